@@ -1,0 +1,64 @@
+"""Model files: a named, versioned list of effects, and the history of who changed it, when and why."""
+
+from __future__ import annotations
+
+from datetime import date, datetime
+from pathlib import Path
+from typing import Annotated
+
+from pydantic import Field, ValidationError, model_validator
+
+from schemas.recipe import Strict, explain, parse_toml, read_text
+
+
+class ModelChange(Strict):
+    """One step of a model's history: the version that it led to, the effect added or removed, by whom, when, why."""
+
+    version: Annotated[int, Field(ge=1)]
+    effect: str = ""
+    by: Annotated[str, Field(min_length=1)]
+    at: datetime | date
+    why: Annotated[str, Field(min_length=1)]
+
+
+class ModelHead(Strict):
+    """Name, version and effects of a model."""
+
+    name: Annotated[str, Field(min_length=1, pattern=r"^[a-z0-9][a-z0-9._-]*$")]
+    version: Annotated[int, Field(ge=1)]
+    effects: Annotated[list[str], Field(min_length=1)]
+
+
+class ModelFile(Strict):
+    """A model as it stands in its file: ``[model]`` and one ``[[change]]`` per version."""
+
+    model: ModelHead
+    change: list[ModelChange] = Field(default_factory=list)
+
+    @model_validator(mode="after")
+    def _consistent(self) -> ModelFile:
+        effects = self.model.effects
+        twice = sorted({e for e in effects if effects.count(e) > 1})
+        if twice:
+            message = f"model.effects: {', '.join(twice)} is there twice, each may be there once; remove the second"
+            raise ValueError(message)
+        versions = [change.version for change in self.change]
+        if versions != sorted(set(versions)):
+            message = f"change: versions {versions} do not rise; write one [[change]] per version, oldest first"
+            raise ValueError(message)
+        if versions and versions[-1] != self.model.version:
+            message = (
+                f"model.version: {self.model.version}, but the last [[change]] led to {versions[-1]}; "
+                "every version needs its [[change]]"
+            )
+            raise ValueError(message)
+        return self
+
+
+def load_model(path: Path) -> ModelFile:
+    """The model of a file, or ``RecipeInvalid`` naming the key and what is needed."""
+    source = f"model {path.name}"
+    try:
+        return ModelFile.model_validate(parse_toml(read_text(path, "model"), source))
+    except ValidationError as problem:
+        raise explain(problem, source, ModelFile) from None

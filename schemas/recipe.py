@@ -1,0 +1,249 @@
+"""The recipe of a calibration: what is measured, how long, where, and which model and limits are applied to it.
+
+The file is TOML and its keys are the fields of :class:`RecipeFile`. Poses may be named there; :class:`Recipe` is the
+same thing with every name resolved, and is what stages and stations are given.
+"""
+
+from __future__ import annotations
+
+import tomllib
+from typing import TYPE_CHECKING, Annotated, Any
+
+from pydantic import (
+    BaseModel,
+    ConfigDict,
+    Field,
+    FiniteFloat,
+    ValidationError,
+    field_validator,
+    model_validator,
+)
+
+from schemas.errors import RecipeInvalid, close_matches, did_you_mean
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from pydantic_core import ErrorDetails
+
+SHORTEST_SOAK_S = 900.0  # at least 15 min of soak per temperature: the field's practice for static tests at ±1 °C
+FEWEST_SAMPLES = 100  # per pose
+
+Positive = Annotated[FiniteFloat, Field(gt=0.0)]
+NotNegative = Annotated[FiniteFloat, Field(ge=0.0)]
+Angles = Annotated[list[FiniteFloat], Field(min_length=2, max_length=2)]
+Gravity = Annotated[
+    FiniteFloat, Field(gt=9.7, lt=9.9)
+]  # every place on earth lies between 9.76 and 9.84 m/s²
+
+
+class Strict(BaseModel):
+    """A part of a file in which an unknown key is an error, not something to skip."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+
+class Pose(Strict):
+    """One attitude of the table: outer angle about the laboratory's x, inner angle about the fixture's z, degrees."""
+
+    name: str
+    outer_deg: FiniteFloat
+    inner_deg: FiniteFloat
+
+
+class Unit(Strict):
+    """One device under test and the slot of the fixture that it sits in, counted from 0."""
+
+    serial: Annotated[
+        str,
+        Field(min_length=1, max_length=64, pattern=r"^[A-Za-z0-9][A-Za-z0-9._+-]*$"),
+    ]
+    slot: Annotated[int, Field(ge=0)]
+
+
+class Lot(Strict):
+    """The units measured together, the kind of device they are, and the seed of a simulated station.
+
+    ``repeat`` counts fresh measurements of the same lot: the devices stay, the noise is new.
+    """
+
+    units: Annotated[list[Unit], Field(min_length=1)]
+    device: str
+    seed: int = 0
+    repeat: Annotated[int, Field(ge=0)] = 0
+
+    @model_validator(mode="after")
+    def _each_once(self) -> Lot:
+        for what, values in (
+            ("serial", [u.serial for u in self.units]),
+            ("slot", [u.slot for u in self.units]),
+        ):
+            texts = [str(value) for value in values]
+            twice = sorted({text for text in texts if texts.count(text) > 1})
+            if twice:
+                message = f"{what} {', '.join(twice)} is there twice, each may be there once; correct the list of units"
+                raise ValueError(message)
+        return self
+
+
+class _Measurement(Strict):
+    """The keys that a recipe file and a resolved recipe share."""
+
+    name: Annotated[str, Field(min_length=1, pattern=r"^[a-z0-9][a-z0-9._-]*$")]
+    description: str = ""
+    device: str
+    local_gravity_m_s2: Gravity
+    temperatures_C: Annotated[list[FiniteFloat], Field(min_length=1)]
+    soak_min_s: Positive = SHORTEST_SOAK_S
+    allow_short_soak: bool = False
+    settle_s: NotNegative = 2.0
+    dwell_s: Positive = 10.0
+    rate_hz: Positive = 100.0
+    static_record_s: NotNegative = 0.0
+    static_temperature_C: FiniteFloat = 25.0
+    effects: list[str] = []
+    limits: str = "consumer"
+    units: list[str] = []
+    seed: int = 0
+
+    @model_validator(mode="after")
+    def _usable(self) -> _Measurement:
+        if self.soak_min_s < SHORTEST_SOAK_S and not self.allow_short_soak:
+            message = (
+                f"soak_min_s: {self.soak_min_s:g} s, the recipe needs {SHORTEST_SOAK_S:g} s; soak longer, or set "
+                "allow_short_soak = true and answer for the temperature gradients"
+            )
+            raise ValueError(message)
+        samples = int(self.dwell_s * self.rate_hz)
+        if samples < FEWEST_SAMPLES:
+            message = f"dwell_s: {samples} samples per pose, a mean needs {FEWEST_SAMPLES}; raise dwell_s or rate_hz"
+            raise ValueError(message)
+        return self
+
+    @field_validator("effects", "units", "temperatures_C")
+    @classmethod
+    def _no_repeats(cls, values: list[Any]) -> list[Any]:
+        twice = sorted({str(v) for v in values if values.count(v) > 1})
+        if twice:
+            message = f"{', '.join(twice)} is there twice, each may be there once; remove the second"
+            raise ValueError(message)
+        return values
+
+
+class RecipeFile(_Measurement):
+    """A recipe as it stands in its file: poses by the name of a plan, or as [outer, inner] in degrees."""
+
+    poses: str | Annotated[list[Angles], Field(min_length=1)]
+    verification: str | list[Angles] = []
+    static_pose: Angles = [0.0, 0.0]
+    model: str = ""
+
+    @model_validator(mode="after")
+    def _one_model(self) -> RecipeFile:
+        if bool(self.model) == bool(self.effects):
+            message = "effects, model: one of the two is needed; list the effects, or name a model file"
+            raise ValueError(message)
+        return self
+
+
+class Recipe(_Measurement):
+    """A recipe with every name resolved: what capture and the stages work from."""
+
+    poses: Annotated[list[Pose], Field(min_length=1)]
+    verification: list[Pose] = []
+    static_pose: Pose
+    model_name: str = ""
+    model_version: int = 0
+
+    @property
+    def wanted_records(self) -> int:
+        """The number of records that capture makes: every pose at every temperature, and the static one."""
+        per_soak = len(self.poses) + len(self.verification)
+        return per_soak * len(self.temperatures_C) + (
+            1 if self.static_record_s > 0.0 else 0
+        )
+
+
+def parse_recipe(text: str, source: str) -> RecipeFile:
+    """The recipe file's content, or :class:`RecipeInvalid` naming the key and what is needed."""
+    try:
+        return RecipeFile.model_validate(parse_toml(text, source))
+    except ValidationError as problem:
+        raise explain(problem, source, RecipeFile) from None
+
+
+def read_text(path: Path, what: str) -> str:
+    """The content of a text file; the message names the file and what it should have been."""
+    try:
+        return path.read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError) as problem:
+        reason = problem.strerror if isinstance(problem, OSError) else "not UTF-8 text"
+        message = f"{what}: {path} cannot be read ({reason}); give the path of a {what} file in TOML"
+        raise RecipeInvalid(message) from None
+
+
+def parse_toml(text: str, source: str) -> dict[str, Any]:
+    """The tables of a TOML text, or :class:`RecipeInvalid` with line and column."""
+    try:
+        return tomllib.loads(text)
+    except tomllib.TOMLDecodeError as problem:
+        message = f"{source}: not valid TOML: {problem}; correct the file"
+        raise RecipeInvalid(message) from None
+
+
+def explain(
+    problem: ValidationError, source: str, model: type[BaseModel]
+) -> RecipeInvalid:
+    """The first problem of a file as one message: key, value, what is needed, close matches.
+
+    An unknown key is told first: it is mostly the cause of the missing one.
+    """
+    details = sorted(
+        problem.errors(include_url=False), key=lambda d: d["type"] != "extra_forbidden"
+    )
+    first = details[0]
+    key = ".".join(str(part) for part in first["loc"] if not _is_branch(part))
+    if first["type"] == "extra_forbidden":
+        known = _fields_at(model, first["loc"][:-1])
+        wrong = str(first["loc"][-1])
+        message = f"{source}: unknown key '{key}'; {did_you_mean(wrong, known)}"
+        return RecipeInvalid(message, key=key, close=close_matches(wrong, known))
+    return RecipeInvalid(f"{source}: {_sentence(first, key)}", key=key)
+
+
+def _is_branch(part: object) -> bool:
+    """Whether a part of a location is a branch of a union, which the file's author never wrote."""
+    return isinstance(part, str) and (part == "str" or "[" in part)
+
+
+def _sentence(detail: ErrorDetails, key: str) -> str:
+    if detail["type"] == "missing":
+        return f"key '{key}' is missing; add it"
+    reason = detail["msg"].removeprefix("Value error, ")
+    if not key:
+        return reason
+    if isinstance(detail["input"], dict | list):
+        return f"key '{key}': {reason}"
+    return f"key '{key}': found {detail['input']!r}: {reason[:1].lower()}{reason[1:]}"
+
+
+def _fields_at(model: type[BaseModel], location: tuple[int | str, ...]) -> list[str]:
+    """Names of the keys allowed at a location of a model, walking through lists, mappings and optional parts."""
+    for part in location:
+        field = model.model_fields.get(str(part))
+        if field is None:
+            continue
+        inner = _models_in(field.annotation)
+        if inner:
+            model = inner[0]
+    return list(model.model_fields)
+
+
+def _models_in(annotation: object) -> list[type[BaseModel]]:
+    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
+        return [annotation]
+    return [
+        found
+        for inner in getattr(annotation, "__args__", ())
+        for found in _models_in(inner)
+    ]

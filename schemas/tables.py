@@ -1,0 +1,347 @@
+"""The tables that cross a stage boundary: columns, types and what every row must satisfy.
+
+``check(name, frame)`` gives the frame back or raises :class:`DataRejected` with unit, row, value and what is needed.
+Every table has a schema version that travels with its file.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pandas as pd
+import pandera.pandas as pa
+from pandera.errors import SchemaError
+
+from schemas.errors import DataRejected
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+VERSION = 1
+AXES = ("x", "y", "z")
+KINDS = ("dwell", "verification", "allan")
+OUTPUT_UNITS = ("V", "LSB", "g", "m/s^2")
+OUTCOMES = ("pass", "fail", "refused")
+
+
+@dataclass(frozen=True)
+class Table:
+    """The contract of one table.
+
+    Parameters
+    ----------
+    columns : the columns that must be there, with their checks.
+    finite : columns in which NaN and infinity are refused; all of them are numbers.
+    key : columns that together name a row; no two rows may share them.
+    only_ok : finite columns count only in rows whose ``status`` is ``ok``.
+    """
+
+    columns: dict[str, pa.Column]
+    finite: tuple[str, ...] = ()
+    key: tuple[str, ...] = ()
+    only_ok: bool = False
+    schema: pa.DataFrameSchema = field(init=False)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(
+            self, "schema", pa.DataFrameSchema(self.columns, strict=False, coerce=True)
+        )
+
+
+def _text(*allowed: str) -> pa.Column:
+    checks = (
+        [pa.Check.isin(list(allowed))]
+        if allowed
+        else [pa.Check.str_length(min_value=1)]
+    )
+    return pa.Column(str, checks=checks)
+
+
+def _number(*, low: float | None = None, missing: bool = False) -> pa.Column:
+    return pa.Column(
+        float, checks=[pa.Check.ge(low)] if low is not None else [], nullable=missing
+    )
+
+
+def _whole(low: int = 0) -> pa.Column:
+    return pa.Column("int64", checks=[pa.Check.ge(low)])
+
+
+def _numbers(names: Sequence[str]) -> dict[str, pa.Column]:
+    return {name: _number() for name in names}
+
+
+def _gaps(names: Sequence[str]) -> dict[str, pa.Column]:
+    return {name: _number(missing=True) for name in names}
+
+
+_OUT = ("out_x", "out_y", "out_z")
+_SD = ("sd_x", "sd_y", "sd_z")
+_FORCE = ("force_x", "force_y", "force_z")
+_PLACE = {"unit": _text(), "slot": _whole(), "record": _whole(), "kind": _text(*KINDS)}
+_ANGLES = ("outer_deg", "inner_deg", "outer_command_deg", "inner_command_deg")
+_SURROUNDINGS = (
+    "chamber_C",
+    "unit_C",
+    "supply_V",
+    "vibration_g",
+    "since_move_s",
+    "since_power_s",
+)
+
+TABLES: dict[str, Table] = {
+    # Samples may hold NaN: what a device really sent is kept, and the validate stage refuses the unit.
+    "samples": Table(
+        {**_PLACE, "time_s": _number(), **_gaps(AXES)}, finite=("time_s",)
+    ),
+    "readings": Table(
+        {
+            **_PLACE,
+            "pose": _text(),
+            "soak": _whole(),
+            **_gaps(_ANGLES),
+            **_gaps(_SURROUNDINGS),
+            **_numbers(("start_s", "duration_s", "rate_hz")),
+            "n": _whole(),
+            "overflow": pa.Column(bool),
+            "status": _text(),
+            "out_unit": _text(*OUTPUT_UNITS),
+            "full_scale": _number(low=0.0),
+        },
+        finite=(
+            *_ANGLES,
+            "chamber_C",
+            "unit_C",
+            "start_s",
+            "duration_s",
+            "rate_hz",
+            "full_scale",
+        ),
+        key=("unit", "record"),
+        only_ok=True,
+    ),
+    "history": Table(
+        {
+            "time_s": _number(),
+            "chamber_C": _number(),
+            "slot": _whole(),
+            "unit": _text(),
+            **_gaps(("unit_C",)),
+        },
+        finite=("time_s", "chamber_C"),
+    ),
+    "verdicts": Table(
+        {
+            "unit": _text(),
+            "slot": _whole(),
+            "refused": pa.Column(bool),
+            "fault": pa.Column(str),
+            "reason": pa.Column(str),
+        },
+        key=("unit",),
+    ),
+    "dwells": Table(
+        {"unit": _text(), "dwell": _whole(), "time_s": _number(), **_numbers(_OUT)},
+        finite=(
+            "time_s",
+            *_OUT,
+            *_SD,
+            *_FORCE,
+            "outer_deg",
+            "inner_deg",
+            "unit_C",
+            "chamber_C",
+        ),
+        key=("unit", "dwell"),
+    ),
+    "coefficients": Table(
+        {
+            "unit": _text(),
+            "axis": _text(*AXES, "*"),
+            "effect": _text(),
+            "name": _text(),
+            **_numbers(("value", "standard_error")),
+            "unit_text": pa.Column(str),
+        },
+        finite=("value", "standard_error"),
+        key=("unit", "axis", "effect", "name"),
+    ),
+    "covariance": Table(
+        {
+            "unit": _text(),
+            "axis": _text(*AXES),
+            "row": _whole(),
+            "column": _whole(),
+            "value": _number(),
+        },
+        finite=("value",),
+        key=("unit", "axis", "row", "column"),
+    ),
+    "residuals": Table(
+        {
+            "unit": _text(),
+            "dwell": _whole(),
+            "axis": _text(*AXES),
+            "pose": _text(),
+            **_numbers(("force_g", "residual_ug", "standard_error_ug")),
+            **_gaps(("unit_C",)),
+        },
+        finite=("residual_ug", "force_g", "standard_error_ug"),
+        key=("unit", "dwell", "axis"),
+    ),
+    "verification": Table(
+        {
+            "unit": _text(),
+            "dwell": _whole(),
+            "pose": _text(),
+            **_numbers(
+                (
+                    "norm_g",
+                    "error_ug",
+                    "uncertainty_ug",
+                    "error_x_ug",
+                    "error_y_ug",
+                    "error_z_ug",
+                )
+            ),
+        },
+        finite=(
+            "norm_g",
+            "error_ug",
+            "uncertainty_ug",
+            "error_x_ug",
+            "error_y_ug",
+            "error_z_ug",
+        ),
+        key=("unit", "dwell"),
+    ),
+    "allan": Table(
+        {
+            "unit": _text(),
+            "axis": _text(*AXES),
+            **_numbers(("tau_s", "deviation_ug", "low_ug", "high_ug", "fitted_ug")),
+        },
+        finite=("tau_s", "deviation_ug", "low_ug", "high_ug"),
+        key=("unit", "axis", "tau_s"),
+    ),
+    "noise": Table(
+        {
+            "unit": _text(),
+            "axis": _text(*AXES),
+            "term": _text(),
+            **_gaps(("value", "low", "high")),
+            "identified": pa.Column(bool),
+            "unit_text": pa.Column(str),
+        },
+        key=("unit", "axis", "term"),
+    ),
+    "figures": Table(
+        {
+            "unit": _text(),
+            "figure": _text(),
+            **_numbers(("value", "uncertainty")),
+            "limit": _number(missing=True),
+            "unit_text": pa.Column(str),
+            "outcome": _text(),
+            "rule": pa.Column(str),
+        },
+        finite=("value", "uncertainty"),
+        key=("unit", "figure"),
+    ),
+    "grades": Table(
+        {
+            "unit": _text(),
+            "slot": _whole(),
+            "outcome": _text(*OUTCOMES),
+            "grade": pa.Column(str),
+            "reasons": pa.Column(str),
+        },
+        key=("unit",),
+    ),
+}
+
+
+def check(name: str, frame: pd.DataFrame, *, where: str = "") -> pd.DataFrame:
+    """The frame with its columns' types made right, or :class:`DataRejected`.
+
+    Parameters
+    ----------
+    name : a key of :data:`TABLES`.
+    where : what to call the table's source in a message; the table's name by default.
+    """
+    table = TABLES[name]
+    source = where or name
+    _refuse_missing_columns(table, frame, source)
+    _refuse_not_finite(table, frame, source)
+    _refuse_twice(table, frame, source)
+    try:
+        return table.schema.validate(frame)
+    except SchemaError as problem:
+        raise DataRejected(_explain(problem, frame, source)) from None
+
+
+def _refuse_missing_columns(table: Table, frame: pd.DataFrame, source: str) -> None:
+    missing = [column for column in table.columns if column not in frame.columns]
+    if missing:
+        found = ", ".join(map(str, frame.columns)) or "none"
+        message = f"{source}: column {', '.join(missing)} is missing, found {found}; add it, or map it to its name"
+        raise DataRejected(message)
+
+
+def _refuse_not_finite(table: Table, frame: pd.DataFrame, source: str) -> None:
+    rows = frame.loc[frame["status"] == "ok"] if table.only_ok else frame
+    for column in table.finite:
+        if column not in rows.columns:
+            continue
+        values = np.asarray(pd.to_numeric(rows[column], errors="coerce"), dtype=float)
+        bad = np.flatnonzero(~np.isfinite(values))
+        if bad.size:
+            index = rows.index[bad[0]]
+            message = (
+                f"{source}: {_row(rows, index)}, column {column}: found {rows[column].loc[index]}, a finite number is "
+                f"needed ({bad.size} such rows); measure again or leave the row out"
+            )
+            raise DataRejected(message)
+
+
+def _refuse_twice(table: Table, frame: pd.DataFrame, source: str) -> None:
+    if not table.key:
+        return
+    twice = frame.duplicated(list(table.key))
+    if twice.any():
+        index = frame.index[int(np.flatnonzero(twice.to_numpy())[0])]
+        named = ", ".join(
+            f"{column} {frame[column].loc[index]}" for column in table.key
+        )
+        message = f"{source}: row {index}: {named} is there twice, it may be there once; remove one of the two"
+        raise DataRejected(message)
+
+
+def _explain(problem: SchemaError, frame: pd.DataFrame, source: str) -> str:
+    column = getattr(problem.schema, "name", None) or "?"
+    cases = problem.failure_cases
+    if (
+        isinstance(cases, pd.DataFrame)
+        and len(cases)
+        and "index" in cases
+        and pd.notna(cases["index"].iloc[0])
+    ):
+        index, value = cases["index"].iloc[0], cases["failure_case"].iloc[0]
+        row = _row(frame, index)
+        return f"{source}: {row}, column {column}: found {value}, {_needed(problem)} is needed; correct the row"
+    return (
+        f"{source}: column {column}: {str(problem).splitlines()[0]}; correct the column"
+    )
+
+
+def _needed(problem: SchemaError) -> str:
+    """What a check asks for, without the library's way of saying it."""
+    words = str(problem.check).removeprefix("<Check ").removesuffix(">")
+    return words.split(": ", 1)[-1].replace("_", " ")
+
+
+def _row(frame: pd.DataFrame, index: object) -> str:
+    unit = f" (unit {frame['unit'].loc[index]})" if "unit" in frame.columns else ""
+    return f"row {index}{unit}"
