@@ -1,0 +1,158 @@
+"""Non-negative mixtures of noise terms under an Allan variance curve, in units of one sample."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import solve_triangular
+from scipy.optimize import nnls
+from scipy.special import digamma, polygamma
+
+from inertial.noise.covariance import Sums, sums
+
+Array = NDArray[np.float64]
+
+TERMS = ("Q", "N", "B", "K", "R")
+_ROUNDS = 4
+_STEPS = 12
+_SETTLED = 1e-6
+_FEWEST_DOF = 1.0
+
+
+def basis(m: NDArray[np.int64]) -> Array:
+    """Allan variances (t, 5) of unit Q, N, B, K, R at averaging times of `m` samples, tau = m.
+
+    3/tau^2, 1/tau, 2 ln2/pi, tau/3, tau^2/2: IEEE Std 952-1997, annex C.
+    """
+    tau = m.astype(np.float64)
+    return np.stack(
+        [
+            3.0 / tau**2,
+            1.0 / tau,
+            np.full_like(tau, 2.0 * np.log(2.0) / np.pi),
+            tau / 3.0,
+            tau**2 / 2.0,
+        ],
+        1,
+    )
+
+
+def degrees_of_freedom(variance: Array, m: NDArray[np.int64], n: int) -> Array:
+    """Equivalent degrees of freedom 2 v^2 / Var[v], (..., t), under the mixture that fits each curve (..., t)."""
+    moments = sums(n, tuple(m.tolist()))
+    flat = variance.reshape(-1, m.size)
+    edf = np.stack([_one_edf(row, moments) for row in flat]) if flat.size else flat
+    return edf.reshape(variance.shape)
+
+
+def _one_edf(variance: Array, moments: Sums) -> Array:
+    model = basis(moments.m)
+    strengths = first_guess(variance, moments)
+    expected = model @ strengths
+    if not np.all(
+        expected > 0.0
+    ):  # a dead channel: every difference is zero and nothing is estimated
+        return np.ones_like(variance)
+    spread = np.diagonal(moments.covariance(strengths[:4], strengths[4]))
+    return np.maximum(
+        2.0 * expected**2 / np.where(spread > 0.0, spread, np.inf), _FEWEST_DOF
+    )
+
+
+def first_guess(variance: Array, moments: Sums) -> Array:
+    """Strengths (5,) by non-negative least squares on relative deviations, weighted as for white noise."""
+    model = basis(moments.m)
+    weight = 1.0 / np.sqrt(moments.m.astype(np.float64))
+    expected = np.maximum(variance, np.finfo(float).tiny)
+    strengths = np.zeros(len(TERMS))
+    for _ in range(_ROUNDS):
+        rows = model * (weight / expected)[:, None]
+        size = np.linalg.norm(rows, axis=0)
+        strengths = nnls(rows / size, variance * weight / expected)[0] / size
+        expected = model @ strengths
+        if not np.all(expected > 0.0):
+            break
+    return strengths
+
+
+@dataclass(frozen=True)
+class Problem:
+    """Generalised least squares on the log-variance of one channel, the covariance taken at given strengths."""
+
+    model: Array
+    """(t, 5)"""
+    target: Array
+    """(t,) log-variance less the mean of the logarithm of chi-square."""
+    root: Array
+    """(t, t) lower Cholesky factor of the covariance of the log-variances."""
+
+    def cost(self, strengths: Array) -> float:
+        """Chi-square of the curve."""
+        expected = self.model @ strengths
+        if not np.all(expected > 0.0):
+            return np.inf
+        residual = solve_triangular(
+            self.root, self.target - np.log(expected), lower=True
+        )
+        return float(residual @ residual)
+
+    def solve(self, free: NDArray[np.bool_], start: Array) -> tuple[Array, float]:
+        """Best strengths and their chi-square: those not `free` stay at `start`, none falls below zero."""
+        strengths = start.copy()
+        cost = self.cost(strengths)
+        for _ in range(_STEPS if free.any() else 0):
+            trial = self._gauss_newton(free, strengths)
+            better = self.cost(trial)
+            halvings = 0
+            while not better <= cost and halvings < _STEPS:
+                trial = 0.5 * (trial + strengths)
+                better, halvings = self.cost(trial), halvings + 1
+            if not better <= cost:
+                break
+            settled = cost - better < _SETTLED
+            strengths, cost = trial, better
+            if settled:
+                break
+        return strengths, cost
+
+    def _gauss_newton(self, free: NDArray[np.bool_], strengths: Array) -> Array:
+        expected = self.model @ strengths
+        expected = np.where(expected > 0.0, expected, np.exp(self.target))
+        rows = solve_triangular(self.root, self.model / expected[:, None], lower=True)
+        wanted = solve_triangular(
+            self.root, self.target - np.log(expected) + 1.0, lower=True
+        )
+        wanted = wanted - rows[:, ~free] @ strengths[~free]
+        size = np.linalg.norm(rows[:, free], axis=0)
+        trial = strengths.copy()
+        trial[free] = nnls(rows[:, free] / size, wanted)[0] / size
+        return trial
+
+
+def problem(variance: Array, moments: Sums, strengths: Array) -> Problem:
+    """The least-squares problem of one curve (t,), its covariance taken under `strengths` (5,).
+
+    The logarithm of chi-square with nu degrees of freedom has mean digamma(nu/2) - ln(nu/2) and variance trigamma(nu/2);
+    the correlations are those of the variances.
+    """
+    expected = basis(moments.m) @ strengths
+    covariance = moments.covariance(strengths[:4], strengths[4]) / np.outer(
+        expected, expected
+    )
+    half = 1.0 / np.diagonal(covariance)  # nu / 2
+    spread = np.sqrt(polygamma(1, half))
+    correlation = covariance * np.sqrt(np.outer(half, half))
+    return Problem(
+        model=basis(moments.m),
+        target=np.log(variance) - (digamma(half) - np.log(half)),
+        root=_root(correlation * np.outer(spread, spread)),
+    )
+
+
+def _root(covariance: Array) -> Array:
+    """Cholesky factor; the covariances set to zero far off the diagonal may cost it its definiteness by a hair."""
+    values, vectors = np.linalg.eigh(covariance)
+    floor = 1e-6 * float(values[-1])
+    if values[0] > floor:
+        return np.linalg.cholesky(covariance)
+    return np.linalg.cholesky((vectors * np.maximum(values, floor)) @ vectors.T)

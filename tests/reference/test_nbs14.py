@@ -1,0 +1,35 @@
+"""Published numbers of the NBS14 data sets: W. J. Riley, NIST Special Publication 1065 (2008), tables 30-32."""
+
+import numpy as np
+import pytest
+
+from inertial.noise.allan import overlapping
+
+NINE = [892.0, 809.0, 823.0, 798.0, 671.0, 644.0, 883.0, 903.0, 677.0]
+
+
+def thousand() -> list[float]:
+    """The 1000-point set: n[i+1] = 16807 n[i] mod 2147483647 from 1234567890, divided by the modulus."""
+    number, out = 1234567890, []
+    for _ in range(1000):
+        out.append(number / 2147483647)
+        number = 16807 * number % 2147483647
+    return out
+
+
+def test_nine_points() -> None:
+    curve = overlapping(NINE, 1.0, [1, 2])
+    assert curve.deviation == pytest.approx([91.22945, 85.95287], abs=1e-5)
+
+
+def test_thousand_points() -> None:
+    curve = overlapping(thousand(), 1.0, [1, 10, 100])
+    assert curve.deviation == pytest.approx(
+        [2.922319e-01, 9.159953e-02, 3.241343e-02], abs=1e-7
+    )
+
+
+def test_thousand_points_are_the_published_ones() -> None:
+    data = np.array(thousand())
+    assert data.mean() == pytest.approx(4.897745e-01, abs=1e-7)
+    assert data.std(ddof=1) == pytest.approx(2.884664e-01, abs=1e-7)
