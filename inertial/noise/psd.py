@@ -59,4 +59,4 @@ def allan_variance(frequency: Array, density: Array, tau: Array) -> Array:
     """
     phase = np.pi * frequency[:, None] * tau
     kernel = np.sin(phase) ** 4 / np.where(phase > 0.0, phase, 1.0) ** 2
-    return 2.0 * np.trapezoid(density[..., :, None] * kernel, frequency, axis=-2)
+    return np.asarray(2.0 * np.trapezoid(density[..., :, None] * kernel, frequency, axis=-2))

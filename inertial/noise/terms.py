@@ -1,7 +1,8 @@
 """Noise coefficients Q, N, B, K, R under an Allan curve, fitted together, each with an interval or an upper limit."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from typing import cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,7 +12,7 @@ from scipy.stats import chi2
 from inertial.noise import mixture
 from inertial.noise.allan import AllanCurve
 from inertial.noise.covariance import Sums, sums
-from inertial.noise.mixture import Problem
+from inertial.noise.mixture import Problem, problem
 
 Array = NDArray[np.float64]
 
@@ -39,6 +40,9 @@ _KEPT_AT = 6.635
 _ONE_SIDED_95 = 2.706
 _NEGLIGIBLE = 1e-6
 """Share of the curve, as a variance, below which a term makes no difference."""
+_WIDEST = 40.0
+_RESOLUTION = 2e-3
+_ROUNDS = 4
 
 
 @dataclass(frozen=True)
@@ -118,7 +122,7 @@ class Terms:
 
 
 def fit_terms(curve: AllanCurve, *, confidence: float = 0.95) -> Terms:
-    """Coefficients of each channel of `curve` by generalised least squares on the log-variance.
+    """Coefficients of each channel of `curve` by generalised least squares on the variances.
 
     The covariance of the estimates at all averaging times is that of the fitted mixture itself. A term that the curve
     does not need (its removal costs less than chi-square 6.6) is not identified and gets a limit. Intervals are profiles
@@ -183,74 +187,89 @@ def _per_sample(rate_hz: float) -> Array:
     return np.array([1.0 / rate_hz**2, 1.0 / rate_hz, 1.0, rate_hz, rate_hz**2])
 
 
-def _one(
-    variance: Array, moments: Sums, threshold: float
-) -> tuple[Array, Array, Array, float, float]:
+@dataclass(frozen=True)
+class _Curve:
+    """One channel's variances with the moments of its estimates."""
+
+    variance: Array
+    moments: Sums
+
+    def best(self, free: NDArray[np.bool_], held: Array) -> tuple[Problem, Array]:
+        """Strengths that agree with their own covariance (those not `free` are `held`), and the problem they solve."""
+        strengths = held
+        task = problem(self.variance, self.moments, strengths)
+        for _ in range(_ROUNDS):
+            fitted, _ = task.solve(free, strengths)
+            strengths = np.where(free, 0.5 * (fitted + strengths), held)
+            task = problem(self.variance, self.moments, strengths)
+        return task, task.solve(free, strengths)[0]
+
+    def excess(self, free: NDArray[np.bool_], held: Array) -> float:
+        """Chi-square that holding the terms not `free` costs, with the covariance that they imply (a score test)."""
+        task, strengths = self.best(free, held)
+        return task.cost(strengths) - task.solve(np.ones_like(free), strengths)[1]
+
+
+def _one(variance: Array, moments: Sums, threshold: float) -> tuple[Array, Array, Array, float, float]:
     """Strengths (NaN where not needed), their ends, chi-square and degrees of freedom of one curve."""
-    everything = np.ones(len(mixture.TERMS), dtype=np.bool_)
-    strengths = mixture.first_guess(variance, moments)
-    for _ in range(3):
-        task = mixture.problem(variance, moments, strengths)
-        strengths, best = task.solve(everything, strengths)
-    kept, reduced, cost = _needed(task, strengths, best)
-    low, high = np.zeros(kept.size), np.zeros(kept.size)
-    for j in range(kept.size):
+    curve = _Curve(variance, moments)
+    count = len(mixture.TERMS)
+    _, strengths = curve.best(np.ones(count, dtype=np.bool_), mixture.first_guess(variance, moments))
+    kept, reduced, cost = _needed(curve, strengths)
+    low, high = np.zeros(count), np.zeros(count)
+    for j in range(count):
         if kept[j]:
-            low[j], high[j] = _profile(task, strengths, best, j, threshold)
+            low[j], high[j] = _profile(curve, strengths, j, threshold)
         else:
-            high[j] = _profile(task, strengths, best, j, _ONE_SIDED_95)[1]
+            high[j] = _profile(curve, strengths, j, _ONE_SIDED_95)[1]
     value = np.where(kept, reduced, np.nan)
     low = np.fmin(low, np.where(kept, reduced, 0.0))
-    return (
-        value,
-        low,
-        np.fmax(high, np.nan_to_num(value)),
-        cost,
-        float(variance.size - int(kept.sum())),
-    )
+    return value, low, np.fmax(high, np.nan_to_num(value)), cost, float(variance.size - int(kept.sum()))
 
 
-def _needed(
-    task: Problem, strengths: Array, best: float
-) -> tuple[NDArray[np.bool_], Array, float]:
+def _needed(curve: _Curve, strengths: Array) -> tuple[NDArray[np.bool_], Array, float]:
     """Terms that stay after dropping, one by one, the one whose loss costs least, while that is little."""
     kept = strengths > 0.0
-    current, cost = np.where(kept, strengths, 0.0), best
+    task, current = curve.best(kept, np.where(kept, strengths, 0.0))
     while kept.sum() > 1:
-        trials: list[tuple[float, int, Array]] = []
+        trials: list[tuple[float, int]] = []
         for j in np.flatnonzero(kept).tolist():
             fewer = kept.copy()
             fewer[j] = False
-            start = np.where(fewer, np.maximum(current, 1e-9 * current.max()), 0.0)
-            fitted, worse = task.solve(fewer, start)
-            trials.append((worse, j, fitted))
-        worse, j, fitted = min(trials, key=lambda trial: trial[0])
-        if worse - cost > _KEPT_AT:
+            trials.append((task.solve(fewer, np.where(fewer, current, 0.0))[1], j))
+        worse, j = min(trials)
+        if worse - task.cost(current) > _KEPT_AT:
             break
-        kept[j], current, cost = False, fitted, worse
-    return kept, current, cost
+        kept[j] = False
+        task, current = curve.best(kept, np.where(kept, np.maximum(current, 1e-9 * current.max()), 0.0))
+    return kept, current, task.cost(current)
 
 
-def _profile(
-    task: Problem, strengths: Array, best: float, j: int, threshold: float
-) -> tuple[float, float]:
+def _profile(curve: _Curve, strengths: Array, j: int, threshold: float) -> tuple[float, float]:
     """Strengths of term j, below and above, at which chi-square has risen by `threshold`, all others free."""
     free = np.ones(strengths.size, dtype=np.bool_)
     free[j] = False
-    whole_curve = float(np.exp(np.min(task.target - np.log(task.model[:, j]))))
+    whole_curve = float(np.min(curve.variance / mixture.basis(curve.moments.m)[:, j]))
 
     def excess(log_strength: float) -> float:
-        start = strengths.copy()
-        start[j] = np.exp(log_strength)
-        return min(task.solve(free, start)[1] - best - threshold, 1e6)
+        held = strengths.copy()
+        held[j] = np.exp(log_strength)
+        return curve.excess(free, held) - threshold
 
-    inside = float(np.log(max(strengths[j], _NEGLIGIBLE * whole_curve)))
-    outside = inside + 0.5
-    while excess(outside) < 0.0:
+    centre = float(np.log(max(strengths[j], _NEGLIGIBLE * whole_curve)))
+    inside, outside = centre, centre + 0.5
+    while excess(outside) < 0.0 and outside < centre + _WIDEST:
         inside, outside = outside, outside + 1.5
-    high = float(np.exp(brentq(excess, inside, outside, xtol=1e-3)))
-    inside = float(np.log(max(strengths[j], _NEGLIGIBLE * whole_curve)))
-    bottom = inside - np.log(1.0 / _NEGLIGIBLE)
+    high = _crossing(excess, inside, outside)
+    bottom = centre + np.log(_NEGLIGIBLE)
     if strengths[j] <= 0.0 or excess(bottom) <= 0.0:
         return 0.0, high
-    return float(np.exp(brentq(excess, bottom, inside, xtol=1e-3))), high
+    return _crossing(excess, bottom, centre), high
+
+
+def _crossing(excess: Callable[[float], float], a: float, b: float) -> float:
+    """Strength where `excess` of its logarithm changes sign; the nearer end where it does not."""
+    at_a, at_b = excess(a), excess(b)
+    if at_a * at_b > 0.0:
+        return float(np.exp(a if abs(at_a) < abs(at_b) else b))
+    return float(np.exp(cast("float", brentq(excess, a, b, xtol=_RESOLUTION))))
