@@ -1,0 +1,1 @@
+"""Stages, archive, flows, reports and the command line of the calibration chain."""

@@ -1,0 +1,15 @@
+"""The archive: immutable Parquet tables with manifests, written aside, made durable, then published."""
+
+from pipelines.archive.archive import Archive, Run, RunInfo, default_root
+from pipelines.archive.keys import code_hash, stage_key
+from pipelines.archive.records import Records
+
+__all__ = [
+    "Archive",
+    "Records",
+    "Run",
+    "RunInfo",
+    "code_hash",
+    "default_root",
+    "stage_key",
+]

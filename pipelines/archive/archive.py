@@ -1,0 +1,267 @@
+"""The archive's folders: captures, and runs that work on them.
+
+``captures/<id>/<record>/`` holds what the station delivered, ``runs/<id>/<table>.parquet`` what stages made of it, with
+``<table>.json`` beside each. A run is named for its recipe and the hash of all that decides its result, so the
+same command finds the same run.
+"""
+
+from __future__ import annotations
+
+import getpass
+import os
+import platform
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from pipelines.archive import files
+from pipelines.archive.keys import digest, libraries
+from pipelines.archive.records import PARTS, Records
+from schemas import tables
+from schemas.errors import ArchiveUnusable, WrongUse, did_you_mean
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    import pandas as pd
+
+FORMAT = 1
+
+
+def default_root() -> Path:
+    """The archive's folder where none is given: the environment's TUMBLELINE_ARCHIVE, else ./archive."""
+    return Path(os.environ.get("TUMBLELINE_ARCHIVE") or "archive")
+
+
+@dataclass(frozen=True)
+class RunInfo:
+    """One line of the archive's list."""
+
+    id: str
+    recipe: str
+    device: str
+    units: tuple[str, ...]
+    started: str
+    finished: bool
+    stages: tuple[str, ...]
+
+
+class Run:
+    """One run: its tables, their manifests, and what it was started with."""
+
+    def __init__(self, archive: Archive, run_id: str) -> None:
+        self.archive, self.id = archive, run_id
+        self.path = archive.root / "runs" / run_id
+
+    @property
+    def about(self) -> dict[str, Any]:
+        """What the run was started with: recipe, limits, lot, station, capture; and who, where, when."""
+        return files.read_json(self.path / "run.json")
+
+    @property
+    def records(self) -> Records | None:
+        """What was captured for this run; None for a run on imported tables."""
+        capture = self.about.get("capture")
+        return Records(self.archive.root / "captures" / capture) if capture else None
+
+    @property
+    def report(self) -> Path:
+        """Where the report for people lies."""
+        return self.path / "report.html"
+
+    def has(self, names: tuple[str, ...], key: str) -> bool:
+        """Whether all these tables are there, made by the stage with this key."""
+        return all(self._is_made_by(name, key) for name in names)
+
+    def save(
+        self,
+        stage: str,
+        key: str,
+        outputs: Mapping[str, pd.DataFrame],
+        about: Mapping[str, Any],
+    ) -> None:
+        """Publish the tables of a stage with a manifest beside each.
+
+        Parameters
+        ----------
+        about : the stage's inputs, parameters and code, as they went into the key.
+        """
+        for name, frame in outputs.items():
+            data = files.table_bytes(
+                name,
+                tables.check(name, frame, where=f"{stage} → {name}"),
+                tables.VERSION,
+            )
+            path = self.path / f"{name}.parquet"
+            files.publish(path, data)
+            content = {
+                "stage": stage,
+                "key": key,
+                "sha256": files.sha256(path),
+                "rows": len(frame),
+            }
+            manifest = {**provenance(), **content, **about, "schema": tables.VERSION}
+            files.publish(self.path / f"{name}.json", files.json_bytes(manifest))
+
+    def save_report(self, key: str, html: str, about: Mapping[str, Any]) -> None:
+        """Publish the report for people with its manifest."""
+        files.publish(self.report, html.encode())
+        content = {"stage": "report", "key": key, "sha256": files.sha256(self.report)}
+        files.publish(
+            self.path / "report.json",
+            files.json_bytes({**provenance(), **content, **about}),
+        )
+
+    def has_report(self, key: str) -> bool:
+        """Whether the report is there, made with this key."""
+        return self.report.is_file() and self._manifest_key("report") == key
+
+    def table(self, name: str) -> pd.DataFrame:
+        """A table of the run, whole and unchanged since it was written."""
+        path = self.path / f"{name}.parquet"
+        if name in PARTS and not path.is_file() and self.records is not None:
+            return self.records.gathered(name)
+        if name not in tables.TABLES:
+            message = f"archive: no table is called '{name}'; {did_you_mean(name, tables.TABLES)}"
+            raise WrongUse(message)
+        return files.read_table(
+            path, name, self.manifest(name)["sha256"] if path.is_file() else None
+        )
+
+    def manifest(self, name: str) -> dict[str, Any]:
+        """The manifest of a table."""
+        return files.read_json(self.path / f"{name}.json")
+
+    def tables(self) -> list[str]:
+        """Names of the tables that are there."""
+        return sorted(path.stem for path in self.path.glob("*.parquet"))
+
+    def _is_made_by(self, name: str, key: str) -> bool:
+        path = self.path / f"{name}.parquet"
+        if not path.is_file() or self._manifest_key(name) != key:
+            return False
+        if files.sha256(path) != self.manifest(name)["sha256"]:
+            message = (
+                f"archive: {path} ({path.stat().st_size} bytes) is truncated or has changed since it was written; "
+                "restore it from a copy, or remove it and its manifest to have the stage run again"
+            )
+            raise ArchiveUnusable(message)
+        return True
+
+    def _manifest_key(self, name: str) -> str:
+        path = self.path / f"{name}.json"
+        return files.read_json(path)["key"] if path.is_file() else ""
+
+
+class Archive:
+    """A folder of captures and runs."""
+
+    def __init__(self, root: Path | str | None = None) -> None:
+        self.root = Path(root) if root is not None else default_root()
+
+    def prepare(self) -> None:
+        """Make sure that the folder is an archive that can be written; refuse a folder of something else."""
+        mark = self.root / "archive.json"
+        if mark.is_file():
+            self._refuse_other_format(files.read_json(mark))
+            with files.writing(self.root):
+                probe = self.root / f"{files.TEMPORARY}probe-{os.getpid()}"
+                probe.touch()
+                probe.unlink()
+            return
+        if self.root.is_dir() and any(self.root.iterdir()):
+            message = f"archive: {self.root} holds other files and no archive; give an empty or new folder"
+            raise ArchiveUnusable(message)
+        files.publish(
+            mark, files.json_bytes({"product": "tumbleline", "format": FORMAT})
+        )
+
+    def open_run(self, name: str, about: Mapping[str, Any], decisive: object) -> Run:
+        """The run named for ``name`` and the hash of what decides its result: found, or begun.
+
+        Parameters
+        ----------
+        about : what is kept for readers in ``run.json``.
+        decisive : JSON-able; everything that the result depends on.
+        """
+        run = Run(self, f"{name}-{digest(decisive)[:10]}")
+        if not (run.path / "run.json").is_file():
+            self.prepare()
+            files.publish(
+                run.path / "run.json", files.json_bytes({**provenance(), **about})
+            )
+        return run
+
+    def capture(self, capture_id: str) -> Records:
+        """The records of a capture, to be read or gone on with."""
+        return Records(self.root / "captures" / capture_id)
+
+    def run(self, name: str) -> Run:
+        """The run of this id, of this unambiguous beginning, or ``latest``."""
+        ids = [info.id for info in self.runs()]
+        if name == "latest" and ids:
+            return Run(self, ids[-1])
+        found = [run_id for run_id in ids if run_id == name] or [
+            i for i in ids if name and i.startswith(name)
+        ]
+        if len(found) == 1:
+            return Run(self, found[0])
+        where = f"archive {self.root}"
+        if found:
+            message = f"{where}: '{name}' begins {len(found)} runs ({', '.join(found)}); write more of the name"
+        elif ids:
+            message = f"{where}: no run is called '{name}'; {did_you_mean(name, ids)}"
+        else:
+            message = f"{where}: there is no run yet; make one with 'tumbleline run'"
+        raise WrongUse(message)
+
+    def table(self, run: str, name: str) -> pd.DataFrame:
+        """A table of a run."""
+        return self.run(run).table(name)
+
+    def runs(self) -> list[RunInfo]:
+        """Every run, the one started first first."""
+        folder = self.root / "runs"
+        if not folder.is_dir():
+            return []
+        infos = [
+            _info(Run(self, path.parent.name)) for path in folder.glob("*/run.json")
+        ]
+        return sorted(infos, key=lambda info: (info.started, info.id))
+
+    def _refuse_other_format(self, mark: Mapping[str, Any]) -> None:
+        if mark.get("format") != FORMAT:
+            message = (
+                f"archive: {self.root} has format {mark.get('format')}, this version writes {FORMAT}; "
+                "use the version that wrote it, or another folder"
+            )
+            raise ArchiveUnusable(message)
+
+
+def provenance() -> dict[str, Any]:
+    """Who, where, when and with which libraries: kept beside results, never inside them nor in keys."""
+    return {
+        "who": getpass.getuser(),
+        "where": platform.node(),
+        "when": datetime.now(UTC).isoformat(timespec="milliseconds"),
+        "libraries": libraries(),
+    }
+
+
+def _info(run: Run) -> RunInfo:
+    about = run.about
+    stages = dict.fromkeys(
+        files.read_json(run.path / f"{name}.json").get("stage", "")
+        for name in run.tables()
+    )
+    lot = about.get("lot", {})
+    return RunInfo(
+        id=run.id,
+        recipe=about.get("recipe", {}).get("name", about.get("name", "")),
+        device=lot.get("device", ""),
+        units=tuple(unit["serial"] for unit in lot.get("units", [])),
+        started=about["when"],
+        finished=run.report.is_file(),
+        stages=tuple(stages),
+    )

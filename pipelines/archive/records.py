@@ -1,0 +1,103 @@
+"""Captured records: one folder per record, published whole; what was captured is never measured again."""
+
+from __future__ import annotations
+
+from hashlib import sha256
+from typing import TYPE_CHECKING
+
+import pandas as pd
+
+from pipelines.archive import files
+from pipelines.archive.keys import digest
+from schemas import tables
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+    from pathlib import Path
+
+PARTS = ("samples", "readings", "history")
+
+
+class Records:
+    """The records of one capture, as the sink that capture writes to and as the source that stages read from."""
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        files.sweep(path)
+
+    def finished(self) -> set[int]:
+        """Numbers of the records that are stored whole."""
+        return {int(folder.name) for folder in self._folders()}
+
+    def put(
+        self,
+        record: int,
+        samples: pd.DataFrame,
+        readings: pd.DataFrame,
+        history: pd.DataFrame,
+        station_state: bytes,
+    ) -> None:
+        """Store one record, durably and all at once, with the station's state after it."""
+        content = {
+            "samples.parquet": self._encoded("samples", samples),
+            "readings.parquet": self._encoded("readings", readings),
+            "history.parquet": self._encoded("history", history),
+        }
+        order = len(self.finished())
+        state = self._state_path(record)
+        files.publish(state, station_state)
+        about = {"record": record, "order": order, "schema": tables.VERSION}
+        hashes = {name: sha256(data).hexdigest() for name, data in content.items()}
+        manifest = files.json_bytes({**about, "content": hashes})
+        files.publish_folder(
+            self.path / f"{record:05d}", {**content, "record.json": manifest}
+        )
+        for old in state.parent.glob("*.bin"):
+            if old != state:
+                old.unlink()
+
+    def last_state(self) -> bytes | None:
+        """The station's state after the record stored last; None before the first."""
+        folders = list(self._folders())
+        if not folders:
+            return None
+        last = max(
+            folders, key=lambda folder: files.read_json(folder / "record.json")["order"]
+        )
+        state = self._state_path(int(last.name))
+        return state.read_bytes() if state.is_file() else None
+
+    def hash(self) -> str:
+        """Hash of everything captured, in order of record."""
+        return digest(
+            {
+                f.name: files.read_json(f / "record.json")["content"]
+                for f in self._folders()
+            }
+        )
+
+    def samples(self) -> Iterator[pd.DataFrame]:
+        """The samples, one table per record in order of record: a lot's samples never lie in memory together."""
+        for folder in self._folders():
+            yield files.read_table(folder / "samples.parquet", "samples")
+
+    def gathered(self, part: str) -> pd.DataFrame:
+        """Readings, history or samples of all records in one table."""
+        parts = [
+            files.read_table(folder / f"{part}.parquet", part)
+            for folder in self._folders()
+        ]
+        kept = [frame for frame in parts if len(frame)] or parts[:1]
+        return pd.concat(kept, ignore_index=True)
+
+    def _folders(self) -> list[Path]:
+        if not self.path.is_dir():
+            return []
+        return sorted(folder for folder in self.path.iterdir() if folder.name.isdigit())
+
+    def _state_path(self, record: int) -> Path:
+        return self.path / "state" / f"{record:05d}.bin"
+
+    @staticmethod
+    def _encoded(name: str, frame: pd.DataFrame) -> bytes:
+        return files.table_bytes(name, tables.check(name, frame), tables.VERSION)

@@ -1,0 +1,92 @@
+"""Samples to dwells: one row per accepted unit and static dwell, in the exchange format."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pandas as pd
+
+from inertial.frames import force_from_angles
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+
+STANDARD_GRAVITY_M_S2 = 9.80665  # CGPM 1901: the g in which specific force is stated
+AXES = ("x", "y", "z")
+KEPT = (
+    *(
+        "unit",
+        "slot",
+        "record",
+        "kind",
+        "pose",
+        "soak",
+        "duration_s",
+        "outer_deg",
+        "inner_deg",
+    ),
+    *(
+        "chamber_C",
+        "unit_C",
+        "supply_V",
+        "vibration_g",
+        "since_move_s",
+        "since_power_s",
+        "out_unit",
+    ),
+)
+
+
+def reduce(
+    samples: Iterable[pd.DataFrame],
+    readings: pd.DataFrame,
+    verdicts: pd.DataFrame,
+    local_gravity_m_s2: float,
+) -> pd.DataFrame:
+    """Dwells of the accepted units, in order of measurement.
+
+    Parameters
+    ----------
+    samples : one table per record.
+    readings : of the whole run; the reference force comes from the encoders as they were read.
+    verdicts : of the validate stage.
+    local_gravity_m_s2 : at the station; the force is stated in standard g.
+    """
+    accepted = set(verdicts.loc[~verdicts["refused"], "unit"])
+    kept = [
+        _means(record[record["unit"].isin(accepted) & (record["kind"] != "allan")])
+        for record in samples
+    ]
+    means = pd.concat(
+        [frame for frame in kept if len(frame)] or kept[:1], ignore_index=True
+    )
+    static = readings[readings["unit"].isin(accepted) & (readings["kind"] != "allan")]
+    columns = static[[*KEPT, "start_s"]].assign(
+        time_s=static["start_s"] + 0.5 * static["duration_s"]
+    )
+    dwells = columns.drop(columns="start_s").merge(
+        means, on=["unit", "record"], validate="one_to_one"
+    )
+    dwells = dwells.assign(
+        dwell=dwells["record"],
+        **_forces(dwells, local_gravity_m_s2 / STANDARD_GRAVITY_M_S2),
+    )
+    return dwells.sort_values(["unit", "dwell"], ignore_index=True)
+
+
+def _means(samples: pd.DataFrame) -> pd.DataFrame:
+    """Mean, standard deviation and number of the samples of every unit in one record."""
+    groups = samples.groupby(["unit", "record"], sort=True)[list(AXES)]
+    out = groups.mean().add_prefix("out_")
+    spread = groups.std(ddof=1).add_prefix("sd_")
+    return pd.concat([out, spread, groups.size().rename("n")], axis=1).reset_index()
+
+
+def _forces(dwells: pd.DataFrame, magnitude_g: float) -> dict[str, np.ndarray]:
+    outer, inner = (
+        np.radians(dwells["outer_deg"].to_numpy()),
+        np.radians(dwells["inner_deg"].to_numpy()),
+    )
+    force = magnitude_g * force_from_angles(outer, inner)
+    return {f"force_{axis}": force[:, i] for i, axis in enumerate(AXES)}

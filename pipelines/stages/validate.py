@@ -1,0 +1,221 @@
+"""Data faults, looked for before any physics: a verdict for every unit of the lot.
+
+A unit with a fault is refused whole. It gets its verdict, and never a coefficient, a grade or a certificate; the other
+units go on.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+import pandas as pd
+
+from inertial.frames import force_from_angles
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Sequence
+
+    from numpy.typing import NDArray
+
+    from schemas.recipe import Unit
+
+FEWEST_TO_JUDGE = (
+    10  # samples: fewer equal values in a row happen by chance where the step is coarse
+)
+CHAMBER_MOVED_K = 5.0
+FOLLOWED_SHARE = 0.2  # a sensor that shows less than a fifth of the chamber's change does not read its temperature
+FORCE_EXPLAINS = (
+    0.5  # of an axis' variance over the poses; a live channel has more than 0.99
+)
+SAMPLES_KEPT = 0.99
+AXES = ("x", "y", "z")
+
+
+class Fault(NamedTuple):
+    """One thing wrong with one unit's data."""
+
+    unit: str
+    fault: str
+    reason: str
+
+
+def validate(
+    samples: Iterable[pd.DataFrame], readings: pd.DataFrame, units: Sequence[Unit]
+) -> pd.DataFrame:
+    """Verdicts: one row per unit of the lot with ``refused``, the fault found first, and all reasons.
+
+    Parameters
+    ----------
+    samples : one table per record.
+    readings : of the whole run.
+    units : the lot, so that a unit which never answered has a verdict too.
+    """
+    faults = [*_silent(readings, units), *_reading_faults(readings)]
+    means: list[pd.DataFrame] = []
+    for record in samples:
+        faults += _sample_faults(record, readings)
+        means.append(
+            record.groupby(["unit", "record"], sort=False)[list(AXES)]
+            .mean()
+            .reset_index()
+        )
+    answered = readings[readings["status"] == "ok"]
+    faults += _stale_temperatures(answered)
+    if means:
+        faults += _dead_channels(pd.concat(means, ignore_index=True), answered)
+    return _verdicts(faults, units)
+
+
+def _verdicts(faults: list[Fault], units: Sequence[Unit]) -> pd.DataFrame:
+    rows = []
+    for unit in units:
+        own = [fault for fault in faults if fault.unit == unit.serial]
+        reasons = list(dict.fromkeys(fault.reason for fault in own))
+        shown = reasons[:3] + (
+            [f"and {len(reasons) - 3} more"] if len(reasons) > 3 else []
+        )
+        rows.append(
+            {
+                "unit": unit.serial,
+                "slot": unit.slot,
+                "refused": bool(own),
+                "fault": own[0].fault if own else "",
+                "reason": "; ".join(shown),
+            }
+        )
+    return pd.DataFrame(rows)
+
+
+def _silent(readings: pd.DataFrame, units: Sequence[Unit]) -> list[Fault]:
+    """Units without a reading for every record that was made."""
+    made = set(readings["record"])
+    faults = []
+    for unit in units:
+        missing = made - set(readings.loc[readings["unit"] == unit.serial, "record"])
+        if missing:
+            reason = f"no reading for {len(missing)} of {len(made)} records, all are needed; check the slot's contacts"
+            faults.append(Fault(unit.serial, "stopped_answering", reason))
+    return faults
+
+
+def _reading_faults(readings: pd.DataFrame) -> list[Fault]:
+    faults = []
+    for row in readings[readings["status"] != "ok"].itertuples():
+        reason = f"stopped answering at record {row.record} (pose {row.pose}): {row.status}; check the slot's contacts"
+        faults.append(Fault(str(row.unit), "stopped_answering", reason))
+    for row in readings[
+        readings["overflow"] & (readings["status"] == "ok")
+    ].itertuples():
+        reason = f"buffer overflow in record {row.record} (pose {row.pose}): samples are lost; read faster or lower the rate"
+        faults.append(Fault(str(row.unit), "overflow", reason))
+    return faults
+
+
+def _sample_faults(samples: pd.DataFrame, readings: pd.DataFrame) -> list[Fault]:
+    faults: list[Fault] = []
+    here = readings[
+        readings["record"].isin(samples["record"].unique())
+        & (readings["status"] == "ok")
+    ]
+    groups = samples.groupby(["unit", "record"], sort=False).indices
+    for row in here.itertuples():
+        place = f"in record {row.record} (pose {row.pose})"
+        index = groups.get((row.unit, row.record), np.array([], dtype=np.int64))
+        values = samples.iloc[index][list(AXES)].to_numpy(dtype=float)
+        found = _fault_of(values, float(row.full_scale), int(row.n), str(row.out_unit))  # pyright: ignore[reportArgumentType]
+        if found:
+            faults.append(
+                Fault(str(row.unit), found[0], f"{found[1]} {place}; {found[2]}")
+            )
+    return faults
+
+
+def _fault_of(
+    values: NDArray[np.float64], full_scale: float, n: int, unit: str
+) -> tuple[str, str, str] | None:
+    """Fault, finding and remedy of one unit's samples (n, 3) in one record; None where there is none."""
+    if len(values) < SAMPLES_KEPT * n or len(values) == 0:
+        return "dropped_samples", f"{len(values)} samples of {n}", "measure again"
+    not_finite = np.argwhere(~np.isfinite(values))
+    if len(not_finite):
+        row, axis = not_finite[0]
+        finding = f"{values[row, axis]} on {AXES[axis]} in row {row} ({len(not_finite)} such values)"
+        return "not_finite", finding, "measure again"
+    still = np.flatnonzero(np.ptp(values, axis=0) == 0.0)
+    if len(values) >= FEWEST_TO_JUDGE and still.size:
+        finding = f"constant output {values[0, still[0]]:g} {unit} on {AXES[still[0]]}"
+        return "stuck_output", finding, "check wiring and power of the slot"
+    clipped = np.argwhere(np.abs(values) >= full_scale)
+    if len(clipped) and full_scale > 0.0:
+        axis = clipped[0][1]
+        finding = f"{len(clipped)} samples at full scale ({full_scale:g} {unit}) on {AXES[axis]}"
+        return "clipped", finding, "choose a wider range"
+    return None
+
+
+def _stale_temperatures(readings: pd.DataFrame) -> list[Fault]:
+    soaks = (
+        readings.groupby(["unit", "soak"])[["chamber_C", "unit_C"]]
+        .mean()
+        .groupby("unit")
+    )
+    spans = soaks.max() - soaks.min()
+    stale = spans[
+        (spans["chamber_C"] > CHAMBER_MOVED_K)
+        & (spans["unit_C"] < FOLLOWED_SHARE * spans["chamber_C"])
+    ]
+    return [
+        Fault(
+            str(unit),
+            "stale_temperature",
+            f"the unit's temperature moved {own:.2f} K while the chamber moved {chamber:.1f} K, at least "
+            f"{FOLLOWED_SHARE * chamber:.1f} K is needed; check the temperature sensor",
+        )
+        for unit, chamber, own in zip(
+            stale.index, stale["chamber_C"], stale["unit_C"], strict=True
+        )
+    ]
+
+
+def _dead_channels(means: pd.DataFrame, readings: pd.DataFrame) -> list[Fault]:
+    """Axes whose mean output over the poses is not a linear function of the specific force."""
+    columns = ["unit", "record", "kind", "outer_deg", "inner_deg", "soak"]
+    joined = means.merge(
+        readings.loc[readings["kind"] != "allan", columns], on=["unit", "record"]
+    )
+    faults = []
+    for unit, rows in joined.groupby("unit"):
+        if len(rows) < FEWEST_TO_JUDGE // 2:
+            continue
+        explained = _explained_by_force(rows)
+        dead = np.flatnonzero(explained < FORCE_EXPLAINS)
+        if dead.size:
+            axis = AXES[dead[0]]
+            reason = (
+                f"dead channel {axis}: the specific force explains {explained[dead[0]]:.0%} of its output over "
+                f"{len(rows)} dwells, at least {FORCE_EXPLAINS:.0%} is needed; replace the unit or mend the slot"
+            )
+            faults.append(Fault(str(unit), "dead_channel", reason))
+    return faults
+
+
+def _explained_by_force(rows: pd.DataFrame) -> NDArray[np.float64]:
+    """Share of each axis' variance inside the soaks that a linear function of the force explains, (3,)."""
+    force = force_from_angles(
+        np.radians(rows["outer_deg"].to_numpy()),
+        np.radians(rows["inner_deg"].to_numpy()),
+    )
+    soaks = (
+        rows["soak"].to_numpy()[:, None] == np.unique(rows["soak"].to_numpy())
+    ).astype(float)
+    output = np.nan_to_num(rows[list(AXES)].to_numpy(dtype=float))
+    inside = output - soaks @ np.linalg.lstsq(soaks, output, rcond=None)[0]
+    design = np.column_stack([force, soaks])
+    left = output - design @ np.linalg.lstsq(design, output, rcond=None)[0]
+    total = np.sum(inside**2, axis=0)
+    return np.where(
+        total > 0.0,
+        1.0 - np.sum(left**2, axis=0) / np.where(total > 0.0, total, 1.0),
+        0.0,
+    )
