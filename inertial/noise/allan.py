@@ -107,7 +107,9 @@ def _checked(data: Array, rate_hz: float) -> int:
         raise ValueError(msg)
     bad = np.argwhere(~np.isfinite(data))
     if bad.size:
-        msg = f"allan: sample {int(bad[0][-1])} is {data[tuple(bad[0])]}, finite values are needed; remove the gap first"
+        msg = (
+            f"allan: sample {int(bad[0][-1])} is {data[tuple(bad[0])]}, finite values are needed; remove the gap first"
+        )
         raise ValueError(msg)
     return n
 
@@ -132,7 +134,5 @@ def _variances(data: Array, spacings: NDArray[np.int64], rate_hz: float) -> Arra
     out = np.empty((*data.shape[:-1], spacings.size))
     for i, m in enumerate(spacings.tolist()):
         second = phase[..., 2 * m :] - 2.0 * phase[..., m:-m] + phase[..., : -2 * m]
-        out[..., i] = np.einsum("...k,...k->...", second, second) / (
-            2.0 * m * m * second.shape[-1]
-        )
+        out[..., i] = np.einsum("...k,...k->...", second, second) / (2.0 * m * m * second.shape[-1])
     return out

@@ -61,12 +61,8 @@ class Sums:
 
     def covariance(self, strengths: Array, ramp: Array) -> Array:
         """Covariance of the Allan variances: strengths (..., 4) of `NOISES`, ramp (...) squared → (..., t, t)."""
-        noise = np.einsum(
-            "...c,...d,abcd->...ab", strengths, strengths, self.quadratic, optimize=True
-        )
-        return noise + ramp[..., None, None] * np.einsum(
-            "...c,abc->...ab", strengths, self.ramp
-        )
+        noise = np.einsum("...c,...d,abcd->...ab", strengths, strengths, self.quadratic, optimize=True)
+        return noise + ramp[..., None, None] * np.einsum("...c,abc->...ab", strengths, self.ramp)
 
 
 @lru_cache(maxsize=16)
@@ -91,9 +87,7 @@ def _pair(n: int, m1: int, m2: int) -> tuple[Array, Array]:
     first, last = -(count1 - 1), count2 - 1
     centre = m1 - m2
     reach = int(_REACH * (m1 + m2))
-    stride = max(
-        1, min(m1 // _POINTS_PER_SPACING, min(count1, count2) // _POINTS_PER_SPACING)
-    )
+    stride = max(1, min(m1 // _POINTS_PER_SPACING, min(count1, count2) // _POINTS_PER_SPACING))
     lags = np.arange(
         max(first, centre - reach),
         min(last, centre + reach) + 1,
@@ -124,9 +118,7 @@ def _pairs_at(lags: Array, count1: int, count2: int) -> Array:
     return np.maximum(np.minimum(count1, count2 - lags) - np.maximum(0.0, -lags), 0.0)
 
 
-def _add_quantisation(
-    form: Array, line: Array, m1: int, m2: int, counts: tuple[int, int]
-) -> None:
+def _add_quantisation(form: Array, line: Array, m1: int, m2: int, counts: tuple[int, int]) -> None:
     """Adds the white phase noise: it is a set of spikes, which a strided sum over lags would miss."""
     spikes: dict[int, float] = {}
     for i, ci in enumerate(_STENCIL):

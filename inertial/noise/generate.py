@@ -8,9 +8,7 @@ from scipy.signal import oaconvolve
 Array = NDArray[np.float64]
 
 
-def white(
-    rng: Generator, shape: tuple[int, ...], density: float, rate_hz: float
-) -> Array:
+def white(rng: Generator, shape: tuple[int, ...], density: float, rate_hz: float) -> Array:
     """White noise (..., n) of one-sided `density` (unit/√Hz, as on a data sheet): a sample has density·√(rate/2)."""
     return rng.normal(scale=density * np.sqrt(0.5 * rate_hz), size=shape)
 
@@ -25,23 +23,15 @@ def flicker(rng: Generator, shape: tuple[int, ...], instability: float) -> Array
     steps = np.arange(1, n, dtype=np.float64)
     response = np.concatenate([[1.0], np.cumprod((steps - 0.5) / steps)])
     drive = rng.normal(scale=instability, size=shape)
-    return np.asarray(
-        oaconvolve(drive, response.reshape((1,) * (len(shape) - 1) + (n,)), axes=-1)
-    )[..., :n]
+    return np.asarray(oaconvolve(drive, response.reshape((1,) * (len(shape) - 1) + (n,)), axes=-1))[..., :n]
 
 
-def random_walk(
-    rng: Generator, shape: tuple[int, ...], coefficient: float, rate_hz: float
-) -> Array:
+def random_walk(rng: Generator, shape: tuple[int, ...], coefficient: float, rate_hz: float) -> Array:
     """Random walk (..., n) of `coefficient` K (unit/√s), starting at zero."""
-    return np.cumsum(
-        rng.normal(scale=coefficient / np.sqrt(rate_hz), size=shape), axis=-1
-    )
+    return np.cumsum(rng.normal(scale=coefficient / np.sqrt(rate_hz), size=shape), axis=-1)
 
 
-def quantisation(
-    rng: Generator, shape: tuple[int, ...], coefficient: float, rate_hz: float
-) -> Array:
+def quantisation(rng: Generator, shape: tuple[int, ...], coefficient: float, rate_hz: float) -> Array:
     """Output (..., n) of an integrating converter whose velocity counts have a step q = Q·√12 (unit·s), Q = `coefficient`.
 
     The rounding error of the count is uniform; the output is its difference times the rate.

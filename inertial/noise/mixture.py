@@ -46,14 +46,10 @@ def _one_edf(variance: Array, moments: Sums) -> Array:
     model = basis(moments.m)
     strengths = first_guess(variance, moments)
     expected = model @ strengths
-    if not np.all(
-        expected > 0.0
-    ):  # a dead channel: every difference is zero and nothing is estimated
+    if not np.all(expected > 0.0):  # a dead channel: every difference is zero and nothing is estimated
         return np.ones_like(variance)
     spread = np.diagonal(moments.covariance(strengths[:4], strengths[4]))
-    return np.maximum(
-        2.0 * expected**2 / np.where(spread > 0.0, spread, np.inf), _FEWEST_DOF
-    )
+    return np.maximum(2.0 * expected**2 / np.where(spread > 0.0, spread, np.inf), _FEWEST_DOF)
 
 
 def first_guess(variance: Array, moments: Sums) -> Array:

@@ -40,9 +40,7 @@ def one_sided(x: ArrayLike, rate_hz: float, *, segment: int | None = None) -> Sp
     if not 8 <= length <= data.shape[-1]:
         msg = f"psd: segment of {length} samples in a record of {data.shape[-1]}, 8 or more must fit; record longer"
         raise ValueError(msg)
-    frequency, density = welch(
-        data, fs=rate_hz, nperseg=length, detrend="constant", scaling="density"
-    )
+    frequency, density = welch(data, fs=rate_hz, nperseg=length, detrend="constant", scaling="density")
     return Spectrum(frequency=np.asarray(frequency), density=np.asarray(density))
 
 

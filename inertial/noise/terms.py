@@ -148,18 +148,12 @@ def fit_terms(curve: AllanCurve, *, confidence: float = 0.95) -> Terms:
         raise ValueError(msg)
     moments = sums(curve.n, tuple(curve.m.tolist()))
     variances = (curve.deviation**2).reshape(-1, curve.m.size)
-    rows = [
-        _one(variance, moments, float(chi2.ppf(confidence, 1)))
-        for variance in variances
-    ]
+    rows = [_one(variance, moments, float(chi2.ppf(confidence, 1))) for variance in variances]
     lead = curve.deviation.shape[:-1]
     scale = np.sqrt(_per_sample(curve.rate_hz))
 
     def coefficients(which: int) -> Array:
-        return (
-            np.sqrt(np.stack([row[which] for row in rows])).reshape(*lead, count)
-            * scale
-        )
+        return np.sqrt(np.stack([row[which] for row in rows])).reshape(*lead, count) * scale
 
     return Terms(
         symbols=mixture.TERMS,
@@ -177,9 +171,7 @@ def model_deviation(terms: Terms, tau: Array) -> Array:
     """Allan deviation (..., t) of the identified terms at `tau` (t,) s: the line through the points of a plot."""
     q, n, b, k, r = np.moveaxis(np.nan_to_num(terms.value), -1, 0)[..., None]
     flat = (FLICKER_FLOOR * b) ** 2
-    return np.sqrt(
-        3.0 * q**2 / tau**2 + n**2 / tau + flat + k**2 * tau / 3.0 + r**2 * tau**2 / 2.0
-    )
+    return np.sqrt(3.0 * q**2 / tau**2 + n**2 / tau + flat + k**2 * tau / 3.0 + r**2 * tau**2 / 2.0)
 
 
 def _per_sample(rate_hz: float) -> Array:

@@ -1,0 +1,1 @@
+"""The science of accelerometer calibration: arrays in, arrays out. Units: g, °C, s, radians."""

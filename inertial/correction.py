@@ -1,0 +1,56 @@
+"""Correction of an output with a calibration: a = K⁻¹(ã − b), with temperature and every other effect of the model."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from inertial import design
+from inertial.design import Values
+from inertial.fits.linear import response_matrix
+from inertial.state import State
+
+Array = NDArray[np.float64]
+
+_STEPS = 12
+"""Fixed-point steps: each shrinks the error by the size of the nonlinearity, below 0.1 for any sensor worth calibrating."""
+
+
+def predict(effects: Sequence[str], state: State, coefficients: Array, nonlinear: Values) -> Array:
+    """Output of the model (..., n, 3), in the output's unit, for coefficients (..., 3, p); station effects left out."""
+    sensor, _ = design.split(effects)
+    columns = design.local_columns(sensor, state, nonlinear)
+    return np.swapaxes(np.matmul(columns, coefficients[..., None])[..., 0], -1, -2)
+
+
+def station_change(effects: Sequence[str], state: State, shared: Array, nonlinear: Values) -> Array:
+    """True minus commanded specific force, (..., n, 3), g, from the station's parameters (q,)."""
+    _, station = design.split(effects)
+    if not station:
+        return np.zeros(state.force.shape)
+    changes = np.concatenate([e.force_change(state, **nonlinear.get(e.id, {})) for e in station], axis=-1)
+    return changes @ shared
+
+
+def correct(effects: Sequence[str], state: State, output: Array, coefficients: Array, nonlinear: Values) -> Array:
+    """Specific force (..., n, 3) in g that explains an output.
+
+    Parameters
+    ----------
+    effects : ids of the model
+    state : conditions of the readings; its force is only the starting point where the model has memory
+    output : (..., n, 3), in the output's unit
+    coefficients : (..., 3, p), as fitted
+    nonlinear : values of nonlinear parameters and constants by effect id
+    """
+    names = tuple(design.local_names(design.split(effects)[0], axis) for axis in range(3))
+    inverse = np.linalg.inv(response_matrix(coefficients, names))
+    force = np.zeros(np.broadcast_shapes(output.shape, state.force.shape))
+    for _ in range(_STEPS):
+        left = output - predict(effects, replace(state, force=force, memory={}), coefficients, nonlinear)
+        step = np.einsum("...ij,...nj->...ni", inverse, left)
+        force = force + step
+        if float(np.max(np.abs(step), initial=0.0)) < 1e-12:
+            break
+    return force

@@ -1,0 +1,68 @@
+"""Design matrices of a model: the columns of its effects, and the names of their coefficients."""
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from inertial import effects as catalogue
+from inertial.effects import SensorEffect, StationEffect
+from inertial.effects.base import AnyEffect
+from inertial.state import State
+
+Array = NDArray[np.float64]
+Values = Mapping[str, Mapping[str, float]]
+"""Nonlinear parameters and constants by effect id."""
+
+
+def split(names: Sequence[str]) -> tuple[list[SensorEffect], list[StationEffect]]:
+    """The effects of a model: those of the sensor (and slot), those of the station.
+
+    Raises
+    ------
+    UnknownEffect
+        With the close matches.
+    """
+    found: list[AnyEffect] = catalogue.get_all(names)
+    sensor = [e for e in found if isinstance(e, SensorEffect)]
+    return sensor, [e for e in found if isinstance(e, StationEffect)]
+
+
+def starting_values(effects: Sequence[AnyEffect], state: State) -> dict[str, dict[str, float]]:
+    """Constants, and the middle of the grid of every nonlinear parameter, by effect id."""
+    values: dict[str, dict[str, float]] = {}
+    for effect in effects:
+        middle = {p.name: float(p.grid()[p.grid().size // 2]) for p in effect.parameters(state)}
+        both = {**effect.constants(state), **middle}
+        if both:
+            values[effect.id] = both
+    return values
+
+
+def local_columns(effects: Sequence[SensorEffect], state: State, values: Values) -> Array:
+    """Columns of the sensor's effects, (..., 3, n, p), g per unit of the coefficient; p counts the same on every axis."""
+    axes = [
+        np.concatenate([e.columns(state, axis, **values.get(e.id, {})) for e in effects], axis=-1) for axis in range(3)
+    ]
+    return np.stack(np.broadcast_arrays(*axes), axis=-3)
+
+
+def shared_columns(effects: Sequence[StationEffect], state: State, values: Values, response: Array) -> Array:
+    """Columns of the station's effects in the output, (..., 3, n, q): changes of force seen through each unit's response.
+
+    Parameters
+    ----------
+    response : (..., 3, 3), output per g: the matrix K of each unit
+    """
+    changes = np.concatenate([e.force_change(state, **values.get(e.id, {})) for e in effects], axis=-1)
+    return np.einsum("...ij,...njq->...inq", response, changes)
+
+
+def local_names(effects: Sequence[SensorEffect], axis: int) -> tuple[tuple[str, str], ...]:
+    """(effect id, coefficient name) of every local column of an axis."""
+    return tuple((e.id, name) for e in effects for name in e.names(axis))
+
+
+def shared_names(effects: Sequence[StationEffect]) -> tuple[tuple[str, str], ...]:
+    """(effect id, parameter name) of every shared column."""
+    return tuple((e.id, name) for e in effects for name in e.names())

@@ -1,0 +1,111 @@
+"""The catalogue of physical effects: every module of this package, every entry point ``tumbleline.effects``, every file added.
+
+Nothing names an effect but its own file: fitting, simulating, diagnosing, planning, documents and export ask here.
+"""
+
+import importlib
+import importlib.util
+import pkgutil
+import sys
+from collections.abc import Iterable
+from functools import cache
+from importlib.metadata import entry_points
+from pathlib import Path
+from types import ModuleType
+
+from inertial.effects.base import AnyEffect, Effect, Nonlinear, SensorEffect, StationEffect
+from inertial.effects.covariate import COVARIATE_PREFIX, Covariate
+from inertial.errors import InertialError, UnknownEffect
+
+__all__ = ["Effect", "Nonlinear", "SensorEffect", "StationEffect", "add_file", "catalogue", "get", "register"]
+
+_extra: dict[str, AnyEffect] = {}
+
+
+class BrokenEffect(InertialError):
+    """A module that should hold an effect cannot be used."""
+
+
+@cache
+def _built_in() -> dict[str, AnyEffect]:
+    found: dict[str, AnyEffect] = {}
+    for info in pkgutil.iter_modules(__path__):
+        _collect(importlib.import_module(f"{__name__}.{info.name}"), found)
+    for point in entry_points(group="tumbleline.effects"):
+        _collect(point.load(), found)
+    return found
+
+
+def _collect(module: ModuleType, found: dict[str, AnyEffect]) -> list[str]:
+    """Instances of the effect classes that a module defines, added to ``found`` by id."""
+    added: list[str] = []
+    for item in vars(module).values():
+        own = isinstance(item, type) and issubclass(item, Effect) and item.__module__ == module.__name__
+        if own and hasattr(item, "id"):
+            if item.id in found:
+                raise BrokenEffect(f"{module.__name__}: effect id '{item.id}' is taken already; choose another id")
+            found[item.id] = item()  # type: ignore[assignment]  # an Effect with an id is one of its two kinds
+            added.append(item.id)
+    return added
+
+
+def catalogue() -> dict[str, AnyEffect]:
+    """Every known effect by id; covariates are made on demand by :func:`get`."""
+    return {**_built_in(), **_extra}
+
+
+def get(name: str) -> AnyEffect:
+    """The effect with this id; ``covariate:<column>`` for any recorded column.
+
+    Raises
+    ------
+    UnknownEffect
+        With the close matches.
+    """
+    if name.startswith(COVARIATE_PREFIX) and len(name) > len(COVARIATE_PREFIX):
+        return Covariate(name.removeprefix(COVARIATE_PREFIX))
+    known = catalogue()
+    if name not in known:
+        raise UnknownEffect(name, known)
+    return known[name]
+
+
+def get_all(names: Iterable[str]) -> list[AnyEffect]:
+    """The effects with these ids, in order, each once."""
+    return [get(name) for name in dict.fromkeys(names)]
+
+
+def register(effect: AnyEffect) -> None:
+    """Adds an effect made at run time (a formula of a model file) to the catalogue."""
+    _extra[effect.id] = effect
+
+
+def add_file(path: str | Path) -> list[str]:
+    """Ids of the effects that a Python file outside the tree adds.
+
+    Raises
+    ------
+    BrokenEffect
+        The file is missing, does not import, or holds no effect.
+    """
+    source = Path(path)
+    spec = importlib.util.spec_from_file_location(f"tumbleline_effect_{source.stem}", source)
+    if spec is None or spec.loader is None or not source.is_file():
+        raise BrokenEffect(
+            f"effect file {source}: no such Python file; give the path of a .py file that defines an effect"
+        )
+    module = importlib.util.module_from_spec(spec)
+    sys.modules[spec.name] = module
+    try:
+        spec.loader.exec_module(module)
+    except Exception as error:  # whatever a user's file raises is reported with the file's name
+        raise BrokenEffect(f"effect file {source}: does not import ({error}); mend the file") from error
+    found = dict(catalogue())
+    added = _collect(module, found)
+    if not added:
+        raise BrokenEffect(
+            f"effect file {source}: holds no effect; define a subclass of SensorEffect or StationEffect with an id"
+        )
+    for name in added:
+        register(found[name])
+    return added

@@ -1,0 +1,44 @@
+"""Lost motion of the drives: the table stops short on the side it comes from."""
+
+from typing import ClassVar
+
+import numpy as np
+
+from inertial.effects.base import Array, StationEffect, stack
+from inertial import frames
+from inertial import operators
+from inertial.state import State
+
+
+class Backlash(StationEffect):
+    """Lost motion of the drives: the table stops short on the side it comes from."""
+
+    id: ClassVar[str] = "backlash"
+    symbol: ClassVar[str] = "ε"
+    equation: ClassVar[str] = "α + ε·sgn(Δα), β + ε·sgn(Δβ)"
+    source: ClassVar[str] = "geometry of a two-axis table"
+    typical_ug: ClassVar[tuple[float, float]] = (5.0, 2000.0)
+    hides_behind: ClassVar[tuple[str, ...]] = ("pose_hysteresis",)
+    breaker: ClassVar[str] = "every pose approached from both sides"
+    simplicity: ClassVar[int] = 43
+
+    def force_change(self, state: State, **nonlinear: float) -> Array:
+        del nonlinear
+        outer, inner = state.need("outer", self.id), state.need("inner", self.id)
+        force = frames.force_from_angles(outer, inner)
+        about_outer = frames.to_fixture((0.0, 1.0, 0.0), outer, inner)
+        about_inner = np.stack([force[..., 1], -force[..., 0], np.zeros_like(inner)], axis=-1)
+        sides = [_side(outer)[..., None] * about_outer, _side(inner)[..., None] * about_inner]
+        return np.stack(sides, axis=-1)
+
+    def names(self) -> tuple[str, ...]:
+        return "backlash_outer", "backlash_inner"
+
+
+_PLAY_RAD = 1e-4
+"""Moves larger than this take up the whole play."""
+
+
+def _side(angle: Array) -> Array:
+    """Side of the play on which the drive rests, −1 … 1, kept while the axis does not move."""
+    return operators.play(angle, _PLAY_RAD)

@@ -1,0 +1,139 @@
+"""What an effect is: design columns of a physical cause, with everything that fitting, planning and documents ask of it."""
+
+from abc import ABC, abstractmethod
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import ClassVar, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from inertial.state import State
+
+Array = NDArray[np.float64]
+Scope = Literal["sensor", "station", "slot"]
+
+
+@dataclass(frozen=True)
+class Nonlinear:
+    """A nonlinear parameter: profiled between its bounds, never fixed.
+
+    low, high : bounds, in ``unit``
+    scale : spacing of the starting grid
+    points : size of the starting grid
+    choices : for a discrete parameter, its values (bounds and points are then theirs)
+    """
+
+    name: str
+    unit: str
+    low: float
+    high: float
+    scale: Literal["log", "linear", "inverse"] = "log"
+    points: int = 10
+    choices: tuple[float, ...] = ()
+
+    def grid(self) -> Array:
+        """Starting values, (points,), in ``unit``."""
+        if self.choices:
+            return np.array(self.choices)
+        if self.scale == "log":
+            return np.geomspace(self.low, self.high, self.points)
+        if self.scale == "inverse":
+            return 1.0 / np.linspace(1.0 / self.high, 1.0 / self.low, self.points)
+        return np.linspace(self.low, self.high, self.points)
+
+
+class Effect(ABC):
+    """One physical cause of error. A subclass with an ``id`` in a module of this package is found by itself.
+
+    Attributes
+    ----------
+    id : public name in model files, on the command line and in JSON
+    symbol : as in IEEE Std 1293 where it has one
+    equation : the term for output axis i, for people
+    scope : "sensor" (coefficients per unit and axis), "station" (shared by all units of a run), "slot"
+    source : where the term comes from
+    typical_ug : range of plausible sizes at 1 g or over the usual range of its driver, µg
+    hides_behind : effects that take its place under poor plans
+    breaker : what to measure so that it shows
+    simplicity : rank among effects that the data cannot tell apart; the lowest is recommended
+    """
+
+    id: ClassVar[str]
+    symbol: ClassVar[str]
+    equation: ClassVar[str]
+    scope: ClassVar[Scope] = "sensor"
+    source: ClassVar[str]
+    typical_ug: ClassVar[tuple[float, float]]
+    hides_behind: ClassVar[tuple[str, ...]] = ()
+    breaker: ClassVar[str]
+    simplicity: ClassVar[int] = 50
+    nonlinear: ClassVar[tuple[Nonlinear, ...]] = ()
+
+    def parameters(self, state: State) -> tuple[Nonlinear, ...]:
+        """Nonlinear parameters with bounds that suit this run (a step lies inside it, a kink inside its temperatures)."""
+        del state
+        return self.nonlinear
+
+    def constants(self, state: State) -> Mapping[str, float]:
+        """What the columns take from the run the model is fitted on (a centre, a range), kept with the coefficients."""
+        del state
+        return {}
+
+
+class SensorEffect(Effect):
+    """An effect inside the device: columns with coefficients of their own for every unit and axis."""
+
+    @abstractmethod
+    def columns(self, state: State, axis: int, **nonlinear: float) -> Array:
+        """Design columns of one output axis.
+
+        Parameters
+        ----------
+        state : of one unit or a lot
+        axis : 0, 1, 2
+        **nonlinear : values of the nonlinear parameters and constants
+
+        Returns
+        -------
+        (..., n, p), g per unit of the coefficient
+
+        Raises
+        ------
+        MissingInput
+            A quantity the effect depends on is not recorded.
+        """
+
+    @abstractmethod
+    def names(self, axis: int) -> tuple[str, ...]:
+        """Names of the p coefficients of one axis."""
+
+
+class StationEffect(Effect):
+    """An effect of the station: changes the specific force itself, by parameters that all units of a run share."""
+
+    scope: ClassVar[Scope] = "station"
+
+    @abstractmethod
+    def force_change(self, state: State, **nonlinear: float) -> Array:
+        """True minus commanded specific force, (..., n, 3, q), g per unit of each of the q parameters."""
+
+    @abstractmethod
+    def names(self) -> tuple[str, ...]:
+        """Names of the q parameters."""
+
+
+AnyEffect = SensorEffect | StationEffect
+
+AXES = ("x", "y", "z")
+
+
+def others(axis: int) -> tuple[int, int]:
+    """The two other axes, in cyclic order."""
+    return (axis + 1) % 3, (axis + 2) % 3
+
+
+def stack(state: State, columns: Sequence[Array]) -> Array:
+    """Columns of shape (..., n) as one array (..., n, p), broadcast against the state's force and one another."""
+    shape = np.broadcast_shapes(state.force.shape[:-1], *(c.shape for c in columns))
+    return np.stack([np.broadcast_to(c, shape) for c in columns], axis=-1)

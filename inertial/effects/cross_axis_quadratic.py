@@ -1,0 +1,28 @@
+"""Quadratic response to specific force across the axis."""
+
+from typing import ClassVar
+
+from inertial.effects.base import AXES, Array, SensorEffect, others, stack
+from inertial.state import State
+
+
+class CrossAxisQuadratic(SensorEffect):
+    """Quadratic response to specific force across the axis."""
+
+    id: ClassVar[str] = "cross_axis_quadratic"
+    symbol: ClassVar[str] = "Kpp, Koo, Kpo"
+    equation: ClassVar[str] = "Kpp·fp² + Koo·fo² + Kpo·fp·fo"
+    source: ClassVar[str] = "IEEE Std 1293-1998, model equation"
+    typical_ug: ClassVar[tuple[float, float]] = (5.0, 500.0)
+    hides_behind: ClassVar[tuple[str, ...]] = ("bias", "second_order")
+    breaker: ClassVar[str] = "general directions; K2 + Kpp + Koo is one with the bias as a sum"
+    simplicity: ClassVar[int] = 18
+
+    def columns(self, state: State, axis: int, **nonlinear: float) -> Array:
+        del nonlinear
+        f, (j, k) = state.force, others(axis)
+        return stack(state, [f[..., j] ** 2, f[..., k] ** 2, f[..., j] * f[..., k]])
+
+    def names(self, axis: int) -> tuple[str, ...]:
+        j, k = others(axis)
+        return f"K{AXES[j]}{AXES[j]}", f"K{AXES[k]}{AXES[k]}", f"K{AXES[j]}*{AXES[k]}"

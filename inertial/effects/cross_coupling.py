@@ -1,0 +1,27 @@
+"""Product of the specific force along the axis with that across it: a pendulum that tips."""
+
+from typing import ClassVar
+
+from inertial.effects.base import AXES, Array, SensorEffect, others, stack
+from inertial.state import State
+
+
+class CrossCoupling(SensorEffect):
+    """Product of the specific force along the axis with that across it: a pendulum that tips."""
+
+    id: ClassVar[str] = "cross_coupling"
+    symbol: ClassVar[str] = "Kip, Kio"
+    equation: ClassVar[str] = "Kip·fi·fp + Kio·fi·fo"
+    source: ClassVar[str] = "IEEE Std 1293-1998, model equation"
+    typical_ug: ClassVar[tuple[float, float]] = (5.0, 1000.0)
+    hides_behind: ClassVar[tuple[str, ...]] = ()
+    breaker: ClassVar[str] = "edges and general directions; β off the multiples of 90°, where fx·fy is zero"
+    simplicity: ClassVar[int] = 15
+
+    def columns(self, state: State, axis: int, **nonlinear: float) -> Array:
+        del nonlinear
+        f, (j, k) = state.force, others(axis)
+        return stack(state, [f[..., axis] * f[..., j], f[..., axis] * f[..., k]])
+
+    def names(self, axis: int) -> tuple[str, ...]:
+        return tuple(f"K{AXES[axis]}*{AXES[k]}" for k in others(axis))

@@ -1,0 +1,30 @@
+"""Output that stays at zero until the specific force leaves a zone about null."""
+
+from typing import ClassVar
+
+import numpy as np
+
+from inertial.effects.base import Array, Nonlinear, SensorEffect, stack
+from inertial.state import State
+
+
+class DeadZone(SensorEffect):
+    """Output that stays at zero until the specific force leaves a zone about null."""
+
+    id: ClassVar[str] = "dead_zone"
+    symbol: ClassVar[str] = "DZ"
+    equation: ClassVar[str] = "−clip(fi, −w, w)"
+    source: ClassVar[str] = "mechanism: stiction or a threshold of the converter; IEEE Std 1293-1998, threshold"
+    typical_ug: ClassVar[tuple[float, float]] = (1.0, 5000.0)
+    hides_behind: ClassVar[tuple[str, ...]] = ("bias_asymmetry", "odd_quadratic")
+    breaker: ClassVar[str] = "a micro-tilt through zero"
+    simplicity: ClassVar[int] = 22
+    nonlinear: ClassVar[tuple[Nonlinear, ...]] = (Nonlinear("width", "g", 0.002, 0.5, "log", 10),)
+
+    def columns(self, state: State, axis: int, *, width: float, **nonlinear: float) -> Array:
+        del nonlinear
+        return stack(state, [-np.clip(state.force[..., axis], -width, width)])
+
+    def names(self, axis: int) -> tuple[str, ...]:
+        del axis
+        return ("DZ",)

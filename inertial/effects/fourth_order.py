@@ -1,0 +1,28 @@
+"""Fourth power of the specific force."""
+
+from typing import ClassVar
+
+from inertial.effects.base import Array, SensorEffect, stack
+from inertial.state import State
+
+
+class FourthOrder(SensorEffect):
+    """Fourth power of the specific force."""
+
+    id: ClassVar[str] = "fourth_order"
+    symbol: ClassVar[str] = "K4"
+    equation: ClassVar[str] = "K4·fi⁴"
+    source: ClassVar[str] = "IEEE Std 1293-1998, model equation"
+    typical_ug: ClassVar[tuple[float, float]] = (5.0, 500.0)
+    hides_behind: ClassVar[tuple[str, ...]] = ("second_order", "scale_asymmetry")
+    breaker: ClassVar[str] = "poses with |fi| between 0.2 and 0.8 g, or a centrifuge"
+    simplicity: ClassVar[int] = 16
+
+    def columns(self, state: State, axis: int, **nonlinear: float) -> Array:
+        del nonlinear
+        f = state.force[..., axis]
+        return stack(state, [f**4])
+
+    def names(self, axis: int) -> tuple[str, ...]:
+        del axis
+        return ("K4",)

@@ -1,0 +1,30 @@
+"""Outer axis or laboratory vertical out of level: up = (δ1, δ2, 1)."""
+
+from typing import ClassVar
+
+import numpy as np
+
+from inertial.effects.base import Array, StationEffect, stack
+from inertial import frames
+from inertial.state import State
+
+
+class LevelError(StationEffect):
+    """Outer axis or laboratory vertical out of level: up = (δ1, δ2, 1)."""
+
+    id: ClassVar[str] = "level_error"
+    symbol: ClassVar[str] = "δ1, δ2"
+    equation: ClassVar[str] = "f = R(α, β)ᵀ·(δ1, δ2, 1)"
+    source: ClassVar[str] = "geometry of a two-axis table"
+    typical_ug: ClassVar[tuple[float, float]] = (5.0, 5000.0)
+    hides_behind: ClassVar[tuple[str, ...]] = ("outer_encoder_offset", "magnetic")
+    breaker: ClassVar[str] = "a level on the table; the tilt along the outer axis is one with the offset of its encoder"
+    simplicity: ClassVar[int] = 40
+
+    def force_change(self, state: State, **nonlinear: float) -> Array:
+        del nonlinear
+        outer, inner = state.need("outer", self.id), state.need("inner", self.id)
+        return np.stack([frames.to_fixture(v, outer, inner) for v in ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0))], axis=-1)
+
+    def names(self) -> tuple[str, ...]:
+        return "level_1", "level_2"

@@ -1,0 +1,33 @@
+"""Response to the laboratory's horizontal magnetic field, seen as it turns in the fixture's frame."""
+
+from typing import ClassVar
+
+import numpy as np
+
+from inertial.effects.base import AXES, Array, SensorEffect
+from inertial import frames
+from inertial.state import State
+
+
+class Magnetic(SensorEffect):
+    """Response to the laboratory's horizontal magnetic field, seen as it turns in the fixture's frame."""
+
+    id: ClassVar[str] = "magnetic"
+    symbol: ClassVar[str] = "B"
+    equation: ClassVar[str] = "Σ bj·(e1·R)j + cj·(e2·R)j"
+    source: ClassVar[str] = "mechanism: magnetised proof mass or torquer leakage"
+    typical_ug: ClassVar[tuple[float, float]] = (1.0, 1000.0)
+    hides_behind: ClassVar[tuple[str, ...]] = ("level_error",)
+    breaker: ClassVar[str] = "turn the station, or a coil about it"
+    simplicity: ClassVar[int] = 45
+
+    def columns(self, state: State, axis: int, **nonlinear: float) -> Array:
+        del axis, nonlinear
+        outer, inner = state.need("outer", self.id), state.need("inner", self.id)
+        north = frames.to_fixture((1.0, 0.0, 0.0), outer, inner)
+        east = frames.to_fixture((0.0, 1.0, 0.0), outer, inner)
+        return np.concatenate([north, east], axis=-1)
+
+    def names(self, axis: int) -> tuple[str, ...]:
+        del axis
+        return tuple(f"B{direction}{a}" for direction in "12" for a in AXES)

@@ -1,0 +1,44 @@
+"""Bias that jumps once."""
+
+from dataclasses import replace
+from typing import ClassVar
+
+import numpy as np
+
+from inertial.effects.base import Array, Nonlinear, SensorEffect, stack
+from inertial.state import State
+
+
+class StepChange(SensorEffect):
+    """Bias that jumps once."""
+
+    id: ClassVar[str] = "step_change"
+    symbol: ClassVar[str] = "kS"
+    equation: ClassVar[str] = "kS·H(t − t0)"
+    source: ClassVar[str] = "mechanism: stiction released, a shock, a charge trapped"
+    typical_ug: ClassVar[tuple[float, float]] = (10.0, 10000.0)
+    hides_behind: ClassVar[tuple[str, ...]] = ("aging_linear",)
+    breaker: ClassVar[str] = "a reference pose repeated through the run"
+    simplicity: ClassVar[int] = 31
+    nonlinear: ClassVar[tuple[Nonlinear, ...]] = (Nonlinear("instant", "s", 0.0, 1.0, "linear", 40),)
+
+    def columns(self, state: State, axis: int, *, instant: float, **nonlinear: float) -> Array:
+        del axis, nonlinear
+        return stack(state, [(state.time > instant).astype(float)])
+
+    def names(self, axis: int) -> tuple[str, ...]:
+        del axis
+        return ("kS",)
+
+    def parameters(self, state: State) -> tuple[Nonlinear, ...]:
+        """Instants between the dwells of the run, with dwells on both sides."""
+        times = np.unique(state.time)
+        between = 0.5 * (times[1:] + times[:-1])[1:-1]
+        if between.size < 1:
+            return (replace(self.nonlinear[0], choices=(float(np.mean(times)),)),)
+        pick = np.unique(np.linspace(0, between.size - 1, min(between.size, 120)).round().astype(int))
+        return (
+            replace(
+                self.nonlinear[0], low=float(between[0]), high=float(between[-1]), choices=tuple(between[pick].tolist())
+            ),
+        )

@@ -1,0 +1,35 @@
+"""Bias that remembers from which side a temperature was reached."""
+
+from typing import ClassVar
+
+from inertial.effects.base import Array, Nonlinear, SensorEffect, stack
+from inertial import operators
+from inertial.state import State
+
+
+class ThermalHysteresis(SensorEffect):
+    """Bias that remembers from which side a temperature was reached."""
+
+    id: ClassVar[str] = "thermal_hysteresis"
+    symbol: ClassVar[str] = "kH"
+    equation: ClassVar[str] = "kH·h(T), h the play operator of half width w"
+    source: ClassVar[str] = "Visintin, Differential Models of Hysteresis; mechanism: friction in the die attach"
+    typical_ug: ClassVar[tuple[float, float]] = (100.0, 10000.0)
+    hides_behind: ClassVar[tuple[str, ...]] = ("aging_linear", "bias_temperature_quadratic")
+    breaker: ClassVar[str] = "a closed loop of temperature, and minor loops; a one-way soak holds no information"
+    simplicity: ClassVar[int] = 24
+    nonlinear: ClassVar[tuple[Nonlinear, ...]] = (Nonlinear("half_width", "K", 1.0, 60.0, "log", 10),)
+
+    def columns(self, state: State, axis: int, *, half_width: float, **nonlinear: float) -> Array:
+        del axis, nonlinear
+
+        def hysteresis(time: Array, temperature: Array) -> Array:
+            del time
+            return operators.play(temperature, half_width)
+
+        inside = state.temperature_operator((self.id, half_width), hysteresis)
+        return stack(state, [inside])
+
+    def names(self, axis: int) -> tuple[str, ...]:
+        del axis
+        return ("kH",)

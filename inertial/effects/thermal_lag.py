@@ -1,0 +1,34 @@
+"""Bias that follows a part of the sensor which is later than its thermometer."""
+
+from typing import ClassVar
+
+from inertial.effects.base import Array, Nonlinear, SensorEffect, stack
+from inertial import operators
+from inertial.state import State
+
+
+class ThermalLag(SensorEffect):
+    """Bias that follows a part of the sensor which is later than its thermometer."""
+
+    id: ClassVar[str] = "thermal_lag"
+    symbol: ClassVar[str] = "kL"
+    equation: ClassVar[str] = "(kL + kL2·θ)·(T_lag − T)"
+    source: ClassVar[str] = "first-order heat conduction between thermometer and sensing element"
+    typical_ug: ClassVar[tuple[float, float]] = (10.0, 10000.0)
+    hides_behind: ClassVar[tuple[str, ...]] = ("thermal_rate", "bias_temperature")
+    breaker: ClassVar[str] = "a fast step of temperature, read while it settles"
+    simplicity: ClassVar[int] = 21
+    nonlinear: ClassVar[tuple[Nonlinear, ...]] = (Nonlinear("tau", "s", 5.0, 3000.0, "log", 14),)
+
+    def columns(self, state: State, axis: int, *, tau: float, **nonlinear: float) -> Array:
+        del axis, nonlinear
+
+        def lag(time: Array, temperature: Array) -> Array:
+            return operators.first_order_lag(time, temperature, tau) - temperature
+
+        behind = state.temperature_operator((self.id, tau), lag)
+        return stack(state, [behind, behind * (state.need("theta", self.id))])
+
+    def names(self, axis: int) -> tuple[str, ...]:
+        del axis
+        return "kL", "kL2"

@@ -1,0 +1,28 @@
+"""Bias from vibration, through the quadratic term."""
+
+from typing import ClassVar
+
+from inertial.effects.base import Array, SensorEffect, stack
+from inertial.state import State
+
+
+class VibrationRectification(SensorEffect):
+    """Bias from vibration, through the quadratic term."""
+
+    id: ClassVar[str] = "vibration_rectification"
+    symbol: ClassVar[str] = "VRE"
+    equation: ClassVar[str] = "VRE·a_rms²"
+    source: ClassVar[str] = "IEEE Std 1293-1998, vibration rectification"
+    typical_ug: ClassVar[tuple[float, float]] = (1.0, 1000.0)
+    hides_behind: ClassVar[tuple[str, ...]] = ("second_order", "bias_temperature")
+    breaker: ClassVar[str] = "the compressor off; the vibration recorded"
+    simplicity: ClassVar[int] = 34
+
+    def columns(self, state: State, axis: int, **nonlinear: float) -> Array:
+        del axis, nonlinear
+        vibration = state.need("vibration", self.id)
+        return stack(state, [vibration**2])
+
+    def names(self, axis: int) -> tuple[str, ...]:
+        del axis
+        return ("VRE",)

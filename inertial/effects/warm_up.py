@@ -1,0 +1,31 @@
+"""Bias that settles after power-on."""
+
+from typing import ClassVar
+
+import numpy as np
+
+from inertial.effects.base import Array, Nonlinear, SensorEffect, stack
+from inertial.state import State
+
+
+class WarmUp(SensorEffect):
+    """Bias that settles after power-on."""
+
+    id: ClassVar[str] = "warm_up"
+    symbol: ClassVar[str] = "kW"
+    equation: ClassVar[str] = "kW·exp(−u/τ)"
+    source: ClassVar[str] = "mechanism: self-heating; IEEE Std 1293-1998, warm-up"
+    typical_ug: ClassVar[tuple[float, float]] = (10.0, 10000.0)
+    hides_behind: ClassVar[tuple[str, ...]] = ("aging_linear", "aging_log")
+    breaker: ClassVar[str] = "a power cycle at constant temperature"
+    simplicity: ClassVar[int] = 26
+    nonlinear: ClassVar[tuple[Nonlinear, ...]] = (Nonlinear("tau", "s", 10.0, 7200.0, "log", 14),)
+
+    def columns(self, state: State, axis: int, *, tau: float, **nonlinear: float) -> Array:
+        del axis, nonlinear
+        since = state.time - state.time[..., :1] if state.since_power is None else state.since_power
+        return stack(state, [np.exp(-since / tau)])
+
+    def names(self, axis: int) -> tuple[str, ...]:
+        del axis
+        return ("kW",)

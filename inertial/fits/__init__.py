@@ -1,0 +1,1 @@
+"""Fits: least squares of a model over a lot, and the closed forms of special plans."""

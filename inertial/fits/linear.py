@@ -1,0 +1,231 @@
+"""Weighted least squares of a model for all units of a lot at once.
+
+Per unit and axis z = H·θ + v is solved as θ̂ = (HᵀWH)⁻¹HᵀWz with one refinement step; parameters of the station, which all
+units share, are found after projecting the units' own columns out (Frisch–Waugh–Lovell), so the cost stays linear in the units.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from inertial import design
+from inertial.design import Values
+from inertial.errors import NotIdentified
+from inertial.state import State
+
+Array = NDArray[np.float64]
+
+_SINGULAR = 1e-11
+"""Smallest eigenvalue of the scaled normal matrix: below, a coefficient is not determined."""
+
+
+@dataclass(frozen=True)
+class LotFit:
+    """Coefficients of a model for every unit of a lot.
+
+    effects : ids of the model, in order
+    coefficients : (..., 3, p), output unit per unit of the column
+    covariance : (..., 3, p, p), from the standard errors given, or from the residuals where none were
+    names : per axis, (effect id, coefficient) of the p columns
+    shared : (q,), parameters of the station; shared_covariance : (q, q); shared_names likewise
+    nonlinear : values of nonlinear parameters and constants by effect id
+    residuals : (..., n, 3), output unit, output minus model
+    chi2 : (..., 3), sum of squared residuals over the variance; dof : (..., 3), degrees of freedom
+    """
+
+    effects: tuple[str, ...]
+    coefficients: Array
+    covariance: Array
+    names: tuple[tuple[tuple[str, str], ...], ...]
+    shared: Array
+    shared_covariance: Array
+    shared_names: tuple[tuple[str, str], ...]
+    nonlinear: dict[str, dict[str, float]]
+    residuals: Array
+    chi2: Array
+    dof: Array
+
+    @property
+    def standard_errors(self) -> Array:
+        """Standard errors of the coefficients, (..., 3, p)."""
+        return np.sqrt(np.diagonal(self.covariance, axis1=-2, axis2=-1))
+
+    def response(self) -> Array:
+        """The matrix K of each unit, (..., 3, 3), output per g: scale on the diagonal, misalignment beside it."""
+        return response_matrix(self.coefficients, self.names)
+
+
+def response_matrix(coefficients: Array, names: Sequence[Sequence[tuple[str, str]]]) -> Array:
+    """K from coefficients (..., 3, p): the columns of ``scale`` and ``misalignment``, (..., 3, 3)."""
+    k = np.zeros((*coefficients.shape[:-2], 3, 3))
+    for axis in range(3):
+        for column, (effect, _) in enumerate(names[axis]):
+            if effect == "scale":
+                k[..., axis, axis] = coefficients[..., axis, column]
+        across = [c for c, (effect, _) in enumerate(names[axis]) if effect == "misalignment"]
+        for column, other in zip(across, ((axis + 1) % 3, (axis + 2) % 3), strict=False):
+            k[..., axis, other] = coefficients[..., axis, column]
+    return k
+
+
+def fit_lot(
+    effects: Sequence[str],
+    state: State,
+    output: Array,
+    standard_error: Array | None = None,
+    *,
+    nonlinear: Values | None = None,
+) -> LotFit:
+    """Least-squares fit of a model to the dwells of a lot.
+
+    Parameters
+    ----------
+    effects : ids of the model
+    state : the dwells; arrays may leave out the batch dimension where all units share them
+    output : (..., n, 3), mean output of each dwell, in the output's unit
+    standard_error : (..., n, 3), output unit; infinity takes a value out of the fit; None weighs all alike
+    nonlinear : values of nonlinear parameters by effect id; the middle of their bounds otherwise
+        (:func:`inertial.fits.profile.fit_profiled` finds them)
+
+    Raises
+    ------
+    NotIdentified
+        The plan cannot determine a coefficient; it is named.
+    UnknownEffect, MissingInput
+        An effect is not in the catalogue, or needs a quantity that the dwells do not carry.
+    """
+    sensor, station = design.split(effects)
+    values = design.starting_values([*sensor, *station], state)
+    for name, given in (nonlinear or {}).items():
+        values[name] = {**values.get(name, {}), **given}
+    names = tuple(design.local_names(sensor, axis) for axis in range(3))
+    z = np.swapaxes(output, -1, -2)
+    weight = None if standard_error is None else 1.0 / np.swapaxes(standard_error, -1, -2)
+    local = _Local(design.local_columns(sensor, state, values), weight, names)
+    theta = local.solve(z)
+    shared, shared_covariance = np.zeros(0), np.zeros((0, 0))
+    if station:
+        columns = design.shared_columns(station, state, values, response_matrix(theta, names))
+        shared, shared_covariance, z = _solve_shared(local, columns, z, design.shared_names(station))
+        theta = local.solve(z)
+    residual = z - local.apply(theta)
+    chi2, dof = local.chi2(residual)
+    covariance = local.inverse
+    if weight is None:
+        variance = chi2 / np.maximum(dof, 1)
+        covariance = covariance * variance[..., None, None]
+        shared_covariance = shared_covariance * float(chi2.sum() / max(dof.sum() - shared.size, 1))
+    return LotFit(
+        effects=tuple(dict.fromkeys(effects)),
+        coefficients=theta,
+        covariance=np.broadcast_to(covariance, (*theta.shape, theta.shape[-1])),
+        names=names,
+        shared=shared,
+        shared_covariance=shared_covariance,
+        shared_names=design.shared_names(station),
+        nonlinear=values,
+        residuals=np.swapaxes(residual, -1, -2),
+        chi2=chi2,
+        dof=dof,
+    )
+
+
+class _Local:
+    """Normal equations of the units' own columns, scaled; one system serves all units where they share design and weights."""
+
+    def __init__(self, columns: Array, weight: Array | None, names: Sequence[Sequence[tuple[str, str]]]) -> None:
+        self.columns, self.weight = columns, weight
+        weighted = columns if weight is None else columns * weight[..., None]
+        self.scale = np.sqrt(np.einsum("...np,...np->...p", weighted, weighted))
+        self._refuse_empty(names)
+        self.scaled = weighted / self.scale[..., None, :]
+        gram = np.swapaxes(self.scaled, -1, -2) @ self.scaled
+        self._refuse_singular(gram, names)
+        self.gram_inverse = np.linalg.inv(gram)
+        self.inverse = self.gram_inverse / (self.scale[..., :, None] * self.scale[..., None, :])
+
+    def _refuse_empty(self, names: Sequence[Sequence[tuple[str, str]]]) -> None:
+        empty = np.argwhere(self.scale <= 0.0)
+        if empty.size:
+            axis, column = int(empty[0, -2]), int(empty[0, -1])
+            effect, name = names[axis][column]
+            raise NotIdentified(
+                f"fit: {effect} ({name} of axis {'xyz'[axis]}) is zero in every dwell; "
+                f"the plan must excite it; add poses or conditions that do, or leave it out of the model"
+            )
+
+    def _refuse_singular(self, gram: Array, names: Sequence[Sequence[tuple[str, str]]]) -> None:
+        values, vectors = np.linalg.eigh(gram)
+        bad = np.argwhere(values[..., 0] < _SINGULAR)
+        if not bad.size:
+            return
+        where = tuple(int(i) for i in bad[0])
+        axis = where[-1]
+        share = np.abs(vectors[(*where, slice(None), 0)])
+        involved = [names[axis][i] for i in np.argsort(-share) if share[i] > 0.1]
+        listed = ", ".join(f"{effect} ({name})" for effect, name in involved)
+        raise NotIdentified(
+            f"fit: the plan cannot tell these coefficients of axis {'xyz'[axis]} apart: {listed}; "
+            f"add poses or temperatures that separate them, or leave one out of the model"
+        )
+
+    def solve(self, z: Array) -> Array:
+        """Coefficients (..., 3, p) for targets (..., 3, n); with one step of refinement against the rounding of HᵀWH."""
+        theta = self._step(z)
+        return theta + self._step(z - self.apply(theta))
+
+    def _step(self, z: Array) -> Array:
+        weighted = z if self.weight is None else z * self.weight
+        right = np.matmul(np.swapaxes(self.scaled, -1, -2), weighted[..., None])
+        return np.matmul(self.gram_inverse, right)[..., 0] / self.scale
+
+    def apply(self, theta: Array) -> Array:
+        """The model's output (..., 3, n)."""
+        return np.matmul(self.columns, theta[..., None])[..., 0]
+
+    def project_out(self, columns: Array) -> Array:
+        """Weighted columns (..., 3, n, q) less what the local columns explain."""
+        weighted = columns if self.weight is None else columns * self.weight[..., None]
+        inside = np.matmul(self.gram_inverse, np.matmul(np.swapaxes(self.scaled, -1, -2), weighted))
+        return weighted - np.matmul(self.scaled, inside)
+
+    def chi2(self, residual: Array) -> tuple[Array, Array]:
+        """Weighted sum of squares and degrees of freedom, each (..., 3)."""
+        weighted = residual if self.weight is None else residual * self.weight
+        count = (
+            np.full(residual.shape[:-1], residual.shape[-1])
+            if self.weight is None
+            else np.count_nonzero(np.broadcast_to(self.weight, residual.shape), axis=-1)
+        )
+        return np.einsum("...n,...n->...", weighted, weighted), count - self.columns.shape[-1]
+
+
+def _solve_shared(
+    local: _Local, columns: Array, z: Array, names: Sequence[tuple[str, str]]
+) -> tuple[Array, Array, Array]:
+    """Shared parameters, their covariance, and the targets without their part."""
+    columns = np.broadcast_to(columns, (*z.shape, columns.shape[-1]))
+    free = local.project_out(columns)
+    target = local.project_out(z[..., None])[..., 0]
+    q = free.shape[-1]
+    flat = free.reshape(-1, q)
+    size, before = np.linalg.norm(flat, axis=0), np.linalg.norm(columns.reshape(-1, q), axis=0)
+    lost = np.flatnonzero(
+        size <= 1e-7 * np.maximum(before * (1.0 if local.weight is None else float(np.max(local.weight))), 1e-300)
+    )
+    if lost.size:
+        effect, name = names[int(lost[0])]
+        raise NotIdentified(
+            f"fit: {effect} ({name}) is one with what every unit fits for itself; leave it out of the model"
+        )
+    scaled = flat / size
+    gram = scaled.T @ scaled
+    if np.linalg.eigvalsh(gram)[0] < _SINGULAR:
+        raise NotIdentified(
+            f"fit: the plan cannot tell these apart: {', '.join(f'{e} ({n})' for e, n in names)}; leave one out of the model"
+        )
+    inverse = np.linalg.inv(gram)
+    shared = (inverse @ (scaled.T @ target.reshape(-1))) / size
+    return shared, inverse / np.outer(size, size), z - np.matmul(columns, shared)

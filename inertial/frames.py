@@ -1,0 +1,60 @@
+"""Specific force on a two-axis table: outer axis horizontal along the laboratory's x, inner axis the fixture's z.
+
+At rest a device feels +1 g upwards: f = (Rx(outer)·Rz(inner))ᵀ·(0, 0, 1). Right-handed, radians.
+"""
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+Array = NDArray[np.float64]
+
+UP: tuple[float, float, float] = (0.0, 0.0, 1.0)
+
+
+def rotation_x(angle: ArrayLike) -> Array:
+    """Rotation matrices about x, shape (..., 3, 3), for ``angle`` (...) in rad."""
+    a = np.asarray(angle, dtype=float)
+    c, s, o, l = np.cos(a), np.sin(a), np.zeros_like(a), np.ones_like(a)
+    return np.stack([l, o, o, o, c, -s, o, s, c], axis=-1).reshape(*a.shape, 3, 3)
+
+
+def rotation_z(angle: ArrayLike) -> Array:
+    """Rotation matrices about z, shape (..., 3, 3), for ``angle`` (...) in rad."""
+    a = np.asarray(angle, dtype=float)
+    c, s, o, l = np.cos(a), np.sin(a), np.zeros_like(a), np.ones_like(a)
+    return np.stack([c, -s, o, s, c, o, o, o, l], axis=-1).reshape(*a.shape, 3, 3)
+
+
+def to_fixture(vector: ArrayLike, outer: ArrayLike, inner: ArrayLike) -> Array:
+    """A laboratory vector seen in the fixture's frame: (Rx(outer)·Rz(inner))ᵀ·vector.
+
+    Parameters
+    ----------
+    vector : (3,) or (..., 3), any unit
+    outer, inner : (...), rad
+
+    Returns
+    -------
+    (..., 3), the vector's unit
+    """
+    alpha, beta = np.asarray(outer, dtype=float), np.asarray(inner, dtype=float)
+    x, y, z = np.moveaxis(np.asarray(vector, dtype=float), -1, 0)
+    ca, sa, cb, sb = np.cos(alpha), np.sin(alpha), np.cos(beta), np.sin(beta)
+    across = ca * y + sa * z
+    return np.stack(np.broadcast_arrays(cb * x + sb * across, -sb * x + cb * across, -sa * y + ca * z), axis=-1)
+
+
+def force_from_angles(outer: ArrayLike, inner: ArrayLike, up: ArrayLike = UP) -> Array:
+    """Specific force in the fixture's frame, (..., 3) in g, at table angles ``outer``, ``inner`` (...) in rad."""
+    return to_fixture(up, outer, inner)
+
+
+def angles_from_force(force: ArrayLike) -> tuple[Array, Array]:
+    """Table angles (outer, inner), each (...) in rad, that turn gravity along ``force`` (..., 3).
+
+    outer lies in [0, π], inner in (-π, π]; where the force is along the inner axis, inner is 0.
+    """
+    f = np.asarray(force, dtype=float)
+    across = np.hypot(f[..., 0], f[..., 1])
+    inner = np.where(across > 1e-12, np.arctan2(f[..., 0], f[..., 1]), 0.0)
+    return np.arctan2(across, f[..., 2]), inner

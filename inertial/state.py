@@ -1,0 +1,167 @@
+"""What an effect may look at: the dwells of one unit, or of a lot, as arrays with the dwells in order of time."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, fields, replace
+from functools import cached_property
+from typing import Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from inertial.errors import MissingInput
+
+Array = NDArray[np.float64]
+
+T_REFERENCE = 25.0
+"""Reference temperature in °C: θ = T − 25 °C."""
+
+
+@dataclass(frozen=True)
+class History:
+    """Temperatures between the dwells, at the station's own rate.
+
+    time : (m,), s
+    temperature : (..., m), °C, the sensor's temperature (batch dimensions as in the state)
+    """
+
+    time: Array
+    temperature: Array
+
+
+@dataclass(frozen=True)
+class State:
+    """Dwells of one unit or a lot; every array has the batch dimensions (...), then n dwells in order of time.
+
+    force : (..., n, 3), g, specific force in the fixture's frame
+    time : (..., n), s since the run began
+    temperature : (..., n), °C, the sensor's own
+    chamber : (..., n), °C
+    since_power, since_move : (..., n), s
+    supply : (..., n), V
+    vibration : (..., n), g rms
+    outer, inner : (..., n), rad, table angles
+    slot : (...,), number of the fixture's slot
+    output : (..., n, 3), nominal output in g (for effects of the output code)
+    covariates : further recorded quantities by name, (..., n)
+    """
+
+    force: Array
+    time: Array
+    temperature: Array | None = None
+    chamber: Array | None = None
+    since_power: Array | None = None
+    since_move: Array | None = None
+    supply: Array | None = None
+    vibration: Array | None = None
+    outer: Array | None = None
+    inner: Array | None = None
+    slot: Array | None = None
+    covariates: Mapping[str, Array] = field(default_factory=dict[str, Array])
+    history: History | None = None
+    memory: dict[tuple[object, ...], Array] = field(
+        default_factory=dict[tuple[object, ...], Array], repr=False, compare=False
+    )
+
+    def remember(self, key: tuple[object, ...], make: Callable[[], Array]) -> Array:
+        """The array that ``make`` returns, computed once per key: operators with memory are the same for every axis."""
+        if key not in self.memory:
+            self.memory[key] = make()
+        return self.memory[key]
+
+    def need(self, quantity: str, effect: str) -> Array:
+        """The array of a quantity, or :class:`MissingInput` naming the effect that needs it."""
+        value = self.covariates.get(quantity) if quantity in self.covariates else getattr(self, quantity, None)
+        if value is None:
+            raise MissingInput(effect, quantity)
+        return value
+
+    @cached_property
+    def theta(self) -> Array | None:
+        """Temperature above 25 °C, (..., n), K."""
+        return None if self.temperature is None else self.temperature - T_REFERENCE
+
+    @cached_property
+    def temperature_rate(self) -> Array | None:
+        """dT/dt at each dwell, (..., n), K/min: from the history where there is one, else from neighbouring dwells."""
+        if self.temperature is None:
+            return None
+        if self.history is not None:
+            return _at_dwells(self.history.time, 60.0 * _slope(self.history.time, self.history.temperature), self.time)
+        return 60.0 * _slope(self.time, self.temperature)
+
+    @cached_property
+    def force_step(self) -> Array:
+        """Change of specific force at the move before each dwell, (..., n, 3), g; zero for the first dwell."""
+        return _step(self.force, axis=-2)
+
+    @cached_property
+    def outer_step(self) -> Array | None:
+        """Change of the outer angle at the move before each dwell, (..., n), rad."""
+        return None if self.outer is None else _step(self.outer, axis=-1)
+
+    @cached_property
+    def inner_step(self) -> Array | None:
+        """Change of the inner angle at the move before each dwell, (..., n), rad."""
+        return None if self.inner is None else _step(self.inner, axis=-1)
+
+    @property
+    def batch(self) -> tuple[int, ...]:
+        """Batch dimensions."""
+        return self.force.shape[:-2]
+
+    def temperature_operator(self, key: tuple[object, ...], operator: Callable[[Array, Array], Array]) -> Array:
+        """``operator(time, temperature)`` read at the dwells, (..., n): run on the history where there is one.
+
+        Raises
+        ------
+        MissingInput
+            The dwells carry no temperature.
+        """
+
+        def run() -> Array:
+            if self.temperature is None:
+                raise MissingInput(str(key[0]), "temperature (unit_C)")
+            if self.history is None:
+                return operator(self.time, self.temperature)
+            return _at_dwells(self.history.time, operator(self.history.time, self.history.temperature), self.time)
+
+        return self.remember(key, run)
+
+    def pick(self, index: object) -> Self:
+        """The units at ``index`` along the first batch dimension."""
+        changed: dict[str, object] = {}
+        for item in fields(self):
+            value = getattr(self, item.name)
+            if isinstance(value, np.ndarray):
+                changed[item.name] = value[index]
+            elif item.name == "covariates":
+                changed[item.name] = {k: v[index] for k, v in self.covariates.items()}
+            elif isinstance(value, History):
+                changed[item.name] = History(value.time, value.temperature[index])
+        changed["memory"] = {}
+        return replace(self, **changed)
+
+
+def _step(values: Array, axis: int) -> Array:
+    first = np.take(values, [0], axis=axis)
+    return np.diff(values, axis=axis, prepend=first)
+
+
+def _slope(time: Array, values: Array) -> Array:
+    """Central differences along the last axis, with the shapes of ``time`` and ``values`` broadcast."""
+    t, v = np.broadcast_arrays(time, values)
+    if v.shape[-1] < 2:
+        return np.zeros(v.shape)
+    before = np.concatenate([v[..., :1], v[..., :-1]], axis=-1)
+    after = np.concatenate([v[..., 1:], v[..., -1:]], axis=-1)
+    t_before = np.concatenate([t[..., :1], t[..., :-1]], axis=-1)
+    t_after = np.concatenate([t[..., 1:], t[..., -1:]], axis=-1)
+    return (after - before) / np.maximum(t_after - t_before, 1e-9)
+
+
+def _at_dwells(grid: Array, values: Array, time: Array) -> Array:
+    """Values on ``grid`` (m,) read at ``time`` (..., n), linear in between, constant beyond the ends."""
+    flat_values = values.reshape(-1, values.shape[-1])
+    flat_time = np.broadcast_to(time, (*values.shape[:-1], time.shape[-1])).reshape(-1, time.shape[-1])
+    picked = [np.interp(t, grid, v) for t, v in zip(flat_time, flat_values, strict=True)]
+    return np.array(picked).reshape(*values.shape[:-1], time.shape[-1])
