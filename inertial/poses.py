@@ -17,7 +17,8 @@ Array = NDArray[np.float64]
 
 def _angles(directions: Array) -> Array:
     outer, inner = angles_from_force(directions / np.linalg.norm(directions, axis=1, keepdims=True))
-    return np.round(np.degrees(np.stack([outer, inner], axis=1)), 9) + 0.0
+    angles: Array = np.degrees(np.stack([outer, inner], axis=1))
+    return np.round(angles, 9) + 0.0
 
 
 def _cube(*weights: int) -> Array:

@@ -127,7 +127,7 @@ class State:
 
         return self.remember(key, run)
 
-    def pick(self, index: object) -> Self:
+    def pick(self, index: slice | NDArray[np.intp]) -> Self:
         """The units at ``index`` along the first batch dimension."""
         changed: dict[str, object] = {}
         for item in fields(self):

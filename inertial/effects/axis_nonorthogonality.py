@@ -4,7 +4,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from inertial.effects.base import Array, StationEffect, stack
+from inertial.effects.base import Array, StationEffect
 from inertial.state import State
 
 

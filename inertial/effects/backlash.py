@@ -4,9 +4,8 @@ from typing import ClassVar
 
 import numpy as np
 
-from inertial.effects.base import Array, StationEffect, stack
-from inertial import frames
-from inertial import operators
+from inertial import frames, operators
+from inertial.effects.base import Array, StationEffect
 from inertial.state import State
 
 

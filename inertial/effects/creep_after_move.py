@@ -4,8 +4,8 @@ from typing import ClassVar
 
 import numpy as np
 
-from inertial.effects.base import Array, Nonlinear, SensorEffect, stack
 from inertial import operators
+from inertial.effects.base import Array, Nonlinear, SensorEffect, stack
 from inertial.state import State
 
 

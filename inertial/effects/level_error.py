@@ -4,8 +4,8 @@ from typing import ClassVar
 
 import numpy as np
 
-from inertial.effects.base import Array, StationEffect, stack
 from inertial import frames
+from inertial.effects.base import Array, StationEffect
 from inertial.state import State
 
 

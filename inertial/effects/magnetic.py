@@ -4,8 +4,8 @@ from typing import ClassVar
 
 import numpy as np
 
-from inertial.effects.base import AXES, Array, SensorEffect
 from inertial import frames
+from inertial.effects.base import AXES, Array, SensorEffect
 from inertial.state import State
 
 

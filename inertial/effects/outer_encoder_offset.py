@@ -2,8 +2,8 @@
 
 from typing import ClassVar
 
-from inertial.effects.base import Array, StationEffect
 from inertial import frames
+from inertial.effects.base import Array, StationEffect
 from inertial.state import State
 
 

@@ -2,8 +2,8 @@
 
 from typing import ClassVar
 
-from inertial.effects.base import Array, Nonlinear, SensorEffect, stack
 from inertial import operators
+from inertial.effects.base import Array, Nonlinear, SensorEffect, stack
 from inertial.state import State
 
 

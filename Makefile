@@ -1,0 +1,68 @@
+# Set-up, the main job and the tests, each in one command.
+PYTHON ?= python3
+VENV := .venv
+BIN := $(VENV)/bin
+export OMP_NUM_THREADS ?= 1
+export OPENBLAS_NUM_THREADS ?= 1
+export PREFECT_SERVER_ANALYTICS_ENABLED = false
+export DO_NOT_TRACK = 1
+
+.PHONY: run test check lint types layers pytest test-slow debian clean locks bench
+
+run: $(VENV)/.run  ## set up and run the main job on the simulated station
+	$(BIN)/tumbleline run
+
+test: check pytest  ## set up, lint, types, layers and tests
+
+check: lint types layers
+
+lint: $(VENV)/.dev
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+
+types: $(VENV)/.dev
+	$(BIN)/pyright
+
+layers: $(VENV)/.dev
+	$(BIN)/lint-imports
+
+pytest: $(VENV)/.dev debian
+	$(BIN)/python -m pytest -m "not slow"
+
+test-slow: $(VENV)/.dev debian  ## suites that take minutes
+	$(BIN)/python -m pytest -m slow
+
+bench: $(VENV)/.bench  ## figures of the README
+	$(BIN)/python -m benchmarks
+
+debian:  ## programs of other makers that tests talk to: mbpoll, chromium
+	@sh deploy/debian-packages.sh
+
+$(VENV)/bin/python:
+	@$(PYTHON) -c 'import sys; sys.exit(0 if sys.version_info >= (3, 11) else "Python 3.11 or newer is needed; set PYTHON=python3.11")'
+	$(PYTHON) -m venv $(VENV)
+
+define install
+	$(BIN)/pip install --quiet --disable-pip-version-check --require-hashes -r $(1)
+	$(BIN)/pip install --quiet --disable-pip-version-check --no-deps --no-build-isolation --editable .
+	@touch $@
+endef
+
+$(VENV)/.run: requirements-run.lock pyproject.toml | $(VENV)/bin/python
+	$(call install,requirements-run.lock)
+
+$(VENV)/.dev: requirements-dev.lock pyproject.toml | $(VENV)/bin/python
+	$(call install,requirements-dev.lock)
+	@touch $(VENV)/.run
+
+$(VENV)/.bench: requirements-bench.lock pyproject.toml | $(VENV)/bin/python
+	$(call install,requirements-bench.lock)
+	@touch $(VENV)/.run $(VENV)/.dev
+
+locks:  ## resolve the locks anew (needs uv)
+	uv pip compile pyproject.toml --extra build --python-version 3.11 --generate-hashes --no-emit-index-url --no-annotate --no-header -o requirements-run.lock
+	uv pip compile pyproject.toml --extra build --extra dev --python-version 3.11 --generate-hashes --no-emit-index-url --no-annotate --no-header -o requirements-dev.lock
+	uv pip compile pyproject.toml --extra build --extra dev --extra bench --python-version 3.11 --generate-hashes --no-emit-index-url --no-annotate --no-header -o requirements-bench.lock
+
+clean:
+	rm -rf $(VENV) archive build dist *.egg-info
