@@ -68,7 +68,7 @@ def overlapping(
     """
     data = np.asarray(x, dtype=np.float64)
     spacings = _spacings(_checked(data, rate_hz), m)
-    variance = _variances(data, spacings, rate_hz)
+    variance = _variances(data, spacings)
     n = data.shape[-1]
     edf = mixture.degrees_of_freedom(variance, spacings, n)
     tail = 0.5 * (1.0 - confidence)
@@ -126,7 +126,7 @@ def _spacings(n: int, m: Spacing | None) -> NDArray[np.int64]:
     return spacings
 
 
-def _variances(data: Array, spacings: NDArray[np.int64], rate_hz: float) -> Array:
+def _variances(data: Array, spacings: NDArray[np.int64]) -> Array:
     """Allan variances (..., t). The mean is taken out first: it does not count, and sums of raw counts lose digits."""
     n = data.shape[-1]
     phase = np.zeros((*data.shape[:-1], n + 1))

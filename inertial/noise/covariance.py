@@ -22,9 +22,8 @@ NOISES = ("Q", "N", "B", "K")
 """Terms that are random; the ramp R is deterministic and enters as the mean of z."""
 
 _STENCIL = np.array([1.0, -2.0, 1.0])
-_FARTHEST_RATIO = 64
-"""Estimates at spacings further apart than this share so little that their covariance is taken as zero."""
 _POINTS_PER_SPACING = 16
+_GROWTH = 1.08
 _REACH = 4.0
 """Lags are summed to this multiple of m1 + m2: only flicker reaches past 1, and its square falls as the fourth power."""
 
@@ -73,8 +72,6 @@ def sums(n: int, spacings: tuple[int, ...]) -> Sums:
     ramp = np.zeros((size, size, 4))
     for a, small in enumerate(spacings):
         for b in range(a, size):
-            if spacings[b] > _FARTHEST_RATIO * small:
-                continue
             square, linear = _pair(n, small, spacings[b])
             quadratic[a, b] = quadratic[b, a] = square
             ramp[a, b] = ramp[b, a] = linear
@@ -84,17 +81,8 @@ def sums(n: int, spacings: tuple[int, ...]) -> Sums:
 def _pair(n: int, m1: int, m2: int) -> tuple[Array, Array]:
     """Quadratic form (4, 4) and ramp vector (4,) of Cov[v(m1), v(m2)], m1 <= m2."""
     count1, count2 = n + 1 - 2 * m1, n + 1 - 2 * m2
-    first, last = -(count1 - 1), count2 - 1
-    centre = m1 - m2
-    reach = int(_REACH * (m1 + m2))
-    stride = max(1, min(m1 // _POINTS_PER_SPACING, min(count1, count2) // _POINTS_PER_SPACING))
-    lags = np.arange(
-        max(first, centre - reach),
-        min(last, centre + reach) + 1,
-        stride,
-        dtype=np.float64,
-    )
-    weights = _pairs_at(lags, count1, count2) * float(stride)
+    lags = _lags(m1, m2, (-(count1 - 1), count2 - 1))
+    weights = _pairs_at(lags, count1, count2) * _widths(lags)
     smooth = np.concatenate([np.zeros((1, lags.size)), _cross(lags, m1, m2)])
     form = np.einsum("cl,dl,l->cd", smooth, smooth, weights)
     line = smooth @ weights
@@ -102,6 +90,25 @@ def _pair(n: int, m1: int, m2: int) -> tuple[Array, Array]:
     scale = 1.0 / (float(m1) ** 2 * float(m2) ** 2 * count1 * count2)
     # Cov[z1^2, z2^2] = 2 R^2 + 4 mu1 mu2 R with mu = R_ramp m^2; each variance carries 1 / (2 m^2)
     return 0.5 * scale * form, scale * float(m1) ** 2 * float(m2) ** 2 * line
+
+
+def _lags(m1: int, m2: int, ends: tuple[int, int]) -> Array:
+    """Whole lags (l,) at which the covariance of z1 and z2 is taken: dense where it has kinks, sparse in between.
+
+    The three points of z2 make kinks as wide as z1; away from them the covariance is smooth on the scale of the distance.
+    """
+    near = np.arange(0.0, 4.0 * m1, max(1.0, m1 / _POINTS_PER_SPACING))
+    reach = _REACH * (m1 + m2)
+    far = np.geomspace(4.0 * m1, 4.0 * m1 + reach, 2 + int(np.log(1.0 + reach / (4.0 * m1)) / np.log(_GROWTH)))
+    offsets = np.concatenate([-far, -near, near, far])
+    lags = np.rint(np.concatenate([m1 - j * m2 + offsets for j in range(3)]))
+    return np.unique(np.clip(lags, *ends))
+
+
+def _widths(lags: Array) -> Array:
+    """Number of whole lags (l,) that each of `lags` stands for: half the gap on each side."""
+    gaps = np.diff(lags)
+    return 0.5 * (np.concatenate([[1.0], gaps]) + np.concatenate([gaps, [1.0]]))
 
 
 def _cross(lags: Array, m1: int, m2: int) -> Array:

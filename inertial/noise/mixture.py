@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import solve_triangular
 from scipy.optimize import nnls
+from scipy.special import digamma, polygamma
 
 from inertial.noise.covariance import Sums, sums
 
@@ -13,6 +14,8 @@ Array = NDArray[np.float64]
 
 TERMS = ("Q", "N", "B", "K", "R")
 _ROUNDS = 4
+_STEPS = 12
+_SETTLED = 1e-6
 _FEWEST_DOF = 1.0
 
 
@@ -43,6 +46,8 @@ def degrees_of_freedom(variance: Array, m: NDArray[np.int64], n: int) -> Array:
 
 
 def _one_edf(variance: Array, moments: Sums) -> Array:
+    if not np.all(variance > 0.0):  # a dead channel: nothing differs and nothing is estimated
+        return np.ones_like(variance)
     model = basis(moments.m)
     strengths = first_guess(variance, moments)
     expected = model @ strengths
@@ -70,47 +75,74 @@ def first_guess(variance: Array, moments: Sums) -> Array:
 
 @dataclass(frozen=True)
 class Problem:
-    """Generalised least squares on the variances of one curve, their covariance taken under some mixture.
+    """Generalised least squares on the log-variance of one channel, the covariance taken at given strengths."""
 
-    The residuals are ratios to that mixture, not logarithms: at few degrees of freedom neighbouring estimates agree far
-    better than a logarithm's curvature allows (chi-square 80 of the truth itself, for 15 points of a random walk), while
-    the ratios have exactly this covariance. The mixture, not the data, sets the weights, so low points gain none.
-    """
-
-    rows: Array
-    """(t, 5) whitened variances of unit strengths."""
-    wanted: Array
-    """(t,) whitened measured variances."""
+    model: Array
+    """(t, 5)"""
+    target: Array
+    """(t,) log-variance less the mean of the logarithm of chi-square."""
+    root: Array
+    """(t, t) lower Cholesky factor of the covariance of the log-variances."""
 
     def cost(self, strengths: Array) -> float:
         """Chi-square of the curve."""
-        residual = self.wanted - self.rows @ strengths
+        expected = self.model @ strengths
+        if not np.all(expected > 0.0):
+            return np.inf
+        residual = solve_triangular(self.root, self.target - np.log(expected), lower=True)
         return float(residual @ residual)
 
-    def solve(self, free: NDArray[np.bool_], held: Array) -> tuple[Array, float]:
-        """Best strengths and their chi-square: those not `free` stay as `held`, none falls below zero."""
-        strengths = held.copy()
-        if free.any():
-            size = np.linalg.norm(self.rows[:, free], axis=0)
-            rest = self.wanted - self.rows[:, ~free] @ held[~free]
-            strengths[free] = nnls(self.rows[:, free] / size, rest)[0] / size
-        return strengths, self.cost(strengths)
+    def solve(self, free: NDArray[np.bool_], start: Array) -> tuple[Array, float]:
+        """Best strengths and their chi-square: those not `free` stay at `start`, none falls below zero."""
+        strengths = start.copy()
+        cost = self.cost(strengths)
+        for _ in range(_STEPS if free.any() else 0):
+            trial = self._gauss_newton(free, strengths)
+            better = self.cost(trial)
+            halvings = 0
+            while not better <= cost and halvings < _STEPS:
+                trial = 0.5 * (trial + strengths)
+                better, halvings = self.cost(trial), halvings + 1
+            if not better <= cost:
+                break
+            settled = cost - better < _SETTLED
+            strengths, cost = trial, better
+            if settled:
+                break
+        return strengths, cost
+
+    def _gauss_newton(self, free: NDArray[np.bool_], strengths: Array) -> Array:
+        expected = self.model @ strengths
+        expected = np.where(expected > 0.0, expected, np.exp(self.target))
+        rows = solve_triangular(self.root, self.model / expected[:, None], lower=True)
+        wanted = solve_triangular(self.root, self.target - np.log(expected) + 1.0, lower=True)
+        wanted = wanted - rows[:, ~free] @ strengths[~free]
+        size = np.linalg.norm(rows[:, free], axis=0)
+        trial = strengths.copy()
+        trial[free] = nnls(rows[:, free] / size, wanted)[0] / size
+        return trial
 
 
 def problem(variance: Array, moments: Sums, strengths: Array) -> Problem:
-    """The least-squares problem of one curve (t,), its covariance taken under `strengths` (5,)."""
-    model = basis(moments.m)
-    expected = model @ strengths
+    """The least-squares problem of one curve (t,), its covariance taken under `strengths` (5,).
+
+    The logarithm of chi-square with nu degrees of freedom has mean digamma(nu/2) - ln(nu/2) and variance trigamma(nu/2);
+    the correlations are those of the variances.
+    """
+    expected = basis(moments.m) @ strengths
     covariance = moments.covariance(strengths[:4], strengths[4]) / np.outer(expected, expected)
-    root = _root(covariance)
+    half = 1.0 / np.diagonal(covariance)  # nu / 2
+    spread = np.sqrt(polygamma(1, half))
+    correlation = covariance * np.sqrt(np.outer(half, half))
     return Problem(
-        rows=solve_triangular(root, model / expected[:, None], lower=True),
-        wanted=solve_triangular(root, variance / expected, lower=True),
+        model=basis(moments.m),
+        target=np.log(variance) - (digamma(half) - np.log(half)),
+        root=_root(correlation * np.outer(spread, spread)),
     )
 
 
 def _root(covariance: Array) -> Array:
-    """Cholesky factor; the covariances set to zero far off the diagonal may cost it its definiteness by a hair."""
+    """Cholesky factor; rounding may cost a nearly singular one its definiteness by a hair."""
     values, vectors = np.linalg.eigh(covariance)
     floor = 1e-6 * float(values[-1])
     if values[0] > floor:

@@ -12,7 +12,7 @@ from scipy.stats import chi2
 from inertial.noise import mixture
 from inertial.noise.allan import AllanCurve
 from inertial.noise.covariance import Sums, sums
-from inertial.noise.mixture import Problem, problem
+from inertial.noise.mixture import Problem
 
 Array = NDArray[np.float64]
 
@@ -42,7 +42,7 @@ _NEGLIGIBLE = 1e-6
 """Share of the curve, as a variance, below which a term makes no difference."""
 _WIDEST = 40.0
 _RESOLUTION = 2e-3
-_ROUNDS = 4
+_ROUNDS = 3
 
 
 @dataclass(frozen=True)
@@ -122,7 +122,7 @@ class Terms:
 
 
 def fit_terms(curve: AllanCurve, *, confidence: float = 0.95) -> Terms:
-    """Coefficients of each channel of `curve` by generalised least squares on the variances.
+    """Coefficients of each channel of `curve` by generalised least squares on the log-variance.
 
     The covariance of the estimates at all averaging times is that of the fitted mixture itself. A term that the curve
     does not need (its removal costs less than chi-square 6.6) is not identified and gets a limit. Intervals are profiles
@@ -179,74 +179,66 @@ def _per_sample(rate_hz: float) -> Array:
     return np.array([1.0 / rate_hz**2, 1.0 / rate_hz, 1.0, rate_hz, rate_hz**2])
 
 
-@dataclass(frozen=True)
-class _Curve:
-    """One channel's variances with the moments of its estimates."""
-
-    variance: Array
-    moments: Sums
-
-    def best(self, free: NDArray[np.bool_], held: Array) -> tuple[Problem, Array]:
-        """Strengths that agree with their own covariance (those not `free` are `held`), and the problem they solve."""
-        strengths = held
-        task = problem(self.variance, self.moments, strengths)
-        for _ in range(_ROUNDS):
-            fitted, _ = task.solve(free, strengths)
-            strengths = np.where(free, 0.5 * (fitted + strengths), held)
-            task = problem(self.variance, self.moments, strengths)
-        return task, task.solve(free, strengths)[0]
-
-    def excess(self, free: NDArray[np.bool_], held: Array) -> float:
-        """Chi-square that holding the terms not `free` costs, with the covariance that they imply (a score test)."""
-        task, strengths = self.best(free, held)
-        return task.cost(strengths) - task.solve(np.ones_like(free), strengths)[1]
-
-
 def _one(variance: Array, moments: Sums, threshold: float) -> tuple[Array, Array, Array, float, float]:
     """Strengths (NaN where not needed), their ends, chi-square and degrees of freedom of one curve."""
-    curve = _Curve(variance, moments)
-    count = len(mixture.TERMS)
-    _, strengths = curve.best(np.ones(count, dtype=np.bool_), mixture.first_guess(variance, moments))
-    kept, reduced, cost = _needed(curve, strengths)
-    low, high = np.zeros(count), np.zeros(count)
-    for j in range(count):
+    everything = np.ones(len(mixture.TERMS), dtype=np.bool_)
+    task, strengths, best = _settled(variance, moments, everything, mixture.first_guess(variance, moments))
+    kept, reduced, cost = _needed(task, strengths, best)
+    low, high = np.zeros(kept.size), np.zeros(kept.size)
+    for j in range(kept.size):
         if kept[j]:
-            low[j], high[j] = _profile(curve, strengths, j, threshold)
+            low[j], high[j] = _profile(task, strengths, best, j, threshold)
         else:
-            high[j] = _profile(curve, strengths, j, _ONE_SIDED_95)[1]
+            high[j] = _profile(task, strengths, best, j, _ONE_SIDED_95)[1]
     value = np.where(kept, reduced, np.nan)
     low = np.fmin(low, np.where(kept, reduced, 0.0))
-    return value, low, np.fmax(high, np.nan_to_num(value)), cost, float(variance.size - int(kept.sum()))
+    return (
+        value,
+        low,
+        np.fmax(high, np.nan_to_num(value)),
+        cost,
+        float(variance.size - int(kept.sum())),
+    )
 
 
-def _needed(curve: _Curve, strengths: Array) -> tuple[NDArray[np.bool_], Array, float]:
+def _settled(variance: Array, moments: Sums, free: NDArray[np.bool_], start: Array) -> tuple[Problem, Array, float]:
+    """The problem whose covariance is that of its own solution, the solution and its chi-square."""
+    strengths = start
+    for _ in range(_ROUNDS):
+        strengths, _ = mixture.problem(variance, moments, strengths).solve(free, strengths)
+    task = mixture.problem(variance, moments, strengths)
+    return task, *task.solve(free, strengths)
+
+
+def _needed(task: Problem, strengths: Array, best: float) -> tuple[NDArray[np.bool_], Array, float]:
     """Terms that stay after dropping, one by one, the one whose loss costs least, while that is little."""
     kept = strengths > 0.0
-    task, current = curve.best(kept, np.where(kept, strengths, 0.0))
+    current, cost = np.where(kept, strengths, 0.0), best
     while kept.sum() > 1:
-        trials: list[tuple[float, int]] = []
+        trials: list[tuple[float, int, Array]] = []
         for j in np.flatnonzero(kept).tolist():
             fewer = kept.copy()
             fewer[j] = False
-            trials.append((task.solve(fewer, np.where(fewer, current, 0.0))[1], j))
-        worse, j = min(trials)
-        if worse - task.cost(current) > _KEPT_AT:
+            start = np.where(fewer, np.maximum(current, 1e-9 * current.max()), 0.0)
+            fitted, worse = task.solve(fewer, start)
+            trials.append((worse, j, fitted))
+        worse, j, fitted = min(trials, key=lambda trial: trial[0])
+        if worse - cost > _KEPT_AT:
             break
-        kept[j] = False
-        task, current = curve.best(kept, np.where(kept, np.maximum(current, 1e-9 * current.max()), 0.0))
-    return kept, current, task.cost(current)
+        kept[j], current, cost = False, fitted, worse
+    return kept, current, cost
 
 
-def _profile(curve: _Curve, strengths: Array, j: int, threshold: float) -> tuple[float, float]:
+def _profile(task: Problem, strengths: Array, best: float, j: int, threshold: float) -> tuple[float, float]:
     """Strengths of term j, below and above, at which chi-square has risen by `threshold`, all others free."""
     free = np.ones(strengths.size, dtype=np.bool_)
     free[j] = False
-    whole_curve = float(np.min(curve.variance / mixture.basis(curve.moments.m)[:, j]))
+    whole_curve = float(np.exp(np.min(task.target - np.log(task.model[:, j]))))
 
     def excess(log_strength: float) -> float:
-        held = strengths.copy()
-        held[j] = np.exp(log_strength)
-        return curve.excess(free, held) - threshold
+        start = strengths.copy()
+        start[j] = np.exp(log_strength)
+        return min(task.solve(free, start)[1] - best - threshold, 1e6)
 
     centre = float(np.log(max(strengths[j], _NEGLIGIBLE * whole_curve)))
     inside, outside = centre, centre + 0.5

@@ -24,9 +24,7 @@ def test_nine_points() -> None:
 
 def test_thousand_points() -> None:
     curve = overlapping(thousand(), 1.0, [1, 10, 100])
-    assert curve.deviation == pytest.approx(
-        [2.922319e-01, 9.159953e-02, 3.241343e-02], abs=1e-7
-    )
+    assert curve.deviation == pytest.approx([2.922319e-01, 9.159953e-02, 3.241343e-02], abs=1e-7)
 
 
 def test_thousand_points_are_the_published_ones() -> None:

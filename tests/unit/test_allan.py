@@ -15,17 +15,11 @@ from inertial.noise.mixture import basis
 @pytest.mark.parametrize("offset", [0.0, 3.0e6])
 def test_equals_allantools_to_a_billionth(rate_hz: float, offset: float) -> None:
     rng = np.random.default_rng(11)
-    x = (
-        rng.normal(size=(3, 5000))
-        + np.cumsum(rng.normal(size=(3, 5000)), axis=-1) * 0.01
-        + offset
-    )
+    x = rng.normal(size=(3, 5000)) + np.cumsum(rng.normal(size=(3, 5000)), axis=-1) * 0.01 + offset
     curve = overlapping(x, rate_hz, np.array([1, 2, 3, 7, 50, 400, 1500]))
     for channel in range(3):
         centred = x[channel] - x[channel].mean()
-        _, peer, _, _ = allantools.oadev(
-            centred, rate=rate_hz, data_type="freq", taus=curve.tau
-        )
+        _, peer, _, _ = allantools.oadev(centred, rate=rate_hz, data_type="freq", taus=curve.tau)
         np.testing.assert_allclose(curve.deviation[channel], peer, rtol=1e-9)
 
 
@@ -41,22 +35,16 @@ def test_many_channels_equal_one_at_a_time() -> None:
     ("term", "alpha", "tolerance"),
     [(0, 2, 1e-6), (1, 0, 0.03), (2, -1, 0.08), (3, -2, 0.01)],
 )
-def test_degrees_of_freedom_agree_with_greenhall(
-    term: int, alpha: int, tolerance: float
-) -> None:
+def test_degrees_of_freedom_agree_with_greenhall(term: int, alpha: int, tolerance: float) -> None:
     n, spacings = 20_000, (64, 256, 1024, 4096)
     moments, v = sums(n, spacings), basis(np.array(spacings))[:, term]
     for i, m in enumerate(spacings):
         mine = 2.0 * v[i] ** 2 / moments.quadratic[i, i, term, term]
-        peer = allantools.edf_greenhall(
-            alpha, 2, m, n + 1, overlapping=True, modified=False
-        )
+        peer = allantools.edf_greenhall(alpha, 2, m, n + 1, overlapping=True, modified=False)
         assert mine == pytest.approx(peer, rel=tolerance)
 
 
-def test_degrees_of_freedom_of_white_noise_at_one_sample_are_two_thirds_of_the_differences() -> (
-    None
-):
+def test_degrees_of_freedom_of_white_noise_at_one_sample_are_two_thirds_of_the_differences() -> None:
     n = 4000
     moments = sums(n, (1,))
     # differences of white noise correlate by -1/2 with their neighbours only: edf = M / (1 + 2/4)
@@ -78,15 +66,11 @@ def test_intervals_cover_the_truth_as_often_as_they_say(kind: str) -> None:
     assert np.all(np.abs(covered - 0.6827) < 0.1), covered
 
 
-def test_the_number_of_averages_as_degrees_of_freedom_would_claim_far_too_much() -> (
-    None
-):
+def test_the_number_of_averages_as_degrees_of_freedom_would_claim_far_too_much() -> None:
     x = np.random.default_rng(8).normal(size=(300, 4096))
     curve = overlapping(x, 1.0, np.array([512]))
     naive = 4096 + 1 - 2 * 512
-    ends = curve.deviation[:, 0, None] * np.sqrt(
-        naive / chi2.ppf([0.84135, 0.15865], naive)
-    )
+    ends = curve.deviation[:, 0, None] * np.sqrt(naive / chi2.ppf([0.84135, 0.15865], naive))
     assert np.mean((ends[:, 0] <= 512**-0.5) & (ends[:, 1] >= 512**-0.5)) < 0.2
 
 
@@ -111,8 +95,6 @@ def test_default_averaging_times_go_to_a_third_of_the_record() -> None:
         (np.zeros(30), 1.0, [1, 20], "1 to 14 are possible"),
     ],
 )
-def test_refuses_records_that_say_nothing(
-    x: np.ndarray, rate: float, m: list[int] | None, words: str
-) -> None:
+def test_refuses_records_that_say_nothing(x: np.ndarray, rate: float, m: list[int] | None, words: str) -> None:
     with pytest.raises(ValueError, match=words):
         overlapping(x, rate, m)
