@@ -39,9 +39,7 @@ def load_recipe(name: str = MAIN_JOB) -> Recipe:
     verification = _resolve(file.verification, "v", "verification", source)
     _refuse_flat_plan(fit_poses)
     _refuse_coincidence(fit_poses, verification, source)
-    shared = file.model_dump(
-        exclude={"poses", "verification", "static_pose", "model", "effects"}
-    )
+    shared = file.model_dump(exclude={"poses", "verification", "static_pose", "model", "effects"})
     outer, inner = file.static_pose
     return Recipe(
         **shared,
@@ -65,9 +63,7 @@ def load_limits(recipe: Recipe, folder: Path | None = None) -> Limits:
     return parse_limits(built_in.read_text(encoding="utf-8"), f"limits {recipe.limits}")
 
 
-def lot_of(
-    recipe: Recipe, serials: Sequence[str], *, seed: int | None = None, repeat: int = 0
-) -> Lot:
+def lot_of(recipe: Recipe, serials: Sequence[str], *, seed: int | None = None, repeat: int = 0) -> Lot:
     """The lot to measure: the serials given, or else the recipe's, one slot after the other."""
     named = list(serials) or recipe.units
     if not named:
@@ -77,11 +73,7 @@ def lot_of(
     if twice:
         message = f"lot: serial {', '.join(twice)} is there twice, each may be there once; correct the list of units"
         raise WrongUse(message)
-    bad = [
-        serial
-        for serial in named
-        if not serial or not set(serial) <= _SERIAL or not serial[0].isalnum()
-    ]
+    bad = [serial for serial in named if not serial or not set(serial) <= _SERIAL or not serial[0].isalnum()]
     if bad:
         message = f"lot: serial '{bad[0]}' is not usable, letters, digits and . _ + - are needed; correct it"
         raise WrongUse(message)
@@ -94,21 +86,14 @@ def lot_of(
     )
 
 
-_SERIAL = frozenset(
-    "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789._+-"
-)
+_SERIAL = frozenset("ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789._+-")
 
 
 def sample_names(prefix: str = "") -> list[str]:
     """Names of the built-in recipes (no prefix) or limits (prefix ``limits-``)."""
-    stems = [
-        item.name.removesuffix(".toml")
-        for item in (files("schemas") / "samples").iterdir()
-    ]
+    stems = [item.name.removesuffix(".toml") for item in (files("schemas") / "samples").iterdir()]
     if prefix:
-        return sorted(
-            stem.removeprefix(prefix) for stem in stems if stem.startswith(prefix)
-        )
+        return sorted(stem.removeprefix(prefix) for stem in stems if stem.startswith(prefix))
     return sorted(stem for stem in stems if not stem.startswith("limits-"))
 
 
@@ -139,9 +124,7 @@ def _model(file: RecipeFile, folder: Path, source: str) -> tuple[list[str], str,
     return names, model_name, version
 
 
-def _resolve(
-    given: str | Sequence[Sequence[float]], letter: str, key: str, source: str
-) -> list[Pose]:
+def _resolve(given: str | Sequence[Sequence[float]], letter: str, key: str, source: str) -> list[Pose]:
     if isinstance(given, str):
         if given not in poses.NAMED:
             known = list(poses.NAMED)
@@ -174,9 +157,7 @@ def _refuse_flat_plan(chosen: Sequence[Pose]) -> None:
         raise RecipeInvalid(message, key="poses")
 
 
-def _refuse_coincidence(
-    fit: Sequence[Pose], verification: Sequence[Pose], source: str
-) -> None:
+def _refuse_coincidence(fit: Sequence[Pose], verification: Sequence[Pose], source: str) -> None:
     """Refuse verification in a direction that the fit has seen: it would verify nothing."""
     if not verification:
         return

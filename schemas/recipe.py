@@ -32,9 +32,7 @@ FEWEST_SAMPLES = 100  # per pose
 Positive = Annotated[FiniteFloat, Field(gt=0.0)]
 NotNegative = Annotated[FiniteFloat, Field(ge=0.0)]
 Angles = Annotated[list[FiniteFloat], Field(min_length=2, max_length=2)]
-Gravity = Annotated[
-    FiniteFloat, Field(gt=9.7, lt=9.9)
-]  # every place on earth lies between 9.76 and 9.84 m/s²
+Gravity = Annotated[FiniteFloat, Field(gt=9.7, lt=9.9)]  # every place on earth lies between 9.76 and 9.84 m/s²
 
 
 class Strict(BaseModel):
@@ -87,7 +85,10 @@ class Lot(Strict):
 
 
 class _Measurement(Strict):
-    """The keys that a recipe file and a resolved recipe share."""
+    """The keys that a recipe file and a resolved recipe share.
+
+    ``zero_output`` is the nominal output at 0 g, in the output's unit; the zero-g offset is counted from it.
+    """
 
     name: Annotated[str, Field(min_length=1, pattern=r"^[a-z0-9][a-z0-9._-]*$")]
     description: str = ""
@@ -101,6 +102,7 @@ class _Measurement(Strict):
     rate_hz: Positive = 100.0
     static_record_s: NotNegative = 0.0
     static_temperature_C: FiniteFloat = 25.0
+    zero_output: FiniteFloat = 0.0
     effects: list[str] = []
     limits: str = "consumer"
     units: list[str] = []
@@ -159,9 +161,7 @@ class Recipe(_Measurement):
     def wanted_records(self) -> int:
         """The number of records that capture makes: every pose at every temperature, and the static one."""
         per_soak = len(self.poses) + len(self.verification)
-        return per_soak * len(self.temperatures_C) + (
-            1 if self.static_record_s > 0.0 else 0
-        )
+        return per_soak * len(self.temperatures_C) + (1 if self.static_record_s > 0.0 else 0)
 
 
 def parse_recipe(text: str, source: str) -> RecipeFile:
@@ -191,16 +191,12 @@ def parse_toml(text: str, source: str) -> dict[str, Any]:
         raise RecipeInvalid(message) from None
 
 
-def explain(
-    problem: ValidationError, source: str, model: type[BaseModel]
-) -> RecipeInvalid:
+def explain(problem: ValidationError, source: str, model: type[BaseModel]) -> RecipeInvalid:
     """The first problem of a file as one message: key, value, what is needed, close matches.
 
     An unknown key is told first: it is mostly the cause of the missing one.
     """
-    details = sorted(
-        problem.errors(include_url=False), key=lambda d: d["type"] != "extra_forbidden"
-    )
+    details = sorted(problem.errors(include_url=False), key=lambda d: d["type"] != "extra_forbidden")
     first = details[0]
     key = ".".join(str(part) for part in first["loc"] if not _is_branch(part))
     if first["type"] == "extra_forbidden":
@@ -242,8 +238,4 @@ def _fields_at(model: type[BaseModel], location: tuple[int | str, ...]) -> list[
 def _models_in(annotation: object) -> list[type[BaseModel]]:
     if isinstance(annotation, type) and issubclass(annotation, BaseModel):
         return [annotation]
-    return [
-        found
-        for inner in getattr(annotation, "__args__", ())
-        for found in _models_in(inner)
-    ]
+    return [found for inner in getattr(annotation, "__args__", ()) for found in _models_in(inner)]

@@ -23,7 +23,19 @@ class Records:
 
     def __init__(self, path: Path) -> None:
         self.path = path
-        files.sweep(path)
+
+    def begin(self) -> None:
+        """Clear away what a killed writer left; only the one process that captures may call this."""
+        files.sweep(self.path)
+        files.sweep(self.path / "state")
+
+    def is_complete(self) -> bool:
+        """Whether capture came to its end."""
+        return (self.path / "complete.json").is_file()
+
+    def complete(self) -> None:
+        """Note that capture came to its end."""
+        files.publish(self.path / "complete.json", files.json_bytes({"records": len(self.finished())}))
 
     def finished(self) -> set[int]:
         """Numbers of the records that are stored whole."""

@@ -54,20 +54,11 @@ def reduce(
     local_gravity_m_s2 : at the station; the force is stated in standard g.
     """
     accepted = set(verdicts.loc[~verdicts["refused"], "unit"])
-    kept = [
-        _means(record[record["unit"].isin(accepted) & (record["kind"] != "allan")])
-        for record in samples
-    ]
-    means = pd.concat(
-        [frame for frame in kept if len(frame)] or kept[:1], ignore_index=True
-    )
+    kept = [_means(record[record["unit"].isin(accepted) & (record["kind"] != "allan")]) for record in samples]
+    means = pd.concat([frame for frame in kept if len(frame)] or kept[:1], ignore_index=True)
     static = readings[readings["unit"].isin(accepted) & (readings["kind"] != "allan")]
-    columns = static[[*KEPT, "start_s"]].assign(
-        time_s=static["start_s"] + 0.5 * static["duration_s"]
-    )
-    dwells = columns.drop(columns="start_s").merge(
-        means, on=["unit", "record"], validate="one_to_one"
-    )
+    columns = static[[*KEPT, "start_s"]].assign(time_s=static["start_s"] + 0.5 * static["duration_s"])
+    dwells = columns.drop(columns="start_s").merge(means, on=["unit", "record"], validate="one_to_one")
     dwells = dwells.assign(
         dwell=dwells["record"],
         **_forces(dwells, local_gravity_m_s2 / STANDARD_GRAVITY_M_S2),

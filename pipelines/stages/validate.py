@@ -20,14 +20,10 @@ if TYPE_CHECKING:
 
     from schemas.recipe import Unit
 
-FEWEST_TO_JUDGE = (
-    10  # samples: fewer equal values in a row happen by chance where the step is coarse
-)
+FEWEST_TO_JUDGE = 10  # samples: fewer equal values in a row happen by chance where the step is coarse
 CHAMBER_MOVED_K = 5.0
 FOLLOWED_SHARE = 0.2  # a sensor that shows less than a fifth of the chamber's change does not read its temperature
-FORCE_EXPLAINS = (
-    0.5  # of an axis' variance over the poses; a live channel has more than 0.99
-)
+FORCE_EXPLAINS = 0.5  # of an axis' variance over the poses; a live channel has more than 0.99
 SAMPLES_KEPT = 0.99
 AXES = ("x", "y", "z")
 
@@ -40,9 +36,7 @@ class Fault(NamedTuple):
     reason: str
 
 
-def validate(
-    samples: Iterable[pd.DataFrame], readings: pd.DataFrame, units: Sequence[Unit]
-) -> pd.DataFrame:
+def validate(samples: Iterable[pd.DataFrame], readings: pd.DataFrame, units: Sequence[Unit]) -> pd.DataFrame:
     """Verdicts: one row per unit of the lot with ``refused``, the fault found first, and all reasons.
 
     Parameters
@@ -55,11 +49,7 @@ def validate(
     means: list[pd.DataFrame] = []
     for record in samples:
         faults += _sample_faults(record, readings)
-        means.append(
-            record.groupby(["unit", "record"], sort=False)[list(AXES)]
-            .mean()
-            .reset_index()
-        )
+        means.append(record.groupby(["unit", "record"], sort=False)[list(AXES)].mean().reset_index())
     answered = readings[readings["status"] == "ok"]
     faults += _stale_temperatures(answered)
     if means:
@@ -72,9 +62,7 @@ def _verdicts(faults: list[Fault], units: Sequence[Unit]) -> pd.DataFrame:
     for unit in units:
         own = [fault for fault in faults if fault.unit == unit.serial]
         reasons = list(dict.fromkeys(fault.reason for fault in own))
-        shown = reasons[:3] + (
-            [f"and {len(reasons) - 3} more"] if len(reasons) > 3 else []
-        )
+        shown = reasons[:3] + ([f"and {len(reasons) - 3} more"] if len(reasons) > 3 else [])
         rows.append(
             {
                 "unit": unit.serial,
@@ -104,20 +92,17 @@ def _reading_faults(readings: pd.DataFrame) -> list[Fault]:
     for row in readings[readings["status"] != "ok"].itertuples():
         reason = f"stopped answering at record {row.record} (pose {row.pose}): {row.status}; check the slot's contacts"
         faults.append(Fault(str(row.unit), "stopped_answering", reason))
-    for row in readings[
-        readings["overflow"] & (readings["status"] == "ok")
-    ].itertuples():
-        reason = f"buffer overflow in record {row.record} (pose {row.pose}): samples are lost; read faster or lower the rate"
+    for row in readings[readings["overflow"] & (readings["status"] == "ok")].itertuples():
+        reason = (
+            f"buffer overflow in record {row.record} (pose {row.pose}): samples are lost; read faster or lower the rate"
+        )
         faults.append(Fault(str(row.unit), "overflow", reason))
     return faults
 
 
 def _sample_faults(samples: pd.DataFrame, readings: pd.DataFrame) -> list[Fault]:
     faults: list[Fault] = []
-    here = readings[
-        readings["record"].isin(samples["record"].unique())
-        & (readings["status"] == "ok")
-    ]
+    here = readings[readings["record"].isin(samples["record"].unique()) & (readings["status"] == "ok")]
     groups = samples.groupby(["unit", "record"], sort=False).indices
     for row in here.itertuples():
         place = f"in record {row.record} (pose {row.pose})"
@@ -125,15 +110,11 @@ def _sample_faults(samples: pd.DataFrame, readings: pd.DataFrame) -> list[Fault]
         values = samples.iloc[index][list(AXES)].to_numpy(dtype=float)
         found = _fault_of(values, float(row.full_scale), int(row.n), str(row.out_unit))  # pyright: ignore[reportArgumentType]
         if found:
-            faults.append(
-                Fault(str(row.unit), found[0], f"{found[1]} {place}; {found[2]}")
-            )
+            faults.append(Fault(str(row.unit), found[0], f"{found[1]} {place}; {found[2]}"))
     return faults
 
 
-def _fault_of(
-    values: NDArray[np.float64], full_scale: float, n: int, unit: str
-) -> tuple[str, str, str] | None:
+def _fault_of(values: NDArray[np.float64], full_scale: float, n: int, unit: str) -> tuple[str, str, str] | None:
     """Fault, finding and remedy of one unit's samples (n, 3) in one record; None where there is none."""
     if len(values) < SAMPLES_KEPT * n or len(values) == 0:
         return "dropped_samples", f"{len(values)} samples of {n}", "measure again"
@@ -155,16 +136,9 @@ def _fault_of(
 
 
 def _stale_temperatures(readings: pd.DataFrame) -> list[Fault]:
-    soaks = (
-        readings.groupby(["unit", "soak"])[["chamber_C", "unit_C"]]
-        .mean()
-        .groupby("unit")
-    )
+    soaks = readings.groupby(["unit", "soak"])[["chamber_C", "unit_C"]].mean().groupby("unit")
     spans = soaks.max() - soaks.min()
-    stale = spans[
-        (spans["chamber_C"] > CHAMBER_MOVED_K)
-        & (spans["unit_C"] < FOLLOWED_SHARE * spans["chamber_C"])
-    ]
+    stale = spans[(spans["chamber_C"] > CHAMBER_MOVED_K) & (spans["unit_C"] < FOLLOWED_SHARE * spans["chamber_C"])]
     return [
         Fault(
             str(unit),
@@ -172,18 +146,14 @@ def _stale_temperatures(readings: pd.DataFrame) -> list[Fault]:
             f"the unit's temperature moved {own:.2f} K while the chamber moved {chamber:.1f} K, at least "
             f"{FOLLOWED_SHARE * chamber:.1f} K is needed; check the temperature sensor",
         )
-        for unit, chamber, own in zip(
-            stale.index, stale["chamber_C"], stale["unit_C"], strict=True
-        )
+        for unit, chamber, own in zip(stale.index, stale["chamber_C"], stale["unit_C"], strict=True)
     ]
 
 
 def _dead_channels(means: pd.DataFrame, readings: pd.DataFrame) -> list[Fault]:
     """Axes whose mean output over the poses is not a linear function of the specific force."""
     columns = ["unit", "record", "kind", "outer_deg", "inner_deg", "soak"]
-    joined = means.merge(
-        readings.loc[readings["kind"] != "allan", columns], on=["unit", "record"]
-    )
+    joined = means.merge(readings.loc[readings["kind"] != "allan", columns], on=["unit", "record"])
     faults = []
     for unit, rows in joined.groupby("unit"):
         if len(rows) < FEWEST_TO_JUDGE // 2:
@@ -206,9 +176,7 @@ def _explained_by_force(rows: pd.DataFrame) -> NDArray[np.float64]:
         np.radians(rows["outer_deg"].to_numpy()),
         np.radians(rows["inner_deg"].to_numpy()),
     )
-    soaks = (
-        rows["soak"].to_numpy()[:, None] == np.unique(rows["soak"].to_numpy())
-    ).astype(float)
+    soaks = (rows["soak"].to_numpy()[:, None] == np.unique(rows["soak"].to_numpy())).astype(float)
     output = np.nan_to_num(rows[list(AXES)].to_numpy(dtype=float))
     inside = output - soaks @ np.linalg.lstsq(soaks, output, rcond=None)[0]
     design = np.column_stack([force, soaks])

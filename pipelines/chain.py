@@ -1,0 +1,145 @@
+"""The stages of the chain, in order: what each reads, what it writes, its parameters and its code."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from pipelines.stages.fit import fit
+from pipelines.stages.grade import Evidence, grade
+from pipelines.stages.noise import noise
+from pipelines.stages.reduce import reduce
+from pipelines.stages.validate import validate
+from pipelines.stages.verify import verify
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    import pandas as pd
+
+    from pipelines.archive import Records, Run
+    from pipelines.job import Job
+
+Tables = dict[str, "pd.DataFrame"]
+RECORDS = "records"
+
+
+@dataclass(frozen=True)
+class Stage:
+    """One stage of the chain.
+
+    inputs : tables it reads; ``records`` are the captured samples
+    parameters : what it is called with besides tables, JSON-able: part of its key
+    modules : import names whose source is part of its key
+    """
+
+    name: str
+    inputs: tuple[str, ...]
+    outputs: tuple[str, ...]
+    parameters: Callable[[Job], dict[str, Any]]
+    call: Callable[[Job, Run], Tables]
+    modules: tuple[str, ...]
+
+
+def _records(run: Run) -> Records:
+    records = run.records
+    if records is None:
+        message = f"run {run.id} has no captured records"
+        raise LookupError(message)
+    return records
+
+
+def _validate(job: Job, run: Run) -> Tables:
+    return {"verdicts": validate(_records(run).samples(), run.table("readings"), job.lot.units)}
+
+
+def _reduce(job: Job, run: Run) -> Tables:
+    tables = run.table("readings"), run.table("verdicts")
+    return {"dwells": reduce(_records(run).samples(), *tables, job.recipe.local_gravity_m_s2)}
+
+
+def _fit(job: Job, run: Run) -> Tables:
+    return fit(run.table("dwells"), job.recipe.effects)
+
+
+def _verify(job: Job, run: Run) -> Tables:
+    del job
+    tables = (run.table(name) for name in ("dwells", "coefficients", "covariance", "residuals"))
+    return {"verification": verify(*tables)}
+
+
+def _noise(job: Job, run: Run) -> Tables:
+    del job
+    tables = (run.table(name) for name in ("readings", "coefficients", "covariance"))
+    return noise(_records(run).samples(), *tables)
+
+
+_EVIDENCE = ("verdicts", "coefficients", "covariance", "residuals", "verification", "noise")
+
+
+def _grade(job: Job, run: Run) -> Tables:
+    return grade(Evidence(*(run.table(name) for name in _EVIDENCE)), job.limits, job.recipe.zero_output)
+
+
+def _none(job: Job) -> dict[str, Any]:
+    del job
+    return {}
+
+
+_SHARED = ("inertial", "pipelines.stages.arrays", "pipelines.stages.calibration", "schemas.tables")
+
+STAGES: tuple[Stage, ...] = (
+    Stage(
+        name="validate",
+        inputs=(RECORDS, "readings"),
+        outputs=("verdicts",),
+        parameters=lambda job: {"lot": job.lot.model_dump(mode="json")},
+        call=_validate,
+        modules=("inertial", "schemas.tables", "pipelines.stages.validate"),
+    ),
+    Stage(
+        name="reduce",
+        inputs=(RECORDS, "readings", "verdicts"),
+        outputs=("dwells",),
+        parameters=lambda job: {"local_gravity_m_s2": job.recipe.local_gravity_m_s2},
+        call=_reduce,
+        modules=("inertial", "schemas.tables", "pipelines.stages.reduce"),
+    ),
+    Stage(
+        name="fit",
+        inputs=("dwells",),
+        outputs=("coefficients", "covariance", "residuals"),
+        parameters=lambda job: {"effects": job.recipe.effects},
+        call=_fit,
+        modules=(*_SHARED, "pipelines.stages.fit"),
+    ),
+    Stage(
+        name="verify",
+        inputs=("dwells", "coefficients", "covariance", "residuals"),
+        outputs=("verification",),
+        parameters=_none,
+        call=_verify,
+        modules=(*_SHARED, "pipelines.stages.verify"),
+    ),
+    Stage(
+        name="noise",
+        inputs=(RECORDS, "readings", "coefficients", "covariance"),
+        outputs=("allan", "noise"),
+        parameters=_none,
+        call=_noise,
+        modules=(*_SHARED, "pipelines.stages.noise"),
+    ),
+    Stage(
+        name="grade",
+        inputs=_EVIDENCE,
+        outputs=("figures", "grades"),
+        parameters=lambda job: {
+            "limits": job.limits.model_dump(mode="json"),
+            "zero_output": job.recipe.zero_output,
+        },
+        call=_grade,
+        modules=(*_SHARED, "schemas.limits", "pipelines.stages.figures", "pipelines.stages.grade"),
+    ),
+)
+ORDER = ("capture", *(stage.name for stage in STAGES), "report")
+BY_NAME = {stage.name: stage for stage in STAGES}

@@ -1,0 +1,116 @@
+"""A job: recipe, limits, lot and station together, and the names that follow from them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from inertial.errors import InertialError
+from pipelines.archive.keys import digest
+from pipelines.planned import refuse_unidentified
+from pipelines.recipes import MAIN_JOB, load_limits, load_recipe, lot_of
+from pipelines.stages.grade import refuse_limits_without_figures
+from schemas.errors import RecipeInvalid, WrongUse
+from schemas.station import SLOTS, load_station
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from schemas.limits import Limits
+    from schemas.recipe import Lot, Recipe
+    from schemas.station import StationConfig
+
+ANALYSIS_KEYS = {
+    "name",
+    "description",
+    "effects",
+    "limits",
+    "units",
+    "seed",
+    "zero_output",
+    "model_name",
+    "model_version",
+}
+
+
+@dataclass(frozen=True)
+class Job:
+    """All that decides a run's result, except the code."""
+
+    recipe: Recipe
+    limits: Limits
+    lot: Lot
+    station: StationConfig
+
+    @property
+    def capture_id(self) -> str:
+        """Name of the capture: the same for recipes that differ only in what is made of the data."""
+        measured = self.recipe.model_dump(mode="json", exclude=ANALYSIS_KEYS)
+        content = {"recipe": measured, "lot": self.lot.model_dump(), "station": self.station.model_dump(mode="json")}
+        return digest(content)[:16]
+
+    @property
+    def about(self) -> dict[str, Any]:
+        """What is kept beside the run for readers."""
+        return {
+            "recipe": self.recipe.model_dump(mode="json"),
+            "limits": self.limits.model_dump(mode="json"),
+            "lot": self.lot.model_dump(mode="json"),
+            "station": self.station.model_dump(mode="json"),
+            "capture": self.capture_id,
+        }
+
+
+def make_job(
+    recipe_name: str = MAIN_JOB,
+    *,
+    station: Path | None = None,
+    units: Sequence[str] = (),
+    seed: int | None = None,
+    repeat: int = 0,
+) -> Job:
+    """The job that a command asks for, with everything refused that cannot work, before anything moves."""
+    recipe = load_recipe(recipe_name)
+    limits = load_limits(recipe, Path(recipe_name).parent)
+    lot = lot_of(recipe, units, seed=seed, repeat=repeat)
+    job = Job(recipe, limits, lot, load_station(station))
+    refuse_limits_without_figures(limits, recipe)
+    _refuse_more_units_than_slots(job)
+    _refuse_beyond_station(job)
+    try:
+        refuse_unidentified(recipe)
+    except InertialError as problem:
+        raise RecipeInvalid(str(problem), key="effects") from None
+    return job
+
+
+def _refuse_more_units_than_slots(job: Job) -> None:
+    if len(job.lot.units) > SLOTS:
+        message = f"lot: {len(job.lot.units)} units, the fixture has {SLOTS} slots; measure them as several lots"
+        raise WrongUse(message)
+
+
+def _refuse_beyond_station(job: Job) -> None:
+    """Refuse temperatures, angles and rates that the station is not able to reach or not allowed to."""
+    recipe, limits = job.recipe, job.station.limits
+    low, high = limits.temperature_C
+    temperatures = [*recipe.temperatures_C, *([recipe.static_temperature_C] if recipe.static_record_s > 0.0 else [])]
+    _refuse_outside("temperatures_C", temperatures, (low, high), f"°C, the chamber of station {job.station.name}")
+    chosen = [*recipe.poses, *recipe.verification, recipe.static_pose]
+    where = f"°, the table of station {job.station.name}"
+    _refuse_outside("poses (outer)", [p.outer_deg for p in chosen], (limits.outer_deg[0], limits.outer_deg[1]), where)
+    _refuse_outside("poses (inner)", [p.inner_deg for p in chosen], (limits.inner_deg[0], limits.inner_deg[1]), where)
+    _refuse_outside("rate_hz", [recipe.rate_hz], (0.0, limits.rate_hz), f"Hz, the reader of station {job.station.name}")
+
+
+def _refuse_outside(key: str, values: Sequence[float], bounds: tuple[float, float], what: str) -> None:
+    low, high = bounds
+    outside = [value for value in values if not low <= value <= high]
+    if outside:
+        unit, owner = what.split(", ", 1)
+        message = (
+            f"recipe: key '{key}': {outside[0]:g} {unit}, {owner} reaches {low:g} to {high:g} {unit}; change the recipe, "
+            "or measure on another station"
+        )
+        raise RecipeInvalid(message, key=key.split(" ", 1)[0])

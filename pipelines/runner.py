@@ -1,0 +1,133 @@
+"""The runner: for each stage it loads, hashes, calls, checks and saves; a stage whose key is there is not run again.
+
+That is going on after a crash and running an archive again, by one mechanism.
+"""
+
+from __future__ import annotations
+
+import fcntl
+import time
+from contextlib import contextmanager
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from threadpoolctl import threadpool_limits
+
+from pipelines.archive import Archive, Run, code_hash, files, stage_key
+from pipelines.chain import BY_NAME, ORDER, RECORDS, Stage
+from pipelines.progress import silent
+from schemas.errors import OperatorNeeded
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+    from pathlib import Path
+
+    from pipelines.job import Job
+    from pipelines.progress import Progress
+
+REPORT_INPUTS = (
+    *("readings", "history", "verdicts", "dwells", "coefficients", "covariance", "residuals", "verification"),
+    *("allan", "noise", "figures", "grades"),
+)
+REPORT_MODULES = ("inertial", "schemas.tables", "schemas.limits", "pipelines.report")
+
+
+@dataclass(frozen=True)
+class Done:
+    """What became of one stage: whether its output was there already, and how long it took."""
+
+    stage: str
+    reused: bool
+    seconds: float
+
+
+class Runner:
+    """The chain for one job in one archive."""
+
+    def __init__(self, job: Job, archive: Archive, progress: Progress = silent) -> None:
+        self.job, self.archive, self.progress = job, archive, progress
+        self.run: Run = archive.open_run(job.recipe.name, job.about, self._decisive())
+
+    def all(self) -> Iterator[Done]:
+        """Every stage, in order, as it is done."""
+        for name in ORDER:
+            yield self.stage(name)
+
+    def stage(self, name: str) -> Done:
+        """Do one stage, or find it done."""
+        start = time.perf_counter()
+        with threadpool_limits(1):
+            if name == "capture":
+                reused = self._capture()
+            elif name == "report":
+                reused = self._report()
+            else:
+                reused = self._compute(BY_NAME[name])
+        return Done(name, reused, time.perf_counter() - start)
+
+    def _decisive(self) -> dict[str, Any]:
+        code = {stage.name: code_hash(stage.modules) for stage in BY_NAME.values()}
+        about = {key: value for key, value in self.job.about.items() if key != "station"}
+        return {**about, "code": {**code, "report": code_hash(REPORT_MODULES)}}
+
+    def _capture(self) -> bool:
+        from pipelines.stages.capture import capture  # noqa: PLC0415  # a re-run of archived data opens no station
+        from stations import open_station  # noqa: PLC0415
+
+        records = self.archive.capture(self.job.capture_id)
+        was_there = records.is_complete()
+        if not was_there:
+            with _alone(records.path):
+                records.begin()
+                with open_station(self.job.station, self.job.lot, resume=records.last_state()) as station:
+                    capture(station, self.job.recipe, self.job.lot, records, progress=self.progress)
+                records.complete()
+        inputs = {RECORDS: records.hash()}
+        about = {"inputs": inputs, "parameters": {"capture": self.job.capture_id}, "code": ""}
+        key = stage_key("capture", inputs, about["parameters"], "")
+        if not self.run.has(("readings", "history"), key):
+            outputs = {name: records.gathered(name) for name in ("readings", "history")}
+            self.run.save("capture", key, outputs, about)
+        return was_there
+
+    def _compute(self, stage: Stage) -> bool:
+        inputs, parameters, code = self._inputs(stage.inputs), stage.parameters(self.job), code_hash(stage.modules)
+        key = stage_key(stage.name, inputs, parameters, code)
+        if self.run.has(stage.outputs, key):
+            return True
+        about = {"inputs": inputs, "parameters": parameters, "code": code}
+        self.run.save(stage.name, key, stage.call(self.job, self.run), about)
+        return False
+
+    def _report(self) -> bool:
+        from pipelines.report import render  # noqa: PLC0415  # figures are slow to import and not needed when reused
+
+        inputs, code = self._inputs(REPORT_INPUTS), code_hash(REPORT_MODULES)
+        key = stage_key("report", inputs, {}, code)
+        if self.run.has_report(key):
+            return True
+        self.run.save_report(key, render(self.run), {"inputs": inputs, "parameters": {}, "code": code})
+        return False
+
+    def _inputs(self, names: tuple[str, ...]) -> dict[str, str]:
+        return {name: self._input_hash(name) for name in names}
+
+    def _input_hash(self, name: str) -> str:
+        if name == RECORDS:
+            return self.archive.capture(self.job.capture_id).hash()
+        return self.run.manifest(name)["sha256"]
+
+
+@contextmanager
+def _alone(folder: Path) -> Iterator[None]:
+    """A block in which no other process captures into the folder; the system frees it when a process dies."""
+    with files.writing(folder):
+        folder.mkdir(parents=True, exist_ok=True)
+        lock = (folder / "lock").open("w")
+    with lock:
+        try:
+            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            message = f"capture: another process is measuring this lot into {folder}; wait for it, or stop it"
+            raise OperatorNeeded(message) from None
+        yield

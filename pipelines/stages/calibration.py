@@ -1,0 +1,202 @@
+"""A fitted calibration as tables, and back: what fit writes and verify, noise, grade and export read."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pandas as pd
+
+from inertial import design, effects
+from inertial.effects import SensorEffect, StationEffect
+from inertial.fits.linear import response_matrix
+from inertial.state import State
+from schemas.errors import DataRejected
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import NDArray
+
+    from inertial.fits.linear import LotFit
+
+AXES = ("x", "y", "z")
+ALL_AXES = "*"
+PROBE_T_C = 31.0
+
+
+@dataclass(frozen=True)
+class Calibration:
+    """Coefficients of a lot.
+
+    coefficients : (units, 3, p), output unit per unit of the column; covariance : (units, 3, p, p)
+    nonlinear : values by effect id; shared : (q,), parameters of the station
+    """
+
+    units: tuple[str, ...]
+    effects: tuple[str, ...]
+    coefficients: NDArray[np.float64]
+    covariance: NDArray[np.float64]
+    nonlinear: dict[str, dict[str, float]]
+    shared: NDArray[np.float64]
+
+    @property
+    def names(self) -> tuple[tuple[tuple[str, str], ...], ...]:
+        """Per axis, (effect id, coefficient) of the p columns."""
+        return column_names(self.effects)
+
+    @property
+    def response(self) -> NDArray[np.float64]:
+        """The matrix K of each unit, (units, 3, 3), output per g."""
+        return response_matrix(self.coefficients, self.names)
+
+    def value(self, effect: str) -> NDArray[np.float64]:
+        """Coefficients of one effect, (units, 3, columns of the effect)."""
+        return np.stack([self.coefficients[:, axis, self._where(effect, axis)] for axis in range(3)], axis=1)
+
+    def standard_error(self, effect: str) -> NDArray[np.float64]:
+        """Standard errors of one effect's coefficients, (units, 3, columns of the effect)."""
+        errors = np.sqrt(np.diagonal(self.covariance, axis1=-2, axis2=-1))
+        return np.stack([errors[:, axis, self._where(effect, axis)] for axis in range(3)], axis=1)
+
+    def _where(self, effect: str, axis: int) -> list[int]:
+        return [column for column, (name, _) in enumerate(self.names[axis]) if name == effect]
+
+
+def column_names(model: Sequence[str]) -> tuple[tuple[tuple[str, str], ...], ...]:
+    """Per axis, (effect id, coefficient) of a model's columns."""
+    sensor, _ = design.split(model)
+    return tuple(design.local_names(sensor, axis) for axis in range(3))
+
+
+def coefficient_rows(units: Sequence[str], fit: LotFit, covariance: NDArray[np.float64], out_unit: str) -> pd.DataFrame:
+    """The long table of coefficients: one row per unit, axis and coefficient; what all axes share has axis ``*``."""
+    errors = np.sqrt(np.diagonal(covariance, axis1=-2, axis2=-1))
+    texts = {effect.id: unit_texts(effect, out_unit) for effect in design.split(fit.effects)[0]}
+    rows: list[dict[str, Any]] = []
+    for u, unit in enumerate(units):
+        for axis, letter in enumerate(AXES):
+            seen: dict[str, int] = {}
+            for column, (effect, name) in enumerate(fit.names[axis]):
+                place = seen.setdefault(effect, 0)
+                seen[effect] += 1
+                value, error = fit.coefficients[u, axis, column], errors[u, axis, column]
+                rows.append(_row(unit, letter, effect, name, (value, error), texts[effect][place]))
+        rows += _shared_rows(unit, fit)
+    return pd.DataFrame(rows)
+
+
+def _row(unit: str, axis: str, effect: str, name: str, value: tuple[float, float], text: str) -> dict[str, Any]:
+    return {
+        "unit": unit,
+        "axis": axis,
+        "effect": effect,
+        "name": name,
+        "value": float(value[0]),
+        "standard_error": float(value[1]),
+        "unit_text": text,
+    }
+
+
+def _shared_rows(unit: str, fit: LotFit) -> list[dict[str, Any]]:
+    errors = np.sqrt(np.diagonal(fit.shared_covariance)) if fit.shared.size else np.zeros(0)
+    rows = [
+        _row(unit, ALL_AXES, effect, name, (fit.shared[q], errors[q]), "rad")
+        for q, (effect, name) in enumerate(fit.shared_names)
+    ]
+    for effect, values in fit.nonlinear.items():
+        known = {parameter.name: parameter.unit for parameter in effects.get(effect).nonlinear}
+        rows += [_row(unit, ALL_AXES, effect, n, (v, 0.0), known.get(n, "")) for n, v in values.items()]
+    return rows
+
+
+def covariance_rows(units: Sequence[str], covariance: NDArray[np.float64]) -> pd.DataFrame:
+    """The covariance (units, 3, p, p) as a long table of its lower triangles."""
+    p = covariance.shape[-1]
+    row, column = np.tril_indices(p)
+    u, a, k = np.meshgrid(np.arange(len(units)), np.arange(3), np.arange(row.size), indexing="ij")
+    return pd.DataFrame(
+        {
+            "unit": np.asarray(units, dtype=object)[u.ravel()],
+            "axis": np.asarray(AXES, dtype=object)[a.ravel()],
+            "row": row[k.ravel()],
+            "column": column[k.ravel()],
+            "value": covariance[:, :, row, column].ravel(),
+        }
+    )
+
+
+def read_calibration(coefficients: pd.DataFrame, covariance: pd.DataFrame) -> Calibration:
+    """The calibration that :func:`coefficient_rows` and :func:`covariance_rows` wrote."""
+    units = tuple(dict.fromkeys(coefficients["unit"].astype(str)))
+    model = tuple(dict.fromkeys(coefficients["effect"].astype(str)))
+    names = column_names(model)
+    p = len(names[0])
+    own = coefficients[coefficients["axis"] != ALL_AXES]
+    if len(own) != len(units) * 3 * p:
+        message = f"coefficients: {len(own)} rows, the model needs {len(units) * 3 * p}; run the fit again"
+        raise DataRejected(message)
+    matrix = np.zeros((len(units), 3, p, p))
+    row, column = np.tril_indices(p)
+    values = covariance["value"].to_numpy().reshape(len(units), 3, -1)
+    matrix[:, :, row, column] = values
+    matrix[:, :, column, row] = values
+    shared, nonlinear = _read_shared(coefficients[coefficients["unit"] == units[0]], model)
+    return Calibration(units, model, own["value"].to_numpy().reshape(len(units), 3, p), matrix, nonlinear, shared)
+
+
+def _read_shared(rows: pd.DataFrame, model: Sequence[str]) -> tuple[NDArray[np.float64], dict[str, dict[str, float]]]:
+    shared: list[float] = []
+    nonlinear: dict[str, dict[str, float]] = {}
+    common = rows[rows["axis"] == ALL_AXES]
+    for name in model:
+        effect = effects.get(name)
+        station = effect.names() if isinstance(effect, StationEffect) else ()
+        for row in common[common["effect"] == name].itertuples():
+            if row.name in station:
+                shared.append(float(row.value))  # pyright: ignore[reportArgumentType]
+            else:
+                nonlinear.setdefault(name, {})[str(row.name)] = float(row.value)  # pyright: ignore[reportArgumentType]
+    return np.array(shared), nonlinear
+
+
+def unit_texts(effect: SensorEffect, out_unit: str) -> list[str]:
+    """Units of an effect's coefficients, found by how its columns grow with force and with temperature.
+
+    A column that doubles with the force is per g, one that doubles with θ is per K, and so on; a column that grows in
+    neither way has the output's unit per unit of the column.
+    """
+    force = np.array([[0.31, 0.52, 0.79], [0.44, -0.67, 0.59]])
+    zeros = np.zeros(2)
+
+    def columns(factor_force: float, factor_theta: float) -> NDArray[np.float64]:
+        warm = np.full(2, 25.0 + factor_theta * (PROBE_T_C - 25.0))
+        state = State(
+            force=factor_force * force, time=zeros, temperature=warm, chamber=warm, since_power=zeros + 600.0,
+            since_move=zeros + 2.0, supply=zeros + 3.3, vibration=zeros + 0.01, outer=zeros, inner=zeros + 0.1,
+        )  # fmt: skip
+        values = design.starting_values([effect], state)
+        return effect.columns(state, 0, **values.get(effect.id, {}))
+
+    if effect.nonlinear or effect.id.startswith("covariate:"):
+        return [out_unit] * len(effect.names(0))
+    base, by_force, by_theta = columns(1.0, 1.0)[0], columns(2.0, 1.0)[0], columns(1.0, 2.0)[0]
+    return [
+        out_unit + _per("g", _degree(base[c], by_force[c])) + _per("K", _degree(base[c], by_theta[c]))
+        for c in range(base.size)
+    ]
+
+
+def _degree(base: float, doubled: float) -> int:
+    if base == 0.0 or doubled / base <= 0.0:
+        return 0
+    degree = np.log2(doubled / base)
+    return round(degree) if abs(degree - round(degree)) < 1e-6 else 0
+
+
+def _per(unit: str, degree: int) -> str:
+    if degree <= 0:
+        return ""
+    power = {1: "", 2: "²", 3: "³", 4: "⁴", 5: "⁵"}.get(degree, f"^{degree}")
+    return f"/{unit}{power}"

@@ -1,0 +1,117 @@
+"""Decisions: every figure of every unit against its limit under the agreed rule, the grade, and the reasons."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pandas as pd
+
+from pipelines.stages.calibration import read_calibration
+from pipelines.stages.empty import empty_table
+from pipelines.stages.figures import NEEDS_EFFECT, NEEDS_STATIC, NEEDS_VERIFICATION, Figure, figures_of
+from schemas.errors import RecipeInvalid
+from schemas.limits import FIGURES, GRADE_FIGURE, GRADES, Decision, Limits, decide, grade_of
+
+if TYPE_CHECKING:
+    from schemas.recipe import Recipe
+
+NO_GRADE = "none"
+
+
+@dataclass(frozen=True)
+class Evidence:
+    """The tables that a decision rests on."""
+
+    verdicts: pd.DataFrame
+    coefficients: pd.DataFrame
+    covariance: pd.DataFrame
+    residuals: pd.DataFrame
+    verification: pd.DataFrame
+    noise: pd.DataFrame
+
+
+def refuse_limits_without_figures(limits: Limits, recipe: Recipe) -> None:
+    """Refuse limits on figures that the recipe cannot yield, before anything is measured."""
+    for name in limits.figures:
+        needed = NEEDS_EFFECT.get(name)
+        missing = ""
+        if name in NEEDS_STATIC and recipe.static_record_s <= 0.0:
+            missing = "a static record (static_record_s > 0)"
+        elif name in NEEDS_VERIFICATION and not recipe.verification:
+            missing = "verification poses"
+        elif needed is not None and needed not in recipe.effects:
+            missing = f"effect {needed} in the model"
+        if missing:
+            message = f"limits {limits.name}: {name} needs {missing}, the recipe has none; add it, or drop the limit"
+            raise RecipeInvalid(message, key=f"figures.{name}")
+
+
+def grade(evidence: Evidence, limits: Limits, zero_g: float = 0.0) -> dict[str, pd.DataFrame]:
+    """Tables ``figures`` (one row per unit and figure) and ``grades`` (one row per unit).
+
+    Parameters
+    ----------
+    zero_g : nominal output at 0 g, output unit.
+    """
+    calibrated = set(evidence.coefficients["unit"].astype(str))
+    calibration = read_calibration(evidence.coefficients, evidence.covariance) if calibrated else None
+    figure_rows: list[dict[str, object]] = []
+    grade_rows: list[dict[str, object]] = []
+    for verdict in evidence.verdicts.to_dict("records"):
+        unit = str(verdict["unit"])
+        if verdict["refused"] or calibration is None:
+            grade_rows.append(_grade_row(verdict, "refused", NO_GRADE, str(verdict["reason"])))
+            continue
+        own = [_of(table, unit) for table in (evidence.residuals, evidence.verification, evidence.noise)]
+        figures = list(figures_of(unit, calibration, own[0], own[1], own[2], zero_g))
+        decisions = [decide(limits, f.name, f.value, f.uncertainty) for f in figures if f.name in limits.figures]
+        figure_rows += [_figure_row(unit, figure, decisions) for figure in figures]
+        grade_rows.append(_decided(verdict, figures, decisions, limits))
+    empty = empty_table(texts="unit figure unit_text outcome rule", numbers="value uncertainty limit")
+    return {"figures": pd.DataFrame(figure_rows) if figure_rows else empty, "grades": pd.DataFrame(grade_rows)}
+
+
+def _of(table: pd.DataFrame, unit: str) -> pd.DataFrame:
+    return table[table["unit"] == unit]
+
+
+def _decided(verdict: dict, figures: list[Figure], decisions: list[Decision], limits: Limits) -> dict[str, object]:
+    best = NO_GRADE
+    reasons = [decision.sentence for decision in decisions if not decision.passed]
+    for figure in figures:
+        if figure.name == GRADE_FIGURE:
+            best = grade_of(figure.value, limits.coverage_factor * figure.uncertainty, limits.rule) or NO_GRADE
+            if not _good_enough(best, limits.grade):
+                reasons.append(f"grade {best}: grade {limits.grade} is needed")
+    return _grade_row(verdict, "fail" if reasons else "pass", best, "; ".join(reasons))
+
+
+def _good_enough(found: str, wanted: str) -> bool:
+    order = list(GRADES)
+    return found in order and order.index(found) <= order.index(wanted)
+
+
+def _grade_row(verdict: dict, outcome: str, best: str, reasons: str) -> dict[str, object]:
+    return {
+        "unit": str(verdict["unit"]),
+        "slot": int(verdict["slot"]),
+        "outcome": outcome,
+        "grade": best,
+        "reasons": reasons,
+    }
+
+
+def _figure_row(unit: str, figure: Figure, decisions: list[Decision]) -> dict[str, object]:
+    decision = next((d for d in decisions if d.figure == figure.name), None)
+    return {
+        "unit": unit,
+        "figure": figure.name,
+        "value": figure.value,
+        "uncertainty": decision.uncertainty if decision else 2.0 * figure.uncertainty,
+        "limit": decision.limit if decision else np.nan,
+        "unit_text": FIGURES[figure.name],
+        "outcome": decision.outcome if decision else "no limit",
+        "rule": decision.rule if decision else "",
+    }

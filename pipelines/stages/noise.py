@@ -1,0 +1,95 @@
+"""Noise of the static record: Allan deviation with honest intervals, and the terms that it needs."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pandas as pd
+
+from inertial.noise.allan import AllanCurve, overlapping
+from inertial.noise.terms import Terms, fit_terms, model_deviation
+from pipelines.stages.calibration import read_calibration
+from pipelines.stages.empty import empty_table
+from schemas.errors import DataRejected
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+
+    from numpy.typing import NDArray
+
+AXES = ("x", "y", "z")
+MICRO = 1e6
+N_ONE_SIDED = "n_d"
+B_BOUND = "B_bound"
+
+
+def noise(
+    samples: Iterable[pd.DataFrame], readings: pd.DataFrame, coefficients: pd.DataFrame, covariance: pd.DataFrame
+) -> dict[str, pd.DataFrame]:
+    """Allan curves (table ``allan``) and noise terms (table ``noise``) of every calibrated unit, in µg.
+
+    Terms: Q, N, B, K, R as in IEEE Std 952 (N is two-sided: σ(τ) = N/√τ); ``n_d`` = N·√2 is the one-sided density of
+    data sheets; ``B_bound`` = min σ/0.664 is only an upper bound of B.
+    """
+    static = readings[(readings["kind"] == "allan") & (readings["status"] == "ok")]
+    if static.empty or coefficients.empty:
+        return _nothing()
+    calibration = read_calibration(coefficients, covariance)
+    records = set(static["record"])
+    kept = [record[record["kind"] == "allan"] for record in samples if record["record"].iloc[0] in records]
+    scale = np.diagonal(calibration.response, axis1=-2, axis2=-1)
+    output = _series(pd.concat(kept, ignore_index=True), calibration.units)
+    curve = overlapping(MICRO * output / scale[..., None], float(static["rate_hz"].iloc[0]))
+    try:
+        terms = fit_terms(curve)
+    except ValueError as problem:
+        raise DataRejected(str(problem)) from None
+    return {"allan": _curve_rows(calibration.units, curve, terms), "noise": _term_rows(calibration.units, terms)}
+
+
+def _series(samples: pd.DataFrame, units: tuple[str, ...]) -> NDArray[np.float64]:
+    """Outputs (units, 3, n) of the static record, as long as the shortest."""
+    series = [samples.loc[samples["unit"] == unit, list(AXES)].to_numpy(dtype=float) for unit in units]
+    shortest = min(len(one) for one in series)
+    return np.stack([one[:shortest].T for one in series])
+
+
+def _curve_rows(units: tuple[str, ...], curve: AllanCurve, terms: Terms) -> pd.DataFrame:
+    u, a, t = (i.ravel() for i in np.meshgrid(*(np.arange(s) for s in curve.deviation.shape), indexing="ij"))
+    return pd.DataFrame(
+        {
+            "unit": np.asarray(units, dtype=object)[u],
+            "axis": np.asarray(AXES, dtype=object)[a],
+            "tau_s": curve.tau[t],
+            "deviation_ug": curve.deviation.ravel(),
+            "low_ug": curve.low.ravel(),
+            "high_ug": curve.high.ravel(),
+            "fitted_ug": model_deviation(terms, curve.tau).ravel(),
+        }
+    )
+
+
+def _term_rows(units: tuple[str, ...], terms: Terms) -> pd.DataFrame:
+    rows = []
+    for u, unit in enumerate(units):
+        for a, axis in enumerate(AXES):
+            for symbol, term in terms.one(u, a).items():
+                value = np.nan if term.value is None else term.value
+                text = term.unit.format("µg")
+                rows.append((unit, axis, symbol, value, term.low, term.high, term.identified, text))
+                if symbol == "N":
+                    root2 = np.sqrt(2.0)
+                    ends = (root2 * value, root2 * term.low, root2 * term.high)
+                    rows.append((unit, axis, N_ONE_SIDED, *ends, term.identified, "µg/√Hz"))
+            bound = float(terms.bias_instability_bound[u, a])
+            rows.append((unit, axis, B_BOUND, np.nan, 0.0, bound, False, "µg"))
+    names = ["unit", "axis", "term", "value", "low", "high", "identified", "unit_text"]
+    return pd.DataFrame(rows, columns=names)
+
+
+def _nothing() -> dict[str, pd.DataFrame]:
+    return {
+        "allan": empty_table(texts="unit axis", numbers="tau_s deviation_ug low_ug high_ug fitted_ug"),
+        "noise": empty_table(texts="unit axis term unit_text", numbers="value low high", flags="identified"),
+    }
