@@ -1,0 +1,230 @@
+"""Sphere fit: bias and response matrix from poses of unknown orientation, where only the norm of gravity is known."""
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from inertial.errors import NotIdentified
+
+Array = NDArray[np.float64]
+Shape = Literal["nine", "six"]
+
+_STEPS = 60
+_SETTLED = 1e-12
+_SINGULAR = 1e-10
+_UPPER = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
+
+
+@dataclass(frozen=True)
+class EllipsoidFit:
+    """Calibration of which the mounting's rotation is not known: f = C·(a - b - h·(T - T0)), C upper triangular."""
+
+    bias: Array
+    """(..., 3), output unit."""
+    correction: Array
+    """(..., 3, 3) upper triangular C = K⁻¹, g per output unit: x stays along the sensor's own x axis."""
+    temperature_offset: Array
+    """(..., 3), output unit per °C; zero where no temperature was given."""
+    reference_temperature: Array
+    """(...,) T0, mean of the temperatures given, °C; NaN where none was."""
+    covariance: Array
+    """(..., p, p) of (bias, C upper: xx yy zz xy xz yz, temperature offset), from the residuals."""
+    norm_residuals: Array
+    """(..., n) |f| - g, in g."""
+    dof: int
+
+    @property
+    def response(self) -> Array:
+        """K = C⁻¹ (..., 3, 3), output unit per g, upper triangular."""
+        return np.asarray(np.linalg.inv(self.correction), dtype=np.float64)
+
+    @property
+    def scale(self) -> Array:
+        """Sensitivity of each axis (..., 3), output unit per g: the diagonal of K."""
+        return np.diagonal(self.response, axis1=-2, axis2=-1)
+
+    @property
+    def rms(self) -> Array:
+        """Root mean square of the norm residuals (...,), g."""
+        return np.sqrt(np.mean(self.norm_residuals**2, axis=-1))
+
+    def apply(self, output: Array, temperature: Array | None = None) -> Array:
+        """Specific force (..., n, 3) in g of an output (..., n, 3), output unit, at `temperature` (..., n), °C."""
+        centred = output - self.bias[..., None, :]
+        if temperature is not None:
+            rise = temperature - self.reference_temperature[..., None]
+            centred = centred - self.temperature_offset[..., None, :] * rise[..., None]
+        return np.einsum("...ij,...nj->...ni", self.correction, centred)
+
+
+def fit_ellipsoid(
+    output: ArrayLike, *, norm: float = 1.0, temperature: ArrayLike | None = None, shape: Shape = "nine"
+) -> EllipsoidFit:
+    """Least-squares fit of |C·(a - b - h·(T - T0))| = norm to dwells of unknown orientation, units as a batch.
+
+    Starts from the algebraic fit of an ellipsoid whose axes lie along the sensor's, then Gauss-Newton with step control
+    on the residuals of the norm, which are what matters. A rotation in front of C changes no norm: C is upper triangular.
+
+    Parameters
+    ----------
+    output : (..., n, 3), output unit
+    norm : local gravity in g
+    temperature : (..., n), °C; adds an offset per °C and axis
+    shape : "nine" for bias, scale and non-orthogonality, "six" for bias and scale
+
+    Raises
+    ------
+    NotIdentified
+        Fewer dwells than unknowns, or orientations that leave a coefficient undetermined.
+    """
+    a = np.asarray(output, dtype=np.float64)
+    lead, n = a.shape[:-2], a.shape[-2]
+    heat = np.zeros((*lead, n)) if temperature is None else np.asarray(temperature, dtype=np.float64)
+    reference = heat.mean(axis=-1)
+    free = 6 if shape == "six" else 9
+    free_heat = 0 if temperature is None else 3
+    if n <= free + free_heat:
+        msg = f"sphere fit: {n} dwells, more than {free + free_heat} are needed; add poses"
+        raise NotIdentified(msg)
+    flat = a.reshape(-1, n, 3)
+    rise = np.broadcast_to(heat - reference[..., None], (*lead, n)).reshape(-1, n)
+    problem = _Sphere(flat, rise, norm, _which(free, free_heat))
+    theta = problem.solve(problem.algebraic())
+    residual, rows = problem.residuals(theta), problem.rows(theta)
+    dof = n - free - free_heat
+    covariance = _covariance(rows, residual, dof)
+    full = np.zeros((flat.shape[0], 12, 12))
+    full[:, problem.free[:, None], problem.free] = covariance
+    kept = 9 + free_heat
+    bias, c, h = _unpack(theta)
+    return EllipsoidFit(
+        bias=bias.reshape(*lead, 3),
+        correction=c.reshape(*lead, 3, 3),
+        temperature_offset=h.reshape(*lead, 3),
+        reference_temperature=reference if temperature is not None else np.full(lead, np.nan),
+        covariance=full[:, :kept, :kept].reshape(*lead, kept, kept),
+        norm_residuals=residual.reshape(*lead, n),
+        dof=dof,
+    )
+
+
+def _which(free: int, free_heat: int) -> NDArray[np.int64]:
+    """Indices of the free parameters among bias (3), C (6), temperature offset (3)."""
+    return np.concatenate([np.arange(free), 9 + np.arange(free_heat)]).astype(np.int64)
+
+
+def _unpack(theta: Array) -> tuple[Array, Array, Array]:
+    """Bias (u, 3), C (u, 3, 3), temperature offset (u, 3) of parameters (u, 12)."""
+    c = np.zeros((theta.shape[0], 3, 3))
+    for k, (i, j) in enumerate(_UPPER):
+        c[:, i, j] = theta[:, 3 + k]
+    return theta[:, :3], c, theta[:, 9:]
+
+
+class _Sphere:
+    """Residuals |f| - norm of a batch (u, n, 3) and their derivatives."""
+
+    def __init__(self, output: Array, rise: Array, norm: float, free: NDArray[np.int64]) -> None:
+        self.output, self.rise, self.norm, self.free = output, rise, norm, free
+
+    def algebraic(self) -> Array:
+        """Start (u, 12) from the linear fit of p·a² + q·a = 1 per axis, in units that keep it well conditioned."""
+        centre = 0.5 * (self.output.max(axis=1) + self.output.min(axis=1))
+        span = 0.5 * (self.output.max(axis=1) - self.output.min(axis=1))
+        if np.any(span <= 0.0):
+            axis = "xyz"[int(np.argwhere(span <= 0.0)[0][1])]
+            msg = f"sphere fit: output {axis} never changes, all axes must be turned; check the channel"
+            raise NotIdentified(msg)
+        scaled = (self.output - centre[:, None, :]) / span[:, None, :]
+        columns = np.concatenate([scaled**2, scaled], axis=-1)
+        p = np.einsum("upn,un->up", np.linalg.pinv(columns), np.ones(self.output.shape[:2]))
+        square, line = p[:, :3], p[:, 3:]
+        theta = np.zeros((self.output.shape[0], 12))
+        good = np.all(square > 0.0, axis=1)
+        safe = np.where(good[:, None], square, 1.0)
+        middle = np.where(good[:, None], -0.5 * line / safe, 0.0)
+        level = 1.0 + np.sum(safe * middle**2, axis=1)
+        theta[:, :3] = centre + middle * span
+        theta[:, 3:6] = self.norm * np.sqrt(safe / np.where(good, level, 1.0)[:, None]) / span
+        return theta
+
+    def force(self, theta: Array) -> tuple[Array, Array, Array]:
+        """Centred output, corrected force and its norm."""
+        bias, c, h = _unpack(theta)
+        centred = self.output - bias[:, None, :] - self.rise[..., None] * h[:, None, :]
+        f = np.einsum("uij,unj->uni", c, centred)
+        return centred, f, np.linalg.norm(f, axis=-1)
+
+    def residuals(self, theta: Array) -> Array:
+        """|f| - norm, (u, n)."""
+        return self.force(theta)[2] - self.norm
+
+    def rows(self, theta: Array) -> Array:
+        """Derivatives (u, n, p) of the residuals by the free parameters."""
+        centred, f, size = self.force(theta)
+        direction = f / size[..., None]
+        by_output = np.einsum("uni,uij->unj", direction, _unpack(theta)[1])
+        by_c = np.stack([direction[..., i] * centred[..., j] for i, j in _UPPER], axis=-1)
+        rows = np.concatenate([-by_output, by_c, -by_output * self.rise[..., None]], axis=-1)
+        return rows[..., self.free]
+
+    def solve(self, theta: Array) -> Array:
+        """Parameters (u, 12) of least squared residuals: Gauss-Newton, each unit's step halved while it does not help."""
+        cost = self._cost(theta)
+        for _ in range(_STEPS):
+            step = np.zeros_like(theta)
+            step[:, self.free] = _solve(self.rows(theta), -self.residuals(theta))
+            theta, lower = self._advance(theta, step, cost)
+            settled = np.all(cost - lower <= _SETTLED * (cost + np.finfo(float).tiny))
+            cost = lower
+            if settled:
+                break
+        return theta
+
+    def _cost(self, theta: Array) -> Array:
+        return np.sum(self.residuals(theta) ** 2, axis=-1)
+
+    def _advance(self, theta: Array, step: Array, cost: Array) -> tuple[Array, Array]:
+        """Parameters and costs (u,) after a step that is halved for each unit until it does not harm."""
+        length = np.ones(theta.shape[0])
+        for _ in range(_STEPS):
+            trial = theta + length[:, None] * step
+            lower = self._cost(trial)
+            worse = lower > cost
+            if not worse.any():
+                return trial, lower
+            length[worse] *= 0.5
+        trial = np.where(
+            (self._cost(theta + length[:, None] * step) > cost)[:, None], theta, theta + length[:, None] * step
+        )
+        return trial, self._cost(trial)
+
+
+def _scaled(rows: Array) -> tuple[Array, Array]:
+    """Columns of equal length, and their lengths; refuses columns that depend on each other."""
+    size = np.linalg.norm(rows, axis=1)
+    unit = rows / np.where(size > 0.0, size, 1.0)[:, None, :]
+    smallest = np.linalg.eigvalsh(np.swapaxes(unit, -1, -2) @ unit)[:, 0]
+    if np.any(smallest < _SINGULAR):
+        msg = (
+            f"sphere fit: unit {int(np.argmin(smallest))} of the batch: the orientations leave a coefficient undetermined; "
+            "add poses in between, with every axis up and down"
+        )
+        raise NotIdentified(msg)
+    return unit, size
+
+
+def _solve(rows: Array, wanted: Array) -> Array:
+    unit, size = _scaled(rows)
+    gram = np.swapaxes(unit, -1, -2) @ unit
+    return np.asarray(
+        np.linalg.solve(gram, np.einsum("unp,un->up", unit, wanted)[..., None])[..., 0] / size, dtype=np.float64
+    )
+
+
+def _covariance(rows: Array, residual: Array, dof: int) -> Array:
+    unit, size = _scaled(rows)
+    inverse = np.linalg.inv(np.swapaxes(unit, -1, -2) @ unit) / (size[:, :, None] * size[:, None, :])
+    return inverse * (np.sum(residual**2, axis=-1) / dof)[:, None, None]

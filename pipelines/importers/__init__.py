@@ -1,0 +1,1 @@
+"""Tables brought from elsewhere: raw records and dwells in the exchange format."""

@@ -1,0 +1,217 @@
+"""Dwells and temperature histories in the exchange format, from a file or from a run of the archive."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pandas as pd
+
+from pipelines.archive import Archive
+from pipelines.importers import files
+from schemas import tables
+from schemas.errors import DataRejected, WrongUse, did_you_mean
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+
+    from numpy.typing import NDArray
+
+REQUIRED = ("unit", "dwell", "time_s", "out_x", "out_y", "out_z")
+FORCE = ("force_x", "force_y", "force_z")
+ANGLES = ("outer_deg", "inner_deg")
+DEVIATIONS = ("sd_x", "sd_y", "sd_z")
+KNOWN = (
+    *REQUIRED,
+    *FORCE,
+    *ANGLES,
+    *DEVIATIONS,
+    *("slot", "n", "duration_s", "unit_C", "chamber_C", "since_move_s", "since_power_s", "supply_V", "vibration_g"),
+    *("kind", "pose", "soak", "record", "out_unit", "outer_command_deg", "inner_command_deg", "full_scale", "rate_hz"),
+)
+"""Columns with a meaning; every other numeric column is a covariate."""
+
+_TEXTS = ("kind", "pose", "out_unit", "status")
+_LARGEST_FORCE = 1e3
+_METRES = (9.7, 9.9)
+"""A reference of this size is gravity in m/s², not 9.8 g in a centrifuge."""
+
+
+def read_dwells(source: str | Path, *, archive: str | Path | None = None) -> pd.DataFrame:
+    """Dwells in the exchange format, checked, in order of unit and dwell.
+
+    Parameters
+    ----------
+    source : a CSV, TSV or Parquet file (also .gz), or the name of a run in the archive
+    archive : the archive's folder where `source` is a run; the default folder otherwise
+
+    Raises
+    ------
+    DataRejected
+        A required column is missing, a value is not finite, a dwell is there twice, a reference is incomplete.
+    WrongUse
+        There is neither such a file nor such a run.
+    """
+    if _is_file(source):
+        frame, _ = files.read(Path(source))
+        return checked(frame, where=Path(source).name)
+    return checked(_from_run(source, archive, "dwells"), where=f"run {source}")
+
+
+def read_history(source: str | Path, *, archive: str | Path | None = None) -> pd.DataFrame:
+    """A run's temperatures against time: `time_s` with `unit_C`, `chamber_C` or both, in order of unit and time.
+
+    Parameters
+    ----------
+    source : a file, or the name of a run in the archive
+    archive : the archive's folder where `source` is a run
+    """
+    if _is_file(source):
+        frame, _ = files.read(Path(source))
+        where = Path(source).name
+    else:
+        frame, where = _from_run(source, archive, "history"), f"run {source}"
+    return _checked_history(frame, where)
+
+
+def checked(frame: pd.DataFrame, *, where: str) -> pd.DataFrame:
+    """The dwells with their types made right, or `DataRejected` with row, value and what is needed."""
+    _require(frame, REQUIRED, where)
+    frame = frame.copy()
+    frame["unit"] = _texts(frame, "unit", where)
+    for column in frame.columns:
+        if column == "unit" or column in _TEXTS:
+            continue
+        if column in KNOWN or pd.api.types.is_numeric_dtype(frame[column]):
+            frame[column] = _numbers(frame, column, where)
+    frame["dwell"] = _whole(frame, "dwell", where)
+    _all_or_none(frame, FORCE, where)
+    _all_or_none(frame, ANGLES, where)
+    _all_or_none(frame, DEVIATIONS, where)
+    _plausible(frame, where)
+    frame = tables.check("dwells", frame, where=where)
+    return frame.sort_values(["unit", "dwell"], kind="stable").reset_index(drop=True)
+
+
+def covariates(frame: pd.DataFrame) -> list[str]:
+    """Names of the numeric columns without a meaning of their own: what a missing effect may depend on."""
+    return [name for name in frame.columns if name not in KNOWN and pd.api.types.is_numeric_dtype(frame[name])]
+
+
+def _is_file(source: str | Path) -> bool:
+    path = Path(source)
+    looks_like_one = isinstance(source, Path) or "/" in str(source) or path.suffix != ""
+    return path.is_file() or (looks_like_one and not _is_run_like(source))
+
+
+def _is_run_like(source: str | Path) -> bool:
+    return isinstance(source, str) and "/" not in source and not Path(source).suffix
+
+
+def _from_run(source: str | Path, archive: str | Path | None, table: str) -> pd.DataFrame:
+    store = Archive(archive)
+    if not store.runs():
+        message = (
+            f"'{source}': neither a file nor a run (the archive {store.root} is empty); name a file of dwells, or give "
+            "the archive with --archive"
+        )
+        raise WrongUse(message)
+    return store.table(str(source), table)
+
+
+def _require(frame: pd.DataFrame, names: Iterable[str], where: str) -> None:
+    missing = [name for name in names if name not in frame.columns]
+    if missing:
+        hints = "; ".join(f"{name}: {did_you_mean(name, map(str, frame.columns))}" for name in missing[:3])
+        message = (
+            f"{where}: column {', '.join(missing)} is missing; {hints}; rename it, or use 'tumbleline import --map'"
+        )
+        raise DataRejected(message)
+
+
+def _texts(frame: pd.DataFrame, column: str, where: str) -> list[str]:
+    names = ["" if pd.isna(value) else _name(value) for value in frame[column].tolist()]
+    if "" in names:
+        message = f"{where}: row {names.index('')}, column {column}: empty, a name is needed; fill it in"
+        raise DataRejected(message)
+    return names
+
+
+def _name(value: object) -> str:
+    """A serial number as text; a column of whole numbers with a gap somewhere comes as floats."""
+    return str(int(value)) if isinstance(value, float) and value.is_integer() else str(value).strip()
+
+
+def _numbers(frame: pd.DataFrame, column: str, where: str) -> NDArray[np.float64]:
+    values = np.asarray(pd.to_numeric(frame[column], errors="coerce"), dtype=np.float64)
+    bad = np.flatnonzero(~np.isfinite(values))
+    needed = (*REQUIRED, *FORCE, *ANGLES)
+    if bad.size and not (column not in needed and bool(np.all(pd.isna(frame[column])))):
+        row = int(bad[0])
+        message = (
+            f"{where}: row {row} (unit {frame['unit'].iloc[row]}), column {column}: found {frame[column].iloc[row]}, a "
+            f"finite number is needed ({bad.size} such rows); measure again, or leave the row or the column out"
+        )
+        raise DataRejected(message)
+    return values
+
+
+def _whole(frame: pd.DataFrame, column: str, where: str) -> NDArray[np.int64]:
+    values = np.asarray(frame[column], dtype=np.float64)
+    bad = np.flatnonzero((values != np.rint(values)) | (values < 0))
+    if bad.size:
+        row = int(bad[0])
+        message = (
+            f"{where}: row {row}, column {column}: found {values[row]}, a whole number from 0 on is needed; correct it"
+        )
+        raise DataRejected(message)
+    return values.astype(np.int64)
+
+
+def _all_or_none(frame: pd.DataFrame, names: tuple[str, ...], where: str) -> None:
+    there = [name for name in names if name in frame.columns]
+    if there and len(there) < len(names):
+        missing = [name for name in names if name not in there]
+        message = f"{where}: {', '.join(there)} without {', '.join(missing)}; give all of {', '.join(names)} or none"
+        raise DataRejected(message)
+
+
+def _plausible(frame: pd.DataFrame, where: str) -> None:
+    if FORCE[0] in frame.columns:
+        size = float(np.median(np.linalg.norm(frame[list(FORCE)].to_numpy(dtype=np.float64), axis=1)))
+        if not 0.0 < size < _LARGEST_FORCE or _METRES[0] < size < _METRES[1]:
+            message = (
+                f"{where}: the reference force has a norm of {size:.4g}, about 1 is needed; give force_x, "
+                "force_y, force_z in g, not m/s² or counts"
+            )
+            raise DataRejected(message)
+    for column in DEVIATIONS:
+        values = np.asarray(frame[column], dtype=np.float64) if column in frame.columns else np.zeros(1)
+        row = int(values.argmin())
+        if values[row] < 0.0:
+            message = f"{where}: row {row}, column {column}: found {values[row]}, 0 or more is needed; correct it"
+            raise DataRejected(message)
+
+
+def _checked_history(frame: pd.DataFrame, where: str) -> pd.DataFrame:
+    _require(frame, ("time_s",), where)
+    heats = [name for name in ("unit_C", "chamber_C") if name in frame.columns]
+    if not heats:
+        hint = did_you_mean("unit_C", map(str, frame.columns))
+        message = f"{where}: neither unit_C nor chamber_C, a temperature is needed; {hint}"
+        raise DataRejected(message)
+    frame = frame.copy()
+    if "unit" in frame.columns:
+        frame["unit"] = _texts(frame, "unit", where)
+    named = frame if "unit" in frame.columns else frame.assign(unit="history")
+    for column in ("time_s", *heats):
+        frame[column] = _numbers(named, column, where)
+    order = ["unit", "time_s"] if "unit" in frame.columns else ["time_s"]
+    frame = frame.sort_values(order, kind="stable").reset_index(drop=True)
+    twice = frame.duplicated(order)
+    if twice.any():
+        row = int(np.flatnonzero(twice.to_numpy())[0])
+        message = f"{where}: time {frame['time_s'].iloc[row]} s is there twice, once is needed; remove one of the two"
+        raise DataRejected(message)
+    return frame
