@@ -9,17 +9,18 @@ from typing import TYPE_CHECKING, Any
 from inertial.errors import InertialError
 from pipelines.archive.keys import digest
 from pipelines.planned import refuse_unidentified
-from pipelines.recipes import MAIN_JOB, load_limits, load_recipe, lot_of
+from pipelines.recipes import MAIN_JOB, load_limits, load_recipe, lot_of, refuse_unknown_effects
 from pipelines.stages.grade import refuse_limits_without_figures
 from schemas.errors import RecipeInvalid, WrongUse
-from schemas.station import SLOTS, load_station
+from schemas.limits import Limits
+from schemas.model import load_model
+from schemas.recipe import Lot, Recipe
+from schemas.station import SLOTS, StationConfig, load_station
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from schemas.limits import Limits
-    from schemas.recipe import Lot, Recipe
-    from schemas.station import StationConfig
+    from pipelines.archive import Run
 
 ANALYSIS_KEYS = {
     "name",
@@ -75,14 +76,45 @@ def make_job(
     limits = load_limits(recipe, Path(recipe_name).parent)
     lot = lot_of(recipe, units, seed=seed, repeat=repeat)
     job = Job(recipe, limits, lot, load_station(station))
-    refuse_limits_without_figures(limits, recipe)
     _refuse_more_units_than_slots(job)
     _refuse_beyond_station(job)
+    _refuse_inconsistent(job)
+    return job
+
+
+def job_of_run(run: Run, *, effects: Sequence[str] = (), model: Path | None = None, limits: str = "") -> Job:
+    """The job of an archived run, with another model or other limits where they are given."""
+    about = run.about
+    if not about.get("capture"):
+        message = f"run {run.id}: its data were imported, not captured; fit them with 'tumbleline import'"
+        raise WrongUse(message)
+    recipe = Recipe.model_validate(about["recipe"])
+    if effects and model is not None:
+        message = "fit: --effects and --model are both given, one is needed; leave one out"
+        raise WrongUse(message)
+    if model is not None:
+        head = load_model(model).model
+        effects, names = head.effects, {"model_name": head.name, "model_version": head.version}
+        recipe = recipe.model_copy(update=names)
+    if effects:
+        refuse_unknown_effects(effects, "fit")
+        recipe = recipe.model_copy(update={"effects": list(effects)})
+    chosen = Limits.model_validate(about["limits"])
+    if limits:
+        recipe = recipe.model_copy(update={"limits": limits})
+        chosen = load_limits(recipe)
+    job = Job(recipe, chosen, Lot.model_validate(about["lot"]), StationConfig.model_validate(about["station"]))
+    _refuse_inconsistent(job)
+    return job
+
+
+def _refuse_inconsistent(job: Job) -> None:
+    """Refuse a model that the plan cannot determine, and limits that neither can serve."""
+    refuse_limits_without_figures(job.limits, job.recipe)
     try:
-        refuse_unidentified(recipe)
+        refuse_unidentified(job.recipe)
     except InertialError as problem:
         raise RecipeInvalid(str(problem), key="effects") from None
-    return job
 
 
 def _refuse_more_units_than_slots(job: Job) -> None:

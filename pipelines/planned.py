@@ -20,8 +20,11 @@ QUIET_G = 1e-3
 
 
 def planned_state(recipe: Recipe) -> State:
-    """The dwells of the fit in order of measurement, all poses at every temperature; quantities the plan does not set
-    (supply, vibration) wander a little, as they do on a station, so that effects of theirs are not refused."""
+    """The dwells of the fit in order of measurement: all poses at every temperature.
+
+    Quantities that the plan does not set (supply, vibration) wander a little, as they do on a station, so that effects
+    of theirs are not refused.
+    """
     angles = np.radians([(pose.outer_deg, pose.inner_deg) for pose in recipe.poses])
     soaks, n = len(recipe.temperatures_C), len(recipe.poses)
     outer, inner = np.tile(angles[:, 0], soaks), np.tile(angles[:, 1], soaks)

@@ -115,13 +115,18 @@ def _model(file: RecipeFile, folder: Path, source: str) -> tuple[list[str], str,
     if file.model:
         model = load_model(folder / file.model).model
         names, model_name, version = model.effects, model.name, model.version
+    refuse_unknown_effects(names, f"{source}: key 'effects'")
+    return names, model_name, version
+
+
+def refuse_unknown_effects(names: Sequence[str], where: str) -> None:
+    """Refuse names that are no effect, with the close matches."""
     for name in names:
         try:
             effects.get(name)
         except UnknownEffect as problem:
-            message = f"{source}: key 'effects': unknown effect '{name}'; {did_you_mean(name, effects.catalogue())}"
+            message = f"{where}: unknown effect '{name}'; {did_you_mean(name, effects.catalogue())}"
             raise RecipeInvalid(message, key="effects", close=problem.close) from None
-    return names, model_name, version
 
 
 def _resolve(given: str | Sequence[Sequence[float]], letter: str, key: str, source: str) -> list[Pose]:

@@ -7,13 +7,14 @@ from __future__ import annotations
 
 import fcntl
 import time
+from collections.abc import Callable
 from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from threadpoolctl import threadpool_limits
 
-from pipelines.archive import Archive, Run, code_hash, files, stage_key
+from pipelines.archive import Archive, Records, Run, code_hash, files, stage_key
 from pipelines.chain import BY_NAME, ORDER, RECORDS, Stage
 from pipelines.progress import silent
 from schemas.errors import OperatorNeeded
@@ -41,11 +42,25 @@ class Done:
     seconds: float
 
 
+Measure = Callable[["Job", "Records", "Progress"], None]
+
+
+def from_station(job: Job, records: Records, progress: Progress) -> None:
+    """Measure a job's lot on its station, going on behind the last record that is stored."""
+    from pipelines.stages.capture import capture  # a re-run of archived data opens no station
+    from stations import open_station
+
+    with open_station(job.station, job.lot, resume=records.last_state()) as station:
+        capture(station, job.recipe, job.lot, records, progress=progress)
+
+
 class Runner:
     """The chain for one job in one archive."""
 
-    def __init__(self, job: Job, archive: Archive, progress: Progress = silent) -> None:
-        self.job, self.archive, self.progress = job, archive, progress
+    def __init__(
+        self, job: Job, archive: Archive, progress: Progress = silent, measure: Measure = from_station
+    ) -> None:
+        self.job, self.archive, self.progress, self.measure = job, archive, progress, measure
         self.run: Run = archive.open_run(job.recipe.name, job.about, self._decisive())
 
     def all(self) -> Iterator[Done]:
@@ -71,16 +86,12 @@ class Runner:
         return {**about, "code": {**code, "report": code_hash(REPORT_MODULES)}}
 
     def _capture(self) -> bool:
-        from pipelines.stages.capture import capture  # noqa: PLC0415  # a re-run of archived data opens no station
-        from stations import open_station  # noqa: PLC0415
-
         records = self.archive.capture(self.job.capture_id)
         was_there = records.is_complete()
         if not was_there:
             with _alone(records.path):
                 records.begin()
-                with open_station(self.job.station, self.job.lot, resume=records.last_state()) as station:
-                    capture(station, self.job.recipe, self.job.lot, records, progress=self.progress)
+                self.measure(self.job, records, self.progress)
                 records.complete()
         inputs = {RECORDS: records.hash()}
         about = {"inputs": inputs, "parameters": {"capture": self.job.capture_id}, "code": ""}
@@ -100,7 +111,7 @@ class Runner:
         return False
 
     def _report(self) -> bool:
-        from pipelines.report import render  # noqa: PLC0415  # figures are slow to import and not needed when reused
+        from pipelines.report import render  # figures are slow to import and not needed when reused
 
         inputs, code = self._inputs(REPORT_INPUTS), code_hash(REPORT_MODULES)
         key = stage_key("report", inputs, {}, code)

@@ -38,9 +38,7 @@ class RecipeInvalid(TumblelineError):
     close : keys or values that exist and look like what was found.
     """
 
-    def __init__(
-        self, message: str, *, key: str = "", close: Iterable[str] = ()
-    ) -> None:
+    def __init__(self, message: str, *, key: str = "", close: Iterable[str] = ()) -> None:
         self.key = key
         self.close = tuple(close)
         super().__init__(message)
@@ -80,11 +78,7 @@ def close_matches(found: str, known: Iterable[str]) -> tuple[str, ...]:
     """Up to three of the known names that look like the one found, best first."""
     names = sorted(set(known))
     exact_but_case = [name for name in names if name.lower() == found.lower()]
-    return tuple(
-        dict.fromkeys(
-            [*exact_but_case, *get_close_matches(found, names, n=3, cutoff=0.55)]
-        )
-    )
+    return tuple(dict.fromkeys([*exact_but_case, *get_close_matches(found, names, n=3, cutoff=0.55)]))
 
 
 def did_you_mean(found: str, known: Iterable[str]) -> str:

@@ -117,9 +117,7 @@ class Decision:
         )
 
 
-def decide(
-    limits: Limits, figure: str, value: float, standard_uncertainty: float
-) -> Decision:
+def decide(limits: Limits, figure: str, value: float, standard_uncertainty: float) -> Decision:
     """The decision on a figure by the limits' rule.
 
     Parameters
@@ -152,12 +150,8 @@ def _outcome(rule: Rule, magnitude: float, limit: float, expanded: float) -> Out
 def describe_rule(limits: Limits) -> str:
     """The decision rule in the words that stand beside every result."""
     if limits.rule == "simple_acceptance":
-        return (
-            f"ILAC-G8:09/2019 simple acceptance, U with k = {limits.coverage_factor:g}"
-        )
-    return (
-        f"ILAC-G8:09/2019 guarded acceptance, w = U with k = {limits.coverage_factor:g}"
-    )
+        return f"ILAC-G8:09/2019 simple acceptance, U with k = {limits.coverage_factor:g}"
+    return f"ILAC-G8:09/2019 guarded acceptance, w = U with k = {limits.coverage_factor:g}"
 
 
 def grade_of(value_ug: float, expanded_ug: float, rule: Rule) -> str | None:

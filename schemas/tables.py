@@ -45,24 +45,16 @@ class Table:
     schema: pa.DataFrameSchema = field(init=False)
 
     def __post_init__(self) -> None:
-        object.__setattr__(
-            self, "schema", pa.DataFrameSchema(self.columns, strict=False, coerce=True)
-        )
+        object.__setattr__(self, "schema", pa.DataFrameSchema(self.columns, strict=False, coerce=True))
 
 
 def _text(*allowed: str) -> pa.Column:
-    checks = (
-        [pa.Check.isin(list(allowed))]
-        if allowed
-        else [pa.Check.str_length(min_value=1)]
-    )
+    checks = [pa.Check.isin(list(allowed))] if allowed else [pa.Check.str_length(min_value=1)]
     return pa.Column(str, checks=checks)
 
 
 def _number(*, low: float | None = None, missing: bool = False) -> pa.Column:
-    return pa.Column(
-        float, checks=[pa.Check.ge(low)] if low is not None else [], nullable=missing
-    )
+    return pa.Column(float, checks=[pa.Check.ge(low)] if low is not None else [], nullable=missing)
 
 
 def _whole(low: int = 0) -> pa.Column:
@@ -93,9 +85,7 @@ _SURROUNDINGS = (
 
 TABLES: dict[str, Table] = {
     # Samples may hold NaN: what a device really sent is kept, and the validate stage refuses the unit.
-    "samples": Table(
-        {**_PLACE, "time_s": _number(), **_gaps(AXES)}, finite=("time_s",)
-    ),
+    "samples": Table({**_PLACE, "time_s": _number(), **_gaps(AXES)}, finite=("time_s",)),
     "readings": Table(
         {
             **_PLACE,
@@ -312,9 +302,7 @@ def _refuse_twice(table: Table, frame: pd.DataFrame, source: str) -> None:
     twice = frame.duplicated(list(table.key))
     if twice.any():
         index = frame.index[int(np.flatnonzero(twice.to_numpy())[0])]
-        named = ", ".join(
-            f"{column} {frame[column].loc[index]}" for column in table.key
-        )
+        named = ", ".join(f"{column} {frame[column].loc[index]}" for column in table.key)
         message = f"{source}: row {index}: {named} is there twice, it may be there once; remove one of the two"
         raise DataRejected(message)
 
@@ -322,18 +310,11 @@ def _refuse_twice(table: Table, frame: pd.DataFrame, source: str) -> None:
 def _explain(problem: SchemaError, frame: pd.DataFrame, source: str) -> str:
     column = getattr(problem.schema, "name", None) or "?"
     cases = problem.failure_cases
-    if (
-        isinstance(cases, pd.DataFrame)
-        and len(cases)
-        and "index" in cases
-        and pd.notna(cases["index"].iloc[0])
-    ):
+    if isinstance(cases, pd.DataFrame) and len(cases) and "index" in cases and pd.notna(cases["index"].iloc[0]):
         index, value = cases["index"].iloc[0], cases["failure_case"].iloc[0]
         row = _row(frame, index)
         return f"{source}: {row}, column {column}: found {value}, {_needed(problem)} is needed; correct the row"
-    return (
-        f"{source}: column {column}: {str(problem).splitlines()[0]}; correct the column"
-    )
+    return f"{source}: column {column}: {str(problem).splitlines()[0]}; correct the column"
 
 
 def _needed(problem: SchemaError) -> str:

@@ -183,8 +183,7 @@ def unit_texts(effect: SensorEffect, out_unit: str) -> list[str]:
         return [out_unit] * len(effect.names(0))
     base, by_force, by_theta = columns(1.0, 1.0)[0], columns(2.0, 1.0)[0], columns(1.0, 2.0)[0]
     return [
-        out_unit + _per("g", _degree(base[c], by_force[c])) + _per("K", _degree(base[c], by_theta[c]))
-        for c in range(base.size)
+        _unit_text(out_unit, _degree(base[c], by_force[c]), _degree(base[c], by_theta[c])) for c in range(base.size)
     ]
 
 
@@ -195,8 +194,11 @@ def _degree(base: float, doubled: float) -> int:
     return round(degree) if abs(degree - round(degree)) < 1e-6 else 0
 
 
-def _per(unit: str, degree: int) -> str:
-    if degree <= 0:
-        return ""
-    power = {1: "", 2: "²", 3: "³", 4: "⁴", 5: "⁵"}.get(degree, f"^{degree}")
-    return f"/{unit}{power}"
+def _unit_text(out_unit: str, force: int, theta: int) -> str:
+    below = [name + _POWERS[degree] for name, degree in (("g", force), ("K", theta)) if degree > 0]
+    if not below:
+        return out_unit
+    return f"{out_unit}/({'·'.join(below)})" if len(below) > 1 else f"{out_unit}/{below[0]}"
+
+
+_POWERS = ("", "", "²", "³", "⁴", "⁵", "⁶")

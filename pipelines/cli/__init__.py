@@ -1,0 +1,97 @@
+"""The command line. A command's module is imported when the command is used, so that help answers at once."""
+
+from __future__ import annotations
+
+import sys
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+import typer
+from typer.core import TyperCommand, TyperGroup
+
+from inertial.errors import InertialError
+from schemas.errors import UNUSABLE, TumblelineError
+
+if TYPE_CHECKING:
+    from typer._click import Command, Context
+
+COMMANDS: dict[str, tuple[str, str]] = {
+    "run": ("run", "Measure and calibrate a lot, from recipe to report: the main job."),
+    "demo": ("demo", "See a hidden effect found, added and the error fall."),
+    "import": ("import_", "Bring recordings of others into the archive."),
+    "list": ("list", "List the runs of the archive."),
+    "show": ("show", "Show a run, or one of its tables."),
+    "fit": ("fit", "Fit a model to archived data again, with other effects if wanted."),
+    "compare": ("compare", "Judge a model on dwells, and on fresh ones."),
+    "diagnose": ("diagnose", "Say whether a model is adequate, where it fails, and which effect is missing."),
+    "extend": ("extend", "Write the next version of a model with one more effect."),
+    "history": ("history", "Show the error over the versions of a model."),
+    "plan": ("plan", "Say what a recipe can and cannot see, before it is measured."),
+    "report": ("report", "Say where a run's report is; make it where it is missing."),
+    "export": ("export", "Write coefficients for firmware and autopilots."),
+    "station": ("station", "Check, serve and describe stations."),
+}
+
+
+class _OnDemand(TyperCommand):
+    """A command known by name and one line of help; the rest is in its module."""
+
+    def __init__(self, name: str, module: str, summary: str) -> None:
+        super().__init__(name, help=summary)
+        self._module = module
+
+    def make_context(self, *args: Any, **kwargs: Any) -> Context:
+        """The context of the real command."""
+        return self._load().make_context(*args, **kwargs)
+
+    def _load(self) -> Command:
+        module = import_module(f"{__name__}.{self._module}")
+        if hasattr(module, "app"):
+            return typer.main.get_command(module.app)
+        own = typer.Typer(add_completion=False, pretty_exceptions_enable=False)
+        own.command(self.name)(module.command)
+        return typer.main.get_command(own)
+
+
+class _Commands(TyperGroup):
+    """The commands in the order in which they are used."""
+
+    def list_commands(self, ctx: Context) -> list[str]:
+        """Names of the commands."""
+        del ctx
+        return list(COMMANDS)
+
+    def get_command(self, ctx: Context, cmd_name: str) -> Command | None:
+        """The command of this name."""
+        del ctx
+        return _OnDemand(cmd_name, *COMMANDS[cmd_name]) if cmd_name in COMMANDS else None
+
+
+app = typer.Typer(
+    cls=_Commands,
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+    context_settings={"help_option_names": ["-h", "--help"]},
+)
+
+
+@app.callback()
+def _product() -> None:
+    """Calibrate accelerometers in production: measure, fit, judge the model, grade, and keep it all traceable."""
+
+
+def main() -> None:
+    """Run the command line; what a person can put right is one message on standard error and an exit status."""
+    try:
+        app()
+    except TumblelineError as problem:
+        _leave(str(problem), problem.exit_status)
+    except InertialError as problem:
+        _leave(str(problem), UNUSABLE)
+
+
+def _leave(message: str, status: int) -> None:
+    sys.stdout.flush()
+    print(f"tumbleline: {message}", file=sys.stderr)
+    sys.exit(status)

@@ -1,0 +1,41 @@
+"""``tumbleline fit``: archived data again, with another model or other limits."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from pipelines.cli.options import ArchiveOption, JsonOption, RunArgument, error_console, print_json
+
+
+def command(
+    run: RunArgument = "latest",
+    effects: Annotated[str, typer.Option("--effects", metavar="a,b,c", help="The model as a list of effects.")] = "",
+    model: Annotated[Path | None, typer.Option("--model", metavar="FILE", help="The model as a model file.")] = None,
+    limits: Annotated[str, typer.Option("--limits", help="A limits file or the name of built-in limits.")] = "",
+    archive: ArchiveOption = None,
+    *,
+    as_json: JsonOption = False,
+) -> None:
+    """Fit a model to archived data again; the result is a run of its own beside the old one, on the same capture."""
+    from pipelines.archive import Archive
+    from pipelines.cli.summary import exit_status, print_summary, summary
+    from pipelines.job import job_of_run
+    from pipelines.runner import Runner
+
+    store = Archive(archive)
+    wanted = [name.strip() for name in effects.split(",")] if effects else []
+    job = job_of_run(store.run(run), effects=wanted, model=model, limits=limits)
+    runner = Runner(job, store)
+    for done in runner.all():
+        error_console().print(
+            f"{done.stage:<9} {'was there' if done.reused else f'{done.seconds:.1f} s'}", markup=False
+        )
+    document = summary(runner.run)
+    if as_json:
+        print_json(document)
+    else:
+        print_summary(document)
+    raise typer.Exit(exit_status(document))

@@ -1,0 +1,95 @@
+"""Options that several commands share, and how they print."""
+
+from __future__ import annotations
+
+import json
+import math
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    import pandas as pd
+    from rich.console import Console
+
+ArchiveOption = Annotated[
+    Path | None,
+    typer.Option("--archive", metavar="DIR", help="Folder of the archive; TUMBLELINE_ARCHIVE or ./archive by default."),
+]
+JsonOption = Annotated[bool, typer.Option("--json", help="Print one JSON document and nothing else.")]
+RunArgument = Annotated[str, typer.Argument(metavar="RUN", help="A run's name, its beginning, or 'latest'.")]
+
+STYLES = {"pass": "bold green", "fail": "bold red", "refused": "bold magenta"}
+
+
+def console() -> Console:
+    """Where results for people go."""
+    from rich.console import Console
+
+    return Console(highlight=False)
+
+
+def error_console() -> Console:
+    """Where progress and remarks go, so that standard output holds results only."""
+    from rich.console import Console
+
+    return Console(stderr=True, highlight=False)
+
+
+def print_json(document: Any) -> None:
+    """One JSON document on standard output; numbers that JSON does not know become null."""
+    sys.stdout.write(json.dumps(plain(document), ensure_ascii=False, indent=1, allow_nan=False) + "\n")
+
+
+def plain(value: Any) -> Any:
+    """A value made of what JSON knows."""
+    if isinstance(value, dict):
+        return {str(key): plain(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [plain(item) for item in value]
+    if hasattr(value, "item") and not isinstance(value, str):
+        value = value.item()
+    if isinstance(value, float) and not math.isfinite(value):
+        return None
+    if isinstance(value, str | int | float | bool) or value is None:
+        return value
+    return str(value)
+
+
+def rows(table: pd.DataFrame) -> list[dict[str, Any]]:
+    """A table as a list of rows for JSON."""
+    return [plain(row) for row in table.to_dict("records")]
+
+
+def print_table(columns: Sequence[str], lines: Sequence[Sequence[str]], title: str = "") -> None:
+    """A table for people; numbers stand to the right."""
+    from rich import box
+    from rich.table import Table
+
+    table = Table(title=title or None, box=box.SIMPLE_HEAD, title_justify="left")
+    for number, column in enumerate(columns):
+        numeric = all(_is_number(line[number]) for line in lines) and bool(lines)
+        table.add_column(column, justify="right" if numeric else "left", overflow="fold")
+    for line in lines:
+        table.add_row(*line)
+    console().print(table)
+
+
+def _is_number(text: str) -> bool:
+    return text.replace(".", "", 1).replace("-", "", 1).replace("−", "", 1).replace("e", "", 1).isdigit() or not text
+
+
+def short(value: float | None, digits: int = 3) -> str:
+    """A number for people: so many significant digits, no exponent where it can be helped, empty where there is none."""
+    if value is None or not math.isfinite(value):
+        return ""
+    if value == 0.0:
+        return "0"
+    places = digits - 1 - math.floor(math.log10(abs(value)))
+    if -3 <= places <= 6:
+        return f"{round(value, places):.{max(places, 0)}f}"
+    return f"{value:.{digits - 1}e}"

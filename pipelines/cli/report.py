@@ -1,0 +1,18 @@
+"""``tumbleline report``: where a run's report is."""
+
+from __future__ import annotations
+
+from pipelines.cli.options import ArchiveOption, JsonOption, RunArgument, print_json
+
+
+def command(run: RunArgument = "latest", archive: ArchiveOption = None, *, as_json: JsonOption = False) -> None:
+    """Say where a run's report is; make it again where it is missing or the run's tables are newer."""
+    from pipelines.archive import Archive
+    from pipelines.report import make_report
+
+    found = Archive(archive).run(run)
+    make_report(found)
+    if as_json:
+        print_json({"run": found.id, "report": str(found.report)})
+    else:
+        print(found.report)

@@ -1,0 +1,68 @@
+"""``tumbleline show``: a run, or one of its tables."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from pipelines.cli.options import ArchiveOption, JsonOption, RunArgument, console, print_json, print_table, rows, short
+
+if TYPE_CHECKING:
+    from pipelines.archive import Run
+
+MANY = 40
+
+
+def command(
+    run: RunArgument = "latest",
+    table: Annotated[
+        str, typer.Argument(metavar="[TABLE]", help="A table of the run, for instance coefficients.")
+    ] = "",
+    archive: ArchiveOption = None,
+    *,
+    as_json: JsonOption = False,
+) -> None:
+    """Show what a run came to, or one of its tables."""
+    from pipelines.archive import Archive
+
+    found = Archive(archive).run(run)
+    if table:
+        _show_table(found, table, as_json=as_json)
+    else:
+        _show_run(found, as_json=as_json)
+
+
+def _show_run(run: Run, *, as_json: bool) -> None:
+    from pipelines.cli.summary import print_summary, summary
+
+    tables = run.tables()
+    document = {
+        **(summary(run) if "grades" in tables else {"run": run.id, "units": []}),
+        "tables": tables,
+        "provenance": {key: run.about.get(key) for key in ("who", "where", "when", "libraries", "capture", "source")},
+    }
+    if as_json:
+        print_json(document)
+        return
+    if document["units"]:
+        print_summary(document)
+    else:
+        console().print(f"run {run.id} has no grades", markup=False)
+    console().print(f"tables  {', '.join(tables)}", markup=False)
+
+
+def _show_table(run: Run, name: str, *, as_json: bool) -> None:
+    frame = run.table(name)
+    if as_json:
+        print_json({"run": run.id, "table": name, "rows": rows(frame)})
+        return
+    shown = frame.head(MANY)
+    lines = [[_cell(value) for value in row] for row in shown.itertuples(index=False)]
+    print_table([str(column) for column in frame.columns], lines, title=f"{run.id}: {name}")
+    if len(frame) > MANY:
+        console().print(f"{len(frame) - MANY} more rows; --json prints all of them", markup=False)
+
+
+def _cell(value: object) -> str:
+    return short(value, 5) if isinstance(value, float) else str(value)

@@ -1,0 +1,76 @@
+"""The result of a run in short: one line per slot, for people and as JSON."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from pipelines.cli.options import STYLES, console, plain, print_table, short
+from schemas.errors import DONE, PART_FAILED
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+    from pipelines.archive import Run
+
+SHOWN = (
+    ("residual_rms_ug", "residual µg"),
+    ("verification_norm_ug", "verification µg"),
+    ("bias_error_ug", "bias error µg"),
+    ("velocity_random_walk_ug_rtHz", "N µg/√Hz"),
+    ("bias_instability_ug", "B ≤ µg"),
+)
+
+
+def summary(run: Run) -> dict[str, Any]:
+    """What a run came to: per unit outcome, grade, reasons and figures; the yield; where the report is."""
+    grades, figures = run.table("grades"), run.table("figures")
+    units = [_unit(row, figures) for row in grades.sort_values("slot").to_dict("records")]
+    passed = sum(unit["outcome"] == "pass" for unit in units)
+    return {
+        "run": run.id,
+        "recipe": run.about["recipe"]["name"],
+        "effects": run.about["recipe"]["effects"],
+        "units": units,
+        "passed": passed,
+        "failed": sum(unit["outcome"] == "fail" for unit in units),
+        "refused": sum(unit["outcome"] == "refused" for unit in units),
+        "yield": passed / len(units),
+        "report": str(run.report),
+        "archive": str(run.archive.root),
+    }
+
+
+def _unit(row: dict[str, Any], figures: pd.DataFrame) -> dict[str, Any]:
+    own = figures[figures["unit"] == row["unit"]]
+    return plain(
+        {
+            **row,
+            "figures": {
+                f["figure"]: {k: f[k] for k in ("value", "uncertainty", "limit", "unit_text", "outcome", "rule")}
+                for f in own.to_dict("records")
+            },
+        }
+    )
+
+
+def exit_status(document: dict[str, Any]) -> int:
+    """Done where every unit passed; otherwise a part failed."""
+    return DONE if document["passed"] == len(document["units"]) else PART_FAILED
+
+
+def print_summary(document: dict[str, Any]) -> None:
+    """The result for people."""
+    lines = []
+    for unit in document["units"]:
+        values = [short(unit["figures"].get(name, {}).get("value")) for name, _ in SHOWN]
+        style = STYLES[unit["outcome"]]
+        lines.append([str(unit["slot"]), unit["unit"], f"[{style}]{unit['outcome']}[/]", unit["grade"], *values])
+    print_table(["slot", "unit", "result", "grade", *(title for _, title in SHOWN)], lines)
+    out = console()
+    for unit in document["units"]:
+        if unit["reasons"]:
+            out.print(f"  {unit['unit']}: {unit['reasons']}", markup=False)
+    total = len(document["units"])
+    out.print(f"{document['passed']} of {total} passed, {document['failed']} failed, {document['refused']} refused")
+    out.print(f"run     {document['run']}", markup=False)
+    out.print(f"report  {document['report']}", markup=False, soft_wrap=True)

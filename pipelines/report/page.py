@@ -1,0 +1,5 @@
+"""The page: temporary."""
+
+
+def render(run):
+    return "<html></html>"
