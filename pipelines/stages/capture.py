@@ -58,14 +58,15 @@ class Step:
 def steps(recipe: Recipe) -> list[Step]:
     """Every record of a recipe in order: per temperature the poses, then those for verification; the static record last.
 
-    The static record has a soak of its own, so that it never depends on what the last temperature was.
+    The static record has a soak of its own, unless it is taken at the last temperature.
     """
     found: list[Step] = []
     for soak, temperature in enumerate(recipe.temperatures_C):
         for kind, poses in (("dwell", recipe.poses), ("verification", recipe.verification)):
             found += [Step(len(found) + i, kind, soak, temperature, pose) for i, pose in enumerate(poses)]
     if recipe.static_record_s > 0.0:
-        soak = len(recipe.temperatures_C)
+        again = recipe.static_temperature_C == recipe.temperatures_C[-1]
+        soak = len(recipe.temperatures_C) - (1 if again else 0)
         found.append(Step(len(found), "allan", soak, recipe.static_temperature_C, recipe.static_pose))
     return found
 

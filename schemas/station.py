@@ -1,0 +1,171 @@
+"""A station's file: which devices it has and where, what they may do, and how a simulated one is made."""
+
+from __future__ import annotations
+
+import tomllib
+from importlib.resources import files
+from typing import TYPE_CHECKING, Annotated, Literal
+
+from pydantic import Field, FiniteFloat, ValidationError, model_validator
+
+from schemas.errors import RecipeInvalid
+from schemas.recipe import Strict, explain, read_text
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+Positive = Annotated[FiniteFloat, Field(gt=0.0)]
+NotNegative = Annotated[FiniteFloat, Field(ge=0.0)]
+Bounds = Annotated[list[FiniteFloat], Field(min_length=2, max_length=2)]
+SIMULATED = "simulated.toml"
+SLOTS = 8
+
+
+class Device(Strict):
+    """A device at an address; a simulated station leaves host and port empty and gets its own."""
+
+    profile: str
+    host: str = ""
+    port: Annotated[int, Field(ge=0, le=65535)] = 502
+    device_id: Annotated[int, Field(ge=1, le=247)]
+
+
+class Slots(Strict):
+    """The reader's slots: slot n answers at ``device_id`` + n."""
+
+    profile: str
+    host: str = ""
+    port: Annotated[int, Field(ge=0, le=65535)] = 502
+    device_id: Annotated[int, Field(ge=1, le=240)]
+
+
+class Devices(Strict):
+    """Everything that answers on the station's links."""
+
+    outer: Device
+    inner: Device
+    chamber: Device
+    reader: Device
+    slots: Slots
+
+
+class Limits(Strict):
+    """What the station may be asked to do; checked before anything moves."""
+
+    outer_deg: Bounds = [-200.0, 200.0]
+    inner_deg: Bounds = [-380.0, 380.0]
+    speed_deg_s: Positive = 30.0
+    acceleration_deg_s2: Positive = 30.0
+    temperature_C: Bounds = [-40.0, 85.0]
+    rate_hz: Positive = 4000.0
+    position_deg: Positive = 0.01
+
+    @model_validator(mode="after")
+    def _ordered(self) -> Limits:
+        for name, (low, high) in (
+            ("outer_deg", self.outer_deg),
+            ("inner_deg", self.inner_deg),
+            ("temperature_C", self.temperature_C),
+        ):
+            if low >= high:
+                message = f"limits.{name}: {low} is not below {high}; give the lower bound first"
+                raise ValueError(message)
+        return self
+
+
+class Soak(Strict):
+    """When a soak counts as reached: every unit inside the band and still, for a while."""
+
+    band_K: Positive = 1.0
+    rate_K_per_min: Positive = 0.1
+    window_s: Positive = 120.0
+    limit_s: Positive = 14400.0
+    poll_s: Positive = 10.0
+
+
+class Link(Strict):
+    """Patience of the links."""
+
+    timeout_s: Positive = 3.0
+    read_attempts: Annotated[int, Field(ge=1, le=5)] = 2
+
+
+class Hidden(Strict):
+    """A hidden effect of the simulated station, with figures other than its usual ones."""
+
+    kind: str
+    figures: dict[str, FiniteFloat] = {}
+
+
+class Fault(Strict):
+    """Something that goes wrong at ``at_s`` on the simulated station's clock.
+
+    ``silent``: the reader's gateway says that the device does not answer. ``mute``: nothing at all comes back. ``dead``: the outputs
+    stay as they are. ``door``: the chamber's door opens. ``serial`` names the unit where one is meant.
+    """
+
+    kind: Literal["silent", "mute", "dead", "door"]
+    at_s: NotNegative = 0.0
+    serial: str = ""
+
+    @model_validator(mode="after")
+    def _names_a_unit(self) -> Fault:
+        if (self.kind == "door") == bool(self.serial):
+            message = f"fault {self.kind}: serial is '{self.serial}'; silent, mute and dead need one, door needs none"
+            raise ValueError(message)
+        return self
+
+
+class Simulation(Strict):
+    """How the simulated station is made."""
+
+    seed: Annotated[int, Field(ge=0)] = 1
+    room_C: FiniteFloat = 23.0
+    slot_rotation_mrad: NotNegative = 1.0
+    slot_lag_s: Bounds = [90.0, 200.0]
+    slot_gradient_K: NotNegative = 0.1
+    supply_spread: NotNegative = 1e-3
+    preset_overrides: dict[str, FiniteFloat] = {}
+    hidden: list[Hidden] = []
+    faults: list[Fault] = []
+
+
+class StationConfig(Strict):
+    """A station."""
+
+    name: Annotated[str, Field(pattern=r"^[a-z0-9][a-z0-9._-]*$")]
+    kind: Literal["simulated", "modbus"]
+    description: str = ""
+    devices: Devices
+    limits: Limits = Limits()
+    soak: Soak = Soak()
+    link: Link = Link()
+    simulation: Simulation | None = None
+
+    @model_validator(mode="after")
+    def _complete(self) -> StationConfig:
+        if self.kind == "simulated" and self.simulation is None:
+            message = "simulation: missing, a station of kind simulated needs it; add [simulation]"
+            raise ValueError(message)
+        if self.kind == "modbus":
+            for name in Devices.model_fields:
+                if not getattr(self.devices, name).host:
+                    message = f"devices.{name}.host: empty, a station of kind modbus needs one; add the address"
+                    raise ValueError(message)
+        return self
+
+
+def load_station(path: Path | None = None) -> StationConfig:
+    """The station in a file, or the built-in simulated one; :class:`RecipeInvalid` names the key and what is needed."""
+    if path is None:
+        source = f"stations/{SIMULATED}"
+        text = files("stations").joinpath(SIMULATED).read_text("utf-8")
+    else:
+        source, text = str(path), read_text(path, "station")
+    try:
+        return StationConfig.model_validate(tomllib.loads(text))
+    except tomllib.TOMLDecodeError as problem:
+        message = f"{source}: not valid TOML: {problem}; correct the file"
+        raise RecipeInvalid(message) from None
+    except ValidationError as problem:
+        raise explain(problem, source, StationConfig) from None

@@ -1,0 +1,155 @@
+"""Words on the wire and values, both ways: the one codec that the client and the simulated station share."""
+
+from __future__ import annotations
+
+import struct
+from typing import TYPE_CHECKING, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from schemas.profile import Register, WordOrder
+
+Value = float | str | list[float]
+Words = NDArray[np.uint16]
+Counts = NDArray[np.int64]
+Packing = Literal["int20x3", "int24x3"]
+
+_FORMAT = {"uint16": ">H", "int16": ">h", "uint32": ">I", "int32": ">i", "float32": ">f"}
+_RANGE = {
+    "uint16": (0, 2**16 - 1),
+    "int16": (-(2**15), 2**15 - 1),
+    "uint32": (0, 2**32 - 1),
+    "int32": (-(2**31), 2**31 - 1),
+}
+WORDS_PER_SAMPLE: dict[Packing, int] = {"int20x3": 4, "int24x3": 5}
+SEQUENCE: dict[Packing, int] = {"int20x3": 16, "int24x3": 256}
+BITS: dict[Packing, int] = {"int20x3": 20, "int24x3": 24}
+
+
+class NotEncodable(ValueError):
+    """A value that a register cannot hold."""
+
+
+def encode(register: Register, order: WordOrder, value: Value) -> list[int]:
+    """The words that hold a value; a number outside the register's type or limits is refused."""
+    if register.type == "string":
+        return _encode_text(register, value)
+    values = value if isinstance(value, list) else [value]
+    if len(values) != register.count:
+        message = f"{register.name}: {len(values)} values, the register holds {register.count}; give that many"
+        raise NotEncodable(message)
+    return [word for one in values for word in _encode_number(register, order, one)]
+
+
+def decode(register: Register, order: WordOrder, words: Sequence[int]) -> Value:
+    """The value that words hold: a number, a list where the register has a count, a text."""
+    if register.type == "string":
+        raw = struct.pack(f">{len(words)}H", *words)
+        return raw.rstrip(b"\0").decode("ascii", errors="replace")
+    size = register.words // register.count
+    numbers = [_decode_number(register, order, words[i : i + size]) for i in range(0, len(words), size)]
+    return numbers if register.count > 1 else numbers[0]
+
+
+def _encode_text(register: Register, value: Value) -> list[int]:
+    if not isinstance(value, str) or not value.isascii() or len(value) > 2 * register.count:
+        message = f"{register.name}: {value!r} is not an ASCII text of at most {2 * register.count} characters"
+        raise NotEncodable(message)
+    raw = value.encode("ascii").ljust(2 * register.count, b"\0")
+    return list(struct.unpack(f">{register.count}H", raw))
+
+
+def _encode_number(register: Register, order: WordOrder, value: float | str) -> tuple[int, ...]:
+    number = _number(register, value)
+    if register.type == "float32":
+        raw: float = number / register.scale
+    else:
+        raw = round(number / register.scale)
+        low, high = _RANGE[register.type]
+        if not low <= raw <= high:
+            message = f"{register.name}: {value} {register.unit} does not fit {register.type}; give a smaller value"
+            raise NotEncodable(message)
+    packed = struct.pack(_FORMAT[register.type], raw)
+    words = struct.unpack(f">{len(packed) // 2}H", packed)
+    return words if order == "high_first" else words[::-1]
+
+
+def _number(register: Register, value: float | str) -> float:
+    """The number behind a value, inside the register's limits."""
+    if isinstance(value, str):
+        if value not in register.enumeration:
+            message = f"{register.name}: '{value}' is none of {', '.join(register.enumeration) or 'nothing named'}"
+            raise NotEncodable(message)
+        return register.enumeration[value] * register.scale
+    low, high = register.minimum, register.maximum
+    if (low is not None and not value >= low) or (high is not None and not value <= high):
+        message = f"{register.name}: {value} {register.unit} is outside {low} to {high}; give a value inside"
+        raise NotEncodable(message)
+    return value
+
+
+def _decode_number(register: Register, order: WordOrder, words: Sequence[int]) -> float:
+    ordered = words if order == "high_first" else words[::-1]
+    raw = struct.unpack(_FORMAT[register.type], struct.pack(f">{len(ordered)}H", *ordered))[0]
+    return raw * register.scale if register.scale != 1.0 else raw
+
+
+def named(register: Register, value: float) -> str:
+    """The name of an enumerated value, or ``unknown (n)``."""
+    for name, number in register.enumeration.items():
+        if number == value:
+            return name
+    return f"unknown ({value:g})"
+
+
+def pack_samples(counts: Counts, first: int, packing: Packing) -> Words:
+    """Samples as words, with the low bits of each sample's number beside it.
+
+    Parameters
+    ----------
+    counts : (n, ..., 3), integers that fit the packing
+    first : number of the first sample since the start
+    packing : three integers of 20 bits and a number of 4 in 4 words, or of 24 and 8 in 5 words; most significant first
+
+    Returns
+    -------
+    (n, ..., 4) or (n, ..., 5)
+    """
+    shape = (-1,) + (1,) * (counts.ndim - 2)
+    number = (np.arange(first, first + len(counts)) % SEQUENCE[packing]).astype(np.uint64).reshape(shape)
+    mask = np.uint64((1 << BITS[packing]) - 1)
+    x, y, z = (counts[..., axis].astype(np.uint64) & mask for axis in range(3))
+    if packing == "int20x3":
+        packed = (x << np.uint64(44)) | (y << np.uint64(24)) | (z << np.uint64(4)) | number
+        return packed.astype(">u8")[..., None].view(">u2").astype(np.uint16)
+    low = np.uint64(0xFF)
+    parts = (
+        x >> np.uint64(8),
+        ((x & low) << np.uint64(8)) | (y >> np.uint64(16)),
+        y & np.uint64(0xFFFF),
+        z >> np.uint64(8),
+        ((z & low) << np.uint64(8)) | np.broadcast_to(number, z.shape),
+    )
+    return np.stack(parts, axis=-1).astype(np.uint16)
+
+
+def unpack_samples(words: Words, packing: Packing) -> tuple[Counts, Counts]:
+    """The counts (n, 3) and the low bits of the sample numbers (n,) in words (n·4,) or (n·5,)."""
+    table = words.reshape(-1, WORDS_PER_SAMPLE[packing]).astype(np.int64)
+    if packing == "int20x3":
+        x = (table[:, 0] << 4) | (table[:, 1] >> 12)
+        y = ((table[:, 1] & 0xFFF) << 8) | (table[:, 2] >> 8)
+        z = ((table[:, 2] & 0xFF) << 12) | (table[:, 3] >> 4)
+        number = table[:, 3] & 0xF
+    else:
+        x = (table[:, 0] << 8) | (table[:, 1] >> 8)
+        y = ((table[:, 1] & 0xFF) << 16) | table[:, 2]
+        z = (table[:, 3] << 8) | (table[:, 4] >> 8)
+        number = table[:, 4] & 0xFF
+    sign = 1 << (BITS[packing] - 1)
+    counts = np.stack((x, y, z), axis=-1)
+    return (counts ^ sign) - sign, number

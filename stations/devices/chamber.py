@@ -1,0 +1,55 @@
+"""The thermal chamber: a set point, read back, and the air's temperature."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+from schemas.errors import StationRefused
+
+if TYPE_CHECKING:
+    from stations.devices.registers import Registers
+
+READ_BACK_K = 1e-3
+PLAUSIBLE_C = (-100.0, 250.0)
+
+
+class ThermalChamber:
+    """A chamber behind a controller that ramps by itself."""
+
+    def __init__(self, registers: Registers, low: float, high: float) -> None:
+        self._registers = registers
+        self._low, self._high = low, high
+
+    def check(self, temperature: float) -> None:
+        """Refuses a temperature outside the station's limits; nothing has been set then."""
+        if not self._low <= temperature <= self._high:
+            message = (
+                f"{self._registers.name}: set point {temperature:g} °C, {self._low:g} to {self._high:g} °C is allowed; "
+                "change the recipe"
+            )
+            raise StationRefused(message)
+
+    def set_temperature(self, temperature: float) -> None:
+        """Sets the target in °C and makes sure that the controller has taken it."""
+        self.check(temperature)
+        self._registers.write("set_point", temperature)
+        found = self._registers.number("set_point")
+        mode = self._registers.text("actual_mode")
+        if abs(found - temperature) > READ_BACK_K or mode != "automatic":
+            message = (
+                f"{self._registers.name}: set point {found:g} °C in mode {mode}, {temperature:g} °C in automatic is "
+                "needed; check the controller's panel"
+            )
+            raise StationRefused(message)
+
+    def temperature(self) -> float:
+        """The air's temperature, °C; what no chamber can have is refused."""
+        value = self._registers.number("temperature")
+        if not (math.isfinite(value) and PLAUSIBLE_C[0] < value < PLAUSIBLE_C[1]):
+            message = (
+                f"{self._registers.name}: air at {value:g} °C, {PLAUSIBLE_C[0]:g} to {PLAUSIBLE_C[1]:g} °C is possible; "
+                "check sensor and word order"
+            )
+            raise StationRefused(message)
+        return value

@@ -1,0 +1,1 @@
+"""Links: what carries register reads and writes to a device."""

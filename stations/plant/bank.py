@@ -1,0 +1,73 @@
+"""Registers of one simulated device: the profile on one side, the plant's values on the other."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import TYPE_CHECKING
+
+from stations.codec import NotEncodable, Value, decode, encode
+
+if TYPE_CHECKING:
+    from schemas.profile import Profile, Register
+
+Source = Callable[[], Value]
+Sink = Callable[[dict[str, Value]], None]
+Window = Callable[[int, int], list[int]]
+
+
+class Busy(Exception):
+    """The device cannot do this now; the server answers exception 6."""
+
+
+def refuse_write(values: dict[str, Value]) -> None:
+    """The sink of a device that takes no commands."""
+    message = f"{', '.join(values)}: not to be written"
+    raise NotEncodable(message)
+
+
+class Bank:
+    """What a device's registers hold now, and what a write to them means."""
+
+    def __init__(
+        self, profile: Profile, sources: Mapping[str, Source], sink: Sink = refuse_write, window: Window | None = None
+    ) -> None:
+        self.profile = profile
+        self._sources = dict(sources)
+        self._sink = sink
+        self._window = window
+        missing = [r.name for r in profile.registers if r.access != "write" and r.name not in self._sources]
+        if missing:
+            message = f"profile {profile.name}: the plant has nothing for {', '.join(missing)}; add a source for each"
+            raise LookupError(message)
+
+    def read(self, address: int, count: int) -> list[tuple[int, list[int]]]:
+        """Words of every register that the span touches, each with its address."""
+        fifo = self.profile.fifo
+        if fifo is not None and self._window is not None and address >= fifo.address:
+            return [(address, self._window(address - fifo.address, count))]
+        end = address + count
+        return [
+            (r.address, encode(r, self.profile.order(r), self._sources[r.name]()))
+            for r in self.profile.registers
+            if r.address < end and r.end > address and r.name in self._sources
+        ]
+
+    def write(self, address: int, words: list[int]) -> None:
+        """Acts on the registers in the span; half a register, a value outside its limits or a read-only one is refused."""
+        end = address + len(words)
+        values: dict[str, Value] = {}
+        for register in self.profile.registers:
+            if register.address < end and register.end > address:
+                values[register.name] = self._value(register, address, words)
+        self._sink(values)
+
+    def _value(self, register: Register, address: int, words: list[int]) -> Value:
+        first = register.address - address
+        part = words[max(first, 0) : first + register.words]
+        if register.access == "read" or first < 0 or len(part) != register.words:
+            message = f"{register.name}: read-only or cut in half; write whole registers that may be written"
+            raise NotEncodable(message)
+        order = self.profile.order(register)
+        value = decode(register, order, part)
+        encode(register, order, value)  # refuses what is outside the limits
+        return value

@@ -1,0 +1,132 @@
+"""Devices under test: what is true of each unit, and how force becomes counts."""
+
+from __future__ import annotations
+
+import zlib
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from stations.plant.preset import Preset
+
+Array = NDArray[np.float64]
+Counts = NDArray[np.int64]
+
+REFERENCE_C = 25.0
+QUADRATIC_PER_K = 0.003  # quadratic over linear temperature coefficient, one sigma
+
+
+@dataclass(frozen=True)
+class Truth:
+    """What a unit really is, in its own frame; ``slot_rotation`` is the fixture's part.
+
+    Output in g = bias(θ) + scale(θ)·(misalignment·f + cubic·f³) + noise, θ = T − 25 °C; times ``output_scale`` it is the output's unit.
+    """
+
+    serial: str
+    bias_g: Array  # (3,)
+    scale_ppm: Array  # (3,), deviation from nominal
+    misalignment: Array  # (3, 3), ones on the diagonal
+    bias_tempco: Array  # (3,), g/K
+    bias_tempco_quadratic: Array  # (3,), g/K²
+    scale_tempco: Array  # (3,), 1/K
+    scale_tempco_quadratic: Array  # (3,), 1/K²
+    cubic: Array  # (3,), 1/g²
+    slot_rotation: Array  # (3, 3), fixture to slot
+    output_scale: float  # output units per g
+    zero_level: float  # output units
+    supply_ratio: float  # true supply over nominal where the output follows it, else 1
+
+    @property
+    def matrix(self) -> Array:
+        """Output in g over force in the fixture at 25 °C, (3, 3): scale, misalignment and slot together."""
+        return (1.0 + 1e-6 * self.scale_ppm)[:, None] * (self.misalignment @ self.slot_rotation)
+
+
+def stream(*key: int | str) -> np.random.Generator:
+    """A generator that belongs to a key of whole numbers and texts."""
+    words = [zlib.crc32(k.encode()) if isinstance(k, str) else k for k in key]
+    return np.random.default_rng(np.random.SeedSequence(words))
+
+
+def draw_truth(
+    preset: Preset, serial: str, seed: int, *, slot_rotation: Array, supply_ratio: float, output_scale: float
+) -> Truth:
+    """A unit's truth, the same for the same serial and seed on every station."""
+    rng = stream(seed, serial, "truth")
+    normal = rng.standard_normal((8, 3))
+    skew = np.eye(3) + 1e-3 * preset.misalignment_sd_mrad * rng.standard_normal((3, 3)) * (1.0 - np.eye(3))
+    tempco, scale_tempco = 1e-6 * preset.bias_tempco_ug_per_K, 1e-6 * preset.scale_tempco_ppm_per_K
+    # The sheet's linearity is the deviation at full scale; an odd transfer keeps most of it out of the range of 1 g.
+    cubic = 1e-2 * preset.linearity_pct_fs / preset.range_g**2
+    return Truth(
+        serial=serial,
+        bias_g=preset.bias_mean_g + preset.bias_sd_g * normal[0],
+        scale_ppm=preset.scale_sd_ppm * normal[1],
+        misalignment=skew,
+        bias_tempco=tempco * normal[2],
+        bias_tempco_quadratic=QUADRATIC_PER_K * tempco * normal[3],
+        scale_tempco=scale_tempco * normal[4],
+        scale_tempco_quadratic=QUADRATIC_PER_K * scale_tempco * normal[5],
+        cubic=cubic * np.tanh(normal[6]),
+        slot_rotation=slot_rotation,
+        output_scale=output_scale,
+        zero_level=preset.zero_level,
+        supply_ratio=supply_ratio if preset.ratiometric else 1.0,
+    )
+
+
+class Devices:
+    """The units of a lot, computed together."""
+
+    def __init__(self, preset: Preset, truths: Sequence[Truth]) -> None:
+        self._preset = preset
+        self._lsb = float(np.float32(preset.lsb))  # as the reader's register tells it
+        self._bias = np.stack([t.bias_g for t in truths])
+        self._scale = np.stack([1.0 + 1e-6 * t.scale_ppm for t in truths])
+        self._matrix = np.stack([t.misalignment for t in truths])
+        self._bias_t = np.stack([t.bias_tempco for t in truths])
+        self._bias_t2 = np.stack([t.bias_tempco_quadratic for t in truths])
+        self._scale_t = np.stack([t.scale_tempco for t in truths])
+        self._scale_t2 = np.stack([t.scale_tempco_quadratic for t in truths])
+        self._cubic = np.stack([t.cubic for t in truths])
+        self._gain = np.array([t.supply_ratio for t in truths])[:, None]
+
+    def output(self, force: Array, temperature: Array) -> Array:
+        """Output without noise, (n, s, 3) in g, under force (n, s, 3) in g at ``temperature`` (n, s) in °C."""
+        theta = (temperature - REFERENCE_C)[..., None]
+        along = rotate(self._matrix, force)
+        along = along + self._cubic * force**3
+        bias = self._bias + theta * (self._bias_t + theta * self._bias_t2)
+        scale = self._scale * (1.0 + theta * (self._scale_t + theta * self._scale_t2))
+        return bias + scale * along
+
+    def counts(self, output: Array) -> Counts:
+        """What the converter says of outputs (n, s, 3) in g: supply, clipping at range and codes, rounding."""
+        preset = self._preset
+        inside = np.clip(output, -preset.range_g, preset.range_g)
+        raw = np.rint(self._gain * (preset.zero_level + preset.scale * inside) / self._lsb)
+        return np.clip(raw, -preset.largest_count - 1, preset.largest_count).astype(np.int64)
+
+
+def rotate(matrices: Array, vectors: Array) -> Array:
+    """Matrices (s, 3, 3) times vectors (n, s, 3); written out, since BLAS sums in an order that depends on n."""
+    m, v = matrices, vectors
+    return np.stack(
+        [m[:, i, 0] * v[..., 0] + m[:, i, 1] * v[..., 1] + m[:, i, 2] * v[..., 2] for i in range(3)], axis=-1
+    )
+
+
+def rotation(vector: Array) -> Array:
+    """The rotation matrix (3, 3) of a small rotation vector (3,), rad (Rodrigues)."""
+    angle = float(np.linalg.norm(vector))
+    if angle == 0.0:
+        return np.eye(3)
+    x, y, z = vector / angle
+    k = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+    return np.eye(3) + np.sin(angle) * k + (1.0 - np.cos(angle)) * k @ k

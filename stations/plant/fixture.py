@@ -1,0 +1,71 @@
+"""The fixture in the chamber: temperatures of air and elements, vibration and supply, second by second."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from stations.plant.chamber import STEP_S, Chamber
+from stations.plant.device import stream
+from stations.plant.grid import Grid
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+
+    from schemas.station import Simulation
+    from stations.plant.hidden import HiddenEffect
+
+Array = NDArray[np.float64]
+
+AIR_UNREST_K = 0.01
+AIR_UNREST_S = 30.0
+
+
+class Fixture:
+    """Slots with a lag and a place in the air stream each. Steps are computed one ahead of the clock.
+
+    A command in the middle of a second acts from the next whole second on, so what happens does not depend on how the time until
+    then was cut up.
+    """
+
+    def __init__(
+        self, sim: Simulation, slots: Sequence[int], air: np.random.Generator, hidden: Sequence[HiddenEffect]
+    ) -> None:
+        place = stream(sim.seed, "fixture")
+        low, high = sim.slot_lag_s
+        lag = place.uniform(low, high, 64)[list(slots)]
+        self._gradient = sim.slot_gradient_K * place.standard_normal(64)[list(slots)]
+        self._keep = np.exp(-STEP_S / lag)
+        self._air_stream = air
+        self._unrest = np.zeros(len(slots))
+        self._hidden = list(hidden)
+        self.chamber = Chamber(room=sim.room_C, ramp_K_min=3.0, air=sim.room_C, wall=sim.room_C, working=sim.room_C)
+        self.chamber.set_point = sim.room_C
+        self.temperature = Grid(np.full(len(slots), sim.room_C))
+        self.air = Grid(np.array(sim.room_C))
+        self.vibration = Grid(np.array(self.chamber.vibration()))
+        self.memory = [Grid(np.zeros((len(slots), 3))) for _ in self._hidden]
+
+    def step_to(self, seconds: float, force: Callable[[float], Array]) -> None:
+        """Computes the grid up to the whole second at or after ``seconds``; ``force(t)`` is (s, 3) in g."""
+        last = math.ceil(seconds / STEP_S)
+        while self.temperature.length <= last:
+            self._step(force)
+
+    def _step(self, force: Callable[[float], Array]) -> None:
+        self.chamber.step()
+        keep = math.exp(-STEP_S / AIR_UNREST_S)
+        z = self._air_stream.standard_normal(len(self._unrest))
+        self._unrest = keep * self._unrest + AIR_UNREST_K * math.sqrt(1.0 - keep**2) * z
+        around = self.chamber.air + self._gradient + self._unrest
+        elements = around + (self.temperature.last - around) * self._keep
+        if self._hidden:
+            before = force((self.temperature.length - 1) * STEP_S)
+            for effect, memory in zip(self._hidden, self.memory, strict=True):
+                memory.append(effect.slow(elements, before, STEP_S))
+        self.temperature.append(elements)
+        self.air.append(np.array(self.chamber.air))
+        self.vibration.append(np.array(self.chamber.vibration()))

@@ -1,0 +1,11 @@
+"""Numbers that belong to an instant: reading twice gives the same, and reading moves nothing."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+
+def keyed_normal(seed: int, channel: int, tick: int, n: int) -> NDArray[np.float64]:
+    """``n`` standard normal numbers that depend on seed, channel and tick only."""
+    return np.random.Generator(np.random.Philox(key=seed, counter=[0, 0, channel, tick])).standard_normal(n)

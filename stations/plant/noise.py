@@ -1,0 +1,84 @@
+"""Noise of the devices under test: white, flicker, random walk, each from the unit's own stream of numbers.
+
+Draws are made sample by sample in order, so that a record does not depend on how it was asked for.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.signal import lfilter
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from stations.plant.preset import Preset
+
+Array = NDArray[np.float64]
+
+SHORTEST_S = 0.1
+RATIO = 3.0  # between time constants; a sum of Lorentzians spaced like this follows 1/f within 0.1 %
+TERMS = 11  # up to 0.1·3^10 s = 1.6 hours
+
+
+def flicker_time_constants() -> Array:
+    """Time constants of the Ornstein–Uhlenbeck processes that make flicker noise, (11,), s."""
+    return SHORTEST_S * RATIO ** np.arange(TERMS)
+
+
+def flicker_variance(instability: float) -> float:
+    """Variance of each process so that their sum has the bias instability B, in the square of its unit.
+
+    Flicker of B has the one-sided density h/f with h = B²/π (its Allan deviation is sqrt(2·ln2·h) = 0.664·B). A process of
+    variance v and time constant τ has 4vτ/(1 + (2πfτ)²); with a ratio r between the τ the sum tends to v/(f·ln r).
+    """
+    return instability**2 / math.pi * math.log(RATIO)
+
+
+class Noise:
+    """The noise of a lot, in g, with the state that goes on from one run of sampling to the next."""
+
+    def __init__(self, preset: Preset, streams: Sequence[np.random.Generator]) -> None:
+        self._density = preset.noise_density_ug * 1e-6
+        self._walk_step = preset.rate_random_walk_ug * 1e-6
+        self._tau = flicker_time_constants()
+        self._sigma = math.sqrt(flicker_variance(preset.bias_instability_ug * 1e-6))
+        self._streams = list(streams)
+        self._flicker = self._sigma * self._draw(1, TERMS)[0]
+        self._walk: Array = np.zeros((len(self._streams), 3))
+
+    def jump(self, gap: float) -> None:
+        """Carries the slow processes over ``gap`` seconds in which nothing was sampled; exact, not stepped."""
+        keep = np.exp(-gap / self._tau)
+        z = self._draw(1, TERMS + 1)[0]
+        self._flicker = keep * self._flicker + self._sigma * np.sqrt(1.0 - keep**2) * z[..., :TERMS]
+        self._walk = self._walk + self._walk_step * math.sqrt(gap) * z[..., TERMS]
+
+    def sample(self, n: int, rate: float) -> Array:
+        """The next ``n`` samples at ``rate`` Hz, (n, units, 3), g.
+
+        White noise of the one-sided density n_d has the deviation n_d·sqrt(fs/2) per sample.
+        """
+        z = self._draw(n, TERMS + 2)
+        total = self._density * math.sqrt(rate / 2.0) * z[..., TERMS + 1]
+        if self._walk_step > 0.0:
+            steps = self._walk_step / math.sqrt(rate) * z[..., TERMS]
+            steps[0] += self._walk
+            path = np.cumsum(steps, axis=0)
+            self._walk = path[-1].copy()
+            total += path
+        if self._sigma > 0.0:
+            for k, keep in enumerate(np.exp(-1.0 / (rate * self._tau))):
+                gain = self._sigma * math.sqrt(1.0 - keep**2)
+                start = (keep * self._flicker[..., k])[None]
+                path, _ = lfilter([gain], [1.0, -keep], z[..., k], axis=0, zi=start)
+                self._flicker[..., k] = path[-1]
+                total += path
+        return total
+
+    def _draw(self, n: int, terms: int) -> Array:
+        """Standard normal numbers, (n, units, 3, terms); each unit's come from its own stream."""
+        return np.stack([stream.standard_normal((n, 3, terms)) for stream in self._streams], axis=1)

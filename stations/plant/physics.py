@@ -1,0 +1,99 @@
+"""From where the table is to what the converters say: the chain of physics for a run of instants."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from stations.plant.device import rotate
+from stations.plant.hidden import Block
+from stations.plant.table import turn
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from stations.codec import Counts
+    from stations.plant.device import Devices
+    from stations.plant.dynamics import Dynamics
+    from stations.plant.fixture import Fixture
+    from stations.plant.hidden import HiddenEffect
+    from stations.plant.noise import Noise
+    from stations.plant.table import Axis
+
+Array = NDArray[np.float64]
+
+VIBRATION_HZ = 47.3
+VIBRATION_ALONG = np.array([0.48, 0.36, 0.80])  # unit vector in the fixture
+
+
+class Physics:
+    """Table, fixture, hidden effects, response, transfer, noise and conversion in the order in which they act."""
+
+    def __init__(
+        self,
+        axes: tuple[Axis, Axis],
+        fixture: Fixture,
+        rotations: Array,
+        devices: Devices,
+        dynamics: Dynamics,
+        noise: Noise,
+        hidden: Sequence[HiddenEffect],
+    ) -> None:
+        self._outer, self._inner = axes
+        self._fixture = fixture
+        self._rotations = rotations
+        self._devices = devices
+        self._dynamics = dynamics
+        self._noise = noise
+        self._hidden = list(hidden)
+        self._sampled_until = 0.0
+        self._up = np.array([0.0, 0.0, 1.0])
+        for effect in self._hidden:
+            self._up = effect.up(self._up)
+        self.dead_from = np.full(len(rotations), math.inf)
+        self._held = devices.counts(np.zeros((1, len(rotations), 3)))[0]
+
+    def force(self, time: Array) -> Array:
+        """True specific force on every unit, (n, s, 3) in g, without vibration."""
+        outer, inner = np.deg2rad(self._outer.angle(time)), np.deg2rad(self._inner.angle(time))
+        for effect in self._hidden:
+            outer, inner = effect.table(outer, inner)
+        force = rotate(self._rotations, turn(self._up, outer, inner)[:, None, :])
+        for effect in self._hidden:
+            force = effect.force(force)
+        return force
+
+    def force_at(self, time: float) -> Array:
+        """True specific force at one instant, (s, 3), g."""
+        return self.force(np.array([time]))[0]
+
+    def begin(self, start: float, rate: float) -> None:
+        """Sampling starts at ``start`` s with ``rate`` Hz."""
+        self._noise.jump(start - self._sampled_until)
+        self._sampled_until = start
+        self._dynamics.begin(rate, self.force_at(start))
+
+    def samples(self, time: Array, rate: float) -> Counts:
+        """Counts (n, s, 3) at the next instants ``time`` (n,), s."""
+        shaking = self._fixture.vibration.at(time)
+        swing = math.sqrt(2.0) * shaking * np.sin(2.0 * math.pi * VIBRATION_HZ * time)
+        felt = self._dynamics.respond(self.force(time) + swing[:, None, None] * VIBRATION_ALONG)
+        temperature = self._fixture.temperature.at(time)
+        out = self._devices.output(felt, temperature)
+        for effect, memory in zip(self._hidden, self._fixture.memory, strict=True):
+            out = out + effect.output(felt, Block(time, time, shaking, temperature, memory.at(time)))
+        counts = self._devices.counts(out + self._noise.sample(len(time), rate))
+        self._sampled_until = float(time[-1])
+        return self._with_the_dead(counts, time)
+
+    def _with_the_dead(self, counts: Counts, time: Array) -> Counts:
+        """Outputs that have died stay at their last count."""
+        for unit, since in enumerate(self.dead_from):
+            first = int(np.searchsorted(time, since))
+            if first > 0:
+                self._held[unit] = counts[first - 1, unit]
+            counts[first:, unit] = self._held[unit]
+        return counts

@@ -1,0 +1,92 @@
+"""Presets: what a data sheet says of a kind of device, and what a simulation must add to it."""
+
+from __future__ import annotations
+
+import tomllib
+from importlib.resources import files
+from typing import TYPE_CHECKING, Annotated, Literal
+
+from pydantic import Field, FiniteFloat, ValidationError
+
+from schemas.errors import RecipeInvalid, did_you_mean
+from schemas.recipe import Strict, explain
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+Positive = Annotated[FiniteFloat, Field(gt=0.0)]
+NotNegative = Annotated[FiniteFloat, Field(ge=0.0)]
+
+
+class Preset(Strict):
+    """A kind of device. Standard deviations are those between units; densities are one-sided."""
+
+    name: str
+    description: str
+    scale: Positive
+    output_unit: Literal["V", "LSB"]
+    range_g: Positive
+    linearity_pct_fs: NotNegative
+    bias_stability_ug: NotNegative
+    bias_tempco_ug_per_K: NotNegative
+    scale_tempco_ppm_per_K: NotNegative
+    temperature_low_C: FiniteFloat
+    temperature_high_C: FiniteFloat
+    noise_density_ug: NotNegative
+    bias_instability_ug: NotNegative
+    rate_random_walk_ug: NotNegative
+    bandwidth_hz: Positive
+    natural_frequency_hz: Positive
+    damping: Positive
+    shock_limit_g: Positive
+    packing: Literal["int20x3", "int24x3"]
+    bias_mean_g: FiniteFloat
+    bias_sd_g: NotNegative
+    scale_sd_ppm: NotNegative
+    misalignment_sd_mrad: NotNegative
+    zero_level: FiniteFloat
+    ratiometric: bool
+    supply_V: Positive
+    thermometer_resolution_K: Positive
+    thermometer_noise_K: NotNegative
+
+    @property
+    def largest_count(self) -> int:
+        """The largest code of the converter."""
+        return 2 ** (19 if self.packing == "int20x3" else 23) - 1
+
+    @property
+    def lsb(self) -> float:
+        """Output units per count: 1 for a digital device; a converter of an analogue one spans its range and a tenth more."""
+        if self.output_unit == "LSB":
+            return 1.0
+        return 1.1 * (abs(self.zero_level) + self.range_g * self.scale) / self.largest_count
+
+    @property
+    def full_scale(self) -> float:
+        """The largest excursion of the output from zero g, in the output's unit: the range, or the last code before it."""
+        return min(self.range_g * self.scale, self.largest_count * self.lsb - abs(self.zero_level))
+
+
+def preset_names() -> list[str]:
+    """Names of the presets, as they are written in their files."""
+    return sorted(_texts())
+
+
+def load_preset(name: str, overrides: Mapping[str, float] | None = None) -> Preset:
+    """The preset of that name (in any case), with some figures replaced; unknown names and keys are refused."""
+    texts = {key.lower(): text for key, text in _texts().items()}
+    if name.lower() not in texts:
+        message = f"device: no preset '{name}'; {did_you_mean(name, preset_names())}"
+        raise RecipeInvalid(message, key="device")
+    figures = tomllib.loads(texts[name.lower()]) | dict(overrides or {})
+    try:
+        return Preset.model_validate(figures)
+    except ValidationError as problem:
+        raise explain(problem, f"preset {name}", Preset) from None
+
+
+def _texts() -> dict[str, str]:
+    folder = files("stations.plant").joinpath("presets")
+    found = {item.name: item.read_text("utf-8") for item in folder.iterdir() if item.name.endswith(".toml")}
+    return {str(tomllib.loads(text)["name"]): text for text in found.values()}

@@ -1,0 +1,85 @@
+"""The reader's sampling: one clock for all slots, a ring of packed samples per slot."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from stations.codec import WORDS_PER_SAMPLE, pack_samples
+
+if TYPE_CHECKING:
+    from stations.codec import Counts, Packing
+
+Array = NDArray[np.float64]
+CHUNK = 1024
+
+
+class Source(Protocol):
+    """Who makes the samples."""
+
+    def begin(self, start: float, rate: float) -> None:
+        """Sampling starts at ``start`` s with ``rate`` Hz; the first sample is one period later."""
+        ...
+
+    def samples(self, time: Array, rate: float) -> Counts:
+        """Counts (n, s, 3) at the next instants ``time`` (n,), s."""
+        ...
+
+
+class Sampler:
+    """Rings of ``registers`` words, filled as the plant's time goes on."""
+
+    def __init__(self, source: Source, units: int, packing: Packing, registers: int) -> None:
+        self._source = source
+        self.packing: Packing = packing
+        self._words = WORDS_PER_SAMPLE[packing]
+        self.capacity = registers // self._words
+        self._ring = np.zeros((units, self.capacity, self._words), dtype=np.uint16)
+        self.running = False
+        self.millihertz = 100_000
+        self._start_us = 0
+        self.head = 0
+        self.tail = [0] * units
+        self.overflow = [False] * units
+
+    def start(self, now_us: int) -> None:
+        """Starts afresh: counters at zero, flags down."""
+        self.running, self._start_us, self.head = True, now_us, 0
+        self.tail = [0] * len(self.tail)
+        self.overflow = [False] * len(self.overflow)
+        self._source.begin(now_us * 1e-6, self.rate)
+
+    def stop(self) -> None:
+        """Stops; what has been sampled stays in the rings."""
+        self.running = False
+
+    @property
+    def rate(self) -> float:
+        """Samples per second, Hz."""
+        return self.millihertz * 1e-3
+
+    def advance(self, now_us: int) -> None:
+        """Makes every sample that is due at ``now_us``."""
+        if not self.running:
+            return
+        due = (now_us - self._start_us) * self.millihertz // 10**9
+        while self.head < due:
+            self._fill(min(CHUNK, due - self.head))
+        for unit, tail in enumerate(self.tail):
+            if self.head - tail > self.capacity:
+                self.overflow[unit] = True
+
+    def _fill(self, n: int) -> None:
+        number = np.arange(self.head + 1, self.head + n + 1)
+        counts = self._source.samples(self._start_us * 1e-6 + number / self.rate, self.rate)
+        packed = pack_samples(counts, self.head, self.packing)
+        self._ring[:, (number - 1) % self.capacity] = np.swapaxes(packed, 0, 1)
+        self.head += n
+
+    def words(self, unit: int, first: int, count: int) -> list[int]:
+        """``count`` words of a unit's ring from word ``first`` on."""
+        flat = self._ring[unit].reshape(-1)
+        part: list[int] = flat[first : first + count].tolist()
+        return part + [0] * (count - len(part))

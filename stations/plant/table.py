@@ -1,0 +1,116 @@
+"""The two-axis tilt table: motion of each axis as a function of time, and where it turns gravity."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from stations.plant.keyed import keyed_normal
+
+Array = NDArray[np.float64]
+
+RING_DEG = 0.01  # overswing at the end of a move
+RING_HZ = 6.0
+RING_TAU_S = 0.35
+HOLD_DEG = 0.0004  # where the servo comes to rest, one sigma around the target
+ENCODER_NOISE_DEG = 0.0003
+ENCODER_STEP_DEG = 0.001
+IN_POSITION_DEG = 0.005
+IN_POSITION_S = 1.5  # by then the ringing has fallen below the window
+
+
+@dataclass(frozen=True)
+class Move:
+    """A trapezoidal move; ``start`` and ``end`` in s on the plant's clock, angles in degrees."""
+
+    start: float
+    origin: float
+    target: float
+    rest: float
+    speed: float
+    acceleration: float
+
+    @property
+    def _ramp(self) -> float:
+        """Seconds of acceleration: to the speed limit, or half way."""
+        return min(self.speed / self.acceleration, math.sqrt(abs(self.target - self.origin) / self.acceleration))
+
+    @property
+    def duration(self) -> float:
+        """Seconds from start to the end of the profile."""
+        distance, ramp = abs(self.target - self.origin), self._ramp
+        if ramp == 0.0:
+            return 0.0
+        return 2.0 * ramp + max(0.0, distance / (self.acceleration * ramp) - ramp)
+
+    @property
+    def end(self) -> float:
+        """When the profile has reached the target; the axis rings on."""
+        return self.start + self.duration
+
+    def angle(self, time: Array) -> Array:
+        """The angle at ``time`` (n,), degrees."""
+        ramp, total = self._ramp, self.duration
+        t = np.clip(time - self.start, 0.0, total)
+        a = self.acceleration
+        up = 0.5 * a * np.minimum(t, ramp) ** 2
+        cruise = a * ramp * np.clip(t - ramp, 0.0, max(0.0, total - 2.0 * ramp))
+        down = np.maximum(t - (total - ramp), 0.0)
+        travelled = up + cruise + a * ramp * down - 0.5 * a * down**2
+        direction = math.copysign(1.0, self.target - self.origin)
+        after = np.maximum(time - self.end, 0.0)
+        size = RING_DEG * min(1.0, abs(self.target - self.origin))
+        ring = size * np.exp(-after / RING_TAU_S) * np.sin(2.0 * math.pi * RING_HZ * after)
+        settled = (self.rest - self.target) * np.clip(after, 0.0, 1.0)
+        return self.origin + direction * (travelled + ring) + settled
+
+
+class Axis:
+    """One axis: a servo with its encoder."""
+
+    def __init__(self, seed: int, channel: int) -> None:
+        self._seed, self._channel = seed, channel
+        self._moves = 0
+        self.move = Move(-1e9, 0.0, 0.0, 0.0, 1.0, 1.0)
+
+    def go(self, now: float, target: float, speed: float, acceleration: float) -> None:
+        """Starts a move to an absolute target; the axis stands still or rings when this is called."""
+        self._moves += 1
+        slip = HOLD_DEG * float(keyed_normal(self._seed, self._channel, self._moves, 1)[0])
+        origin = float(self.angle(np.array([now]))[0])
+        self.move = Move(now, origin, target, target + slip, speed, acceleration)
+
+    def angle(self, time: Array) -> Array:
+        """The shaft's angle as the encoder would see it without noise, degrees."""
+        return self.move.angle(time)
+
+    def moving(self, now: float) -> bool:
+        """Whether the profile is running."""
+        return self.move.start <= now < self.move.end
+
+    def in_position(self, now: float) -> bool:
+        """Whether the axis has been inside its window long enough."""
+        return now >= self.move.end + IN_POSITION_S
+
+    def encoder(self, now: float) -> float:
+        """The encoder's reading: quantised to 0.001°, noise of its own at every millisecond."""
+        noise = ENCODER_NOISE_DEG * float(keyed_normal(self._seed, self._channel + 1, int(now * 1000), 1)[0])
+        angle = float(self.angle(np.array([now]))[0]) + noise
+        return round(angle / ENCODER_STEP_DEG) * ENCODER_STEP_DEG
+
+
+def turn(up: Array, outer: Array, inner: Array) -> Array:
+    """Specific force in the fixture, (n, 3) in g: first the inner axis, then the outer one turned back.
+
+    Parameters
+    ----------
+    up : (3,), the direction opposite to gravity in the laboratory, g
+    outer, inner : (n,), rad
+    """
+    y = np.cos(outer) * up[1] + np.sin(outer) * up[2]
+    z = np.cos(outer) * up[2] - np.sin(outer) * up[1]
+    x = np.full_like(y, up[0])
+    return np.stack((np.cos(inner) * x + np.sin(inner) * y, np.cos(inner) * y - np.sin(inner) * x, z), axis=-1)
