@@ -1,0 +1,196 @@
+"""Scores the diagnosis on blind runs: `python benchmarks/blind.py --runs 400 --jobs 2`.
+
+Each run is made from a seed, its truth stays here, and the diagnosis gets the tables alone: in process, or with `--cli` through the
+command line on files. `--runs` counts runs over all scenarios (dealt by weight), or per scenario with `--each`.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable, Iterator
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+for _name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
+    os.environ.setdefault(_name, "1")  # before numpy: threads of two processes fight over two cores
+
+ROOT = Path(__file__).resolve().parents[1]
+sys.path[:0] = [str(ROOT), str(ROOT / "tests" / "blind")]
+
+import pandas as pd  # noqa: E402
+from score import Score, score, table, text  # noqa: E402
+from truth import SCENARIOS, Run, case  # noqa: E402
+
+Answer = tuple[dict[str, Any], float | None]  # the document, and the fresh run's RMS in µg after extending
+Method = Callable[[Run], Answer]
+
+WEIGHTS = {
+    "lot8_size2": 35, "lot8_size1": 35, "lot8_size05": 35, "lot8_size4": 35, "single_size2": 30, "lot4_size2": 10, "lot16_size2": 10,
+    "station_size2": 20, "null_white": 60, "null_flicker": 60, "null_walk": 10, "null_single": 20, "pairs": 35, "triples": 25,
+    "covariate_line": 15, "covariate_curve": 15, "withheld": 21, "invisible": 18, "faults": 28,
+}  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Job:
+    """One run of one scenario, and how to diagnose it."""
+
+    scenario: str
+    index: int
+    seed: int
+    method: str
+
+
+def in_process(run: Run) -> Answer:
+    """The product's diagnosis, called as a function."""
+    from pipelines.stages.criticise import compare, diagnose
+
+    truth = run.sealed
+    effects = list(truth.spec.base) if truth.spec.base else None
+    history = run.history if truth.spec.history else None
+    document = diagnose(run.dwells, history=history, effects=effects)
+    model = [*truth.base, *document["recommended"]]
+    if truth.faults or any(name.startswith("covariate:") and name[10:] not in run.fresh for name in model):
+        return document, None
+    fresh_history = run.fresh_history if truth.spec.history else None
+    compared = compare(run.dwells, effects=model, history=history, fresh=run.fresh, fresh_history=fresh_history)
+    return document, float(compared["fresh_rms_ug"])
+
+
+def write(run: Run, folder: Path) -> list[Path]:
+    """Writes the measurements, and only them: dwells, history, fresh, fresh_history."""
+    folder.mkdir(parents=True, exist_ok=True)
+    paths = []
+    for name in ("dwells", "history", "fresh", "fresh_history"):
+        paths.append(folder / f"{name}.parquet")
+        getattr(run, name).to_parquet(paths[-1])
+    return paths
+
+
+def _command(*arguments: str) -> dict[str, Any]:
+    done = subprocess.run(
+        [sys.executable, "-m", "pipelines.cli", *arguments, "--json"], capture_output=True, text=True, cwd=ROOT, check=False
+    )
+    if done.returncode not in {0, 1}:
+        raise RuntimeError(f"blind: {' '.join(arguments)} ended with status {done.returncode}: {done.stderr[-2000:]}")
+    return json.loads(done.stdout)
+
+
+def by_command_line(run: Run) -> Answer:
+    """The product's diagnosis through files and the command line."""
+    with tempfile.TemporaryDirectory() as folder:
+        dwells, history, fresh, _ = write(run, Path(folder))
+        document = _command("diagnose", str(dwells), "--history", str(history))
+        if run.sealed.faults:
+            return document, None
+        model = ",".join([*run.sealed.base, *document["recommended"]])
+        compared = _command("compare", str(dwells), "--effects", model, "--fresh", str(fresh))
+        return document, float(compared["fresh_rms_ug"])
+
+
+def methods() -> dict[str, Method]:
+    """Every way to diagnose a run, by name."""
+    from baselines import BASELINES
+
+    return {"tumbleline": in_process, "cli": by_command_line, **BASELINES}
+
+
+def one(job: Job) -> tuple[Job, Score, dict[str, Any], dict[str, Any]]:
+    """The score of one job, with the document and the truth for those who look into failures."""
+    run = case(job.scenario, job.index, job.seed)
+    begin = time.perf_counter()
+    document, fresh = methods()[job.method](run)
+    seconds = time.perf_counter() - begin
+    return job, score(document, run.sealed, scenario=job.scenario, fresh_rms_ug=fresh, seconds=seconds), document, run.sealed.document()
+
+
+def deal(scenarios: list[str], runs: int, *, each: bool) -> Iterator[tuple[str, int]]:
+    """Scenario and index of every run: `runs` in all by weight, or of each scenario."""
+    total = sum(WEIGHTS[name] for name in scenarios)
+    for name in scenarios:
+        for index in range(runs if each else max(1, round(runs * WEIGHTS[name] / total))):
+            yield name, index
+
+
+def work(jobs: list[Job], processes: int) -> list[tuple[Job, Score, dict[str, Any], dict[str, Any]]]:
+    """All jobs done, in their order, with a line of progress on standard error."""
+    done = []
+    with ProcessPoolExecutor(processes) as pool:
+        results = pool.map(one, jobs) if processes > 1 else map(one, jobs)
+        for result in results:
+            done.append(result)
+            print(f"\r{len(done)}/{len(jobs)} {result[0].scenario:20}", end="", file=sys.stderr, flush=True)
+    print(file=sys.stderr)
+    return done
+
+
+def save(folder: Path, results: list[tuple[Job, Score, dict[str, Any], dict[str, Any]]]) -> None:
+    """Scores as Parquet, documents with truths as JSON lines."""
+    folder.mkdir(parents=True, exist_ok=True)
+    rows = [{"method": j.method, "index": j.index, "seed": j.seed} | s.row() for j, s, _, _ in results]
+    scores = pd.DataFrame(rows)
+    for column in ("truth", "named"):
+        scores[column] = scores[column].map(json.dumps)
+    scores.to_parquet(folder / "scores.parquet")
+    with (folder / "runs.jsonl").open("w") as lines:
+        for job, result, document, truth in results:
+            entry = {"job": vars(job), "score": result.row(), "document": document, "truth": truth}
+            lines.write(json.dumps(entry, default=str) + "\n")
+
+
+def dump(folder: Path, cases: Iterator[tuple[str, int]], seed: int) -> None:
+    """Runs as files in FOLDER/runs, their truths in FOLDER-truth: nothing of the truth lies beside the measurements."""
+    sealed = folder.with_name(folder.name + "-truth")
+    sealed.mkdir(parents=True, exist_ok=True)
+    for name, index in cases:
+        run = case(name, index, seed)
+        write(run, folder / f"{name}-{index:03d}")
+        (sealed / f"{name}-{index:03d}.json").write_text(json.dumps(run.sealed.document(), indent=1))
+
+
+def arguments() -> argparse.Namespace:
+    """The command line."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--runs", type=int, default=100, help="runs over all scenarios, or of each with --each")
+    parser.add_argument("--each", action="store_true", help="--runs counts runs of each scenario")
+    parser.add_argument("--scenario", action="append", choices=list(SCENARIOS), help="only these (repeatable)")
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--jobs", type=int, default=2)
+    parser.add_argument("--method", action="append", help="tumbleline (default), cli, or a baseline: bic, bonferroni, stlsq, lasso")
+    parser.add_argument("--cli", action="store_true", help="the same as --method cli")
+    parser.add_argument("--out", type=Path, help="folder for scores.parquet, runs.jsonl and figures.json")
+    parser.add_argument("--dump", type=Path, help="only write the runs into this folder, and their truth into FOLDER-truth")
+    return parser.parse_args()
+
+
+def main() -> None:
+    options = arguments()
+    scenarios = options.scenario or list(SCENARIOS)
+    cases = list(deal(scenarios, options.runs, each=options.each))
+    if options.dump:
+        dump(options.dump, iter(cases), options.seed)
+        return
+    figures = {}
+    everything = []
+    for method in options.method or ["cli" if options.cli else "tumbleline"]:
+        results = work([Job(name, index, options.seed, method) for name, index in cases], options.jobs)
+        everything += results
+        figures[method] = table(s for _, s, _, _ in results)
+        times = sorted(s.seconds for _, s, _, _ in results)
+        print(f"\n{method}: {len(results)} runs, seed {options.seed}, median {times[len(times) // 2]:.2f} s, longest {times[-1]:.2f} s")
+        print(text(figures[method]))
+    if options.out:
+        save(options.out, everything)
+        (options.out / "figures.json").write_text(json.dumps(figures, indent=1))
+
+
+if __name__ == "__main__":
+    main()
