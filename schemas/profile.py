@@ -7,6 +7,7 @@ only. ``verified`` says whether anybody has held it against the device.
 from __future__ import annotations
 
 import tomllib
+from itertools import pairwise
 from typing import Annotated, Literal
 
 from pydantic import Field, FiniteFloat, ValidationError, model_validator
@@ -26,7 +27,8 @@ LONGEST_WRITE = 123  # registers in one FC16 request (Modbus Application Protoco
 class Register(Strict):
     """One value, or ``count`` of the same kind in a row, at a wire address.
 
-    ``value = raw · scale``; ``minimum`` and ``maximum`` bound the value, in ``unit``. A string has ``count`` words of two characters.
+    ``value = raw · scale``; ``minimum`` and ``maximum`` bound the value, in ``unit``. A string has ``count`` words of two
+    characters.
     """
 
     name: Annotated[str, Field(pattern=r"^[a-z][a-z0-9_]*$")]
@@ -40,8 +42,8 @@ class Register(Strict):
     minimum: FiniteFloat | None = None
     maximum: FiniteFloat | None = None
     access: Literal["read", "write", "read_write"] = "read"
-    enumeration: dict[str, int] = {}
-    bits: dict[str, int] = {}
+    enumeration: dict[str, int] = Field(default_factory=dict[str, int])
+    bits: dict[str, int] = Field(default_factory=dict[str, int])
     source: str = ""
 
     @property
@@ -83,7 +85,7 @@ class Profile(Strict):
     source: str
     word_order: WordOrder = "high_first"
     registers: Annotated[list[Register], Field(min_length=1)]
-    groups: dict[str, list[str]] = {}
+    groups: dict[str, list[str]] = Field(default_factory=dict[str, list[str]])
     fifo: Fifo | None = None
 
     @model_validator(mode="after")
@@ -111,7 +113,7 @@ def _refuse_overlaps(profile: Profile) -> None:
     if profile.fifo is not None:
         spans.append((profile.fifo.address, profile.fifo.address + profile.fifo.registers, "fifo"))
     spans.sort()
-    for (_, end, name), (start, _, following) in zip(spans, spans[1:], strict=False):
+    for (_, end, name), (start, _, following) in pairwise(spans):
         if start < end:
             message = f"registers {name} and {following} overlap at address {start}; each needs its own; correct one"
             raise ValueError(message)
@@ -124,7 +126,7 @@ def _refuse_overlaps(profile: Profile) -> None:
 
 def _refuse_gaps(group: str, registers: list[Register]) -> None:
     """A group is written in one request, so its registers follow each other without a gap."""
-    for left, right in zip(registers, registers[1:], strict=False):
+    for left, right in pairwise(registers):
         if left.end != right.address:
             message = f"group {group}: {right.name} does not follow {left.name} ({left.end} is needed); order them"
             raise ValueError(message)

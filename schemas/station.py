@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 Positive = Annotated[FiniteFloat, Field(gt=0.0)]
 NotNegative = Annotated[FiniteFloat, Field(ge=0.0)]
-Bounds = Annotated[list[FiniteFloat], Field(min_length=2, max_length=2)]
+Bounds = tuple[FiniteFloat, FiniteFloat]
 SIMULATED = "simulated.toml"
 SLOTS = 8
 
@@ -52,11 +52,11 @@ class Devices(Strict):
 class Limits(Strict):
     """What the station may be asked to do; checked before anything moves."""
 
-    outer_deg: Bounds = [-200.0, 200.0]
-    inner_deg: Bounds = [-380.0, 380.0]
+    outer_deg: Bounds = (-200.0, 200.0)
+    inner_deg: Bounds = (-380.0, 380.0)
     speed_deg_s: Positive = 30.0
     acceleration_deg_s2: Positive = 30.0
-    temperature_C: Bounds = [-40.0, 85.0]
+    temperature_C: Bounds = (-40.0, 85.0)
     rate_hz: Positive = 4000.0
     position_deg: Positive = 0.01
 
@@ -94,14 +94,14 @@ class Hidden(Strict):
     """A hidden effect of the simulated station, with figures other than its usual ones."""
 
     kind: str
-    figures: dict[str, FiniteFloat] = {}
+    figures: dict[str, FiniteFloat] = Field(default_factory=dict[str, float])
 
 
 class Fault(Strict):
     """Something that goes wrong at ``at_s`` on the simulated station's clock.
 
-    ``silent``: the reader's gateway says that the device does not answer. ``mute``: nothing at all comes back. ``dead``: the outputs
-    stay as they are. ``door``: the chamber's door opens. ``serial`` names the unit where one is meant.
+    ``silent``: the reader's gateway says that the device does not answer. ``mute``: nothing at all comes back.
+    ``dead``: the outputs stay as they are. ``door``: the chamber's door opens. ``serial`` names the unit where one is meant.
     """
 
     kind: Literal["silent", "mute", "dead", "door"]
@@ -122,12 +122,12 @@ class Simulation(Strict):
     seed: Annotated[int, Field(ge=0)] = 1
     room_C: FiniteFloat = 23.0
     slot_rotation_mrad: NotNegative = 1.0
-    slot_lag_s: Bounds = [90.0, 200.0]
+    slot_lag_s: Bounds = (90.0, 200.0)
     slot_gradient_K: NotNegative = 0.1
     supply_spread: NotNegative = 1e-3
-    preset_overrides: dict[str, FiniteFloat] = {}
-    hidden: list[Hidden] = []
-    faults: list[Fault] = []
+    preset_overrides: dict[str, FiniteFloat] = Field(default_factory=dict[str, float])
+    hidden: list[Hidden] = Field(default_factory=list[Hidden])
+    faults: list[Fault] = Field(default_factory=list[Fault])
 
 
 class StationConfig(Strict):

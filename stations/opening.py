@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Generator
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
@@ -55,7 +55,7 @@ class _Links:
 @contextmanager
 def open_station(
     config: StationConfig, lot: Lot, resume: bytes | None = None, *, hidden: Sequence[HiddenEffect] = ()
-) -> Iterator[Station]:
+) -> Generator[Station]:
     """A station ready to be driven; closed when the context ends.
 
     Parameters
@@ -88,7 +88,7 @@ def make_plant(
 
 
 @contextmanager
-def serve_plant(config: StationConfig, lot: Lot, plant: Plant) -> Iterator[Station]:
+def serve_plant(config: StationConfig, lot: Lot, plant: Plant) -> Generator[Station]:
     """A station whose devices are the plant's, over Modbus TCP on loopback."""
     from stations.plant.clock import PlantClock  # noqa: PLC0415 - hardware needs no plant
     from stations.plant.server import PlantServer  # noqa: PLC0415

@@ -40,8 +40,8 @@ class Station:
     def soak(self, target: float, shortest: float, slots: Sequence[int], observe: Observe) -> float:
         """Takes the devices to ``target`` °C and gives the seconds it took until they had settled.
 
-        Settled: every device inside the band around the target and changing slower than the rate over the window, and ``shortest``
-        seconds gone. ``observe`` gives the temperatures by slot and may note them.
+        Settled: every device inside the band around the target and changing slower than the rate over the window, and
+        ``shortest`` seconds gone. ``observe`` gives the temperatures by slot and may note them.
         """
         limits, clock = self.soak_limits, self.clock
         self.chamber.set_temperature(target)

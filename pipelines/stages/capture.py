@@ -9,7 +9,7 @@ import numpy as np
 import pandas as pd
 
 from pipelines.stages.captured import History, Record, readings_row
-from schemas.errors import OperatorNeeded, StationError
+from schemas.errors import LinkLost, OperatorNeeded, StationError, StationTimeout
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -23,6 +23,7 @@ Kind = Literal["dwell", "verification", "allan"]
 
 OBSERVATIONS = 5  # looks at encoders and instruments within a dwell
 HISTORY_S = 10.0
+OK = "ok"
 FILL = 0.5  # part of the slots' memory that may fill before it is emptied
 
 
@@ -62,7 +63,8 @@ def steps(recipe: Recipe) -> list[Step]:
     """
     found: list[Step] = []
     for soak, temperature in enumerate(recipe.temperatures_C):
-        for kind, poses in (("dwell", recipe.poses), ("verification", recipe.verification)):
+        parts: tuple[tuple[Kind, list[Pose]], ...] = (("dwell", recipe.poses), ("verification", recipe.verification))
+        for kind, poses in parts:
             found += [Step(len(found) + i, kind, soak, temperature, pose) for i, pose in enumerate(poses)]
     if recipe.static_record_s > 0.0:
         again = recipe.static_temperature_C == recipe.temperatures_C[-1]
@@ -103,6 +105,15 @@ def check(station: Station, recipe: Recipe, plan: list[Step]) -> None:
     station.reader.check(recipe.rate_hz)
 
 
+def fault_text(slot: int, problem: StationError) -> str:
+    """What readings say of a unit that is lost; the same whenever it is asked, so that a resumed run says it too."""
+    if isinstance(problem, StationTimeout):
+        return f"slot {slot}: no answer"
+    if isinstance(problem, LinkLost):
+        return f"slot {slot}: link lost"
+    return f"slot {slot}: implausible answer"
+
+
 @dataclass
 class _Work:
     """The capture of one lot: who still answers, and the history since the last record."""
@@ -121,7 +132,7 @@ class _Work:
             try:
                 identity = self.station.reader.slots[unit.slot].identity()
             except StationError as problem:
-                self.lost[unit.serial] = str(problem)
+                self.lost[unit.serial] = fault_text(unit.slot, problem)
                 continue
             if identity.serial != unit.serial:
                 message = (
@@ -190,12 +201,13 @@ class _Work:
                 try:
                     record.keep(unit.serial, self.station.reader.slots[unit.slot].take())
                 except StationError as problem:
-                    self.lost[unit.serial] = str(problem)
+                    self.lost[unit.serial] = fault_text(unit.slot, problem)
 
     def tables(self, record: Record) -> tuple[pd.DataFrame, pd.DataFrame]:
         """The record as tables: samples of the units that answered, readings of all."""
+        of_the_lot = next(iter(self.identities.values()))  # one kind of device: who fell silent had the same unit
         rows = [
-            readings_row(record, unit, self.identities.get(unit.serial), self.lost.get(unit.serial, "ok"))
+            readings_row(record, unit, self.identities.get(unit.serial, of_the_lot), self.lost.get(unit.serial, OK))
             for unit in self.lot.units
         ]
         return record.samples([u for u in self.lot.units if u.serial not in self.lost]), pd.DataFrame(rows)

@@ -18,7 +18,6 @@ if TYPE_CHECKING:
     from stations.devices.slot import Identity, Samples
 
 AXES = ("x", "y", "z")
-UNKNOWN = "LSB"  # the output unit of a device that never said its own
 
 
 @dataclass
@@ -103,7 +102,7 @@ def _numbers(parts: Sequence[Samples]) -> NDArray[np.float64]:
     return np.concatenate([part.first + np.arange(len(part.outputs), dtype=np.float64) for part in parts])
 
 
-def readings_row(record: Record, unit: Unit, identity: Identity | None, status: str) -> dict[str, object]:
+def readings_row(record: Record, unit: Unit, identity: Identity, status: str) -> dict[str, object]:
     """What the station read beside a unit's samples: means over the looks of a record."""
     outer, inner = np.mean(record.angles, axis=0)
     looks = record.instruments
@@ -130,6 +129,6 @@ def readings_row(record: Record, unit: Unit, identity: Identity | None, status: 
         "n": record.count(unit.serial) if status == "ok" else 0,
         "overflow": record.overflow(unit.serial),
         "status": status,
-        "out_unit": identity.out_unit if identity is not None else UNKNOWN,
-        "full_scale": identity.full_scale if identity is not None else 0.0,
+        "out_unit": identity.out_unit,
+        "full_scale": identity.full_scale,
     }

@@ -34,7 +34,7 @@ class Identity:
 
 @dataclass(frozen=True)
 class Samples:
-    """Samples taken from a slot: their first number since the start, outputs (n, 3) in the output's unit, and whether some were lost."""
+    """Samples taken from a slot: first number since the start, outputs (n, 3) in the output's unit, whether some were lost."""
 
     first: int
     outputs: NDArray[np.float64]

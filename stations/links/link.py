@@ -11,7 +11,8 @@ if TYPE_CHECKING:
 class Link(Protocol):
     """Registers of the devices behind one address.
 
-    Both methods raise :class:`StationTimeout`, :class:`LinkLost` or :class:`StationRefused`, naming device, address and what was asked.
+    Reading and writing raise :class:`StationTimeout`, :class:`LinkLost` or :class:`StationRefused`, naming device, address and
+    what was asked.
     """
 
     def read(self, device_id: int, address: int, count: int, what: str) -> list[int]:

@@ -1,7 +1,7 @@
 """Modbus TCP through pymodbus' synchronous client.
 
-pymodbus re-sends writes on a time-out by default, so that a slow device acts several times: retries are off here. Reads are repeated
-by this module, which is safe: reading changes nothing in any device of this project.
+pymodbus re-sends writes on a time-out by default, so that a slow device acts several times: retries are off here.
+Reads are repeated by this module, which is safe: reading changes nothing in any device of this project.
 """
 
 from __future__ import annotations
@@ -56,7 +56,7 @@ class ModbusLink:
                 if attempt + 1 == self._attempts or isinstance(problem, _BehindGateway):
                     raise
             else:
-                return self._checked(answer.registers, count, device_id, asked)
+                return self._checked(list(answer.registers), count, device_id, asked)
         message = f"{self._where} device {device_id}: no attempt to {asked} was allowed; set read_attempts to 1 or more"
         raise StationTimeout(message)
 
@@ -89,7 +89,10 @@ class ModbusLink:
 
     def _checked(self, words: list[int], count: int, device_id: int, asked: str) -> list[int]:
         if len(words) != count:
-            message = f"{self._where} device {device_id}: {len(words)} registers answered '{asked}', {count} are needed; check the profile"
+            message = (
+                f"{self._where} device {device_id}: {len(words)} registers answered '{asked}', {count} are needed; "
+                "check the profile"
+            )
             raise StationRefused(message)
         return words
 

@@ -102,7 +102,7 @@ def _chamber(plant: Plant, name: str) -> Bank:
         "ramp_rate": lambda: chamber.ramp_K_min,
         "power": lambda: 100.0 * chamber.power,
         "working_set_point": lambda: chamber.working,
-        "temperature": lambda: plant.air_reading(),
+        "temperature": plant.air_reading,
     }
     return Bank(profile, sources, command)
 

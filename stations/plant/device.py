@@ -25,7 +25,8 @@ QUADRATIC_PER_K = 0.003  # quadratic over linear temperature coefficient, one si
 class Truth:
     """What a unit really is, in its own frame; ``slot_rotation`` is the fixture's part.
 
-    Output in g = bias(θ) + scale(θ)·(misalignment·f + cubic·f³) + noise, θ = T − 25 °C; times ``output_scale`` it is the output's unit.
+    Output in g = bias(θ) + scale(θ)·(misalignment·f + cubic·f³) + noise, θ = T − 25 °C; times ``output_scale`` it is in
+    the output's unit.
     """
 
     serial: str

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -47,7 +47,8 @@ class Dynamics:
 
     def begin(self, rate: float, force: Array) -> None:
         """Starts at ``rate`` Hz from rest under ``force`` (units, 3), g."""
-        numerator, denominator, _ = cont2discrete(self._transfer, 1.0 / rate, method="foh")
+        found: Any = cont2discrete(self._transfer, 1.0 / rate, method="foh")
+        numerator, denominator = found[0], found[1]
         self._b, self._a = np.atleast_1d(np.squeeze(numerator)), np.atleast_1d(denominator)
         self._state = lfilter_zi(self._b, self._a)[:, None, None] * force[None]
 

@@ -1,3 +1,4 @@
+# ruff: noqa: ARG002 - an effect is told everything and uses what its physics needs
 """Hidden effects: physics that a station or a device may have and that no client is told of.
 
 Each is written from its mechanism, independently of the columns in ``inertial.effects``: a truth that is made of the
@@ -302,7 +303,7 @@ def hidden_effect(kind: str, figures: Mapping[str, float]) -> HiddenEffect:
         message = f"simulation.hidden: no effect '{kind}'; {did_you_mean(kind, HIDDEN)}"
         raise RecipeInvalid(message, key="simulation.hidden")
     make = HIDDEN[kind]
-    known = [f.name for f in fields(make) if f.init] if isinstance(make, type) else list(figures)  # pyright: ignore
+    known = [f.name for f in fields(make) if f.init] if isinstance(make, type) else list(figures)  # pyright: ignore[reportArgumentType]
     for name in figures:
         if name not in known:
             message = f"simulation.hidden: {kind} has no '{name}'; {did_you_mean(name, known)}"

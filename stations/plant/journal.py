@@ -1,4 +1,7 @@
-"""The plant's journal: everything that was ever done to it, with the time; played again, it leads to the same place, bit for bit."""
+"""The plant's journal: everything that was ever done to it, with the time.
+
+Played again on a fresh plant, it leads to the same place, bit for bit.
+"""
 
 from __future__ import annotations
 

@@ -26,7 +26,7 @@ TERMS = 11  # up to 0.1·3^10 s = 1.6 hours
 
 def flicker_time_constants() -> Array:
     """Time constants of the Ornstein–Uhlenbeck processes that make flicker noise, (11,), s."""
-    return SHORTEST_S * RATIO ** np.arange(TERMS)
+    return np.array([SHORTEST_S * RATIO**k for k in range(TERMS)])
 
 
 def flicker_variance(instability: float) -> float:

@@ -9,7 +9,7 @@ import asyncio
 import logging
 import threading
 from functools import partial
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Self
 
 from pymodbus.constants import ExcCodes
 from pymodbus.exceptions import NoSuchIdException
@@ -84,7 +84,7 @@ class PlantServer:
         self._server: ModbusTcpServer | None = None
         self._thread = threading.Thread(target=self._run, name="plant-server", daemon=True)
 
-    def __enter__(self) -> PlantServer:
+    def __enter__(self) -> Self:
         """Starts, and waits until the port listens."""
         logging.getLogger("pymodbus").setLevel(logging.CRITICAL)  # its errors reach the client as answers
         self._thread.start()
