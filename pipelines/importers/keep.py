@@ -1,0 +1,37 @@
+"""Imports in the archive: a run of its own, named for the unit and for what decides its content."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import pandas as pd
+
+from pipelines.archive import Archive, code_hash, stage_key
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from pipelines.archive import Run
+    from pipelines.importers.files import Source
+    from pipelines.importers.judge import Judged
+    from pipelines.importers.mapping import Mapping
+    from pipelines.importers.record import Imported
+
+
+def keep(data: Imported, source: Source, how: Mapping, judged: Judged | None, archive: Path | None) -> Run:
+    """The run that holds the import: samples, dwells and coefficients, each with a manifest that names the source."""
+    inputs = {"source": source.sha256}
+    parameters = {"mapping": how.model_dump(mode="json"), "fit": None if judged is None else judged.method}
+    code = code_hash(("pipelines.importers", "inertial.fits", "inertial.static_intervals"))
+    key = stage_key("import", inputs, parameters, code)
+    about: dict[str, Any] = {"name": f"import of {', '.join(data.units[:3])}", "source": source.as_dict()}
+    about |= {"mapping": parameters["mapping"], "remarks": list(data.remarks)}
+    about["lot"] = {"device": "imported", "units": [{"serial": unit, "slot": 0} for unit in data.units]}
+    run = Archive(archive).open_run("import", about, {"key": key})
+    tables = {"samples": data.samples, "dwells": data.dwells}
+    if judged is not None and judged.coefficients:
+        tables["coefficients"] = pd.DataFrame(judged.coefficients)
+    there = {name: frame for name, frame in tables.items() if frame is not None}
+    if not run.has(tuple(there), key):
+        run.save("import", key, there, {"inputs": inputs, "parameters": parameters, "code": code})
+    return run

@@ -1,0 +1,183 @@
+"""What the columns of a foreign file mean: from the command line or a small TOML file, checked before anything is read."""
+
+from __future__ import annotations
+
+import tomllib
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator
+
+from schemas.errors import RecipeInvalid, WrongUse, close_matches, did_you_mean
+
+STANDARD_GRAVITY = 9.80665
+"""m/s² in one g: the unit of specific force in tables, everywhere; the local value is another matter."""
+
+NEEDED = ("x", "y", "z")
+MEANINGS: dict[str, str] = {
+    "temperature": "unit_C",
+    "chamber": "chamber_C",
+    "supply": "supply_V",
+    "vibration": "vibration_g",
+    "outer": "outer_deg",
+    "inner": "inner_deg",
+    "n": "n",
+    "duration": "duration_s",
+    "sd_x": "sd_x",
+    "sd_y": "sd_y",
+    "sd_z": "sd_z",
+    "force_x": "force_x",
+    "force_y": "force_y",
+    "force_z": "force_z",
+}
+"""Further names of a mapping and the columns that they become."""
+KNOWN = ("time", *NEEDED, "unit", "dwell", *MEANINGS)
+
+OUTPUT_UNITS: dict[str, tuple[str, float]] = {
+    "g": ("g", 1.0),
+    "mg": ("g", 1e-3),
+    "m/s^2": ("m/s^2", 1.0),
+    "V": ("V", 1.0),
+    "mV": ("V", 1e-3),
+    "LSB": ("LSB", 1.0),
+}
+TIME_UNITS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
+TEMPERATURE_UNITS = ("degC", "K", "degF")
+FACES = {
+    f"{sign}{axis}": tuple(float(sign + "1") * (axis == other) for other in "xyz") for sign in "+-" for axis in "xyz"
+}
+"""Specific force, in units of local gravity, with an axis up (+) or down (-)."""
+
+
+class Units(BaseModel):
+    """Units of the source."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+    output: str
+    time: str = "s"
+    temperature: str = "degC"
+
+    @field_validator("output")
+    @classmethod
+    def _known_output(cls, value: str) -> str:
+        return _one_of(value, OUTPUT_UNITS, "unit of the output")
+
+    @field_validator("time")
+    @classmethod
+    def _known_time(cls, value: str) -> str:
+        return _one_of(value, (*TIME_UNITS, "samples"), "unit of time")
+
+    @field_validator("temperature")
+    @classmethod
+    def _known_temperature(cls, value: str) -> str:
+        return _one_of(value, TEMPERATURE_UNITS, "unit of temperature")
+
+
+class Mapping(BaseModel):
+    """How a foreign file is read."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+    columns: dict[str, str]
+    """What is wanted → column of the file; names beyond the known ones become covariates."""
+    units: Units
+    unit: str = ""
+    """Serial number, where the file has no column for it."""
+    rows: Literal["samples", "dwells"] = "samples"
+    rate_hz: Annotated[float, Field(gt=0.0)] | None = None
+    axes: tuple[Literal["x", "y", "z"], Literal["x", "y", "z"], Literal["x", "y", "z"]] = ("x", "y", "z")
+    """Mapped axes in the order in which they become x, y, z."""
+    signs: tuple[Literal["+", "-"], Literal["+", "-"], Literal["+", "-"]] = ("+", "+", "+")
+    local_gravity_m_s2: Annotated[float, Field(gt=9.7, lt=9.9)] | None = None
+    poses: dict[str, str] = Field(default_factory=dict)
+    """Label of a dwell → face up, as +x … -z; with any given, dwells with other labels are left out."""
+    face: Literal["", "+x", "+y", "+z", "-x", "-y", "-z"] = ""
+    """The face that is up all the time, for a record in one pose."""
+    block_s: Annotated[float, Field(gt=0.0)] | None = None
+    """Dwells of this length instead of found ones, for a record in one pose."""
+
+    @field_validator("columns")
+    @classmethod
+    def _complete(cls, value: dict[str, str]) -> dict[str, str]:
+        missing = [name for name in NEEDED if name not in value]
+        if missing:
+            message = f"{', '.join(missing)} not mapped; x, y and z are needed"
+            raise ValueError(message)
+        for name in value:
+            close = close_matches(name, KNOWN) if name not in KNOWN else ()
+            if close and len(name) > 1:
+                message = f"'{name}' is not known, but close to one that is; did you mean {' or '.join(close)}?"
+                raise ValueError(message)
+        return value
+
+    @field_validator("axes")
+    @classmethod
+    def _each_once(cls, value: tuple[str, str, str]) -> tuple[str, str, str]:
+        if len(set(value)) < len(value):
+            message = f"{','.join(value)}: every axis is needed once"
+            raise ValueError(message)
+        return value
+
+    @field_validator("poses")
+    @classmethod
+    def _faces(cls, value: dict[str, str]) -> dict[str, str]:
+        for label, face in value.items():
+            if face not in FACES:
+                message = f"'{label}': found '{face}', one of {', '.join(FACES)} is needed"
+                raise ValueError(message)
+        return value
+
+    @property
+    def norm_g(self) -> float | None:
+        """Local gravity in g; None where it was not given."""
+        return None if self.local_gravity_m_s2 is None else self.local_gravity_m_s2 / STANDARD_GRAVITY
+
+
+def build(content: dict[str, Any], where: str) -> Mapping:
+    """The mapping of `content`, or `RecipeInvalid` that names the key and its close matches."""
+    try:
+        return Mapping.model_validate(content)
+    except ValidationError as problem:
+        first = problem.errors()[0]
+        key = ".".join(str(part) for part in first["loc"])
+        words = first["msg"].removeprefix("Value error, ")
+        close: tuple[str, ...] = ()
+        if first["type"] == "extra_forbidden":
+            known = Units.model_fields if first["loc"][0] == "units" else Mapping.model_fields
+            close = close_matches(str(first["loc"][-1]), known)
+            words = f"this key is not known; {did_you_mean(str(first['loc'][-1]), known)}"
+        elif first["type"] == "missing":
+            words = "it is needed; add it"
+        raise RecipeInvalid(f"{where}: {key}: {words}", key=key, close=close) from None
+
+
+def from_file(path: Path) -> dict[str, Any]:
+    """The content of a mapping file."""
+    try:
+        return tomllib.loads(path.read_text(encoding="utf-8"))
+    except OSError as problem:
+        message = f"{path}: cannot be read ({problem.strerror}); check the name of the mapping file"
+        raise WrongUse(message) from None
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as problem:
+        raise RecipeInvalid(f"{path}: not TOML: {problem}; correct that place") from None
+
+
+def pairs(text: str, option: str) -> dict[str, str]:
+    """name=value pairs of an option, divided by commas."""
+    found: dict[str, str] = {}
+    for part in filter(None, (piece.strip() for piece in text.split(","))):
+        name, equals, value = (piece.strip() for piece in part.partition("="))
+        if not (name and equals and value):
+            message = f"{option}: found '{part}', name=value is needed, divided by commas; correct it"
+            raise WrongUse(message)
+        if name in found:
+            message = f"{option}: '{name}' is there twice, once is needed; remove one"
+            raise WrongUse(message)
+        found[name] = value
+    return found
+
+
+def _one_of(value: str, known: Any, what: str) -> str:
+    if value not in known:
+        message = f"found '{value}', a known {what} is needed: {', '.join(known)}"
+        raise ValueError(message)
+    return value
