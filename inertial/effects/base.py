@@ -57,6 +57,7 @@ class Effect(ABC):
     hides_behind : effects that take its place under poor plans
     breaker : what to measure so that it shows
     simplicity : rank among effects that the data cannot tell apart; the lowest is recommended
+    primary : number of leading columns that stand for a simpler form of the effect; None where there is none
     """
 
     id: ClassVar[str]
@@ -68,6 +69,7 @@ class Effect(ABC):
     hides_behind: ClassVar[tuple[str, ...]] = ()
     breaker: ClassVar[str]
     simplicity: ClassVar[int] = 50
+    primary: ClassVar[int | None] = None
     nonlinear: ClassVar[tuple[Nonlinear, ...]] = ()
 
     def parameters(self, state: State) -> tuple[Nonlinear, ...]:

@@ -27,6 +27,7 @@ class Covariate(SensorEffect):
     hides_behind: ClassVar[tuple[str, ...]] = ()
     breaker: ClassVar[str] = "vary this quantity alone"
     simplicity: ClassVar[int] = 60
+    primary: ClassVar[int | None] = 1
 
     def __init__(self, column: str, *, curve: bool = True) -> None:
         self.column = column

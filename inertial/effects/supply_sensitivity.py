@@ -20,6 +20,7 @@ class SupplySensitivity(SensorEffect):
     hides_behind: ClassVar[tuple[str, ...]] = ("bias_temperature",)
     breaker: ClassVar[str] = "steps of the supply at constant temperature"
     simplicity: ClassVar[int] = 35
+    primary: ClassVar[int | None] = 1
 
     def columns(self, state: State, axis: int, *, nominal: float, **nonlinear: float) -> Array:
         del nonlinear

@@ -1,0 +1,193 @@
+"""The diagnosis of a lot: adequacy, where the model fails, classes of missing effects, what is left unexplained."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.random import Generator
+
+from inertial import effects as catalogue
+from inertial.criticism.adequacy import adequacy
+from inertial.criticism.classes import EffectClass, class_of
+from inertial.criticism.drivers import Driver, Place, drivers_of, places
+from inertial.criticism.heldout import fit_rms, heldout_rms
+from inertial.criticism.model import Model, Term
+from inertial.criticism.problem import Lot, Problem
+from inertial.criticism.search import MATERIAL, NAMED_BELOW, Field, Rival, log_p_value, search, size_of, terms_of
+from inertial.effects.base import AnyEffect
+from inertial.effects.covariate import COVARIATE_PREFIX, Covariate
+
+ADEQUATE_ABOVE = 0.05
+"""Probability above which a model passes: the nominal rate of false alarms."""
+
+
+@dataclass(frozen=True)
+class Named:
+    """A class of effects that is missing, with the errors before and after it is added; g."""
+
+    effects: EffectClass
+    rms_after: float
+    heldout_after: float
+
+
+@dataclass(frozen=True)
+class Unexplained:
+    """A driver that the residuals follow without an effect of the catalogue that would explain it."""
+
+    driver: str
+    shape: str
+    log_p: float
+
+
+@dataclass(frozen=True)
+class Diagnosis:
+    """What a lot says of a model; errors in g.
+
+    problem, base, final : the series, the model judged, the model with everything that was found
+    rms : of the base model's residuals; floor : of the noise that is there; share : of wander in it, ρ
+    """
+
+    problem: Problem
+    base: Model
+    final: Model
+    rms: float
+    floor: float
+    log_p: float
+    adequate: bool
+    where: tuple[Place, ...]
+    named: tuple[Named, ...]
+    unexplained: Unexplained | None
+    unseen: tuple[str, ...]
+    ladder: tuple[Rival, ...]
+
+
+def diagnose(lot: Lot, effects: Sequence[str], rng: Generator) -> Diagnosis:
+    """The diagnosis of a lot against a model.
+
+    Parameters
+    ----------
+    lot : dwells in g
+    effects : ids of the model to judge
+    rng : draws the noise that adequacy is measured against
+    """
+    problem = Problem(lot)
+    held = catalogue.get_all(effects)
+    base = Model(problem, terms_of(held, problem))
+    candidates = [e for e in catalogue.catalogue().values() if e.id not in set(effects)]
+    covariates = [Covariate(name) for name in lot.state.covariates if f"{COVARIATE_PREFIX}{name}" not in set(effects)]
+    field = Field(problem, [*candidates, *covariates])
+    drivers = drivers_of(problem)
+    unseen = _unseen(field, base, candidates)
+    log_p = adequacy(field, drivers, base.space, rng)
+    found = search(field, base)
+    adequate = log_p >= np.log(ADEQUATE_ABOVE) and not found.added
+    final, unexplained = found.model, None
+    if not adequate:
+        final, unexplained = _beyond(problem, base, final, drivers)
+    classes = _classes(field, base, final)
+    named = _named(problem, base, classes)
+    if unexplained is None:
+        unexplained = _covariate(classes)
+    floor = final.floor()
+    where = places(problem, drivers, base.at(final.share), final.space.variance)
+    charged = tuple(p for p in where if p.log_p + np.log(len(drivers)) < np.log(ADEQUATE_ABOVE))
+    return Diagnosis(
+        problem=problem,
+        base=base,
+        final=final,
+        rms=fit_rms(problem, base.terms),
+        floor=floor,
+        log_p=log_p,
+        adequate=adequate,
+        where=() if adequate else charged,
+        named=named,
+        unexplained=unexplained,
+        unseen=unseen,
+        ladder=found.ladder,
+    )
+
+
+def _unseen(field: Field, base: Model, candidates: Sequence[AnyEffect]) -> tuple[str, ...]:
+    """Effects whose columns the plan leaves empty, makes one with the model's, or does not carry the quantities for."""
+    gains = field.gains(base.at(0.0), {t.effect.id for t in base.terms})
+    blind = [name for name, gain in gains.items() if not gain.rank.any()]
+    order = [e.id for e in candidates]
+    return tuple(sorted({*blind, *field.lacking} & set(order), key=order.index))
+
+
+def _classes(field: Field, base: Model, final: Model) -> list[EffectClass]:
+    """A class for every effect that was found, the largest first."""
+    held = {t.effect.id for t in base.terms}
+    added = [t for t in final.terms if t.effect.id not in held]
+    found = [class_of(field, final, t) for t in added]
+    return sorted(found, key=lambda c: -c.size)
+
+
+def _named(problem: Problem, base: Model, classes: Sequence[EffectClass]) -> tuple[Named, ...]:
+    """Errors after each class is added to those before it."""
+    terms, found = list(base.terms), []
+    for group in classes:
+        terms.append(group.members[0].term)
+        found.append(Named(group, fit_rms(problem, terms), heldout_rms(problem, terms)))
+    return tuple(found)
+
+
+def _covariate(classes: Sequence[EffectClass]) -> Unexplained | None:
+    """A dependence on a recorded column without physics behind it: real, and its cause unknown."""
+    for group in classes:
+        best = group.simplest
+        if isinstance(best.effect, Covariate):
+            return Unexplained(best.effect.column, "line" if best.first == 1 else "curve", group.log_p)
+    return None
+
+
+def _beyond(problem: Problem, base: Model, final: Model, drivers: list[Driver]) -> tuple[Model, Unexplained | None]:
+    """What smooth dependence is left after the effects found; effects that only imitate it are taken back."""
+    space = final.space
+    convincing = [d for d in drivers if _convincing(final, d, len(drivers))]
+    if not convincing:
+        return final, None
+    best = max(convincing, key=lambda d: _worth(final, d))
+    held = {t.effect.id for t in base.terms}
+    left = _driver_size(final, best)
+    kept: list[Term] = []
+    for term in (t for t in final.terms if t.effect.id not in held):
+        rest = final.without(term.effect.id)
+        imitates = left > 0.35 * size_of(rest, term) and _inside(rest, term, best)
+        if not imitates:
+            kept.append(term)
+    gain = space.gain(best.candidate)
+    log_p = log_p_value(space, float(gain.drop[0]), int(gain.rank[0])) + np.log(len(drivers))
+    shape = "line" if best.candidate.columns.shape[-1] == 1 else "curve"
+    model = final if len(kept) + len(base.terms) == len(final.terms) else Model(problem, [*base.terms, *kept])
+    return model, Unexplained(best.name, shape, float(log_p))
+
+
+def _convincing(model: Model, driver: Driver, looks: int) -> bool:
+    gain = model.space.gain(driver.candidate)
+    log_p = log_p_value(model.space, float(gain.drop[0]), int(gain.rank[0]))
+    return log_p + np.log(looks) < np.log(NAMED_BELOW) and _driver_size(model, driver) > 1.5 * MATERIAL * model.floor()
+
+
+def _worth(model: Model, driver: Driver) -> float:
+    gain = model.space.gain(driver.candidate)
+    return float(gain.drop[0]) / model.space.variance - 2.5 * float(gain.rank[0])
+
+
+def _driver_size(model: Model, driver: Driver) -> float:
+    """RMS, g, of what a driver explains beyond noise."""
+    gain = model.at(0.0).gain(driver.candidate)
+    error = model.problem.basis.error
+    white = float(np.mean(error[np.isfinite(error)] ** 2))
+    beyond = float(gain.drop[0]) * white - model.floor() ** 2 * float(gain.rank[0])
+    return float(np.sqrt(max(beyond, 0.0) / model.problem.count))
+
+
+def _inside(model: Model, term: Term, driver: Driver) -> bool:
+    """Whether a smooth curve of the driver reproduces nine tenths of what a term explains."""
+    before = model.at(0.0)
+    wanted = model.problem.candidate(term.effect, [term.keywords], first=term.first)
+    alone = float(before.gain(wanted).drop[0])
+    local = np.concatenate([model.local, driver.candidate.columns[:, :, 0, :]], axis=-1)
+    after = type(before)(model.problem.basis, 0.0, model.problem.y, local, model.shared)
+    return float(after.gain(wanted).drop[0]) < 0.2 * alone

@@ -1,0 +1,163 @@
+"""Where a model fails: smooth dependence of its residuals on everything that was recorded, physics or not."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from itertools import combinations_with_replacement
+
+import numpy as np
+from numpy.typing import NDArray
+
+from inertial.criticism.problem import Problem
+from inertial.criticism.search import log_p_value
+from inertial.criticism.space import Candidate, Space
+from inertial.state import State
+
+Array = NDArray[np.float64]
+
+_KNOTS = 5
+_TIME_KNOTS = 8
+
+
+@dataclass(frozen=True)
+class Driver:
+    """Rotated columns of a smooth dependence on one driver.
+
+    name : as in the exchange format (``unit_C``, ``time_s``, a covariate), or ``pose``, ``approach``, ``temperature_rate``
+    values : (units, n) of the driver itself, None where it is not one quantity
+    """
+
+    name: str
+    candidate: Candidate
+    values: Array | None
+
+
+@dataclass(frozen=True)
+class Place:
+    """Where the model fails: a driver, the axes it shows on, the share of the excess it explains."""
+
+    driver: str
+    axes: tuple[str, ...]
+    share: float
+    log_p: float
+    rank: int
+    drop: float
+
+
+def drivers_of(problem: Problem) -> list[Driver]:
+    """Every driver that varies in a lot."""
+    state = problem.lot.state
+    found = [
+        Driver(name, _by_block(problem, curve(values, knots)), values)
+        for name, values, knots in _quantities(state)
+        if _varies(values)
+    ]
+    pose = _pose_columns(state, most=max(4, (problem.n - 8) // 3))
+    if pose.shape[-1]:
+        found.append(Driver("pose", _by_block(problem, pose), None))
+    approach = np.tanh(state.force_step / 0.05)
+    if np.any(np.abs(approach) > 0.1):
+        found.append(Driver("approach", _by_axis(problem, approach), None))
+    return found
+
+
+def _quantities(state: State) -> list[tuple[str, Array, int]]:
+    fields: dict[str, Array | None] = {
+        "unit_C": state.temperature,
+        "temperature_rate": state.temperature_rate,
+        "chamber_C": state.chamber,
+        "time_s": state.time,
+        "since_move_s": state.since_move,
+        "since_power_s": state.since_power,
+        "supply_V": state.supply,
+        "vibration_g": state.vibration,
+    }
+    every: Mapping[str, Array | None] = {**fields, **state.covariates}
+    return [
+        (k, v, _TIME_KNOTS if k.startswith(("time", "since_power")) else _KNOTS)
+        for k, v in every.items()
+        if v is not None
+    ]
+
+
+def _varies(values: Array) -> bool:
+    return bool(np.ptp(values) > 1e-9 * max(1.0, float(np.max(np.abs(values)))))
+
+
+def curve(values: Array, knots: int) -> Array:
+    """Natural cubic spline basis (..., n, d) of a driver, knots at its quantiles, d ≤ ``knots``; a line for few values."""
+    low, high = float(np.min(values)), float(np.max(values))
+    z = (values - low) / max(high - low, 1e-12)
+    distinct = np.unique(np.round(z, 6))
+    if distinct.size <= 3:
+        return np.stack([z**k for k in range(1, distinct.size)], axis=-1)
+    places = np.unique(np.quantile(distinct, np.linspace(0.0, 1.0, min(knots + 1, distinct.size))))
+    return np.stack([z, *_natural(z, places)], axis=-1)
+
+
+def _natural(z: Array, knots: Array) -> list[Array]:
+    """The nonlinear functions of a natural spline. Hastie, Tibshirani, Friedman: Elements of Statistical Learning, eq. 5.4."""
+
+    def d(k: int) -> Array:
+        top = np.maximum(z - knots[k], 0.0) ** 3 - np.maximum(z - knots[-1], 0.0) ** 3
+        return top / (knots[-1] - knots[k])
+
+    return [d(k) - d(knots.size - 2) for k in range(knots.size - 2)]
+
+
+def _pose_columns(state: State, most: int) -> Array:
+    """Polynomials of the direction of gravity from second degree on, at most so many, (units, n, d)."""
+    found: list[Array] = []
+    f = np.moveaxis(state.force, -1, 0)
+    for degree in (2, 3, 4):
+        terms = [np.prod(f[list(c)], axis=0) for c in combinations_with_replacement(range(3), degree)]
+        # on the sphere x² + y² + z² = 1: terms with z² are sums of lower ones
+        keep = [
+            t for t, c in zip(terms, combinations_with_replacement(range(3), degree), strict=True) if c.count(2) < 2
+        ]
+        if len(found) + len(keep) > most:
+            break
+        found.extend(keep)
+    return np.stack(found, axis=-1) if found else np.zeros((*state.force.shape[:-1], 0))
+
+
+def _by_block(problem: Problem, columns: Array) -> Candidate:
+    """Columns (units, n, d), the same for every axis, as a candidate."""
+    each = columns if problem.lot.radial else np.repeat(columns, 3, axis=0)
+    rotated = problem.basis.rotate(np.broadcast_to(each, (problem.blocks, problem.n, columns.shape[-1])))
+    return Candidate(rotated[:, :, None, :], shared=False)
+
+
+def _by_axis(problem: Problem, values: Array) -> Candidate:
+    """One column per axis, (units, n, 3), as a candidate."""
+    if problem.lot.radial:
+        return _by_block(problem, values)
+    column = np.swapaxes(values, -1, -2).reshape(problem.blocks, problem.n, 1)
+    return Candidate(problem.basis.rotate(column)[:, :, None, :], shared=False)
+
+
+def places(problem: Problem, drivers: list[Driver], space: Space, floor_variance: float) -> list[Place]:
+    """Where the residuals of a space lie, most telling first.
+
+    Parameters
+    ----------
+    floor_variance : what the variance would be if nothing were missing, in the space's own unit
+    """
+    excess = max(space.rss - space.dof * floor_variance, 1e-12)
+    found: list[Place] = []
+    for driver in drivers:
+        gain = space.gain(driver.candidate)
+        drop, rank = float(gain.drop[0]), int(gain.rank[0])
+        if rank:
+            share = float(np.clip((drop - rank * floor_variance) / excess, 0.0, 1.0))
+            axes = _axes(problem, gain.by_block[:, 0], rank, floor_variance)
+            found.append(Place(driver.name, axes, share, log_p_value(space, drop, rank), rank, drop))
+    return sorted(found, key=lambda p: p.log_p)
+
+
+def _axes(problem: Problem, by_block: Array, rank: int, variance: float) -> tuple[str, ...]:
+    """Axes that take more than a tenth of what the driver explains beyond noise."""
+    if problem.lot.radial:
+        return ("norm",)
+    by_axis = by_block.reshape(-1, 3).sum(axis=0) - rank / 3.0 * variance
+    total = max(float(np.sum(np.maximum(by_axis, 0.0))), 1e-300)
+    return tuple(a for a, v in zip("xyz", by_axis, strict=True) if v > 0.1 * total)

@@ -1,0 +1,93 @@
+"""Error of a model on dwells left out: whole poses at a time, so that what is predicted was not seen in any row."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from inertial.criticism.model import Term
+from inertial.criticism.problem import Problem
+
+Array = NDArray[np.float64]
+
+_FOLDS = 6
+
+
+def residuals(problem: Problem, terms: Sequence[Term], train: NDArray[np.bool_]) -> Array:
+    """Residuals (blocks, n) in g of least squares on some dwells, weighted by the white standard errors.
+
+    Parameters
+    ----------
+    train : (n,), dwells that are fitted; all are predicted
+    """
+    lot_error = problem.basis.error
+    y = _plain(problem, problem.y[..., None])[..., 0]
+    local = [t for t in terms if t.effect.scope != "station"]
+    shared = [t for t in terms if t.effect.scope == "station"]
+    x = _stacked(problem, local)
+    z = _stacked(problem, shared)
+    weight = np.where(np.isfinite(lot_error), 1.0 / lot_error, 0.0) * train
+    solve = _solver(x, weight)
+    if shared:
+        free = (z - x @ solve(z)) * weight[..., None]
+        target = (y - (x @ solve(y[..., None]))[..., 0]) * weight
+        flat = free.reshape(-1, free.shape[-1])
+        y = y - z @ np.linalg.lstsq(flat, target.reshape(-1), rcond=1e-9)[0]
+    left = y - (x @ solve(y[..., None]))[..., 0]
+    return np.where(np.isfinite(lot_error), left, np.nan)
+
+
+def heldout_rms(problem: Problem, terms: Sequence[Term]) -> float:
+    """RMS error in g on poses left out, each pose in one of six folds."""
+    fold = _folds(problem)
+    squares, count = 0.0, 0
+    for k in range(_FOLDS):
+        test = fold == k
+        if test.any() and not test.all():
+            left = residuals(problem, terms, ~test)[:, test]
+            squares += float(np.nansum(left**2))
+            count += int(np.count_nonzero(np.isfinite(left)))
+    return float(np.sqrt(squares / max(count, 1)))
+
+
+def fit_rms(problem: Problem, terms: Sequence[Term]) -> float:
+    """RMS residual in g of the fit to all dwells."""
+    left = residuals(problem, terms, np.ones(problem.n, dtype=bool))
+    return float(np.sqrt(np.nanmean(left**2)))
+
+
+def _folds(problem: Problem) -> NDArray[np.intp]:
+    """Fold of each dwell, (n,): equal poses together; dwells in turn where no pose comes again."""
+    force = np.round(problem.lot.state.force[0], 3)
+    _, pose = np.unique(force, axis=0, return_inverse=True)
+    pose = pose.reshape(-1)
+    if pose.max() + 1 < 2 * _FOLDS:
+        return np.arange(problem.n) % _FOLDS
+    return (pose * 7) % _FOLDS  # neighbours on the sphere fall into different folds
+
+
+def _stacked(problem: Problem, terms: Sequence[Term]) -> Array:
+    found = [problem.columns(t.effect, t.keywords)[..., : t.first] for t in terms]
+    return np.concatenate(found, axis=-1) if found else np.zeros((problem.blocks, problem.n, 0))
+
+
+def _plain(problem: Problem, rotated: Array) -> Array:
+    """Rotated values turned back, g."""
+    turned = np.matmul(np.swapaxes(problem.basis.turn, -1, -2), rotated)
+    error = np.where(np.isfinite(problem.basis.error), problem.basis.error, 0.0)
+    return turned * error[..., None]
+
+
+class _solver:  # noqa: N801  # a function with a prepared factor
+    """Coefficients (blocks, p, m) for targets (blocks, n, m) in weighted least squares on columns (blocks, n, p)."""
+
+    def __init__(self, x: Array, weight: Array) -> None:
+        weighted = x * weight[..., None]
+        self.size = np.sqrt(np.einsum("bnp,bnp->bp", weighted, weighted))
+        self.size = np.where(self.size > 0.0, self.size, 1.0)
+        self.scaled, self.weight = weighted / self.size[:, None, :], weight
+        self.inverse = np.linalg.pinv(np.swapaxes(self.scaled, -1, -2) @ self.scaled, rcond=1e-9, hermitian=True)
+
+    def __call__(self, target: Array) -> Array:
+        right = np.swapaxes(self.scaled, -1, -2) @ (target * self.weight[..., None])
+        return (self.inverse @ right) / self.size[..., None]

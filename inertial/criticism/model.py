@@ -1,0 +1,134 @@
+"""A model under criticism: its columns in a problem, and the share of wander that its residuals show."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from inertial.criticism.problem import Problem
+from inertial.criticism.space import Space, information
+from inertial.effects.base import AnyEffect
+
+Array = NDArray[np.float64]
+
+_SHARES = np.concatenate([[0.0], np.geomspace(0.02, 2e4, 13)])
+
+
+@dataclass(frozen=True)
+class Term:
+    """An effect in a model, at values of its nonlinear parameters.
+
+    first : how many of its columns are used; None for all
+    steps : sizes of the nonlinear parameters' local columns, by name, that let every unit differ a little; empty for none
+    """
+
+    effect: AnyEffect
+    values: tuple[tuple[str, float], ...] = ()
+    first: int | None = None
+    loose: bool = False
+
+    @property
+    def keywords(self) -> dict[str, float]:
+        """Values as keywords of the effect's columns."""
+        return dict(self.values)
+
+
+class Model:
+    """Terms in a problem."""
+
+    def __init__(self, problem: Problem, terms: Sequence[Term], *, near: float | None = None) -> None:
+        self.problem, self.terms, self._near = problem, tuple(terms), near
+
+    @cached_property
+    def local(self) -> Array:
+        """Rotated columns with coefficients by block, (blocks, n, p)."""
+        found = [self._of(t) for t in self.terms if t.effect.scope != "station"]
+        found += [self._loose(t) for t in self.terms if t.loose and t.effect.scope != "station"]
+        if not found:
+            return np.zeros((self.problem.blocks, self.problem.n, 0))
+        return np.concatenate(found, axis=-1)
+
+    @cached_property
+    def shared(self) -> Array:
+        """Rotated columns with coefficients of all blocks, (blocks, n, q)."""
+        found = [self._of(t) for t in self.terms if t.effect.scope == "station"]
+        if not found:
+            return np.zeros((self.problem.blocks, self.problem.n, 0))
+        return np.concatenate(found, axis=-1)
+
+    def _of(self, term: Term) -> Array:
+        columns = self.problem.rotated(term.effect, term.keywords)
+        return columns if term.first is None else columns[..., : term.first]
+
+    def _loose(self, term: Term) -> Array:
+        """Derivatives of a term's columns by its continuous nonlinear parameters: what a unit's own value would add."""
+        found: list[Array] = []
+        for parameter in term.effect.parameters(self.problem.lot.state):
+            if parameter.choices:
+                continue
+            value = term.keywords[parameter.name]
+            step = 0.02 * (value if parameter.scale != "linear" else parameter.high - parameter.low)
+            up = self.problem.rotated(term.effect, {**term.keywords, parameter.name: value + step})
+            down = self.problem.rotated(term.effect, {**term.keywords, parameter.name: value - step})
+            found.append((up - down)[..., : term.first])
+        return np.concatenate(found, axis=-1) if found else np.zeros((self.problem.blocks, self.problem.n, 0))
+
+    def at(self, share: float) -> Space:
+        """What the model leaves, whitened at a share of wander."""
+        return Space(self.problem.basis, share, self.problem.y, self.local, self.shared)
+
+    @cached_property
+    def share(self) -> float:
+        """ρ by restricted maximum likelihood, pooled over the blocks."""
+        shares = _SHARES
+        if self._near is not None:
+            around = self._near * np.array([0.03, 0.1, 0.3, 0.6, 1.0, 1.6, 3.0]) if self._near > 0.0 else _SHARES[1:6]
+            shares = np.concatenate([[0.0], around])
+        found = np.array([self._deviance(s) for s in shares])
+        best = int(np.argmin(found))
+        if 0 < best < shares.size - 1 and shares[best - 1] > 0.0:
+            return float(np.exp(_vertex(np.log(shares[best - 1 : best + 2]), found[best - 1 : best + 2])))
+        return float(shares[best])
+
+    def _deviance(self, share: float) -> float:
+        space = self.at(share)
+        return space.restricted(np.array(information(self.local, space.spread)))
+
+    @cached_property
+    def space(self) -> Space:
+        """What the model leaves, whitened at its own share of wander."""
+        return self.at(self.share)
+
+    def floor(self) -> float:
+        """RMS of the noise of a dwell mean, g: white and wander about the record's own mean."""
+        basis, space = self.problem.basis, self.space
+        there = np.isfinite(basis.error)
+        white = float(np.mean(basis.error[there] ** 2))
+        # the constant part of the wander goes into the bias of the run and is no error of the dwells against each other
+        slow = space.share * self._wander_about_mean()
+        return float(np.sqrt(space.variance * white * (1.0 + slow)))
+
+    def _wander_about_mean(self) -> float:
+        basis = self.problem.basis
+        turn, wander = basis.turn[0], basis.wander[0]
+        kernel = (turn.T * wander) @ turn
+        n = kernel.shape[0]
+        return float(np.trace(kernel) / n - kernel.sum() / n**2)
+
+    def with_term(self, term: Term) -> "Model":
+        """The model with one more term."""
+        return Model(self.problem, [*self.terms, term], near=self.share)
+
+    def without(self, effect_id: str) -> "Model":
+        """The model less one effect."""
+        return Model(self.problem, [t for t in self.terms if t.effect.id != effect_id], near=self.share)
+
+
+def _vertex(x: Array, y: Array) -> float:
+    """Abscissa of the parabola through three points, kept between the outer two."""
+    a = np.polyfit(x - x[1], y, 2)
+    if a[0] <= 0.0:
+        return float(x[1])
+    return float(np.clip(x[1] - a[1] / (2.0 * a[0]), x[0], x[2]))

@@ -1,0 +1,90 @@
+"""Covariance of dwell means: white noise and a 1/f wander between the dwells, in real time.
+
+The wander is a sum of Ornstein–Uhlenbeck processes of equal variance with time constants an octave apart: its spectrum is 1/f
+between the slowest and the fastest. In the basis that diagonalises it against the white part every covariance
+a·(I + ρ·F) is diagonal, so that trying many values of ρ costs nothing.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+_EVEN = 1.3
+"""White standard errors of a block that differ by less than this factor are taken as equal: one basis then serves a whole lot."""
+
+
+def flicker_kernel(time: Array, *, slowest: float = 4.0) -> Array:
+    """Correlation matrix of 1/f wander at times ``time`` (..., n) in s, (..., n, n).
+
+    Time constants run in octaves from a third of the typical spacing to ``slowest`` times the length of the record.
+    """
+    gap = np.abs(time[..., :, None] - time[..., None, :])
+    span = float(np.max(gap, initial=1.0))
+    spacing = max(float(np.median(np.diff(np.unique(time)))) if np.unique(time).size > 1 else 1.0, span / 1e5, 1e-6)
+    octaves = max(int(np.ceil(np.log2(slowest * span / (spacing / 3.0)))), 2)
+    taus = slowest * span * 0.5 ** np.arange(octaves)
+    kernel = np.zeros(gap.shape)
+    for tau in taus:
+        kernel += np.exp(-gap / tau)
+    return kernel / taus.size
+
+
+@dataclass(frozen=True)
+class Basis:
+    """Rotation in which white noise is the identity and the wander is diagonal.
+
+    turn : (1 or blocks, n, n), applied from the left to values already divided by ``error``
+    error : (blocks, n), white standard error of each dwell, g; infinite for a dwell that is not there
+    wander : (1 or blocks, n), variance of the wander along each rotated coordinate, for share ρ = 1
+    count : number of dwells that are there
+    """
+
+    turn: Array
+    error: Array
+    wander: Array
+    count: int
+
+    def rotate(self, columns: Array) -> Array:
+        """Columns (blocks, n, m) divided by the white standard error and rotated."""
+        weighted = columns / self.error[..., None]
+        return np.matmul(self.turn, weighted)
+
+    def spread(self, share: float) -> Array:
+        """Standard deviations (1 or blocks, n) of the rotated coordinates at a share ρ of wander, for white noise of 1."""
+        return np.sqrt(1.0 + share * self.wander)
+
+
+def basis(time: Array, error: Array) -> Basis:
+    """The rotation for blocks of dwells.
+
+    Parameters
+    ----------
+    time : (blocks, n), s
+    error : (blocks, n), white standard error of each dwell, infinite where a dwell is missing
+    """
+    there = np.isfinite(error)
+    even = _evened(error, there)
+    same_time = np.all(np.abs(time - time[:1]) < 1.0)
+    flat = np.all(there) and np.all(even == even[:, :1])
+    if same_time and flat:
+        values, vectors = np.linalg.eigh(flicker_kernel(time[0]))
+        turn, wander = vectors.T[None], np.maximum(values, 0.0)[None]
+    else:
+        typical = np.array([np.mean(e[t] ** 2) if t.any() else 1.0 for e, t in zip(even, there, strict=True)])
+        weight = np.where(there, np.sqrt(typical)[:, None] / even, 0.0)
+        values, vectors = np.linalg.eigh(flicker_kernel(time) * weight[:, :, None] * weight[:, None, :])
+        turn, wander = np.swapaxes(vectors, -1, -2), np.maximum(values, 0.0)
+    return Basis(turn, even, wander, int(there.sum()))
+
+
+def _evened(error: Array, there: NDArray[np.bool_]) -> Array:
+    """Standard errors, made equal within a block where they nearly are."""
+    out = error.copy()
+    for block, mask in enumerate(there):
+        values = error[block, mask]
+        if values.size and values.max() < _EVEN * values.min():
+            out[block, mask] = np.sqrt(np.mean(values**2))
+    return out

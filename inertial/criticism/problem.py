@@ -1,0 +1,132 @@
+"""A lot's dwells as series in g: one block per unit and axis, or one per unit where only the norm of gravity is known."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from itertools import product
+
+import numpy as np
+from numpy.typing import NDArray
+
+from inertial import design
+from inertial.criticism.noise import Basis, basis
+from inertial.criticism.space import Candidate
+from inertial.effects import SensorEffect
+from inertial.effects.base import AnyEffect
+from inertial.state import State
+
+Array = NDArray[np.float64]
+
+_CACHE = 30_000_000
+"""Numbers of rotated columns kept between passes; beyond, they are made again: memory stays bounded for large lots."""
+
+
+@dataclass(frozen=True)
+class Lot:
+    """Measurements of a lot in g.
+
+    state : the dwells of all units, (units, n)
+    output : (units, n, 3), output over the nominal scale: g
+    error : (units, n, 3), white standard error of each dwell mean, g; infinite where a dwell is missing
+    response : (units, 3, 3), K over its diagonal: how a change of force shows on each axis
+    radial : only the norm of the force is known; the state's force is then the corrected output's own direction
+    """
+
+    state: State
+    output: Array
+    error: Array
+    response: Array
+    radial: bool = False
+
+    def units(self, index: Sequence[int]) -> "Lot":
+        """The lot of some units only."""
+        pick = np.asarray(index, dtype=np.intp)
+        return replace(
+            self,
+            state=self.state.pick(pick),
+            output=self.output[pick],
+            error=self.error[pick],
+            response=self.response[pick],
+        )
+
+
+class Problem:
+    """Series and columns of a lot in the blocks' rotated coordinates."""
+
+    def __init__(self, lot: Lot) -> None:
+        self.lot = lot
+        units, n = lot.state.time.shape
+        self.blocks = units if lot.radial else 3 * units
+        self.n = n
+        time = lot.state.time if lot.radial else np.repeat(lot.state.time, 3, axis=0)
+        self.basis: Basis = basis(time, self._error())
+        self.y = self.basis.rotate(self._series()[..., None])[..., 0]
+        self._kept: dict[tuple[object, ...], Candidate] = {}
+        self._room = _CACHE
+
+    def _series(self) -> Array:
+        """Measurements (blocks, n), g: outputs, or what the norm of the corrected output exceeds 1 g by."""
+        if self.lot.radial:
+            return np.einsum("unj,unj->un", self._direction, self.lot.output) - 1.0
+        return np.swapaxes(self.lot.output, -1, -2).reshape(self.blocks, self.n)
+
+    def _error(self) -> Array:
+        if self.lot.radial:
+            squares = np.where(np.isfinite(self.lot.error), self.lot.error, 0.0) ** 2
+            total = np.sqrt(np.einsum("unj,unj->un", self._direction**2, squares))
+            return np.where(np.isfinite(self.lot.error).all(axis=-1), total, np.inf)
+        return np.swapaxes(self.lot.error, -1, -2).reshape(self.blocks, self.n)
+
+    @cached_property
+    def _direction(self) -> Array:
+        return self.lot.state.force / np.linalg.norm(self.lot.state.force, axis=-1, keepdims=True)
+
+    @property
+    def count(self) -> int:
+        """Number of measurements."""
+        return self.basis.count
+
+    def columns(self, effect: AnyEffect, values: dict[str, float]) -> Array:
+        """Columns of an effect by block, (blocks, n, p), g per unit of the coefficient; radial lots join the axes' columns."""
+        state = self.lot.state
+        if isinstance(effect, SensorEffect):
+            axes = [effect.columns(state, axis, **values) for axis in range(3)]
+            axes = [np.broadcast_to(a, (*state.time.shape, a.shape[-1])) for a in axes]
+            if self.lot.radial:
+                weighted = [a * self._direction[..., i, None] for i, a in enumerate(axes)]
+                return np.concatenate(weighted, axis=-1)
+            return np.stack(axes, axis=1).reshape(self.blocks, self.n, -1)
+        seen = design.shared_columns([effect], state, {effect.id: values}, self.lot.response)
+        seen = np.broadcast_to(seen, (state.time.shape[0], 3, self.n, seen.shape[-1]))
+        if self.lot.radial:
+            return np.einsum("uni,uinq->unq", self._direction, seen)
+        return seen.reshape(self.blocks, self.n, -1)
+
+    def rotated(self, effect: AnyEffect, values: dict[str, float]) -> Array:
+        """Rotated columns (blocks, n, p) of an effect."""
+        return self.basis.rotate(self.columns(effect, values))
+
+    def candidate(self, effect: AnyEffect, grid: list[dict[str, float]], *, first: int | None = None) -> Candidate:
+        """Rotated columns of an effect over values of its nonlinear parameters; ``first`` keeps only so many columns an axis."""
+        key = (effect.id, len(grid), tuple(grid[0].items()), tuple(grid[-1].items()))
+        kept = self._kept.get(key)
+        if kept is None:
+            stacked = np.stack([self.rotated(effect, values) for values in grid], axis=2)
+            kept = Candidate(stacked, shared=effect.scope == "station")
+            if stacked.size < self._room:
+                self._room -= stacked.size
+                self._kept[key] = kept
+        if first is None:
+            return kept
+        return Candidate(kept.columns[..., :first], kept.shared)
+
+
+def grid_of(effect: AnyEffect, state: State) -> list[dict[str, float]]:
+    """Starting values of an effect's nonlinear parameters, with its constants, as a list of keyword sets."""
+    constants = dict(effect.constants(state))
+    parameters = effect.parameters(state)
+    if not parameters:
+        return [constants]
+    values = product(*(p.grid().tolist() for p in parameters))
+    names = [p.name for p in parameters]
+    return [{**constants, **dict(zip(names, v, strict=True))} for v in values]

@@ -1,0 +1,87 @@
+"""The dwells of a lot as they were read, before any physics: what data faults are looked for in."""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+_ROUNDS = 12
+_TUKEY = 4.685
+
+
+@dataclass(frozen=True)
+class Readings:
+    """Readings of a lot, dwells in the order of their numbers; NaN where a unit lacks a dwell.
+
+    force : (units, n, 3), g, commanded
+    output, spread : (units, n, 3), output unit; mean and standard deviation of a sample; spread None where not recorded
+    count : (units, n), samples averaged; duration : (units, n), s; each None where not recorded
+    time : (units, n), s
+    temperature, chamber, vibration : (units, n), °C, °C, g; None where not recorded
+    unit_name : the output's unit where it is stated ("g", "V", "LSB")
+    """
+
+    force: Array
+    output: Array
+    time: Array
+    spread: Array | None = None
+    count: Array | None = None
+    duration: Array | None = None
+    temperature: Array | None = None
+    chamber: Array | None = None
+    vibration: Array | None = None
+    unit_name: str | None = None
+
+    @property
+    def there(self) -> NDArray[np.bool_]:
+        """Which units have which dwells, (units, n)."""
+        return np.isfinite(self.output).all(axis=-1)
+
+    @cached_property
+    def fits(self) -> Array:
+        """Robust bias and response of every unit, (units, 3, 4): columns 1, fx, fy, fz; output unit."""
+        return np.stack([robust_fit(f, o) for f, o in zip(self.force, self.output, strict=True)])
+
+    @cached_property
+    def scale(self) -> Array:
+        """Typical output per g of every unit, (units,): the root of the mean squared response."""
+        return np.sqrt(np.sum(self.fits[:, :, 1:] ** 2, axis=(1, 2)) / 3.0)
+
+    @cached_property
+    def misfit(self) -> Array:
+        """Output less the robust fit, over the unit's scale: g, (units, n, 3)."""
+        design = np.concatenate([np.ones((*self.force.shape[:2], 1)), self.force], axis=-1)
+        model = np.einsum("unp,uip->uni", design, self.fits)
+        return (self.output - model) / np.where(self.scale > 0.0, self.scale, 1.0)[:, None, None]
+
+
+def robust_fit(force: Array, output: Array) -> Array:
+    """Bias and response (3, 4) that the majority of dwells agrees on: least squares reweighted by Tukey's biweight.
+
+    Dwells are weighed by the norm of their residual over the three axes, so that a wrong pose loses all of them together.
+    """
+    there = np.isfinite(output).all(axis=-1)
+    x = np.concatenate([np.ones((int(there.sum()), 1)), force[there]], axis=-1)
+    y = output[there]
+    weight = np.ones(len(y))
+    found = np.zeros((4, 3))
+    for turn in range(_ROUNDS):
+        found = np.linalg.lstsq(x * weight[:, None], y * weight[:, None], rcond=1e-9)[0]
+        size = np.linalg.norm(y - x @ found, axis=1)
+        middle = float(np.median(size))
+        if middle <= 0.0:
+            break
+        # absolute values first: they move off outliers that the biweight would still balance between
+        weight = (
+            np.sqrt(1.0 / np.maximum(size, 0.1 * middle)) if turn < 5 else _biweight(size / (_TUKEY * 1.5 * middle))
+        )
+        if np.count_nonzero(weight) < 5:
+            break
+    return found.T
+
+
+def _biweight(u: Array) -> Array:
+    return np.where(u < 1.0, 1.0 - u**2, 0.0)

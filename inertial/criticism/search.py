@@ -1,0 +1,253 @@
+"""The search for missing effects: forward with the noise estimated anew, back again over what was chosen, until nothing is left."""
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import stats
+
+from inertial.criticism.model import Model, Term
+from inertial.criticism.problem import Problem, grid_of
+from inertial.criticism.space import Gain, Space
+from inertial.effects.base import AnyEffect, Nonlinear
+from inertial.errors import MissingInput
+
+Array = NDArray[np.float64]
+
+PER_COEFFICIENT = 2.5
+PER_COLUMN = 6.0
+"""Penalty, in chi-square, for each coefficient and each column: a larger effect must earn its size."""
+
+NAMED_BELOW = 1e-4
+"""Probability, over all looks together, below which an effect is named."""
+
+MATERIAL = 0.2
+"""Share of the floor below which a significant effect is not named: remainders of imperfect drivers are of that size."""
+
+_FINALISTS = 6
+_MOST = 6
+_SHARES_TRIED = (1.0, 0.15, 0.01)
+
+
+@dataclass(frozen=True)
+class Rival:
+    """A candidate effect on its best values, judged beside a model."""
+
+    term: Term
+    drop: float
+    rank: int
+    cost: float
+    log_p: float
+
+
+@dataclass(frozen=True)
+class Found:
+    """Outcome of the search: the model with what was added, and the rivals of the first step, best first."""
+
+    model: Model
+    added: tuple[Term, ...]
+    ladder: tuple[Rival, ...]
+
+
+class Field:
+    """The candidates of a search, those that these dwells carry the quantities for."""
+
+    def __init__(self, problem: Problem, effects: Iterable[AnyEffect]) -> None:
+        self.problem = problem
+        self.effects: list[AnyEffect] = []
+        self.grids: dict[str, list[dict[str, float]]] = {}
+        self.lacking: dict[str, str] = {}
+        for effect in effects:
+            try:
+                grid = grid_of(effect, problem.lot.state)
+                problem.candidate(effect, grid)
+            except MissingInput as reason:
+                self.lacking[effect.id] = reason.quantity
+                continue
+            self.effects.append(effect)
+            self.grids[effect.id] = grid
+
+    @property
+    def looks(self) -> int:
+        """Number of tests made in one pass: every effect at every value of its nonlinear parameters."""
+        return sum(len(g) for g in self.grids.values())
+
+    def gains(self, space: Space, leave: set[str]) -> dict[str, Gain]:
+        """Gain of every candidate that the model does not hold already."""
+        found: dict[str, Gain] = {}
+        for effect in self.effects:
+            if effect.id not in leave:
+                found[effect.id] = space.gain(self.problem.candidate(effect, self.grids[effect.id]))
+        return found
+
+    def primary_gains(self, space: Space, leave: set[str]) -> dict[str, Gain]:
+        """Gain of the leading column alone, for effects of several columns whose first is an effect of its own."""
+        found: dict[str, Gain] = {}
+        for effect in self.effects:
+            first = effect.primary
+            if effect.id not in leave and first is not None:
+                found[effect.id] = space.gain(self.problem.candidate(effect, self.grids[effect.id], first=first))
+        return found
+
+
+def cost_of(rank: int, columns: int, nonlinear: int) -> float:
+    """Penalty of an effect, in chi-square."""
+    return PER_COEFFICIENT * (rank + nonlinear) + PER_COLUMN * columns
+
+
+def log_p_value(space: Space, drop: float, rank: int) -> float:
+    """Natural logarithm of the probability that noise alone takes off so much with so many coefficients."""
+    after = space.dof - rank
+    if rank == 0 or after <= 0:
+        return 0.0
+    left = max(space.rss - drop, 1e-300)
+    return float(stats.f.logsf((drop / rank) / (left / after), rank, after))
+
+
+def search(field: Field, base: Model) -> Found:
+    """The effects that the measurements call for beyond a base model."""
+    model, chosen, ladder = base, [], ()
+    for _ in range(_MOST):
+        rivals = _contest(field, model)
+        ladder = ladder or tuple(rivals)
+        best = next((r for r in rivals if convincing(field, model, r)), None)
+        if best is None:
+            break
+        chosen.append(best.term)
+        model = model.with_term(best.term)
+        if len(chosen) > 1:
+            model, chosen = _reexamine(field, base, model, chosen)
+    return Found(model, tuple(chosen), ladder)
+
+
+def convincing(field: Field, model: Model, rival: Rival) -> bool:
+    """Whether a rival is significant over all looks, and large enough to matter."""
+    if rival.log_p + np.log(max(field.looks, 1)) > np.log(NAMED_BELOW):
+        return False
+    return size_of(model, rival.term) > MATERIAL * model.with_term(rival.term).floor()
+
+
+def size_of(model: Model, term: Term) -> float:
+    """RMS, in g, of what a term explains that the model cannot absorb, less what noise would."""
+    flat = model.at(0.0)
+    wanted = model.problem.candidate(term.effect, [term.keywords], first=term.first)
+    gain = flat.gain(wanted)
+    noise = model.with_term(term).floor() ** 2 * float(gain.rank[0])
+    white = float(np.mean(model.problem.basis.error[np.isfinite(model.problem.basis.error)] ** 2))
+    return float(np.sqrt(max(float(gain.drop[0]) * white - noise, 0.0) / model.problem.count))
+
+
+def _contest(field: Field, model: Model) -> list[Rival]:
+    """Rivals by their penalised likelihood, the finalists with the noise estimated anew beside them."""
+    leave = {t.effect.id for t in model.terms}
+    count = field.problem.count
+    tried: dict[str, tuple[float, int, int | None]] = {}
+    for factor in _SHARES_TRIED:
+        space = model.at(model.share * factor)
+        logdet = float(np.sum(np.log(space.spread**2))) * (field.problem.blocks / space.spread.shape[0])
+        for primary, gains in ((False, field.gains(space, leave)), (True, field.primary_gains(space, leave))):
+            for name, gain in gains.items():
+                place, score = _best_of(field, space, name, gain, logdet, count)
+                if gain.rank[place] and (name not in tried or score < tried[name][0]):
+                    effect = next(e for e in field.effects if e.id == name)
+                    tried[name] = (score, place, effect.primary if primary else None)
+    ranked = sorted(tried, key=lambda k: tried[k][0])[:_FINALISTS]
+    finalists = [_exact(field, model, name, tried[name][1], tried[name][2]) for name in ranked]
+    return sorted(finalists, key=lambda r: r.cost)
+
+
+def _best_of(field: Field, space: Space, name: str, gain: Gain, logdet: float, count: int) -> tuple[int, float]:
+    """Best grid value of a candidate, and its penalised deviance there."""
+    left = np.maximum(space.rss - gain.drop, 1e-300)
+    place = int(np.argmin(left))
+    columns = max(1, round(gain.rank[place] / field.problem.blocks))
+    nonlinear = len(field.grids[name][0]) if len(field.grids[name]) > 1 else 0
+    deviance = count * np.log(left[place] / count) + logdet
+    return place, float(deviance + cost_of(int(gain.rank[place]), columns, nonlinear))
+
+
+def _exact(field: Field, model: Model, name: str, place: int, first: int | None) -> Rival:
+    """A finalist with its nonlinear parameters refined and the share of wander estimated with it inside."""
+    effect = next(e for e in field.effects if e.id == name)
+    term = Term(effect, tuple(field.grids[name][place].items()), first)
+    term = refine(model, term, model.with_term(term).share)
+    richer = model.with_term(term)
+    return judge(field, model, term, richer.share)
+
+
+def judge(field: Field, model: Model, term: Term, share: float) -> Rival:
+    """A term beside a model at a given share of wander."""
+    space = model.at(share)
+    gain = space.gain(field.problem.candidate(term.effect, [term.keywords], first=term.first))
+    drop, rank = float(gain.drop[0]), int(gain.rank[0])
+    columns = max(1, round(rank / field.problem.blocks))
+    nonlinear = len(term.effect.parameters(field.problem.lot.state))
+    count = field.problem.count
+    logdet = float(np.sum(np.log(space.spread**2))) * (field.problem.blocks / space.spread.shape[0])
+    deviance = count * np.log(max(space.rss - drop, 1e-300) / count) + logdet
+    return Rival(term, drop, rank, float(deviance + cost_of(rank, columns, nonlinear)), log_p_value(space, drop, rank))
+
+
+def refine(model: Model, term: Term, share: float) -> Term:
+    """A term with its continuous nonlinear parameters moved to the best fit near their grid value."""
+    space = model.at(share)
+    for parameter in term.effect.parameters(model.problem.lot.state):
+        if parameter.choices:
+            continue
+        term = _refine_one(space, model.problem, term, parameter)
+    return term
+
+
+def _refine_one(space: Space, problem: Problem, term: Term, parameter: Nonlinear) -> Term:
+    """Three rounds of five values, each round a third as wide."""
+    grid = parameter.grid()
+    to, back = (np.log, np.exp) if parameter.scale == "log" else ((lambda v: 1.0 / v), (lambda v: 1.0 / v))
+    if parameter.scale == "linear":
+        to, back = (lambda v: v), (lambda v: v)
+    low, high = sorted((float(to(parameter.low)), float(to(parameter.high))))
+    width = (high - low) / max(grid.size - 1, 1)
+    centre = float(to(term.keywords[parameter.name]))
+    for _ in range(3):
+        values = np.clip(centre + width * np.array([-0.9, -0.45, 0.0, 0.45, 0.9]), low, high)
+        sets = [{**term.keywords, parameter.name: float(back(v))} for v in values]
+        columns = np.stack([problem.rotated(term.effect, s) for s in sets], axis=2)
+        candidate = type(problem.candidate(term.effect, sets[:1]))(
+            columns[..., : term.first], term.effect.scope == "station"
+        )
+        centre = float(values[int(np.argmax(space.gain(candidate).drop))])
+        width *= 0.4
+    return Term(
+        term.effect, tuple({**term.keywords, parameter.name: float(back(centre))}.items()), term.first, term.loose
+    )
+
+
+def _reexamine(field: Field, base: Model, model: Model, chosen: list[Term]) -> tuple[Model, list[Term]]:
+    """Each chosen effect again beside the others: kept, swapped for a better one, or dropped."""
+    for term in list(chosen):
+        if len(chosen) < 2:
+            break
+        rest = model.without(term.effect.id)
+        rivals = _contest(field, rest)
+        best = next((r for r in rivals if convincing(field, rest, r)), None)
+        others = [t for t in chosen if t is not term]
+        if best is None:
+            chosen, model = others, rest
+            continue
+        chosen = [*others, best.term]
+        model = Model(field.problem, [*base.terms, *chosen], near=model.share)
+    return model, chosen
+
+
+def terms_of(effects: Sequence[AnyEffect], problem: Problem) -> list[Term]:
+    """Terms of a given model, nonlinear parameters found one after the other beside the rest."""
+    terms = [Term(e, tuple(grid_of(e, problem.lot.state)[0].items())) for e in effects]
+    for place, effect in enumerate(effects):
+        grid = grid_of(effect, problem.lot.state)
+        if len(grid) < 2:
+            continue
+        rest = Model(problem, [t for i, t in enumerate(terms) if i != place])
+        gain = rest.space.gain(problem.candidate(effect, grid))
+        best = Term(effect, tuple(grid[int(np.argmax(gain.drop))].items()))
+        terms[place] = refine(rest, best, rest.share)
+    return terms

@@ -1,0 +1,229 @@
+"""A table of dwells as the arrays that criticism works on; units may lack dwells, and the reference may be angles or nothing."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pandas as pd
+
+from inertial import frames
+from inertial.criticism.problem import Lot
+from inertial.criticism.readings import Readings
+from inertial.state import History, State
+from pipelines.importers.exchange import covariates
+from schemas.errors import DataRejected
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    Array = NDArray[np.float64]
+
+OUT = ("out_x", "out_y", "out_z")
+SPREAD = ("sd_x", "sd_y", "sd_z")
+FORCE = ("force_x", "force_y", "force_z")
+_HISTORY_POINTS = 4000
+
+
+@dataclass(frozen=True)
+class Measured:
+    """Dwells of a lot, (units, n): readings as they came, and all that effects may look at.
+
+    dwells : (n,), numbers of the dwells
+    reference : "force", "angles" or "norm"
+    """
+
+    units: tuple[str, ...]
+    dwells: NDArray[np.int64]
+    readings: Readings
+    state: State
+    reference: str
+
+    def pick(self, units: list[int]) -> Measured:
+        """The same for some units."""
+        index = np.asarray(units, dtype=np.intp)
+        r = self.readings
+        fields = {
+            k: v[index] if isinstance(v, np.ndarray) else v for k, v in vars(r).items() if k in Readings.__annotations__
+        }
+        return Measured(
+            tuple(self.units[i] for i in units), self.dwells, Readings(**fields), self.state.pick(index), self.reference
+        )
+
+
+def measured(dwells: pd.DataFrame, history: pd.DataFrame | None = None) -> Measured:
+    """The arrays of a table of dwells in the exchange format.
+
+    Raises
+    ------
+    DataRejected
+        There are no rows, or too few dwells to judge anything.
+    """
+    if dwells.empty:
+        raise DataRejected("dwells: no rows; at least one unit with its dwells is needed")
+    if "kind" in dwells.columns:
+        dwells = dwells[dwells["kind"].isin(["dwell", "verification"])]
+    ordered = dwells.sort_values(["unit", "dwell"], kind="stable")
+    units = tuple(dict.fromkeys(ordered["unit"].astype(str)))
+    numbers = np.unique(ordered["dwell"].to_numpy())
+    place = {u: i for i, u in enumerate(units)}
+    rows = ordered["unit"].astype(str).map(place).to_numpy(), np.searchsorted(numbers, ordered["dwell"].to_numpy())
+    table = _Table(ordered, rows, (len(units), len(numbers)))
+    reference, force = _force(table)
+    readings = Readings(
+        force=force,
+        output=table.raw(OUT),
+        time=table.raw(("time_s",))[..., 0],
+        spread=table.raw(SPREAD) if table.has(*SPREAD) else None,
+        count=table.one("n", filled=False),
+        duration=table.one("duration_s", filled=False),
+        temperature=table.one("unit_C", filled=False),
+        chamber=table.one("chamber_C", filled=False),
+        vibration=table.one("vibration_g", filled=False),
+        unit_name=_stated_unit(dwells),
+    )
+    return Measured(units, numbers, readings, _state(table, force, units, history), reference)
+
+
+class _Table:
+    """Columns of a long table as (units, n, k) arrays; a missing dwell takes the other units' middle value where asked."""
+
+    def __init__(self, frame: pd.DataFrame, rows: tuple[Array, Array], shape: tuple[int, int]) -> None:
+        self.frame, self.rows, self.shape = frame, rows, shape
+
+    def has(self, *names: str) -> bool:
+        return all(n in self.frame.columns and self.frame[n].notna().all() for n in names)
+
+    def raw(self, names: tuple[str, ...]) -> Array:
+        out = np.full((*self.shape, len(names)), np.nan)
+        out[self.rows] = self.frame[list(names)].to_numpy(dtype=float)
+        return out
+
+    def one(self, name: str, *, filled: bool = True) -> Array | None:
+        if not self.has(name):
+            return None
+        values = self.raw((name,))
+        return (_filled(values) if filled else values)[..., 0]
+
+
+def _filled(values: Array) -> Array:
+    if not np.isnan(values).any():
+        return values
+    middle = np.nanmedian(values, axis=0, keepdims=True)
+    return np.where(np.isnan(values), middle, values)
+
+
+def _stated_unit(dwells: pd.DataFrame) -> str | None:
+    if "out_unit" not in dwells.columns:
+        return None
+    stated = dwells["out_unit"].dropna().astype(str).unique()
+    return str(stated[0]) if len(stated) == 1 else None
+
+
+def _force(table: _Table) -> tuple[str, Array]:
+    if table.has(*FORCE):
+        return "force", _filled(table.raw(FORCE))
+    if table.has("outer_deg", "inner_deg"):
+        angles = np.radians(_filled(table.raw(("outer_deg", "inner_deg"))))
+        return "angles", frames.force_from_angles(angles[..., 0], angles[..., 1])
+    return "norm", np.zeros((*table.shape, 3))
+
+
+def _state(table: _Table, force: Array, units: tuple[str, ...], history: pd.DataFrame | None) -> State:
+    angles = table.has("outer_deg", "inner_deg")
+    time = _filled(table.raw(("time_s",)))[..., 0]
+    temperature = table.one("unit_C")
+    if temperature is None:
+        temperature = table.one("chamber_C")
+    outer, inner = (table.one(n) if angles else None for n in ("outer_deg", "inner_deg"))
+    slot = table.one("slot")
+    return State(
+        force=force,
+        time=time,
+        temperature=temperature,
+        chamber=table.one("chamber_C"),
+        since_power=table.one("since_power_s"),
+        since_move=table.one("since_move_s"),
+        supply=table.one("supply_V"),
+        vibration=table.one("vibration_g"),
+        outer=None if outer is None else np.radians(outer),
+        inner=None if inner is None else np.radians(inner),
+        slot=None if slot is None else slot[:, 0],
+        covariates={n: v for n in covariates(table.frame) if (v := table.one(n)) is not None and np.ptp(v) > 0.0},
+        history=_history(history, units, time) if history is not None and temperature is not None else None,
+    )
+
+
+def _history(history: pd.DataFrame, units: tuple[str, ...], time: Array) -> History | None:
+    """Temperatures of every unit on one time grid; a history without units serves all of them."""
+    column = "unit_C" if "unit_C" in history.columns else "chamber_C"
+    low, high = float(history["time_s"].min()), float(history["time_s"].max())
+    if low > float(np.max(time)) or high < float(np.min(time)):
+        return None
+    count = min(_HISTORY_POINTS, max(2, history["time_s"].nunique()))
+    grid = np.linspace(low, high, count)
+    series: list[Array] = []
+    for unit in units:
+        own = history[history["unit"].astype(str) == unit] if "unit" in history.columns else history
+        if own.empty:
+            return None
+        own = own.groupby("time_s", as_index=False)[column].mean()
+        series.append(np.interp(grid, own["time_s"].to_numpy(dtype=float), own[column].to_numpy(dtype=float)))
+    return History(grid, np.stack(series))
+
+
+def lot_of(found: Measured) -> Lot:
+    """The lot in g: outputs over a nominal scale, white standard errors, normalised response.
+
+    Where only the norm of gravity is known, a nine-parameter fit gives the directions, and the lot is radial.
+    """
+    readings = found.readings
+    if found.reference == "norm":
+        return _radial(found)
+    coefficients = readings.fits
+    scale = np.abs(np.diagonal(coefficients[:, :, 1:], axis1=1, axis2=2))
+    scale = np.where(scale > 0.0, scale, 1.0)
+    response = coefficients[:, :, 1:] / scale[:, :, None]
+    output = readings.output / scale[:, None, :]
+    there = readings.there
+    error = np.where(there[..., None], _white_error(readings, scale, output), np.inf)
+    return Lot(found.state, np.where(there[..., None], output, 0.0), error, response)
+
+
+def _white_error(readings: Readings, scale: Array, output: Array) -> Array:
+    """White standard errors (units, n, 3) in g: sd/√n where recorded, else from the scatter about a plain fit."""
+    if readings.spread is not None and readings.count is not None:
+        error = readings.spread / np.sqrt(np.maximum(readings.count, 1.0)[..., None]) / scale[:, None, :]
+        typical = np.nanmedian(np.where(error > 0.0, error, np.nan), axis=1, keepdims=True)
+        typical = np.where(np.isfinite(typical), typical, np.nanmax(typical) if np.isfinite(typical).any() else 1e-6)
+        return np.where(np.isfinite(error) & (error > 0.2 * typical), error, typical)
+    del output
+    spread = np.sqrt(np.nanmean(readings.misfit**2, axis=1, keepdims=True))
+    pooled = np.sqrt(np.mean(spread**2, axis=0, keepdims=True))
+    return np.broadcast_to(np.maximum(pooled, 1e-12), readings.output.shape)
+
+
+def _radial(found: Measured) -> Lot:
+    from inertial.fits.ellipsoid import fit_ellipsoid
+
+    readings = found.readings
+    forces, outputs, errors = [], [], []
+    for unit in range(len(found.units)):
+        there = readings.there[unit]
+        fit = fit_ellipsoid(readings.output[unit, there])
+        corrected = np.zeros((there.size, 3))
+        corrected[there] = fit.apply(readings.output[unit, there])
+        size = np.linalg.norm(corrected, axis=1, keepdims=True)
+        forces.append(np.where(size > 0.0, corrected / np.where(size > 0.0, size, 1.0), (0.0, 0.0, 1.0)))
+        outputs.append(corrected)
+        errors.append(np.where(there, np.sqrt(np.mean((size[there] - 1.0) ** 2)), np.inf)[:, None] * np.ones(3))
+    state = State(
+        **{
+            **{k: v for k, v in vars(found.state).items() if k in State.__annotations__},
+            "force": np.stack(forces),
+            "memory": {},
+        }
+    )
+    eye = np.broadcast_to(np.eye(3), (len(found.units), 3, 3))
+    return Lot(state, np.stack(outputs), np.stack(errors), eye, radial=True)
