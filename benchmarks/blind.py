@@ -1,7 +1,7 @@
 """Scores the diagnosis on blind runs: `python benchmarks/blind.py --runs 400 --jobs 2`.
 
-Each run is made from a seed, its truth stays here, and the diagnosis gets the tables alone: in process, or with `--cli` through the
-command line on files. `--runs` counts runs over all scenarios (dealt by weight), or per scenario with `--each`.
+Each run is made from a seed, its truth stays here, and the diagnosis gets the tables alone: in process, or with `--cli`
+through the command line on files. `--runs` counts runs over all scenarios (dealt by weight), or per scenario with `--each`.
 """
 
 from __future__ import annotations
@@ -32,10 +32,12 @@ from truth import SCENARIOS, Run, case  # noqa: E402
 Answer = tuple[dict[str, Any], float | None]  # the document, and the fresh run's RMS in µg after extending
 Method = Callable[[Run], Answer]
 
+WAYS = ("tumbleline", "cli", "bic", "bonferroni", "stlsq", "lasso")
 WEIGHTS = {
-    "lot8_size2": 35, "lot8_size1": 35, "lot8_size05": 35, "lot8_size4": 35, "single_size2": 30, "lot4_size2": 10, "lot16_size2": 10,
-    "station_size2": 20, "null_white": 60, "null_flicker": 60, "null_walk": 10, "null_single": 20, "pairs": 35, "triples": 25,
-    "covariate_line": 15, "covariate_curve": 15, "withheld": 21, "invisible": 18, "faults": 28,
+    "lot8_size2": 35, "lot8_size1": 35, "lot8_size05": 35, "lot8_size4": 35, "single_size2": 30,
+    "lot4_size2": 10, "lot16_size2": 10, "station_size2": 20, "null_white": 60, "null_flicker": 60,
+    "null_walk": 10, "null_single": 20, "pairs": 35, "triples": 25, "covariate_line": 15, "covariate_curve": 15,
+    "withheld": 21, "invisible": 18, "faults": 28,
 }  # fmt: skip
 
 
@@ -77,7 +79,11 @@ def write(run: Run, folder: Path) -> list[Path]:
 
 def _command(*arguments: str) -> dict[str, Any]:
     done = subprocess.run(
-        [sys.executable, "-m", "pipelines.cli", *arguments, "--json"], capture_output=True, text=True, cwd=ROOT, check=False
+        [sys.executable, "-m", "pipelines.cli", *arguments, "--json"],
+        capture_output=True,
+        text=True,
+        cwd=ROOT,
+        check=False,
     )
     if done.returncode not in {0, 1}:
         raise RuntimeError(f"blind: {' '.join(arguments)} ended with status {done.returncode}: {done.stderr[-2000:]}")
@@ -96,20 +102,29 @@ def by_command_line(run: Run) -> Answer:
         return document, float(compared["fresh_rms_ug"])
 
 
-def methods() -> dict[str, Method]:
-    """Every way to diagnose a run, by name."""
+def method(name: str) -> Method:
+    """The way of that name to diagnose a run: `tumbleline`, `cli`, or a baseline."""
+    if name == "tumbleline":
+        return in_process
+    if name == "cli":
+        return by_command_line
     from baselines import BASELINES
 
-    return {"tumbleline": in_process, "cli": by_command_line, **BASELINES}
+    return BASELINES[name]
 
 
 def one(job: Job) -> tuple[Job, Score, dict[str, Any], dict[str, Any]]:
     """The score of one job, with the document and the truth for those who look into failures."""
     run = case(job.scenario, job.index, job.seed)
     begin = time.perf_counter()
-    document, fresh = methods()[job.method](run)
+    document, fresh = method(job.method)(run)
     seconds = time.perf_counter() - begin
-    return job, score(document, run.sealed, scenario=job.scenario, fresh_rms_ug=fresh, seconds=seconds), document, run.sealed.document()
+    return (
+        job,
+        score(document, run.sealed, scenario=job.scenario, fresh_rms_ug=fresh, seconds=seconds),
+        document,
+        run.sealed.document(),
+    )
 
 
 def deal(scenarios: list[str], runs: int, *, each: bool) -> Iterator[tuple[str, int]]:
@@ -164,10 +179,14 @@ def arguments() -> argparse.Namespace:
     parser.add_argument("--scenario", action="append", choices=list(SCENARIOS), help="only these (repeatable)")
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--jobs", type=int, default=2)
-    parser.add_argument("--method", action="append", help="tumbleline (default), cli, or a baseline: bic, bonferroni, stlsq, lasso")
+    parser.add_argument(
+        "--method", action="append", choices=WAYS, help="ways to diagnose (repeatable); tumbleline is the default"
+    )
     parser.add_argument("--cli", action="store_true", help="the same as --method cli")
     parser.add_argument("--out", type=Path, help="folder for scores.parquet, runs.jsonl and figures.json")
-    parser.add_argument("--dump", type=Path, help="only write the runs into this folder, and their truth into FOLDER-truth")
+    parser.add_argument(
+        "--dump", type=Path, help="only write the runs into this folder, and their truth into FOLDER-truth"
+    )
     return parser.parse_args()
 
 
@@ -180,13 +199,15 @@ def main() -> None:
         return
     figures = {}
     everything = []
-    for method in options.method or ["cli" if options.cli else "tumbleline"]:
-        results = work([Job(name, index, options.seed, method) for name, index in cases], options.jobs)
+    for way in options.method or ["cli" if options.cli else "tumbleline"]:
+        results = work([Job(name, index, options.seed, way) for name, index in cases], options.jobs)
         everything += results
-        figures[method] = table(s for _, s, _, _ in results)
+        figures[way] = table(s for _, s, _, _ in results)
         times = sorted(s.seconds for _, s, _, _ in results)
-        print(f"\n{method}: {len(results)} runs, seed {options.seed}, median {times[len(times) // 2]:.2f} s, longest {times[-1]:.2f} s")
-        print(text(figures[method]))
+        print(
+            f"\n{way}: {len(results)} runs, seed {options.seed}, median {times[len(times) // 2]:.2f} s, longest {times[-1]:.2f} s"
+        )
+        print(text(figures[way]))
     if options.out:
         save(options.out, everything)
         (options.out / "figures.json").write_text(json.dumps(figures, indent=1))

@@ -14,7 +14,6 @@ import numpy as np
 from scipy.sparse import csr_matrix
 from scipy.sparse.csgraph import maximum_bipartite_matching
 from scipy.stats import norm
-
 from truth import Truth
 
 Document = Mapping[str, Any]
@@ -80,12 +79,15 @@ def _faults(document: Document, truth: Truth) -> tuple[bool | None, bool | None,
     if not truth.faults:
         return None, None, bool(blocked)
     named = all(
-        all(any(unit in units and name in fault.accepted for name, units in blocked) for unit in fault.units) for fault in truth.faults
+        all(any(unit in units and name in fault.accepted for name, units in blocked) for unit in fault.units)
+        for fault in truth.faults
     )
     return guilty <= accused, named, bool(accused - guilty)
 
 
-def score(document: Document, truth: Truth, *, scenario: str = "", fresh_rms_ug: float | None = None, seconds: float = 0.0) -> Score:
+def score(
+    document: Document, truth: Truth, *, scenario: str = "", fresh_rms_ug: float | None = None, seconds: float = 0.0
+) -> Score:
     """The score of one diagnosis, `document` with the keys of `tumbleline diagnose --json`, against the sealed truth."""
     classes = _classes(document)
     groups = [group for group, _ in classes]
@@ -108,7 +110,9 @@ def score(document: Document, truth: Truth, *, scenario: str = "", fresh_rms_ug:
         named_something=bool(groups),
         called_inadequate=not document.get("adequate", True),
         mean_class_size=float(np.mean([len(group) for group in groups])) if groups and catalogue else None,
-        scope_right=all(real == said for real, said in scoped) if any(real == "station" for real, _ in scoped) else None,
+        scope_right=all(real == said for real, said in scoped)
+        if any(real == "station" for real, _ in scoped)
+        else None,
         sensor_called_station=(
             any(said == "station" for _, said in classes)
             if catalogue and all(effects[name].scope == "sensor" for name in catalogue) and groups
@@ -214,5 +218,7 @@ def text(rows: Sequence[Mapping[str, Any]]) -> str:
     lines = [f"{'figure':52} {'wanted':>8} {'runs':>5} {'measured':>9}  95 %"]
     for row in rows:
         band = "" if row["low"] is None else f"{row['low']:5.1f}–{row['high']:5.1f} %"
-        lines.append(f"{row['figure']:52} {row['wanted']:>8} {row['runs']:5d} {row['value']:7.1f}{row['unit']:2}  {band}")
+        lines.append(
+            f"{row['figure']:52} {row['wanted']:>8} {row['runs']:5d} {row['value']:7.1f}{row['unit']:2}  {band}"
+        )
     return "\n".join(lines)

@@ -46,7 +46,11 @@ def noiseless(lot: Lot, scene: Scene, active: Active) -> Floats:
     # The tempco of the gain acts along the fixture's axis: times the misalignment it would be a misalignment that moves with
     # temperature, an effect of its own and many floors large.
     seat = nominal_force(scene)
-    output = lot.bias[:, None] + lot.gain()[:, None] * force + warmth * (lot.bias_tempco[:, None] + lot.scale_tempco[:, None] * seat)
+    output = (
+        lot.bias[:, None]
+        + lot.gain()[:, None] * force
+        + warmth * (lot.bias_tempco[:, None] + lot.scale_tempco[:, None] * seat)
+    )
     for physics, amplitude in active:
         if physics.signal is not None:
             output = output + amplitude * physics.signal(scene, force)

@@ -10,6 +10,7 @@ import pandas as pd
 from .spec import Fault
 
 OUTPUTS = ["out_x", "out_y", "out_z"]
+LOST = -1  # the number of a dwell that the caller shall drop
 SCATTERS = ["sd_x", "sd_y", "sd_z"]
 POSE = {"swapped_dwells", "wrong_pose"}
 GAIN = {"wrong_units", "wrong_range"}
@@ -38,10 +39,9 @@ def _dwells(table: pd.DataFrame, rows: np.ndarray) -> tuple[int, ...]:
 
 @fault("axis_flip")
 def _flip(table: pd.DataFrame, rows: np.ndarray, _noise: float, rng: np.random.Generator) -> tuple[int, ...]:
-    values = table.loc[rows, OUTPUTS].to_numpy()
+    values = table.loc[rows, OUTPUTS].to_numpy(copy=True)
     if rng.random() < 0.5:
         axis = int(rng.integers(3))
-        zero = float(np.median([values[:, axis].max(), values[:, axis].min()]))
         zero = 0.0 if table["out_unit"].iloc[0] != "V" else 1.5
         values[:, axis] = 2.0 * zero - values[:, axis]
     else:
@@ -125,7 +125,9 @@ def _spikes(table: pd.DataFrame, rows: np.ndarray, noise: float, rng: np.random.
         jump = noise * float(rng.uniform(40.0, 400.0)) * float(rng.choice([-1.0, 1.0]))
         count = float(table.loc[row, "n"])
         table.loc[row, OUTPUTS[axis]] += jump
-        table.loc[row, SCATTERS[axis]] = float(np.hypot(table.loc[row, SCATTERS[axis]], abs(jump) * np.sqrt(count / 2.0)))
+        table.loc[row, SCATTERS[axis]] = float(
+            np.hypot(table.loc[row, SCATTERS[axis]], abs(jump) * np.sqrt(count / 2.0))
+        )
     return _dwells(table, np.sort(hit))
 
 
@@ -167,7 +169,7 @@ def _dropped(table: pd.DataFrame, rows: np.ndarray, noise: float, rng: np.random
 @fault("clock_jitter", "dropped_samples")
 def _clock(table: pd.DataFrame, rows: np.ndarray, _noise: float, rng: np.random.Generator) -> tuple[int, ...]:
     start = int(len(rows) * rng.uniform(0.3, 0.7))
-    seconds = table.loc[rows, "time_s"].to_numpy(dtype=float)
+    seconds = table.loc[rows, "time_s"].to_numpy(dtype=float, copy=True)
     seconds[start:] -= float(rng.uniform(0.3, 0.8)) * (seconds[start] - seconds[0]) + 60.0
     table.loc[rows, "time_s"] = seconds
     return _dwells(table, rows[start:])
@@ -177,7 +179,7 @@ def _clock(table: pd.DataFrame, rows: np.ndarray, _noise: float, rng: np.random.
 def _truncated(table: pd.DataFrame, rows: np.ndarray, _noise: float, rng: np.random.Generator) -> tuple[int, ...]:
     lost = rows[int(len(rows) * rng.uniform(0.4, 0.8)) :]
     touched = _dwells(table, lost)
-    table.drop(index=lost, inplace=True)  # noqa: PD002 - the caller holds this table
+    table.loc[lost, "dwell"] = LOST
     return touched
 
 

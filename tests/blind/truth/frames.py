@@ -18,7 +18,9 @@ AXES = ("x", "y", "z")
 HISTORY_STEP = 2  # every second point of the grid: 10 s
 
 
-def dwells(spec: Spec, lot: Lot, places: Places, scene: Scene, output: Floats, rng: np.random.Generator) -> pd.DataFrame:
+def dwells(
+    spec: Spec, lot: Lot, places: Places, scene: Scene, output: Floats, rng: np.random.Generator
+) -> pd.DataFrame:
     """One row per unit and dwell; `output` is (U, n, 3) in g of nominal sensitivity, noise included."""
     units, count = output.shape[:2]
     samples = round(scene.timeline.dwell * lot.kind.rate)
@@ -51,7 +53,11 @@ def dwells(spec: Spec, lot: Lot, places: Places, scene: Scene, output: Floats, r
         "vibration_g": np.tile(scene.vibration, units),
         "out_unit": lot.kind.out_unit,
     }
-    shown = list(dict.fromkeys([*spec.decoys, *(name.partition(":")[2] for name in spec.effects if name.startswith("covariate:"))]))
+    shown = list(
+        dict.fromkeys(
+            [*spec.decoys, *(name.partition(":")[2] for name in spec.effects if name.startswith("covariate:"))]
+        )
+    )
     rows |= {name: np.tile(scene.covariates[name], units) for name in sorted(shown)}
     return pd.DataFrame(rows)
 

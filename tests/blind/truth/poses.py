@@ -39,7 +39,7 @@ def _orthogonal() -> Floats:
 
 def _tilt_scan() -> Floats:
     """Fine tilts through zero on each axis, and the faces: what sees dead zones and converter steps."""
-    small = np.array([-8.0, -3.0, -1.0, -0.3, 0.3, 1.0, 3.0, 8.0])
+    small = np.array([-9.0, -4.0, -2.0, -1.0, 1.0, 2.0, 4.0, 9.0])
     around_y = np.column_stack([90.0 + small, np.full(8, 20.0)])
     around_x = np.column_stack([np.full(8, 75.0), small])
     around_inner = np.column_stack([np.full(8, 80.0), 90.0 + small])

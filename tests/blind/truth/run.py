@@ -13,7 +13,7 @@ from . import frames, timeline
 from . import scene as scenes
 from .chain import noiseless, nominal_force
 from .device import Lot
-from .faults import FAULTS, units_swapped
+from .faults import FAULTS, LOST, units_swapped
 from .noise import flicker_series, walk_series
 from .physics import REGISTRY, Draw, Physics
 from .scene import Places, Scene
@@ -48,8 +48,9 @@ def _noise(spec: Spec, lot: Lot, scene: Scene, rng: np.random.Generator) -> Floa
     ):
         if share > 0.0:
             wander = scene.over_dwell(series()).reshape(units, 3, count).transpose(0, 2, 1)
-            typical = rms(wander - wander.mean(axis=1, keepdims=True))
-            noise = noise + share * wander / typical
+            # A constant is bias: how it differs from run to run is turn-on repeatability, which no model can know.
+            wander = wander - wander.mean(axis=1, keepdims=True)
+            noise = noise + share * wander / rms(wander)
     return white[:, None] * noise
 
 
@@ -98,7 +99,9 @@ def _quiet(lot: Lot, scene: Scene, absorber: Absorber, floor: float) -> Lot:
     return replace(lot, bias_tempco=factor * lot.bias_tempco, scale_tempco=factor * lot.scale_tempco)
 
 
-def _hide(lot: Lot, scene: Scene, absorber: Absorber, physics: Physics, size: float, floor: float) -> tuple[float, Hidden, Floats]:
+def _hide(
+    lot: Lot, scene: Scene, absorber: Absorber, physics: Physics, size: float, floor: float
+) -> tuple[float, Hidden, Floats]:
     """Amplitude, record and unabsorbed part of one effect brought to its size (invisible ones: raw RMS to that size)."""
     probing = amplitude_for(lot, scene, physics, None, floor)
     if physics.generic > 0.0:
@@ -119,7 +122,9 @@ def _hide(lot: Lot, scene: Scene, absorber: Absorber, physics: Physics, size: fl
     return amplitude, record, left
 
 
-def _faults(spec: Spec, table: pd.DataFrame, names: tuple[str, ...], noise: float, rng: np.random.Generator) -> tuple[Fault, ...]:
+def _faults(
+    spec: Spec, table: pd.DataFrame, names: tuple[str, ...], noise: float, rng: np.random.Generator
+) -> tuple[Fault, ...]:
     left = list(names)
     done = []
     for name in spec.faults:
@@ -133,7 +138,9 @@ def _faults(spec: Spec, table: pd.DataFrame, names: tuple[str, ...], noise: floa
 
 def make_run(spec: Spec, seed: int) -> Run:
     """The run, its fresh repetition and its sealed truth; the same seed gives the same bytes."""
-    plan, lot_seed, day, other_day, noise, other_noise, fault, *effects = np.random.SeedSequence(seed).spawn(7 + len(spec.effects))
+    plan, lot_seed, day, other_day, noise, other_noise, fault, *effects = np.random.SeedSequence(seed).spawn(
+        7 + len(spec.effects)
+    )
     rng = np.random.default_rng(lot_seed)
     line = timeline.build(spec, np.random.default_rng(plan))
     lot = Lot.draw(rng, spec.device, spec.units)
@@ -150,13 +157,17 @@ def make_run(spec: Spec, seed: int) -> Run:
     effective = [error + _reading_noise(lot, s) for error, s in zip(errors, (scene, again), strict=True)]
     floor = _spread(effective[0])
     drawn = _draw(spec, scene, spec.units, effects)
-    placed = [_hide(lot, scene, absorber, physics, size, floor) for physics, size in zip(drawn, spec.sizes, strict=True)]
+    placed = [
+        _hide(lot, scene, absorber, physics, size, floor) for physics, size in zip(drawn, spec.sizes, strict=True)
+    ]
     active = [(physics, amplitude) for physics, (amplitude, _, _) in zip(drawn, placed, strict=True)]
     tables = []
     for s, error, stream in ((scene, errors[0], noise), (again, errors[1], other_noise)):
         frame_rng = np.random.default_rng(stream.spawn(1)[0])
         output = noiseless(lot, s, active) + error
-        tables.append((frames.dwells(spec, lot, places, s, output, frame_rng), frames.history(lot, places, s, frame_rng)))
+        tables.append(
+            (frames.dwells(spec, lot, places, s, output, frame_rng), frames.history(lot, places, s, frame_rng))
+        )
     white = float(np.mean(lot.sample_noise)) / np.sqrt(round(line.dwell * lot.kind.rate)) * lot.kind.per_g
     faults = _faults(spec, tables[0][0], lot.names, white, np.random.default_rng(fault))
     oracle = effective[1] - absorber.absorbed(effective[0])
@@ -167,6 +178,5 @@ def make_run(spec: Spec, seed: int) -> Run:
         tuple(name for physics in drawn for name in physics.drivers), faults,
     )  # fmt: skip
     (dwells, history), (fresh, fresh_history) = tables
-    dwells = dwells.reset_index(drop=True)
+    dwells = dwells[dwells["dwell"] != LOST].reset_index(drop=True)
     return Run(dwells, history, fresh, fresh_history, truth)
-

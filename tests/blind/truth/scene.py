@@ -129,7 +129,11 @@ def build(spec: Spec, timeline: Timeline, places: Places, rng: np.random.Generat
     read = timeline.commanded + 0.0004 * rng.standard_normal((count, 2))
     cooling = (np.gradient(chamber, GRID_S) < -0.005) | (_wander(rng, grid, 700.0) > 0.3)
     compressor = (0.01 + 0.09 * cooling) * np.exp(0.25 * _wander(rng, grid, 600.0))
-    supply = 3.3 + 0.004 * _wander(rng, grid, 3600.0) + 0.003 * np.sign(np.sin(2.0 * np.pi * grid / rng.uniform(1500.0, 4000.0)))
+    supply = (
+        3.3
+        + 0.004 * _wander(rng, grid, 3600.0)
+        + 0.003 * np.sign(np.sin(2.0 * np.pi * grid / rng.uniform(1500.0, 4000.0)))
+    )
     scene = Scene(
         timeline, grid, chamber, die, np.radians(read[:, 0]), np.radians(read[:, 1]), np.zeros(count), np.zeros(count), {},
         places.reading_noise * rng.standard_normal((spec.units, count)), first, last,

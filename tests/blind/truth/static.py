@@ -17,7 +17,12 @@ def _poly(effect: str, order: int, cap_ug: float) -> None:
         return signal(effect, cap_ug, lambda _scene, force: curve * force**order, generic=POSE_RMS)
 
 
-for _effect, _order, _cap in (("second_order", 2, 5e3), ("third_order", 3, 5e3), ("fourth_order", 4, 5e3), ("fifth_order", 5, 5e3)):
+for _effect, _order, _cap in (
+    ("second_order", 2, 5e3),
+    ("third_order", 3, 5e3),
+    ("fourth_order", 4, 5e3),
+    ("fifth_order", 5, 5e3),
+):
     _poly(_effect, _order, _cap)
 
 
@@ -25,21 +30,31 @@ for _effect, _order, _cap in (("second_order", 2, 5e3), ("third_order", 3, 5e3),
 def _two_gains(draw: Draw) -> Physics:
     """Push and pull of the loop have unlike gains."""
     gain = draw.each(3)[:, None, :]
-    return signal("scale_asymmetry", 5e3, lambda _scene, force: np.where(force > 0.0, gain, -gain) * force, generic=POSE_RMS)
+    return signal(
+        "scale_asymmetry", 5e3, lambda _scene, force: np.where(force > 0.0, gain, -gain) * force, generic=POSE_RMS
+    )
 
 
 @hidden("odd_quadratic")
 def _odd_quadratic(draw: Draw) -> Physics:
     """Stiffening that grows with the deflection, alike to both sides."""
     curve = draw.each(3)[:, None, :]
-    return signal("odd_quadratic", 5e3, lambda _scene, force: np.copysign(curve * force**2, curve * force), generic=POSE_RMS)
+    return signal(
+        "odd_quadratic", 5e3, lambda _scene, force: np.copysign(curve * force**2, curve * force), generic=POSE_RMS
+    )
 
 
 @hidden("bias_asymmetry")
 def _comparator(draw: Draw) -> Physics:
     """The averaged decision of a comparator dithered by a few mg of noise."""
     jump, dither = draw.each(3)[:, None, :], draw.log(1e-3, 5e-3)
-    return signal("bias_asymmetry", 5e3, lambda _scene, force: jump * np.tanh(force / dither), parameters={"dither_g": dither}, generic=POSE_RMS)
+    return signal(
+        "bias_asymmetry",
+        5e3,
+        lambda _scene, force: jump * np.tanh(force / dither),
+        parameters={"dither_g": dither},
+        generic=POSE_RMS,
+    )
 
 
 @hidden("cross_coupling")
@@ -90,7 +105,12 @@ def _converter(draw: Draw) -> Physics:
         return output + amplitude * size[:, None, :] * wave
 
     return Physics(
-        "adc_nonlinearity", "sensor", 20e3, converter=act, variant="triangle" if triangle else "wave", parameters={"period_g": period}
+        "adc_nonlinearity",
+        "sensor",
+        20e3,
+        converter=act,
+        variant="triangle" if triangle else "wave",
+        parameters={"period_g": period},
     )
 
 
@@ -114,7 +134,7 @@ def _friction(draw: Draw) -> Physics:
 @hidden("clipping")
 def _stops(draw: Draw) -> Physics:
     """Mechanical stops a little short of 1 g."""
-    depth = draw.near(1.0, 0.05)[:, None, None]
+    depth = draw.near(1.0, 0.003)[:, None, None]
 
     def act(_scene: Scene, force: Floats, amplitude: float) -> Floats:
         stop = 1.0 - amplitude * depth

@@ -51,7 +51,9 @@ def _knock(draw: Draw) -> Physics:
     middle = draw.scene.middle
     at = float(middle[int(len(middle) * draw.rng.uniform(0.15, 0.85))] - 15.0)
     jump = draw.each(3, loose=True)[:, None, :]
-    return signal("step_change", 5e3, lambda scene, _force: jump * (scene.middle > at)[:, None], parameters={"at_s": at})
+    return signal(
+        "step_change", 5e3, lambda scene, _force: jump * (scene.middle > at)[:, None], parameters={"at_s": at}
+    )
 
 
 @hidden("creep_after_move")

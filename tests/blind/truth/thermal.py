@@ -100,7 +100,9 @@ def _hysteresis(draw: Draw) -> Physics:
         fine = np.repeat(memory, COARSE, axis=1)[:, : scene.grid.size]
         return size * scene.over_dwell(fine)[..., None]
 
-    return signal("thermal_hysteresis", 10e3, act, variant="preisach" if relays else "play", parameters={"reach": float(reach)})
+    return signal(
+        "thermal_hysteresis", 10e3, act, variant="preisach" if relays else "play", parameters={"reach": float(reach)}
+    )
 
 
 @hidden("thermal_kink")

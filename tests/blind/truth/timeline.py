@@ -87,7 +87,15 @@ def build(spec: Spec, rng: np.random.Generator) -> Timeline:
     begin = np.array(start)
     stay = np.append(begin[1:] - np.array(wait)[1:] - begin[:-1] - dwell, 0.0)
     return Timeline(
-        np.array(commanded), begin, np.array(wait), dwell, stay, np.array(power_on), np.array(power_gap), np.array(profile), now
+        np.array(commanded),
+        begin,
+        np.array(wait),
+        dwell,
+        stay,
+        np.array(power_on),
+        np.array(power_gap),
+        np.array(profile),
+        now,
     )
 
 
