@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -63,23 +63,30 @@ class Job:
         }
 
 
-def make_job(
-    recipe_name: str = MAIN_JOB,
-    *,
-    station: Path | None = None,
-    units: Sequence[str] = (),
-    seed: int | None = None,
-    repeat: int = 0,
-) -> Job:
-    """The job that a command asks for, with everything refused that cannot work, before anything moves."""
-    recipe = load_recipe(recipe_name)
-    limits = load_limits(recipe, Path(recipe_name).parent)
-    lot = lot_of(recipe, units, seed=seed, repeat=repeat)
-    job = Job(recipe, limits, lot, load_station(station))
-    _refuse_more_units_than_slots(job)
-    _refuse_beyond_station(job)
-    _refuse_inconsistent(job)
-    return job
+@dataclass(frozen=True)
+class Request:
+    """What a command or a schedule asks for: plain values that a job is made from."""
+
+    recipe: str = MAIN_JOB
+    station: Path | None = None
+    units: tuple[str, ...] = ()
+    seed: int | None = None
+    repeat: int = 0
+
+    def parameters(self) -> dict[str, Any]:
+        """The request as JSON-able values."""
+        return {**asdict(self), "station": str(self.station) if self.station else None, "units": list(self.units)}
+
+    def job(self) -> Job:
+        """The job that is asked for, with everything refused that cannot work, before anything moves."""
+        recipe = load_recipe(self.recipe)
+        limits = load_limits(recipe, Path(self.recipe).parent)
+        lot = lot_of(recipe, self.units, seed=self.seed, repeat=self.repeat)
+        job = Job(recipe, limits, lot, load_station(self.station))
+        _refuse_more_units_than_slots(job)
+        _refuse_beyond_station(job)
+        _refuse_inconsistent(job)
+        return job
 
 
 def job_of_run(run: Run, *, effects: Sequence[str] = (), model: Path | None = None, limits: str = "") -> Job:

@@ -29,6 +29,7 @@ Outcome = Literal["pass", "conditional pass", "conditional fail", "fail"]
 
 FIGURES: Mapping[str, str] = {
     "verification_norm_ug": "µg",
+    "verification_ratio": "1",
     "bias_error_ug": "µg",
     "residual_rms_ug": "µg",
     "zero_g_offset_mg": "mg",
@@ -111,9 +112,11 @@ class Decision:
     @property
     def sentence(self) -> str:
         """The decision for people: figure, value, uncertainty, limit, margin and rule."""
+        unit = "" if self.unit == "1" else f" {self.unit}"
+        spread = f" ± {self.uncertainty:.2g}" if self.uncertainty > 0.0 else ""
         return (
-            f"{self.figure} {self.outcome}: {self.value:.4g} ± {self.uncertainty:.2g} {self.unit}, "
-            f"limit {self.limit:.4g} {self.unit}, margin {self.margin:.3g} {self.unit} ({self.rule})"
+            f"{self.figure} {self.outcome}: {self.value:.4g}{spread}{unit}, "
+            f"limit {self.limit:.4g}{unit}, margin {self.margin:.3g}{unit} ({self.rule})"
         )
 
 

@@ -211,7 +211,8 @@ TABLES: dict[str, Table] = {
         {
             "unit": _text(),
             "axis": _text(*AXES),
-            **_numbers(("tau_s", "deviation_ug", "low_ug", "high_ug", "fitted_ug")),
+            **_numbers(("tau_s", "deviation_ug", "low_ug", "high_ug")),
+            **_gaps(("fitted_ug",)),
         },
         finite=("tau_s", "deviation_ug", "low_ug", "high_ug"),
         key=("unit", "axis", "tau_s"),

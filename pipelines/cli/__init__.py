@@ -93,5 +93,5 @@ def main() -> None:
 
 def _leave(message: str, status: int) -> None:
     sys.stdout.flush()
-    print(f"tumbleline: {message}", file=sys.stderr)
+    sys.stderr.write(f"tumbleline: {message}\n")
     sys.exit(status)

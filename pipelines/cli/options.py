@@ -73,7 +73,7 @@ def print_table(columns: Sequence[str], lines: Sequence[Sequence[str]], title: s
     table = Table(title=title or None, box=box.SIMPLE_HEAD, title_justify="left")
     for number, column in enumerate(columns):
         numeric = all(_is_number(line[number]) for line in lines) and bool(lines)
-        table.add_column(column, justify="right" if numeric else "left", overflow="fold")
+        table.add_column(column, justify="right" if numeric else "left", overflow="fold", no_wrap=number < 4)
     for line in lines:
         table.add_row(*line)
     console().print(table)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import typer
+
 from pipelines.cli.options import ArchiveOption, JsonOption, RunArgument, print_json
 
 
@@ -15,4 +17,4 @@ def command(run: RunArgument = "latest", archive: ArchiveOption = None, *, as_js
     if as_json:
         print_json({"run": found.id, "report": str(found.report)})
     else:
-        print(found.report)
+        typer.echo(found.report)

@@ -43,10 +43,11 @@ def command(
     """
     from pipelines.archive import Archive
     from pipelines.cli.summary import exit_status, print_summary, summary
-    from pipelines.job import make_job
+    from pipelines.job import Request
     from pipelines.runner import Runner
 
-    job = make_job(recipe, station=station, units=_serials(units), seed=seed, repeat=repeat)
+    request = Request(recipe=recipe, station=station, units=_serials(units), seed=seed, repeat=repeat)
+    job = request.job()
     store = Archive(archive)
     with _shown() as (progress, told):
         if direct:
@@ -57,7 +58,7 @@ def command(
         else:
             from pipelines.flows.local import run_locally
 
-            run = run_locally(job, store, progress, told)
+            run = run_locally(request, job, store, progress, told)
     document = summary(run)
     if as_json:
         print_json(document)
@@ -66,9 +67,9 @@ def command(
     raise typer.Exit(exit_status(document))
 
 
-def _serials(text: str) -> list[str]:
+def _serials(text: str) -> tuple[str, ...]:
     """Serial numbers of a comma-separated list; blanks around them do not count."""
-    return [serial.strip() for serial in text.split(",")] if text else []
+    return tuple(serial.strip() for serial in text.split(",")) if text else ()
 
 
 @contextmanager

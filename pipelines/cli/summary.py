@@ -13,11 +13,16 @@ if TYPE_CHECKING:
     from pipelines.archive import Run
 
 SHOWN = (
-    ("residual_rms_ug", "residual µg"),
-    ("verification_norm_ug", "verification µg"),
-    ("bias_error_ug", "bias error µg"),
-    ("velocity_random_walk_ug_rtHz", "N µg/√Hz"),
-    ("bias_instability_ug", "B ≤ µg"),
+    ("residual_rms_ug", "fit\nµg"),
+    ("verification_norm_ug", "verify\nµg"),
+    ("bias_error_ug", "error\nµg"),
+    ("velocity_random_walk_ug_rtHz", "N\nµg/√Hz"),
+    ("bias_instability_ug", "B\nµg"),
+)
+
+LEGEND = (
+    "fit: rms residual · verify: largest | |a| − g | on poses not used · error: rms of the worst axis on those poses\n"
+    "N, B: noise of the worst axis, an upper limit where a term is not identified"
 )
 
 
@@ -67,6 +72,7 @@ def print_summary(document: dict[str, Any]) -> None:
         lines.append([str(unit["slot"]), unit["unit"], f"[{style}]{unit['outcome']}[/]", unit["grade"], *values])
     print_table(["slot", "unit", "result", "grade", *(title for _, title in SHOWN)], lines)
     out = console()
+    out.print(LEGEND, style="dim")
     for unit in document["units"]:
         if unit["reasons"]:
             out.print(f"  {unit['unit']}: {unit['reasons']}", markup=False)

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 import pandas as pd
 
 from inertial.noise.allan import AllanCurve, overlapping
-from inertial.noise.terms import Terms, fit_terms, model_deviation
+from inertial.noise.terms import FLICKER_FLOOR, Terms, fit_terms, model_deviation
 from pipelines.stages.calibration import read_calibration
 from pipelines.stages.empty import empty_table
 from schemas.errors import DataRejected
@@ -20,6 +21,7 @@ if TYPE_CHECKING:
 
 AXES = ("x", "y", "z")
 MICRO = 1e6
+UNEXPLAINED_P = 1e-6  # the covariance of the curve is itself estimated, so only a plain misfit counts
 N_ONE_SIDED = "n_d"
 B_BOUND = "B_bound"
 
@@ -45,7 +47,31 @@ def noise(
         terms = fit_terms(curve)
     except ValueError as problem:
         raise DataRejected(str(problem)) from None
+    terms = _limits_where_unexplained(curve, terms)
     return {"allan": _curve_rows(calibration.units, curve, terms), "noise": _term_rows(calibration.units, terms)}
+
+
+def _limits_where_unexplained(curve: AllanCurve, terms: Terms) -> Terms:
+    """The terms, with mere upper limits for channels whose curve no mixture of the five terms explains.
+
+    Each term alone can be no larger than the whole curve anywhere: N ≤ min σ·√τ, B ≤ min σ/0.664, K ≤ min σ·√(3/τ), …
+    """
+    tau, sigma = curve.tau, curve.high
+    ceilings = {
+        "Q": sigma * tau / np.sqrt(3.0),
+        "N": sigma * np.sqrt(tau),
+        "B": sigma / FLICKER_FLOOR,
+        "K": sigma * np.sqrt(3.0 / tau),
+        "R": sigma * np.sqrt(2.0) / tau,
+    }
+    limit = np.stack([np.min(ceilings[symbol], axis=-1) for symbol in terms.symbols], axis=-1)
+    unexplained = (terms.p_value < UNEXPLAINED_P)[..., None]
+    return replace(
+        terms,
+        value=np.where(unexplained, np.nan, terms.value),
+        low=np.where(unexplained, 0.0, terms.low),
+        high=np.where(unexplained, limit, terms.high),
+    )
 
 
 def _series(samples: pd.DataFrame, units: tuple[str, ...]) -> NDArray[np.float64]:
@@ -65,9 +91,15 @@ def _curve_rows(units: tuple[str, ...], curve: AllanCurve, terms: Terms) -> pd.D
             "deviation_ug": curve.deviation.ravel(),
             "low_ug": curve.low.ravel(),
             "high_ug": curve.high.ravel(),
-            "fitted_ug": model_deviation(terms, curve.tau).ravel(),
+            "fitted_ug": _fitted(curve, terms).ravel(),
         }
     )
+
+
+def _fitted(curve: AllanCurve, terms: Terms) -> NDArray[np.float64]:
+    """Deviation of the fitted terms; NaN for channels that they do not explain."""
+    identified = np.any(np.isfinite(terms.value), axis=-1)[..., None]
+    return np.where(identified, model_deviation(terms, curve.tau), np.nan)
 
 
 def _term_rows(units: tuple[str, ...], terms: Terms) -> pd.DataFrame:

@@ -26,11 +26,12 @@ def verify(
     """The error that is left in every verification dwell, in µg.
 
     ``error_ug`` is |a_corr| − g, which needs no angle; ``error_x_ug`` … compare with the table's angles too.
-    ``uncertainty_ug`` (k = 1) joins what the coefficients' covariance does there with the wander of a single dwell.
+    ``uncertainty_ug`` (k = 1) is what may be expected there: the coefficients' covariance and the wander of a single
+    dwell, both from the fit. ``reading_ug`` (k = 1) is the white noise of the reading alone.
     """
     unseen = dwells[dwells["kind"] == "verification"]
     if unseen.empty or coefficients.empty:
-        numbers = "norm_g error_ug uncertainty_ug error_x_ug error_y_ug error_z_ug unit_C"
+        numbers = "norm_g error_ug uncertainty_ug reading_ug error_x_ug error_y_ug error_z_ug unit_C"
         return empty_table(texts="unit pose", whole="dwell", numbers=numbers)
     lot, calibration = lot_arrays(unseen), read_calibration(coefficients, covariance)
     model = calibration.effects
@@ -39,8 +40,14 @@ def verify(
     norm = np.linalg.norm(corrected, axis=-1)
     axis_error = _axis_uncertainty(lot, calibration, residuals)
     toward = corrected / norm[..., None]
-    uncertainty = np.sqrt(np.sum((toward * axis_error) ** 2, axis=-1))
-    return _rows(lot, norm, norm - np.linalg.norm(lot.state.force, axis=-1), uncertainty, corrected - truth)
+    scale = np.abs(np.diagonal(calibration.response, axis1=-2, axis2=-1))[:, None, :]
+    columns = {
+        "norm_g": norm,
+        "error_ug": MICRO * (norm - np.linalg.norm(lot.state.force, axis=-1)),
+        "uncertainty_ug": MICRO * np.sqrt(np.sum((toward * axis_error) ** 2, axis=-1)),
+        "reading_ug": MICRO * np.sqrt(np.sum((toward * lot.standard_error / scale) ** 2, axis=-1)),
+    }
+    return _rows(lot, columns, MICRO * (corrected - truth))
 
 
 def _axis_uncertainty(lot: LotArrays, calibration: Calibration, residuals: pd.DataFrame) -> NDArray[np.float64]:
@@ -56,24 +63,16 @@ def _axis_uncertainty(lot: LotArrays, calibration: Calibration, residuals: pd.Da
     return np.sqrt(model / scale[:, None, :] ** 2 + single[:, None, :])
 
 
-def _rows(
-    lot: LotArrays,
-    norm: NDArray[np.float64],
-    error: NDArray[np.float64],
-    uncertainty: NDArray[np.float64],
-    by_axis: NDArray[np.float64],
-) -> pd.DataFrame:
-    u, n = (index.ravel() for index in np.meshgrid(*(np.arange(s) for s in norm.shape), indexing="ij"))
+def _rows(lot: LotArrays, columns: dict[str, NDArray[np.float64]], by_axis: NDArray[np.float64]) -> pd.DataFrame:
+    u, n = (index.ravel() for index in np.meshgrid(*(np.arange(s) for s in by_axis.shape[:2]), indexing="ij"))
     temperature = lot.state.temperature
     return pd.DataFrame(
         {
             "unit": np.asarray(lot.units, dtype=object)[u],
             "dwell": lot.dwells[n],
             "pose": np.asarray(lot.poses, dtype=object)[n],
-            "norm_g": norm.ravel(),
-            "error_ug": MICRO * error.ravel(),
-            "uncertainty_ug": MICRO * uncertainty.ravel(),
-            **{f"error_{letter}_ug": MICRO * by_axis[..., axis].ravel() for axis, letter in enumerate(AXES)},
+            **{name: values.ravel() for name, values in columns.items()},
+            **{f"error_{letter}_ug": by_axis[..., axis].ravel() for axis, letter in enumerate(AXES)},
             "unit_C": np.full(u.size, np.nan) if temperature is None else temperature[u, n],
         }
     )

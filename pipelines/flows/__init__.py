@@ -1,0 +1,1 @@
+"""Flows: the chain as Prefect sees it. The only place that imports Prefect."""

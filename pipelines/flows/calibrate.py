@@ -1,0 +1,125 @@
+"""The flow ``calibrate_lot``: the stages of the chain in order, a task per stage of a lot."""
+
+from __future__ import annotations
+
+import time
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from prefect import flow, task
+from prefect.cache_policies import NO_CACHE
+from prefect.client.orchestration import SyncPrefectClient, get_client
+from prefect.client.schemas.filters import FlowRunFilter, FlowRunFilterId, FlowRunFilterName
+from prefect.client.schemas.objects import FlowRun, StateType
+from prefect.client.schemas.sorting import FlowRunSort, TaskRunSort
+from prefect.runtime import flow_run
+from prefect.states import Crashed
+
+from pipelines.archive import Archive
+from pipelines.chain import ORDER
+from pipelines.job import Request
+from pipelines.progress import silent
+from pipelines.runner import Done, Runner
+from schemas.errors import LinkLost, StationTimeout
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator
+
+    from pipelines.progress import Progress
+
+HISTORY_S = 20.0
+MANY = 200  # the server's own largest page
+FINAL = {StateType.COMPLETED, StateType.FAILED, StateType.CRASHED, StateType.CANCELLED}
+
+_listeners: list[tuple[Progress, Callable[[Done], None]]] = []
+
+
+@contextmanager
+def listening(progress: Progress, told: Callable[[Done], None]) -> Iterator[None]:
+    """A block in which flows of this process tell how far they are."""
+    _listeners.append((progress, told))
+    try:
+        yield
+    finally:
+        _listeners.pop()
+
+
+def _worth_repeating(task_: Any, task_run: Any, state: Any) -> bool:
+    """Whether a stage failed for a link or a device that may come back; a finished record is not measured again."""
+    del task_, task_run
+    try:
+        state.result()
+    except (LinkLost, StationTimeout):
+        return True
+    except Exception:  # noqa: BLE001 - whatever else went wrong would go wrong again
+        return False
+    return False
+
+
+@task(
+    task_run_name="{name}",
+    cache_policy=NO_CACHE,  # the archive's keys decide what is done again, not the orchestrator
+    persist_result=False,
+    retries=2,
+    retry_delay_seconds=10,
+    retry_condition_fn=_worth_repeating,
+)
+def stage(name: str, runner: Runner) -> Done:
+    """One stage of the chain."""
+    return runner.stage(name)
+
+
+@flow(name="calibrate_lot", persist_result=False, log_prints=False)
+def calibrate_lot(
+    recipe: str = "production",
+    station: str | None = None,
+    units: list[str] | None = None,
+    archive: str | None = None,
+    seed: int | None = None,
+    repeat: int | None = None,
+) -> str:
+    """Measure and calibrate a lot; the id of its run in the archive.
+
+    Without ``repeat`` every flow run measures the lot anew, and a retry of the same flow run goes on where it was.
+    """
+    anew = int(str(flow_run.id).replace("-", "")[:7], 16) if repeat is None else repeat
+    progress, told = _listeners[-1] if _listeners else (silent, lambda _done: None)
+    where = Path(station) if station else None
+    job = Request(recipe=recipe, station=where, units=tuple(units or ()), seed=seed, repeat=anew).job()
+    runner = Runner(job, Archive(archive), progress)
+    for name in ORDER:
+        told(stage(name, runner))
+    return runner.run.id
+
+
+def settle_history(name: str, stages: int) -> None:
+    """Wait until the server has the final state of the newest flow run of this name and of all its tasks."""
+    end = time.monotonic() + HISTORY_S
+    with get_client(sync_client=True) as client:
+        runs = _flow_runs(client, name)[:1]
+        while runs and time.monotonic() < end:
+            wanted = FlowRunFilter(id=FlowRunFilterId(any_=[runs[0].id]))
+            tasks = client.read_task_runs(flow_run_filter=wanted, sort=TaskRunSort.EXPECTED_START_TIME_ASC, limit=MANY)
+            if len(tasks) >= stages and all(one.state_type in FINAL for one in tasks):
+                return
+            time.sleep(0.1)
+
+
+def close_dead_runs(name: str) -> None:
+    """Mark flow runs whose process was killed, which the orchestrator still believes to be running, as crashed."""
+    with get_client(sync_client=True) as client:
+        _close(client, name)
+
+
+def _close(client: SyncPrefectClient, name: str) -> None:
+    for run in _flow_runs(client, name):
+        if run.state_type == StateType.RUNNING:
+            message = "its process was killed; another flow run of this name goes on in its stead"
+            client.set_flow_run_state(run.id, Crashed(message=message), force=True)
+
+
+def _flow_runs(client: SyncPrefectClient, name: str) -> list[FlowRun]:
+    """Flow runs of a name, the newest first."""
+    wanted = FlowRunFilter(name=FlowRunFilterName(any_=[name]))
+    return client.read_flow_runs(flow_run_filter=wanted, sort=FlowRunSort.START_TIME_DESC, limit=MANY)
