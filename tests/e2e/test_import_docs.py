@@ -1,0 +1,56 @@
+"""The examples of the guide to importing run as printed there, on the real recordings."""
+
+import json
+import os
+import re
+import shlex
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[2]
+GUIDE = (ROOT / "docs" / "how-to" / "import-your-data.md").read_text(encoding="utf-8")
+EXAMPLES = [block.partition("\n") for block in re.findall(r"```console\n\$ (.*?)```", GUIDE, flags=re.DOTALL)]
+
+
+def run(command: str, data: Path, archive: Path, *more: str) -> subprocess.CompletedProcess[str]:
+    words = shlex.split(command.replace("$DATA", str(data)))
+    assert words[0] == "tumbleline"
+    return subprocess.run(
+        [sys.executable, "-m", "pipelines.cli", *words[1:], "--archive", str(archive), *more],
+        capture_output=True,
+        text=True,
+        cwd=ROOT,
+        env={**os.environ, "COLUMNS": "200", "OMP_NUM_THREADS": "1"},
+        check=False,
+    )
+
+
+@pytest.mark.parametrize(("command", "printed"), [(c, p) for c, _, p in EXAMPLES], ids=range(len(EXAMPLES)))
+def test_an_example_prints_what_the_guide_says(command: str, printed: str, shared_data: Path, tmp_path: Path) -> None:
+    done = run(command, shared_data, tmp_path / "archive")
+    assert done.stderr == ""
+    assert done.returncode == (1 if "NOT ADEQUATE" in printed else 0)
+    expected = re.escape(printed.strip()).replace("…", "[0-9a-f]+")
+    assert re.fullmatch(expected, done.stdout.strip()), done.stdout
+
+
+def test_json_holds_the_whole_answer_and_nothing_else(shared_data: Path, tmp_path: Path) -> None:
+    done = run(EXAMPLES[0][0], shared_data, tmp_path / "archive", "--json")
+    document = json.loads(done.stdout)
+    assert document["adequate"] is True
+    assert document["source"]["sha256"] == "" or len(document["source"]["sha256"]) == 64
+    assert document["error"]["rms_ug"] < 102.0
+
+
+def test_the_mapping_file_of_the_guide_does_the_same(shared_data: Path, tmp_path: Path) -> None:
+    content = re.search(r"```toml\n(.*?)```", GUIDE, flags=re.DOTALL)
+    assert content is not None
+    file = tmp_path / "mapping.toml"
+    file.write_text(content[1], encoding="utf-8")
+    command = f"tumbleline import $DATA/xsens-tumble/xsens_acc.mat.gz --mapping {file} --fit norm --json"
+    document = json.loads(run(command, shared_data, tmp_path / "archive").stdout)
+    by_options = json.loads(run(EXAMPLES[0][0], shared_data, tmp_path / "archive", "--json").stdout)
+    assert document == by_options
