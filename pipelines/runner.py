@@ -26,12 +26,6 @@ if TYPE_CHECKING:
     from pipelines.job import Job
     from pipelines.progress import Progress
 
-REPORT_INPUTS = (
-    *("readings", "history", "verdicts", "dwells", "coefficients", "covariance", "residuals", "verification"),
-    *("allan", "noise", "figures", "grades"),
-)
-REPORT_MODULES = ("inertial", "schemas.tables", "schemas.limits", "pipelines.report")
-
 
 @dataclass(frozen=True)
 class Done:
@@ -81,9 +75,10 @@ class Runner:
         return Done(name, reused, time.perf_counter() - start)
 
     def _decisive(self) -> dict[str, Any]:
+        """What the result depends on; the report only shows it and may be made anew in its place."""
         code = {stage.name: code_hash(stage.modules) for stage in BY_NAME.values()}
         about = {key: value for key, value in self.job.about.items() if key != "station"}
-        return {**about, "code": {**code, "report": code_hash(REPORT_MODULES)}}
+        return {**about, "code": code}
 
     def _capture(self) -> bool:
         records = self.archive.capture(self.job.capture_id)
@@ -111,14 +106,9 @@ class Runner:
         return False
 
     def _report(self) -> bool:
-        from pipelines.report import render  # figures are slow to import and not needed when reused
+        from pipelines.report import make_report  # plots are slow to import
 
-        inputs, code = self._inputs(REPORT_INPUTS), code_hash(REPORT_MODULES)
-        key = stage_key("report", inputs, {}, code)
-        if self.run.has_report(key):
-            return True
-        self.run.save_report(key, render(self.run), {"inputs": inputs, "parameters": {}, "code": code})
-        return False
+        return make_report(self.run)
 
     def _inputs(self, names: tuple[str, ...]) -> dict[str, str]:
         return {name: self._input_hash(name) for name in names}

@@ -111,12 +111,12 @@ class Decision:
 
     @property
     def sentence(self) -> str:
-        """The decision for people: figure, value, uncertainty, limit, margin and rule."""
+        """The decision for people: figure, value, uncertainty, limit and margin."""
         unit = "" if self.unit == "1" else f" {self.unit}"
         spread = f" ± {self.uncertainty:.2g}" if self.uncertainty > 0.0 else ""
         return (
             f"{self.figure} {self.outcome}: {self.value:.4g}{spread}{unit}, "
-            f"limit {self.limit:.4g}{unit}, margin {self.margin:.3g}{unit} ({self.rule})"
+            f"limit {self.limit:.4g}{unit}, margin {self.margin:.3g}{unit}"
         )
 
 

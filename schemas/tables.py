@@ -248,6 +248,7 @@ TABLES: dict[str, Table] = {
             "outcome": _text(*OUTCOMES),
             "grade": pa.Column(str),
             "reasons": pa.Column(str),
+            "rule": pa.Column(str),
         },
         key=("unit",),
     ),

@@ -35,6 +35,7 @@ def summary(run: Run) -> dict[str, Any]:
         "run": run.id,
         "recipe": run.about["recipe"]["name"],
         "effects": run.about["recipe"]["effects"],
+        "rule": str(grades["rule"].iloc[0]),
         "units": units,
         "passed": passed,
         "failed": sum(unit["outcome"] == "fail" for unit in units),
@@ -76,6 +77,7 @@ def print_summary(document: dict[str, Any]) -> None:
     for unit in document["units"]:
         if unit["reasons"]:
             out.print(f"  {unit['unit']}: {unit['reasons']}", markup=False)
+    out.print(f"  decided by {document['rule']}", markup=False, style="dim")
     total = len(document["units"])
     out.print(f"{document['passed']} of {total} passed, {document['failed']} failed, {document['refused']} refused")
     out.print(f"run     {document['run']}", markup=False)

@@ -12,7 +12,7 @@ from pipelines.stages.calibration import read_calibration
 from pipelines.stages.empty import empty_table
 from pipelines.stages.figures import NEEDS_EFFECT, NEEDS_STATIC, NEEDS_VERIFICATION, Figure, figures_of
 from schemas.errors import RecipeInvalid
-from schemas.limits import FIGURES, GRADE_FIGURE, GRADES, Decision, Limits, decide, grade_of
+from schemas.limits import FIGURES, GRADE_FIGURE, GRADES, Decision, Limits, decide, describe_rule, grade_of
 
 if TYPE_CHECKING:
     from schemas.recipe import Recipe
@@ -55,6 +55,7 @@ def grade(evidence: Evidence, limits: Limits, zero_g: float = 0.0) -> dict[str, 
     ----------
     zero_g : nominal output at 0 g, output unit.
     """
+    rule = describe_rule(limits)
     calibrated = set(evidence.coefficients["unit"].astype(str))
     calibration = read_calibration(evidence.coefficients, evidence.covariance) if calibrated else None
     figure_rows: list[dict[str, object]] = []
@@ -70,7 +71,10 @@ def grade(evidence: Evidence, limits: Limits, zero_g: float = 0.0) -> dict[str, 
         figure_rows += [_figure_row(unit, figure, decisions) for figure in figures]
         grade_rows.append(_decided(verdict, figures, decisions, limits))
     empty = empty_table(texts="unit figure unit_text outcome rule", numbers="value uncertainty limit")
-    return {"figures": pd.DataFrame(figure_rows) if figure_rows else empty, "grades": pd.DataFrame(grade_rows)}
+    return {
+        "figures": pd.DataFrame(figure_rows) if figure_rows else empty,
+        "grades": pd.DataFrame(grade_rows).assign(rule=rule),
+    }
 
 
 def _of(table: pd.DataFrame, unit: str) -> pd.DataFrame:

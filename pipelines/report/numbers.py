@@ -1,0 +1,36 @@
+"""Numbers for people: as many digits as their uncertainty supports, no more."""
+
+from __future__ import annotations
+
+import math
+
+MINUS = "−"
+THIN = "\u202f"  # narrow no-break space between groups of three digits
+
+
+def plain(value: float, digits: int = 3) -> str:
+    """A number with so many significant digits, in fixed notation where that is short."""
+    if not math.isfinite(value):
+        return ""
+    if value == 0.0:
+        return "0"
+    places = digits - 1 - math.floor(math.log10(abs(value)))
+    return _fixed(value, places) if places <= 8 else _signed(f"{value:.{digits - 1}e}")
+
+
+def with_uncertainty(value: float, expanded: float) -> tuple[str, str]:
+    """Value and expanded uncertainty, the uncertainty to two digits and the value to the same place (GUM 7.2.6)."""
+    if not math.isfinite(expanded) or expanded <= 0.0:
+        return plain(value, 4), ""
+    places = 1 - math.floor(math.log10(expanded))
+    if places > 8:
+        return _signed(f"{value:.3e}"), _signed(f"{expanded:.1e}")
+    return _fixed(value, places), _fixed(expanded, places)
+
+
+def _fixed(value: float, places: int) -> str:
+    return _signed(f"{round(value, places):,.{max(places, 0)}f}".replace(",", THIN))
+
+
+def _signed(text: str) -> str:
+    return text.replace("-", MINUS)
