@@ -74,7 +74,10 @@ class Limits(Strict):
 
 
 class Soak(Strict):
-    """When a soak counts as reached: every unit inside the band and still, for a while."""
+    """When a soak counts as reached: every unit inside the band and still, for a while.
+
+    It is given up ``limit_s`` after the shortest soak that the recipe asks for.
+    """
 
     band_K: Positive = 1.0
     rate_K_per_min: Positive = 0.1
@@ -101,17 +104,24 @@ class Fault(Strict):
     """Something that goes wrong at ``at_s`` on the simulated station's clock.
 
     ``silent``: the reader's gateway says that the device does not answer. ``mute``: nothing at all comes back.
-    ``dead``: the outputs stay as they are. ``door``: the chamber's door opens. ``serial`` names the unit where one is meant.
+    ``dead``: the outputs stay as they are. ``door``: the chamber's door opens. ``serial`` names the unit that is meant,
+    ``device`` one of the station's own.
     """
 
     kind: Literal["silent", "mute", "dead", "door"]
     at_s: NotNegative = 0.0
     serial: str = ""
+    device: Literal["", "outer", "inner", "chamber", "reader"] = ""
 
     @model_validator(mode="after")
-    def _names_a_unit(self) -> Fault:
-        if (self.kind == "door") == bool(self.serial):
-            message = f"fault {self.kind}: serial is '{self.serial}'; silent, mute and dead need one, door needs none"
+    def _names_what_is_meant(self) -> Fault:
+        wanted = {"door": (False, False), "dead": (True, False)}.get(self.kind)
+        named = (bool(self.serial), bool(self.device))
+        if named != wanted and (wanted is not None or sum(named) != 1):
+            message = (
+                f"fault {self.kind}: serial '{self.serial}', device '{self.device}'; dead needs a serial, silent and mute "
+                "a serial or a device, door neither; correct the fault"
+            )
             raise ValueError(message)
         return self
 
@@ -121,6 +131,7 @@ class Simulation(Strict):
 
     seed: Annotated[int, Field(ge=0)] = 1
     room_C: FiniteFloat = 23.0
+    local_gravity_m_s2: Annotated[FiniteFloat, Field(gt=9.7, lt=9.9)] = 9.80665
     slot_rotation_mrad: NotNegative = 1.0
     slot_lag_s: Bounds = (90.0, 200.0)
     slot_gradient_K: NotNegative = 0.1

@@ -55,10 +55,10 @@ class Station:
                 past.popleft()
             if now - start >= shortest and self._settled(past, target):
                 return now - start
-            if now - start > limits.limit_s:
+            if now - start > shortest + limits.limit_s:
                 worst = max((temperatures[slot] for slot in slots), key=lambda t: abs(t - target))
                 message = (
-                    f"soak: a device at {worst:.2f} °C after {limits.limit_s:g} s, {target:g} ± {limits.band_K:g} °C and "
+                    f"soak: a device at {worst:.2f} °C after {now - start:.0f} s, {target:g} ± {limits.band_K:g} °C and "
                     f"{limits.rate_K_per_min:g} K/min are needed; check the chamber, or widen [soak] in the station's file"
                 )
                 raise StationTimeout(message)

@@ -167,10 +167,11 @@ class _Work:
         station.table.move(step.pose.outer_deg, step.pose.inner_deg)
         station.clock.sleep(recipe.settle_s)
         duration = recipe.static_record_s if step.kind == "allan" else recipe.dwell_s
-        record = Record(step.record, step.kind, step.pose, step.soak, station.clock.now(), duration, recipe.rate_hz)
-        record.since_move = record.start + duration / 2.0 - station.table.still_since
-        record.since_power = station.reader.since_power() + duration / 2.0
+        powered = station.reader.since_power()
         station.reader.start(recipe.rate_hz)
+        record = Record(step.record, step.kind, step.pose, step.soak, station.clock.now(), duration, recipe.rate_hz)
+        record.since_move = record.start + duration / 2.0 - station.table.still_since  # in the middle, as the mean is
+        record.since_power = powered + duration / 2.0
         for _ in self._spans(record):
             self.observe(record)
             self.empty(record)

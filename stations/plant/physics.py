@@ -41,6 +41,7 @@ class Physics:
         dynamics: Dynamics,
         noise: Noise,
         hidden: Sequence[HiddenEffect],
+        gravity: float,
     ) -> None:
         self._outer, self._inner = axes
         self._fixture = fixture
@@ -50,7 +51,7 @@ class Physics:
         self._noise = noise
         self._hidden = list(hidden)
         self._sampled_until = 0.0
-        self._up = np.array([0.0, 0.0, 1.0])
+        self._up = np.array([0.0, 0.0, gravity])
         for effect in self._hidden:
             self._up = effect.up(self._up)
         self.dead_from = np.full(len(rotations), math.inf)

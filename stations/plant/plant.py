@@ -33,6 +33,7 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 AIR, THERMOMETER, SUPPLY, VIBRATION, OUTER, INNER = 1, 2, 3, 4, 10, 20  # channels of keyed noise
+STANDARD_G = 9.80665  # m/s², CGPM 1901
 AIR_NOISE_K = 0.01
 SUPPLY_NOISE = 2e-5
 VIBRATION_NOISE = 0.02
@@ -66,11 +67,12 @@ class Plant:
             Dynamics(self.preset),
             Noise(self.preset, noise),
             effects,
+            sim.local_gravity_m_s2 / STANDARD_G,
         )
         fifo = load_profile(config.devices.slots.profile).fifo
         registers = fifo.registers if fifo is not None else 0
         self.sampler = Sampler(self._physics, len(self.slots), self.preset.packing, registers)
-        self._first_slot = config.devices.slots.device_id
+        self._devices = config.devices
         self.faults: list[Fault] = []
         self.banks = build_banks(self, config.devices)
         self.journal = Journal(fingerprint(config, lot))
@@ -135,11 +137,15 @@ class Plant:
     def fault_of(self, device_id: int) -> str:
         """``silent``, ``mute`` or nothing: how the device behind an id answers now."""
         for fault in self.faults:
-            if fault.kind in {"silent", "mute"} and fault.at_s <= self.now:
-                slot = self.slots[self.serials.index(fault.serial)]
-                if device_id == self._first_slot + slot:
-                    return fault.kind
+            if fault.kind in {"silent", "mute"} and fault.at_s <= self.now and device_id == self._id_of(fault):
+                return fault.kind
         return ""
+
+    def _id_of(self, fault: Fault) -> int:
+        """The device id that a fault is about."""
+        if fault.device:
+            return int(getattr(self._devices, fault.device).device_id)
+        return self._devices.slots.device_id + self.slots[self.serials.index(fault.serial)]
 
     def truth(self, serial: str) -> Truth:
         """What a unit really is; for tests and benchmarks, never for a client."""

@@ -1,0 +1,151 @@
+"""Every profile: read from its file, served by pymodbus, answered as it says, by the same codec on both sides."""
+
+import socket
+import struct
+from contextlib import contextmanager
+
+import pytest
+from small_station import lot_of, plant_of
+
+from schemas.errors import RecipeInvalid, StationRefused
+from schemas.profile import parse_profile
+from schemas.station import load_station
+from stations.codec import NotEncodable, encode
+from stations.devices.registers import Registers
+from stations.links.modbus import ModbusLink
+from stations.plant.preset import load_preset, preset_names
+from stations.plant.server import PlantServer
+from stations.profile_files import load_profile, profile_names
+
+
+@pytest.fixture(scope="module")
+def served():
+    plant = plant_of(lot=lot_of(2))
+    plant.advance(12_345_678)
+    with PlantServer(plant) as server:
+        link = ModbusLink(server.host, server.port, timeout_s=5.0, read_attempts=1)
+        yield plant, server, link
+        link.close()
+
+
+def devices_of(plant, name):
+    return [device_id for device_id, bank in plant.banks.items() if bank.profile.name == name]
+
+
+@pytest.mark.parametrize("name", profile_names())
+def test_profile_names_itself_and_its_source(name):
+    profile = load_profile(name)
+    assert profile.name == name
+    assert profile.source
+
+
+@pytest.mark.parametrize("name", profile_names())
+def test_some_device_of_the_built_in_station_answers_by_the_profile(name, served):
+    assert devices_of(served[0], name)
+
+
+@pytest.mark.parametrize("name", profile_names())
+def test_every_readable_register_answers_inside_its_limits(name, served):
+    plant, _, link = served
+    for device_id in devices_of(plant, name):
+        registers = Registers(name, link, device_id, load_profile(name))
+        for register in load_profile(name).registers:
+            if register.access == "write":
+                continue
+            value = registers.read(register.name)
+            # what was read can be written: inside type, limits and enumeration
+            assert encode(register, registers.profile.order(register), value)
+            if register.enumeration:
+                assert registers.text(register.name) in register.enumeration
+
+
+@pytest.mark.parametrize("name", profile_names())
+def test_read_only_registers_refuse_to_be_written(name, served):
+    plant, _, link = served
+    device_id = devices_of(plant, name)[0]
+    for register in load_profile(name).registers:
+        if register.access == "read":
+            with pytest.raises(StationRefused, match=r"exception [23]"):
+                link.write(device_id, register.address, [0] * register.words, register.name)
+
+
+@pytest.mark.parametrize("name", profile_names())
+def test_addresses_beside_the_profile_are_refused(name, served):
+    plant, _, link = served
+    last = max(r.end for r in load_profile(name).registers)
+    with pytest.raises(StationRefused, match="exception 2"):
+        link.read(devices_of(plant, name)[0], last, 1, "nothing")
+
+
+@pytest.mark.parametrize("name", profile_names())
+def test_values_outside_their_limits_are_refused_before_they_are_sent(name):
+    profile = load_profile(name)
+    for register in profile.registers:
+        for bound, beyond in ((register.minimum, -1.0), (register.maximum, 1.0)):
+            if bound is not None:
+                with pytest.raises(NotEncodable):
+                    encode(register, profile.order(register), bound + beyond)
+
+
+@contextmanager
+def raw_socket(server):
+    with socket.create_connection((server.host, server.port), timeout=5.0) as connection:
+        yield connection
+
+
+def test_words_on_the_wire_are_those_of_the_f4t_low_word_first(served):
+    plant, server, _ = served
+    with raw_socket(server) as connection:  # by hand: no library of either side
+        connection.sendall(struct.pack(">HHHBBHH", 7, 0, 6, 3, 3, 2782, 2))
+        answer = connection.recv(64)
+    transaction, _, length, device_id, function, size, low, high = struct.unpack(">HHHBBBHH", answer)
+    assert (transaction, length, device_id, function, size) == (7, 7, 3, 3, 4)
+    found = struct.unpack(">f", struct.pack(">HH", high, low))[0]
+    assert found == plant.fixture.chamber.set_point
+
+
+def test_half_a_register_is_not_written(served):
+    plant, _, link = served
+    before = plant.fixture.chamber.set_point
+    with pytest.raises(StationRefused, match="exception 3"):
+        link.write(3, 2782, [0x41C8], "half a set point")
+    assert plant.fixture.chamber.set_point == before
+
+
+PROFILE = """
+name = "p"
+kind = "axis"
+maker = "m"
+model = "m"
+verified = false
+source = "s"
+registers = [{registers}]
+"""
+
+
+@pytest.mark.parametrize(
+    ("registers", "needed"),
+    [
+        ('{name="a",address=0,type="float32"},{name="b",address=1,type="uint16"}', "overlap at address 1"),
+        ('{name="a",address=0,type="uint16"},{name="a",address=1,type="uint16"}', "twice"),
+        ('{name="a",address=65535,type="float32"}', "65535"),
+        ('{name="a",address=0,type="float32",enumeration={x=1}}', "enumeration"),
+        ('{name="a",adress=0,type="uint16"}', "address"),
+    ],
+)
+def test_refuses_profiles_that_contradict_themselves(registers, needed):
+    with pytest.raises(RecipeInvalid, match=needed):
+        parse_profile(PROFILE.replace("{registers}", registers), "p.toml")
+
+
+def test_unknown_profile_is_refused_with_what_looks_like_it():
+    with pytest.raises(RecipeInvalid, match="watlow_f4t"):
+        load_profile("watlow_f4")
+
+
+@pytest.mark.parametrize("name", preset_names())
+def test_every_preset_can_be_built_and_read(name):
+    plant = plant_of(load_station(), lot_of(2, name.lower()))
+    plant.advance(1_000_000)
+    assert plant.preset == load_preset(name)
+    assert len(plant.temperature_reading()) == 8

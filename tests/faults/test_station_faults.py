@@ -1,0 +1,246 @@
+"""Trouble at the station: reported by name, never passed over, and the rest goes on."""
+
+import threading
+
+import numpy as np
+import pytest
+from pydantic import ValidationError
+from small_station import MemorySink, lot_of, quiet_progress, short_recipe, station_of
+
+from pipelines.stages.capture import capture
+from schemas.errors import (
+    ArchiveUnusable,
+    DataRejected,
+    LinkLost,
+    OperatorNeeded,
+    RecipeInvalid,
+    StationRefused,
+    StationTimeout,
+    WrongUse,
+)
+from schemas.station import Fault, load_station
+from stations.links.modbus import ModbusLink
+from stations.opening import make_plant, open_station, serve_plant
+from stations.plant.server import PlantServer
+from stations.serving import serve
+
+
+def run(config, lot, recipe=None, sink=None):
+    sink = sink or MemorySink()
+    with open_station(config, lot, resume=sink.last_state()) as station:
+        capture(station, recipe or short_recipe(), lot, sink, progress=quiet_progress)
+    return sink
+
+
+def test_a_unit_that_falls_silent_is_reported_and_the_others_go_on():
+    sink = run(station_of(faults=[{"kind": "silent", "at_s": 905.0, "serial": "U001"}]), lot_of())
+    readings = sink.all(1)
+    lost = readings[readings["unit"] == "U001"]
+    assert (lost["status"] == "slot 1: no answer").all()
+    assert (lost["n"] == 0).all()
+    others = readings[readings["unit"] != "U001"]
+    assert (others["status"] == "ok").all()
+    assert (others["n"] == 200).all()
+    assert "U001" not in set(sink.all(0)["unit"])
+
+
+def test_a_unit_that_falls_silent_between_records_keeps_its_earlier_samples():
+    sink = run(station_of(faults=[{"kind": "silent", "at_s": 912.0, "serial": "U001"}]), lot_of())
+    status = sink.all(1).query("unit == 'U001'")["status"].tolist()
+    assert status[0] == "ok"
+    assert status[-1] == "slot 1: no answer"
+
+
+def test_a_unit_that_sends_nothing_at_all_costs_one_time_out_and_is_reported():
+    config = station_of(faults=[{"kind": "mute", "at_s": 905.0, "serial": "U002"}])
+    config = config.model_copy(update={"link": config.link.model_copy(update={"timeout_s": 0.5, "read_attempts": 1})})
+    readings = run(config, lot_of()).all(1)
+    assert (readings.query("unit == 'U002'")["status"] == "slot 2: no answer").all()
+    assert (readings.query("unit != 'U002'")["status"] == "ok").all()
+
+
+def test_a_dead_output_stays_where_it_was():
+    samples = run(station_of(faults=[{"kind": "dead", "at_s": 0.0, "serial": "U000"}]), lot_of()).all(0)
+    dead, alive = samples.query("unit == 'U000'"), samples.query("unit == 'U001'")
+    assert (dead[["x", "y", "z"]].nunique() == 1).all()
+    assert (alive[["x", "y", "z"]].nunique() > 50).all()
+
+
+def test_an_open_door_stops_the_run_for_the_operator():
+    with pytest.raises(OperatorNeeded, match="door"):
+        run(station_of(faults=[{"kind": "door", "at_s": 300.0}]), lot_of())
+
+
+def test_another_serial_in_the_slot_stops_the_run_before_anything_is_measured():
+    config, lot = load_station(), lot_of()
+    plant = make_plant(config, lot)
+    plant.serials[1] = "X999"
+    sink = MemorySink()
+    with serve_plant(config, lot, plant) as station, pytest.raises(OperatorNeeded, match="'X999' sits there, 'U001'"):
+        capture(station, short_recipe(), lot, sink, progress=quiet_progress)
+    assert not sink.records
+
+
+def test_a_lot_of_which_nobody_answers_is_refused():
+    with pytest.raises(OperatorNeeded, match="no unit"):
+        run(station_of(faults=[{"kind": "silent", "serial": "U000"}]), lot_of(1))
+
+
+@pytest.mark.parametrize(
+    ("change", "needed"),
+    [
+        ({"temperatures_C": [25.0, 120.0]}, "120 °C"),
+        ({"rate_hz": 9000.0}, "9000 Hz"),
+    ],
+)
+def test_what_the_station_may_not_do_is_refused_before_anything_moves(change, needed):
+    lot, sink = lot_of(), MemorySink()
+    recipe = short_recipe().model_copy(update=change)
+    with open_station(load_station(), lot) as station:
+        with pytest.raises(StationRefused, match=needed):
+            capture(station, recipe, lot, sink, progress=quiet_progress)
+        assert station.clock.now() == 0.0
+        assert station.table.angles() == pytest.approx((0.0, 0.0), abs=0.01)
+
+
+def test_a_pose_beyond_the_table_is_refused_with_the_limits():
+    with open_station(load_station(), lot_of()) as station, pytest.raises(StationRefused, match="-200 to 200 deg"):
+        station.table.move(250.0, 0.0)
+
+
+def test_a_soak_that_never_settles_is_given_up():
+    config = station_of()
+    config = config.model_copy(update={"soak": config.soak.model_copy(update={"band_K": 1e-4, "limit_s": 1100.0})})
+    with pytest.raises(StationTimeout, match=r"after 2[0-9]{3} s"):
+        run(config, lot_of())
+
+
+def test_samples_that_the_ring_has_lost_are_flagged_and_not_made_up():
+    lot = lot_of(1)
+    with open_station(load_station(), lot) as station:
+        station.reader.start(1000.0)
+        station.clock.sleep(20.0)
+        station.reader.stop()
+        samples = station.reader.slots[0].take()
+    assert samples.overflow
+    assert (samples.first, len(samples.outputs)) == (8000, 12000)
+
+
+def test_nothing_is_flagged_when_the_ring_is_emptied_in_time():
+    with open_station(load_station(), lot_of(1)) as station:
+        station.reader.start(1000.0)
+        parts = []
+        for _ in range(4):
+            station.clock.sleep(5.0)
+            parts.append(station.reader.slots[0].take())
+    assert [part.first for part in parts] == [0, 5000, 10000, 15000]
+    assert not any(part.overflow for part in parts)
+    assert not np.array_equal(parts[0].outputs, parts[3].outputs)
+
+
+def test_a_move_asked_while_moving_is_refused_as_busy_and_not_queued():
+    with open_station(load_station(), lot_of(1)) as station:
+        outer = station.table._outer
+        outer.start(90.0)
+        station.clock.sleep(0.5)
+        with pytest.raises(StationRefused, match="busy"):
+            outer.start(10.0)
+        station.clock.sleep(30.0)
+        assert outer.position() == pytest.approx(90.0, abs=0.01)
+
+
+def test_a_write_whose_answer_is_lost_is_sent_once():
+    config, lot = load_station(), lot_of(1)
+    plant = make_plant(config, lot)
+    plant.inject(Fault(kind="mute", serial="U000"))
+    with PlantServer(plant) as server:
+        link = ModbusLink(server.host, server.port, timeout_s=0.3, read_attempts=3)
+        with pytest.raises(StationTimeout, match=r"device 11: no answer to 'write tail"):
+            link.write(11, 42, [0, 0], "tail")
+        assert link.read(10, 0, 1, "slots") == [8]
+        link.close()
+
+
+def test_a_server_that_is_gone_is_a_lost_link_with_its_address():
+    plant = make_plant(load_station(), lot_of(1))
+    with PlantServer(plant) as server:
+        port = server.port
+        link = ModbusLink(server.host, port, timeout_s=0.5, read_attempts=2)
+        assert link.read(10, 0, 1, "slots") == [8]
+    with pytest.raises((LinkLost, StationTimeout), match=f"127.0.0.1:{port}"):
+        link.read(10, 0, 1, "slots")
+    link.close()
+
+
+def test_a_port_that_is_taken_is_refused():
+    plant = make_plant(load_station(), lot_of(1))
+    with PlantServer(plant) as server, pytest.raises(StationRefused, match="free port"):
+        PlantServer(make_plant(load_station(), lot_of(1)), port=server.port).__enter__()
+
+
+@pytest.mark.parametrize("device", ["outer", "chamber", "reader"])
+def test_a_station_device_that_falls_silent_stops_the_run_by_name(device):
+    config = station_of(faults=[{"kind": "silent", "at_s": 500.0, "device": device}])
+    with pytest.raises(StationTimeout, match=device):
+        run(config, lot_of())
+
+
+@pytest.mark.parametrize(
+    "fault",
+    [{"kind": "dead"}, {"kind": "door", "serial": "U000"}, {"kind": "mute", "serial": "U000", "device": "reader"}],
+)
+def test_a_fault_that_does_not_say_what_is_meant_is_refused(fault):
+    with pytest.raises(ValidationError, match="correct the fault"):
+        Fault.model_validate(fault)
+
+
+def test_hardware_is_not_served():
+    config = load_station().model_copy(update={"kind": "modbus"})
+    with pytest.raises(WrongUse, match="only a simulated station"):
+        serve(config, lot_of(), host="127.0.0.1", port=0, speed=1.0, stop=threading.Event(), ready=print)
+
+
+def test_a_fault_of_a_unit_that_is_not_there_is_refused():
+    with pytest.raises(WrongUse, match="U001"):
+        make_plant(station_of(faults=[{"kind": "dead", "serial": "U0O1"}]), lot_of())
+
+
+def test_a_state_of_another_lot_is_refused():
+    sink = run(station_of(), lot_of())
+    with (
+        pytest.raises(DataRejected, match="another station or lot"),
+        open_station(station_of(), lot_of(seed=6), resume=sink.state),
+    ):
+        pass
+    with pytest.raises(ArchiveUnusable, match="not readable"), open_station(station_of(), lot_of(), resume=b"torn"):
+        pass
+
+
+@pytest.mark.parametrize(
+    ("text", "needed"),
+    [
+        ("name = 'x'\nkind = 'simulated'\n[limts]\n", "limits"),
+        ("name = 'x'\nkind =", "not valid TOML"),
+    ],
+)
+def test_a_station_file_with_a_typo_is_refused_with_what_was_meant(tmp_path, text, needed):
+    path = tmp_path / "station.toml"
+    path.write_text(text, encoding="utf-8")
+    with pytest.raises(RecipeInvalid, match=needed):
+        load_station(path)
+
+
+def test_a_hardware_station_without_an_address_is_refused(tmp_path):
+    source = load_station().model_dump_json()
+    assert '"kind":"simulated"' in source
+    path = tmp_path / "station.toml"
+    text = (load_profile_text()).replace('kind = "simulated"', 'kind = "modbus"')
+    path.write_text(text, encoding="utf-8")
+    with pytest.raises(RecipeInvalid, match=r"devices\.outer\.host"):
+        load_station(path)
+
+
+def load_profile_text():
+    from importlib.resources import files
+
+    return files("stations").joinpath("simulated.toml").read_text("utf-8")

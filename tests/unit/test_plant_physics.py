@@ -1,0 +1,204 @@
+"""Physics of the simulated station, seen from its truth."""
+
+import numpy as np
+import pytest
+from small_station import QUIET, lot_of, plant_of, station_of, turn_to, write
+
+from inertial.frames import force_from_angles
+from schemas.errors import RecipeInvalid, WrongUse
+from schemas.recipe import Lot, Unit
+from stations.codec import unpack_samples
+from stations.plant.chamber import Chamber
+from stations.plant.hidden import HIDDEN, hidden_effect
+from stations.plant.preset import load_preset
+from stations.plant.table import Axis, Move, turn
+
+
+def mean_counts(plant, seconds=2, slot_id=11):
+    """Mean counts of the first slot over some seconds."""
+    write(plant, 10, "rate", 100.0)
+    write(plant, 10, "sampling", "running")
+    plant.advance(seconds * 1_000_000)
+    write(plant, 10, "sampling", "stopped")
+    width = 4 if plant.preset.packing == "int20x3" else 5
+    n = plant.sampler.head
+    words = [w for i in range(n) for w in plant.banks[slot_id].read(1000 + i * width, width)[0][1]]
+    counts, _ = unpack_samples(np.array(words, dtype=np.uint16), plant.preset.packing)
+    return counts.mean(axis=0)
+
+
+def still(**simulation):
+    return station_of(preset_overrides=QUIET, **simulation)
+
+
+def test_table_turns_gravity_as_the_science_says(rng):
+    outer, inner = rng.uniform(-3.0, 3.0, (2, 40))
+    up = np.array([0.01, -0.02, 1.0])
+    assert turn(up, outer, inner) == pytest.approx(force_from_angles(outer, inner, up), abs=1e-14)
+
+
+def test_output_at_rest_is_what_the_truth_says():
+    plant = plant_of(still())
+    plant.advance(1_800_000_000)
+    turn_to(plant, 60.0, 35.0)
+    truth = plant.truth("U000")
+    force = force_from_angles(np.radians(60.0), np.radians(35.0))
+    theta = 23.0 - 25.0
+    bias = truth.bias_g + theta * (truth.bias_tempco + theta * truth.bias_tempco_quadratic)
+    scale = 1.0 + theta * (truth.scale_tempco + theta * truth.scale_tempco_quadratic)
+    # a servo rests within some 0.0004° of its target and the gradient of the air is some 0.1 K: 30 µg
+    assert mean_counts(plant) / 256000.0 == pytest.approx(bias + scale * (truth.matrix @ force), abs=3e-5)
+
+
+def test_gravity_of_the_place_scales_the_force():
+    plants = [plant_of(still(local_gravity_m_s2=g)) for g in (9.78, 9.83)]
+    near, far = (mean_counts(plant) for plant in plants)
+    assert (far - near)[2] == pytest.approx(256000.0 * 0.05 / 9.80665, rel=0.02)
+
+
+def test_truth_of_a_unit_does_not_depend_on_slot_or_lot():
+    alone = Lot(units=[Unit(serial="U002", slot=7)], device="ADXL355", seed=5)
+    a, b = plant_of().truth("U002"), plant_of(lot=alone).truth("U002")
+    assert np.array_equal(a.bias_g, b.bias_g)
+    assert np.array_equal(a.misalignment, b.misalignment)
+    assert not np.array_equal(a.slot_rotation, b.slot_rotation)
+
+
+def test_repeat_keeps_the_devices_and_renews_the_noise():
+    first, again = plant_of(), plant_of(lot=lot_of(repeat=1))
+    assert np.array_equal(first.truth("U001").bias_g, again.truth("U001").bias_g)
+    assert not np.array_equal(mean_counts(first), mean_counts(again))
+
+
+def test_codes_end_before_the_range_of_8_g_at_the_scale_of_the_table():
+    preset = load_preset("ADXL355")
+    assert preset.full_scale == 2**19 - 1
+    assert preset.full_scale / preset.scale == pytest.approx(2.048, abs=1e-4)
+
+
+def test_output_beyond_the_range_is_clipped():
+    plant = plant_of(station_of(preset_overrides=QUIET | {"range_g": 0.5}))
+    assert mean_counts(plant)[2] == 128000.0
+
+
+def test_analogue_device_sits_at_half_its_supply_and_follows_it():
+    plant = plant_of(still(supply_spread=0.02, slot_rotation_mrad=0.0), lot_of(device="analogue"))
+    truth = plant.truth("U000")
+    assert truth.supply_ratio != 1.0
+    plant.advance(60_000_000)
+    volts = mean_counts(plant) * plant.preset.lsb
+    nominal = 1.5 + 0.3 * (truth.bias_g[2] - 2.0 * truth.bias_tempco[2] + (1.0 + 1e-6 * truth.scale_ppm[2]))
+    assert volts[2] == pytest.approx(truth.supply_ratio * nominal, rel=1e-3)
+    seen = plant.supply_reading()[0]
+    assert seen == pytest.approx(3.0 * truth.supply_ratio, abs=3e-4)
+
+
+def test_bias_of_analogue_devices_is_drawn_once_per_device_as_the_note_says():
+    plants = [plant_of(lot=lot_of(8, "analogue", seed=seed)) for seed in range(12)]
+    volts = 0.3 * np.array([p.truth(s).bias_g for p in plants for s in p.serials])
+    assert volts.mean() == pytest.approx(0.03, abs=0.002)
+    assert volts.std() == pytest.approx(0.01, rel=0.15)
+
+
+def test_move_keeps_its_speed_and_acceleration():
+    move = Move(start=0.0, origin=10.0, target=100.0, rest=100.0, speed=30.0, acceleration=20.0)
+    time = np.linspace(0.0, move.end, 4001)
+    angle = move.angle(time)
+    speed = np.gradient(angle, time)
+    assert angle[-1] == pytest.approx(100.0, abs=1e-9)
+    assert abs(speed).max() == pytest.approx(30.0, rel=1e-3)
+    assert abs(np.gradient(speed, time)).max() <= 20.0 * 1.01
+
+
+def test_axis_rings_and_settles_and_the_encoder_has_its_resolution():
+    axis = Axis(seed=3, channel=10)
+    axis.go(0.0, 45.0, 30.0, 30.0)
+    end = axis.move.end
+    ringing = axis.angle(np.linspace(end, end + 0.2, 50))
+    assert 0.003 < abs(ringing - 45.0).max() < 0.02
+    readings = np.array([axis.encoder(end + 5.0 + 0.001 * i) for i in range(200)])
+    assert np.allclose(readings / 0.001, np.round(readings / 0.001), atol=1e-6)
+    assert abs(readings.mean() - 45.0) < 0.002
+    assert readings.std() > 0.0
+
+
+def test_chamber_ramps_within_its_limit_overshoots_a_little_and_settles():
+    chamber = Chamber(room=23.0, ramp_K_min=3.0)
+    chamber.set_point = 60.0
+    air = []
+    for _ in range(3600):
+        chamber.step()
+        air.append(chamber.air)
+    path = np.array(air)
+    assert np.diff(path).max() * 60.0 < 5.0
+    assert 60.1 < path.max() < 61.5
+    assert abs(path[-600:] - 60.0).max() < 0.05
+
+
+def test_cooling_shakes_the_fixture_more_than_heating():
+    cold, warm = Chamber(room=23.0, ramp_K_min=3.0), Chamber(room=23.0, ramp_K_min=3.0)
+    cold.set_point, warm.set_point = -20.0, 60.0
+    for _ in range(600):
+        cold.step()
+        warm.step()
+    assert cold.vibration() > 5.0 * warm.vibration()
+
+
+def test_open_door_lets_the_room_in():
+    plant = plant_of(station_of(faults=[{"kind": "door", "at_s": 4000.0}]))
+    write(plant, 3, "set_point", 60.0)
+    plant.advance(4_000_000_000)
+    assert plant.air_reading() == pytest.approx(60.0, abs=0.2)
+    plant.advance(600_000_000)
+    assert plant.air_reading() < 55.0
+
+
+def test_slots_lag_behind_the_air_each_by_its_own():
+    plant = plant_of(lot=lot_of(8))
+    write(plant, 3, "set_point", 60.0)
+    plant.advance(600_000_000)
+    readings = np.array(plant.temperature_reading())
+    assert (readings < plant.air_reading() - 3.0).all()
+    assert np.ptp(readings) > 1.0
+
+
+@pytest.mark.parametrize("kind", sorted(HIDDEN))
+def test_every_hidden_effect_moves_an_output_and_nothing_at_zero_size(kind):
+    size = {
+        "cubic_transfer": "hardening", "pendulous_mass": "compliance", "hysteresis_play": "gain", "element_lag": "tempco",
+        "creep": "size", "level_error": "about_x", "encoder_harmonic": "size", "slot_rotation": "size",
+        "vibration_rectification": "coefficient", "warm_up": "size", "step_change": "size",
+    }[kind]  # fmt: skip
+    zero = {size: 0.0} | ({"about_y": 0.0} if kind == "level_error" else {})
+
+    def run(*hidden):
+        plant = plant_of(still(), lot_of(1), hidden=hidden)
+        write(plant, 3, "set_point", 45.0)
+        plant.advance(900_000_000)
+        turn_to(plant, 50.0, 20.0)
+        return mean_counts(plant)
+
+    figures = {"at": 500.0} if kind == "step_change" else {}
+    if kind == "vibration_rectification":
+        figures = {"coefficient": 1e7}
+    if kind == "creep":
+        figures = {"size": 5e-3, "tau": 60.0}
+    assert np.array_equal(run(), run(hidden_effect(kind, zero)))
+    assert abs(run() - run(hidden_effect(kind, figures))).max() > 1.0
+
+
+def test_refuses_a_hidden_effect_or_figure_that_does_not_exist():
+    with pytest.raises(RecipeInvalid, match="cubic_transfer"):
+        hidden_effect("cubic_transfre", {})
+    with pytest.raises(RecipeInvalid, match="hardening"):
+        hidden_effect("cubic_transfer", {"hardnening": 1.0})
+
+
+def test_refuses_a_preset_that_does_not_exist_with_what_looks_like_it():
+    with pytest.raises(RecipeInvalid, match="ADXL355"):
+        load_preset("ADXL35")
+
+
+def test_refuses_a_unit_in_a_slot_that_the_fixture_does_not_have():
+    with pytest.raises(WrongUse, match="slot 8"):
+        plant_of(lot=Lot(units=[Unit(serial="A", slot=8)], device="ADXL355"))
