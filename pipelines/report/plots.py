@@ -60,7 +60,7 @@ def check_plots(residuals: pd.DataFrame, verification: pd.DataFrame, allan: pd.D
         figure = Figure(figsize=(WIDTH_IN * shown / 3.0, 3.5))
         places = list(figure.subplots(1, shown, squeeze=False)[0])
         edge = 0.075 * 3.0 / shown
-        figure.subplots_adjust(left=edge, right=1.0 - 0.01, bottom=0.14, top=0.91, wspace=0.24)
+        figure.subplots_adjust(left=edge, right=1.0 - 0.01, bottom=0.14, top=0.91, wspace=0.3)
         _by_pose(places.pop(0), residuals)
         if len(verification):
             _verification(places.pop(0), verification, limit_ug)

@@ -1,0 +1,47 @@
+"""``tumbleline export``: coefficients for firmware, autopilots and spreadsheets."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from pipelines.cli.options import ArchiveOption, JsonOption, RunArgument
+
+
+def command(
+    run: RunArgument = "latest",
+    form: Annotated[str, typer.Option("--format", help="json, csv, c, ardupilot or px4.")] = "json",
+    units: Annotated[str, typer.Option("--units", metavar="SN,…", help="Only these; all that passed by default.")] = "",
+    output: Annotated[
+        Path | None, typer.Option("--output", "-o", metavar="FILE", help="Standard output by default.")
+    ] = None,
+    nominal: Annotated[
+        float | None, typer.Option("--nominal", help="Output per g that the autopilot's driver assumes.")
+    ] = None,
+    archive: ArchiveOption = None,
+    *,
+    failed: Annotated[bool, typer.Option("--failed", help="Hand out units that failed their limits, too.")] = False,
+    as_json: JsonOption = False,
+) -> None:
+    """Write coefficients: bias b and response K as polynomials in temperature, to apply as a = K⁻¹(ã − b)."""
+    from pipelines.archive import Archive
+    from pipelines.export import FORMATS, export_text, unit_calibrations
+    from schemas.errors import WrongUse, did_you_mean
+
+    form = "json" if as_json else form
+    if form not in FORMATS:
+        message = f"export: no format is called '{form}'; {did_you_mean(form, FORMATS)}"
+        raise WrongUse(message)
+    found = Archive(archive).run(run)
+    serials = tuple(serial.strip() for serial in units.split(",")) if units else ()
+    text = export_text(form, unit_calibrations(found, serials, failed=failed), found.id, nominal)
+    if output is None:
+        typer.echo(text, nl=False)
+        return
+    try:
+        output.write_text(text, encoding="utf-8")
+    except OSError as problem:
+        message = f"export: {output} cannot be written ({problem.strerror}); give another file with --output"
+        raise WrongUse(message) from None

@@ -1,0 +1,121 @@
+"""A calibration as polynomials in temperature: bias b(θ) and response K(θ), the form that firmware can apply."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from pipelines.stages.calibration import read_calibration
+from schemas.errors import WrongUse
+
+if TYPE_CHECKING:
+    import pandas as pd
+    from numpy.typing import NDArray
+
+    from pipelines.archive import Run
+    from pipelines.stages.calibration import Calibration
+
+BIAS = ("bias", "bias_temperature", "bias_temperature_quadratic", "bias_temperature_cubic")
+SCALE = ("scale", "scale_temperature", "scale_temperature_quadratic")
+ACROSS = ("misalignment", "misalignment_temperature")
+ORDER = 4
+EXPORTABLE = ("pass",)
+
+
+@dataclass(frozen=True)
+class UnitCalibration:
+    """Calibration of one unit.
+
+    bias : (4, 3), output unit per K^k, coefficients of θ⁰ … θ³
+    response : (4, 3, 3), output unit per g and K^k
+    left_out : effects of the model that have no place in this form
+    """
+
+    unit: str
+    outcome: str
+    grade: str
+    out_unit: str
+    bias: NDArray[np.float64]
+    response: NDArray[np.float64]
+    temperatures: tuple[float, float]
+    left_out: tuple[str, ...]
+
+    def correct(self, output: NDArray[np.float64], temperature: float) -> NDArray[np.float64]:
+        """Specific force (n, 3) in g for outputs (n, 3), as firmware computes it."""
+        powers = (temperature - 25.0) ** np.arange(ORDER)
+        bias = np.einsum("k,ki->i", powers, self.bias)
+        matrix = np.einsum("k,kij->ij", powers, self.response)
+        return np.linalg.solve(matrix, (output - bias).T).T
+
+
+def unit_calibrations(run: Run, serials: tuple[str, ...], *, failed: bool) -> list[UnitCalibration]:
+    """Calibrations of the units that passed, or of those named.
+
+    Parameters
+    ----------
+    failed : hand out units that failed their limits too; units whose data were refused have none.
+    """
+    grades = run.table("grades").set_index("unit")
+    _refuse(grades, serials, failed=failed)
+    allowed = ("pass", "fail") if failed else EXPORTABLE
+    chosen = [u for u in (serials or tuple(grades.index)) if grades.loc[u, "outcome"] in allowed]
+    if not chosen:
+        message = f"export: no unit of run {run.id} passed, at least one is needed; --failed hands out failed ones too"
+        raise WrongUse(message)
+    calibration = read_calibration(run.table("coefficients"), run.table("covariance"))
+    dwells = run.table("dwells")
+    out_unit = str(dwells["out_unit"].iloc[0])
+    spans = dwells.groupby("unit")["unit_C"].agg(["min", "max"])
+    return [
+        _one(calibration, unit, grades.loc[unit].to_dict(), out_unit, (spans.loc[unit, "min"], spans.loc[unit, "max"]))
+        for unit in chosen
+    ]
+
+
+def _refuse(grades: pd.DataFrame, serials: tuple[str, ...], *, failed: bool) -> None:
+    for unit in serials:
+        if unit not in grades.index:
+            message = f"export: no unit {unit} in this run; there are {', '.join(grades.index)}"
+            raise WrongUse(message)
+        outcome, reasons = grades.loc[unit, "outcome"], grades.loc[unit, "reasons"]
+        if outcome == "refused":
+            message = (
+                f"export: the data of unit {unit} were refused ({reasons}), so it has no coefficients; measure it again"
+            )
+            raise WrongUse(message)
+        if outcome == "fail" and not failed:
+            message = f"export: unit {unit} failed ({reasons}); --failed hands its coefficients out nevertheless"
+            raise WrongUse(message)
+
+
+def _one(
+    calibration: Calibration, unit: str, grade: dict, out_unit: str, temperatures: tuple[float, float]
+) -> UnitCalibration:
+    u = calibration.units.index(unit)
+    bias, response = np.zeros((ORDER, 3)), np.zeros((ORDER, 3, 3))
+    for power, effect in enumerate(BIAS):
+        values = calibration.value(effect)[u]
+        if values.size:
+            bias[power] = values[:, 0]
+    for power, effect in enumerate(SCALE):
+        values = calibration.value(effect)[u]
+        if values.size:
+            response[power][np.diag_indices(3)] = values[:, 0]
+    for power, effect in enumerate(ACROSS):
+        values = calibration.value(effect)[u]
+        if values.size:
+            for axis in range(3):
+                response[power, axis, [(axis + 1) % 3, (axis + 2) % 3]] = values[axis]
+    known = {*BIAS, *SCALE, *ACROSS}
+    return UnitCalibration(
+        unit=unit,
+        outcome=str(grade["outcome"]),
+        grade=str(grade["grade"]),
+        out_unit=out_unit,
+        bias=bias,
+        response=response,
+        temperatures=(float(temperatures[0]), float(temperatures[1])),
+        left_out=tuple(effect for effect in calibration.effects if effect not in known),
+    )
