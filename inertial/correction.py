@@ -45,12 +45,21 @@ def correct(effects: Sequence[str], state: State, output: Array, coefficients: A
     nonlinear : values of nonlinear parameters and constants by effect id
     """
     names = tuple(design.local_names(design.split(effects)[0], axis) for axis in range(3))
-    inverse = np.linalg.inv(response_matrix(coefficients, names))
+    response = response_matrix(coefficients, names)
+    inverse = np.linalg.inv(response)
     force = np.zeros(np.broadcast_shapes(output.shape, state.force.shape))
     for _ in range(_STEPS):
-        left = output - predict(effects, replace(state, force=force, memory={}), coefficients, nonlinear)
+        left = output - predict(
+            effects, replace(state, force=force, felt=_felt(response, force), memory={}), coefficients, nonlinear
+        )
         step = np.einsum("...ij,...nj->...ni", inverse, left)
         force = force + step
         if float(np.max(np.abs(step), initial=0.0)) < 1e-12:
             break
     return force
+
+
+def _felt(response: Array, force: Array) -> Array:
+    """Force along the sensor's own axes, (..., n, 3), g."""
+    own = np.diagonal(response, axis1=-2, axis2=-1)
+    return np.einsum("...ij,...nj->...ni", response / own[..., :, None], force)

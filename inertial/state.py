@@ -41,7 +41,7 @@ class State:
     vibration : (..., n), g rms
     outer, inner : (..., n), rad, table angles
     slot : (...,), number of the fixture's slot
-    output : (..., n, 3), nominal output in g (for effects of the output code)
+    felt : (..., n, 3), g, force along the sensor's own axes where its misalignment is known: what a sharp nonlinearity answers to
     covariates : further recorded quantities by name, (..., n)
     """
 
@@ -56,6 +56,7 @@ class State:
     outer: Array | None = None
     inner: Array | None = None
     slot: Array | None = None
+    felt: Array | None = None
     covariates: Mapping[str, Array] = field(default_factory=dict[str, Array])
     history: History | None = None
     memory: dict[tuple[object, ...], Array] = field(
@@ -74,6 +75,10 @@ class State:
         if value is None:
             raise MissingInput(effect, quantity)
         return value
+
+    def along(self, axis: int) -> Array:
+        """Specific force along the sensor's own axis, (..., n), g; along the fixture's where the misalignment is not known."""
+        return (self.force if self.felt is None else self.felt)[..., axis]
 
     @cached_property
     def theta(self) -> Array | None:

@@ -143,7 +143,6 @@ def _covariate(classes: Sequence[EffectClass]) -> Unexplained | None:
 
 def _beyond(problem: Problem, base: Model, final: Model, drivers: list[Driver]) -> tuple[Model, Unexplained | None]:
     """What smooth dependence is left after the effects found; effects that only imitate it are taken back."""
-    space = final.space
     convincing = [d for d in drivers if _convincing(final, d, len(drivers))]
     if not convincing:
         return final, None
@@ -156,17 +155,24 @@ def _beyond(problem: Problem, base: Model, final: Model, drivers: list[Driver]) 
         imitates = left > 0.35 * size_of(rest, term) and _inside(rest, term, best)
         if not imitates:
             kept.append(term)
-    gain = space.gain(best.candidate)
-    log_p = log_p_value(space, float(gain.drop[0]), int(gain.rank[0])) + np.log(len(drivers))
+    log_p = _driver_log_p(final, best) + np.log(len(drivers))
     shape = "line" if best.candidate.columns.shape[-1] == 1 else "curve"
     model = final if len(kept) + len(base.terms) == len(final.terms) else Model(problem, [*base.terms, *kept])
     return model, Unexplained(best.name, shape, float(log_p))
 
 
 def _convincing(model: Model, driver: Driver, looks: int) -> bool:
-    gain = model.space.gain(driver.candidate)
-    log_p = log_p_value(model.space, float(gain.drop[0]), int(gain.rank[0]))
-    return log_p + np.log(looks) < np.log(NAMED_BELOW) and _driver_size(model, driver) > 1.5 * MATERIAL * model.floor()
+    """Whether a driver is significant and large, the wander estimated with it inside: slow drivers and wander look alike."""
+    if _driver_size(model, driver) < 1.5 * MATERIAL * model.floor():
+        return False
+    return _driver_log_p(model, driver) + np.log(looks) < np.log(NAMED_BELOW)
+
+
+def _driver_log_p(model: Model, driver: Driver) -> float:
+    richer = model.with_curves(driver.candidate.columns[:, :, 0, :])
+    space = model.at(richer.share)
+    gain = space.gain(driver.candidate)
+    return log_p_value(space, float(gain.drop[0]), int(gain.rank[0]))
 
 
 def _worth(model: Model, driver: Driver) -> float:

@@ -1,4 +1,4 @@
-"""Data faults: what must be mended before physics is diagnosed. One look per fault; the first that finds one stands for a unit."""
+"""Data faults: what must be mended before physics is diagnosed. The first look that finds one stands for a unit."""
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
@@ -131,10 +131,8 @@ def scale_units(readings: Readings) -> Iterator[Fault]:
     scale = readings.scale
     stated_g = readings.unit_name == "g"
     for unit in range(scale.size):
-        if scale.size > 2:
-            others = float(np.median(np.delete(scale, unit)))
-        else:
-            others = 1.0 if stated_g else float(scale[unit])
+        alone = 1.0 if stated_g else float(scale[unit])
+        others = float(np.median(np.delete(scale, unit))) if scale.size > 2 else alone
         ratio = float(scale[unit]) / others
         if not 0.75 < ratio < 1.33:
             yield Fault(_kind(ratio), unit, (), f"scale is {ratio:.4g} times that of the lot")
@@ -277,11 +275,11 @@ def noisy(readings: Readings) -> Iterator[Fault]:
     typical = np.nanmedian(readings.spread, axis=1, keepdims=True)
     ratio = readings.spread / np.where(typical > 0.0, typical, np.inf)
     common = np.nanmedian(ratio, axis=0, keepdims=True) if len(ratio) > 2 else np.ones((1, *ratio.shape[1:]))
-    loud = (ratio > 5.0) & (ratio > 3.0 * common)
+    loud: NDArray[np.bool_] = np.logical_and(ratio > 5.0, ratio > 3.0 * common)
     if readings.vibration is not None:
         level = np.nanmedian(readings.vibration, axis=1, keepdims=True)
         loud &= ~(readings.vibration > 2.0 * np.maximum(level, 1e-12))[..., None]
-    for unit, row in enumerate(loud):
+    for unit, row in enumerate(np.asarray(loud)):
         places = np.flatnonzero(row.any(axis=-1))
         if not places.size:
             continue
@@ -299,8 +297,8 @@ def outliers(readings: Readings) -> Iterator[Fault]:
         return
     size = np.abs(readings.misfit)
     typical = np.nanmedian(size, axis=1, keepdims=True)
-    out = (size > np.maximum(0.005, 40.0 * typical)).any(axis=-1)
-    for unit, row in enumerate(out):
+    out = np.any(size > np.maximum(0.005, 40.0 * typical), axis=-1)
+    for unit, row in enumerate(np.asarray(out)):
         places = np.flatnonzero(row)
         if 0 < places.size <= 0.1 * row.size:
             yield Fault("spikes", unit, _places(places), f"{places.size} dwells far off the others")
@@ -314,7 +312,8 @@ def quantised(readings: Readings) -> Iterator[Fault]:
             step = lattice_step(out[there, axis])
             noise = _white(readings, unit, axis)
             if step is not None and noise is not None and step / np.sqrt(12.0) > 1.5 * noise:
-                evidence = f"axis {'xyz'[axis]} moves in steps of {step:.3g}, {step / np.sqrt(12.0) / noise:.1f} times the noise as LSB/√12"
+                ratio = step / np.sqrt(12.0) / noise
+                evidence = f"axis {'xyz'[axis]} moves in steps of {step:.3g}: LSB/√12 is {ratio:.1f} times the noise"
                 yield Fault("quantised", unit, (), evidence)
                 break
 

@@ -36,16 +36,26 @@ class Term:
 
 
 class Model:
-    """Terms in a problem."""
+    """Terms in a problem.
 
-    def __init__(self, problem: Problem, terms: Sequence[Term], *, near: float | None = None) -> None:
-        self.problem, self.terms, self._near = problem, tuple(terms), near
+    Parameters
+    ----------
+    near : a share of wander near which this model's is looked for
+    curves : (blocks, n, d), rotated columns of a smooth driver that is no effect
+    """
+
+    def __init__(
+        self, problem: Problem, terms: Sequence[Term], *, near: float | None = None, curves: Array | None = None
+    ) -> None:
+        self.problem, self.terms, self._near, self._curves = problem, tuple(terms), near, curves
 
     @cached_property
     def local(self) -> Array:
         """Rotated columns with coefficients by block, (blocks, n, p)."""
         found = [self._of(t) for t in self.terms if t.effect.scope != "station"]
         found += [self._loose(t) for t in self.terms if t.loose and t.effect.scope != "station"]
+        if self._curves is not None:
+            found.append(self._curves)
         if not found:
             return np.zeros((self.problem.blocks, self.problem.n, 0))
         return np.concatenate(found, axis=-1)
@@ -120,6 +130,10 @@ class Model:
     def with_term(self, term: Term) -> "Model":
         """The model with one more term."""
         return Model(self.problem, [*self.terms, term], near=self.share)
+
+    def with_curves(self, columns: Array) -> "Model":
+        """The model with the columns (blocks, n, d) of a smooth driver."""
+        return Model(self.problem, self.terms, near=self.share, curves=columns)
 
     def without(self, effect_id: str) -> "Model":
         """The model less one effect."""

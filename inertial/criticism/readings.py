@@ -38,7 +38,8 @@ class Readings:
     @property
     def there(self) -> NDArray[np.bool_]:
         """Which units have which dwells, (units, n)."""
-        return np.isfinite(self.output).all(axis=-1)
+        there: NDArray[np.bool_] = np.all(np.isfinite(self.output), axis=-1)
+        return there
 
     @cached_property
     def fits(self) -> Array:
@@ -67,9 +68,9 @@ def robust_fit(force: Array, output: Array) -> Array:
     x = np.concatenate([np.ones((int(there.sum()), 1)), force[there]], axis=-1)
     y = output[there]
     weight = np.ones(len(y))
-    found = np.zeros((4, 3))
+    found: Array = np.zeros((4, 3))
     for turn in range(_ROUNDS):
-        found = np.linalg.lstsq(x * weight[:, None], y * weight[:, None], rcond=1e-9)[0]
+        found = np.asarray(np.linalg.lstsq(x * weight[:, None], y * weight[:, None], rcond=1e-9)[0])
         size = np.linalg.norm(y - x @ found, axis=1)
         middle = float(np.median(size))
         if middle <= 0.0:

@@ -1,4 +1,4 @@
-"""The search for missing effects: forward with the noise estimated anew, back again over what was chosen, until nothing is left."""
+"""The search for missing effects: forward with the noise estimated anew, and back again over what was chosen."""
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
@@ -224,7 +224,7 @@ def _refine_one(space: Space, problem: Problem, term: Term, parameter: Nonlinear
 
 def _reexamine(field: Field, base: Model, model: Model, chosen: list[Term]) -> tuple[Model, list[Term]]:
     """Each chosen effect again beside the others: kept, swapped for a better one, or dropped."""
-    for term in list(chosen):
+    for term in tuple(chosen):
         if len(chosen) < 2:
             break
         rest = model.without(term.effect.id)

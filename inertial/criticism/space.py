@@ -156,7 +156,7 @@ class Space:
 
 
 def left_over(basis: Basis, space: Space, candidate: Candidate) -> Array:
-    """v of a candidate: RMS of its columns after the model over their RMS, per value of its parameters, (grid,)."""
+    """The part v of a candidate that is left, (grid,): RMS of its columns after the model over their RMS."""
     del basis
     blocks, n, grid, p = candidate.columns.shape
     flat = (candidate.columns / space.spread[..., None, None]).reshape(blocks, n, grid * p)

@@ -19,11 +19,12 @@ class AdcNonlinearity(SensorEffect):
     hides_behind: ClassVar[tuple[str, ...]] = ("third_order", "fifth_order")
     breaker: ClassVar[str] = "a fine tilt scan over several periods of the converter"
     simplicity: ClassVar[int] = 30
+    sharp: ClassVar[bool] = True
     nonlinear: ClassVar[tuple[Nonlinear, ...]] = (Nonlinear("period", "g", 0.08, 1.0, "inverse", 90),)
 
     def columns(self, state: State, axis: int, *, period: float, **nonlinear: float) -> Array:
         del nonlinear
-        turn = 2.0 * np.pi * state.force[..., axis] / period
+        turn = 2.0 * np.pi * state.along(axis) / period
         return stack(state, [np.sin(turn), np.cos(turn)])
 
     def names(self, axis: int) -> tuple[str, ...]:

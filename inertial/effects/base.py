@@ -57,6 +57,7 @@ class Effect(ABC):
     hides_behind : effects that take its place under poor plans
     breaker : what to measure so that it shows
     simplicity : rank among effects that the data cannot tell apart; the lowest is recommended
+    sharp : whether it answers to the force along the sensor's own axis so sharply that misalignment matters
     primary : number of leading columns that stand for a simpler form of the effect; None where there is none
     """
 
@@ -70,6 +71,7 @@ class Effect(ABC):
     breaker: ClassVar[str]
     simplicity: ClassVar[int] = 50
     primary: ClassVar[int | None] = None
+    sharp: ClassVar[bool] = False
     nonlinear: ClassVar[tuple[Nonlinear, ...]] = ()
 
     def parameters(self, state: State) -> tuple[Nonlinear, ...]:

@@ -19,10 +19,11 @@ class BiasAsymmetry(SensorEffect):
     hides_behind: ClassVar[tuple[str, ...]] = ("odd_quadratic", "third_order", "dead_zone")
     breaker: ClassVar[str] = "poses near 0 g on this axis, from both sides"
     simplicity: ClassVar[int] = 14
+    sharp: ClassVar[bool] = True
 
     def columns(self, state: State, axis: int, **nonlinear: float) -> Array:
         del nonlinear
-        f = state.force[..., axis]
+        f = state.along(axis)
         return stack(state, [np.where(np.abs(f) < 1e-9, 0.0, np.sign(f))])
 
     def names(self, axis: int) -> tuple[str, ...]:

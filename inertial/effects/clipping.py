@@ -19,11 +19,12 @@ class Clipping(SensorEffect):
     hides_behind: ClassVar[tuple[str, ...]] = ("third_order",)
     breaker: ClassVar[str] = "a margin between the largest specific force and the range"
     simplicity: ClassVar[int] = 23
+    sharp: ClassVar[bool] = True
     nonlinear: ClassVar[tuple[Nonlinear, ...]] = (Nonlinear("full_scale", "g", 0.5, 0.999, "linear", 14),)
 
     def columns(self, state: State, axis: int, *, full_scale: float, **nonlinear: float) -> Array:
         del nonlinear
-        f = state.force[..., axis]
+        f = state.along(axis)
         return stack(state, [np.clip(f, -full_scale, full_scale) - f])
 
     def names(self, axis: int) -> tuple[str, ...]:

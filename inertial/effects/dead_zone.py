@@ -19,11 +19,12 @@ class DeadZone(SensorEffect):
     hides_behind: ClassVar[tuple[str, ...]] = ("bias_asymmetry", "odd_quadratic")
     breaker: ClassVar[str] = "a micro-tilt through zero"
     simplicity: ClassVar[int] = 22
+    sharp: ClassVar[bool] = True
     nonlinear: ClassVar[tuple[Nonlinear, ...]] = (Nonlinear("width", "g", 0.002, 0.5, "log", 10),)
 
     def columns(self, state: State, axis: int, *, width: float, **nonlinear: float) -> Array:
         del nonlinear
-        return stack(state, [-np.clip(state.force[..., axis], -width, width)])
+        return stack(state, [-np.clip(state.along(axis), -width, width)])
 
     def names(self, axis: int) -> tuple[str, ...]:
         del axis

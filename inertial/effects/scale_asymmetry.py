@@ -19,10 +19,11 @@ class ScaleAsymmetry(SensorEffect):
     hides_behind: ClassVar[tuple[str, ...]] = ("second_order", "fourth_order")
     breaker: ClassVar[str] = "poses with |fi| between 0.2 and 0.8 g"
     simplicity: ClassVar[int] = 12
+    sharp: ClassVar[bool] = True
 
     def columns(self, state: State, axis: int, **nonlinear: float) -> Array:
         del nonlinear
-        f = state.force[..., axis]
+        f = state.along(axis)
         return stack(state, [np.abs(f)])
 
     def names(self, axis: int) -> tuple[str, ...]:

@@ -1,11 +1,12 @@
 """Weighted least squares of a model for all units of a lot at once.
 
-Per unit and axis z = H·θ + v is solved as θ̂ = (HᵀWH)⁻¹HᵀWz with one refinement step; parameters of the station, which all
-units share, are found after projecting the units' own columns out (Frisch–Waugh–Lovell), so the cost stays linear in the units.
+Per unit and axis z = H·θ + v is solved as θ̂ = (HᵀWH)⁻¹HᵀWz, refined once where the system is ill-conditioned. Parameters
+of the station, which all units share, are found after projecting the units' own columns out (Frisch–Waugh–Lovell), so
+the cost stays linear in the units.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,6 +20,9 @@ Array = NDArray[np.float64]
 
 _SINGULAR = 1e-11
 """Smallest eigenvalue of the scaled normal matrix: below, a coefficient is not determined."""
+
+_DELICATE = 1e-3
+"""Smallest eigenvalue of the scaled normal matrix below which the solution is refined once."""
 
 
 @dataclass(frozen=True)
@@ -97,11 +101,15 @@ def fit_lot(
         An effect is not in the catalogue, or needs a quantity that the dwells do not carry.
     """
     sensor, station = design.split(effects)
+    if state.felt is None and any(e.sharp for e in sensor):
+        state = replace(state, felt=felt_force(state.force, output), memory={})
     values = design.starting_values([*sensor, *station], state)
     for name, given in (nonlinear or {}).items():
         values[name] = {**values.get(name, {}), **given}
     names = tuple(design.local_names(sensor, axis) for axis in range(3))
-    z = np.swapaxes(output, -1, -2)
+    z = np.moveaxis(
+        np.ascontiguousarray(np.moveaxis(output, -1, 0)), 0, -2
+    )  # axis by axis in memory, as it is worked on
     weight = None if standard_error is None else 1.0 / np.swapaxes(standard_error, -1, -2)
     local = _Local(design.local_columns(sensor, state, values), weight, names)
     theta = local.solve(z)
@@ -132,6 +140,15 @@ def fit_lot(
     )
 
 
+def felt_force(force: Array, output: Array) -> Array:
+    """Specific force along the sensor's own axes, (..., n, 3), g, from a plain fit of bias and response."""
+    x = np.concatenate([np.ones((*force.shape[:-1], 1)), force], axis=-1)
+    found = np.linalg.pinv(x, rcond=1e-9) @ output
+    k = np.swapaxes(found[..., 1:, :], -1, -2)
+    own = np.diagonal(k, axis1=-2, axis2=-1)
+    return np.einsum("...ij,...nj->...ni", k / np.where(own == 0.0, 1.0, own)[..., :, None], force)
+
+
 class _Local:
     """Normal equations of the units' own columns, scaled; one system serves all units where they share design and weights."""
 
@@ -142,7 +159,7 @@ class _Local:
         self._refuse_empty(names)
         self.scaled = weighted / self.scale[..., None, :]
         gram = np.swapaxes(self.scaled, -1, -2) @ self.scaled
-        self._refuse_singular(gram, names)
+        self.delicate = self._refuse_singular(gram, names)
         self.gram_inverse = np.linalg.inv(gram)
         self.inverse = self.gram_inverse / (self.scale[..., :, None] * self.scale[..., None, :])
 
@@ -156,11 +173,12 @@ class _Local:
                 f"the plan must excite it; add poses or conditions that do, or leave it out of the model"
             )
 
-    def _refuse_singular(self, gram: Array, names: Sequence[Sequence[tuple[str, str]]]) -> None:
+    def _refuse_singular(self, gram: Array, names: Sequence[Sequence[tuple[str, str]]]) -> bool:
+        """Whether the system is so ill-conditioned that rounding asks for a step of refinement; refuses a singular one."""
         values, vectors = np.linalg.eigh(gram)
         bad = np.argwhere(values[..., 0] < _SINGULAR)
         if not bad.size:
-            return
+            return bool(np.min(values) < _DELICATE)
         where = tuple(int(i) for i in bad[0])
         axis = where[-1]
         share = np.abs(vectors[(*where, slice(None), 0)])
@@ -174,16 +192,16 @@ class _Local:
     def solve(self, z: Array) -> Array:
         """Coefficients (..., 3, p) for targets (..., 3, n); with one step of refinement against the rounding of HᵀWH."""
         theta = self._step(z)
-        return theta + self._step(z - self.apply(theta))
+        return theta + self._step(z - self.apply(theta)) if self.delicate else theta
 
     def _step(self, z: Array) -> Array:
         weighted = z if self.weight is None else z * self.weight
-        right = np.matmul(np.swapaxes(self.scaled, -1, -2), weighted[..., None])
-        return np.matmul(self.gram_inverse, right)[..., 0] / self.scale
+        right = _apply(np.swapaxes(self.scaled, -1, -2), weighted)
+        return _apply(self.gram_inverse, right) / self.scale
 
     def apply(self, theta: Array) -> Array:
         """The model's output (..., 3, n)."""
-        return np.matmul(self.columns, theta[..., None])[..., 0]
+        return _apply(self.columns, theta)
 
     def project_out(self, columns: Array) -> Array:
         """Weighted columns (..., 3, n, q) less what the local columns explain."""
@@ -200,6 +218,14 @@ class _Local:
             else np.count_nonzero(np.broadcast_to(self.weight, residual.shape), axis=-1)
         )
         return np.einsum("...n,...n->...", weighted, weighted), count - self.columns.shape[-1]
+
+
+def _apply(matrices: Array, vectors: Array) -> Array:
+    """Matrices (..., 3, m, k) times vectors (..., 3, k); where all units share the matrices, as one product per axis."""
+    if matrices.ndim == 3 and vectors.ndim == 3:
+        product = np.matmul(np.swapaxes(vectors, 0, 1), np.swapaxes(matrices, -1, -2))
+        return np.swapaxes(product, 0, 1)
+    return np.matmul(matrices, vectors[..., None])[..., 0]
 
 
 def _solve_shared(

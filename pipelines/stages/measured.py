@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pandas as pd
@@ -43,13 +43,12 @@ class Measured:
     def pick(self, units: list[int]) -> Measured:
         """The same for some units."""
         index = np.asarray(units, dtype=np.intp)
-        r = self.readings
-        fields = {
-            k: v[index] if isinstance(v, np.ndarray) else v for k, v in vars(r).items() if k in Readings.__annotations__
-        }
-        return Measured(
-            tuple(self.units[i] for i in units), self.dwells, Readings(**fields), self.state.pick(index), self.reference
-        )
+        picked: dict[str, Any] = {}
+        for name in Readings.__dataclass_fields__:
+            value = getattr(self.readings, name)
+            picked[name] = value[index] if isinstance(value, np.ndarray) else value
+        names = tuple(self.units[i] for i in units)
+        return Measured(names, self.dwells, Readings(**picked), self.state.pick(index), self.reference)
 
 
 def measured(dwells: pd.DataFrame, history: pd.DataFrame | None = None) -> Measured:
@@ -68,7 +67,10 @@ def measured(dwells: pd.DataFrame, history: pd.DataFrame | None = None) -> Measu
     units = tuple(dict.fromkeys(ordered["unit"].astype(str)))
     numbers = np.unique(ordered["dwell"].to_numpy())
     place = {u: i for i, u in enumerate(units)}
-    rows = ordered["unit"].astype(str).map(place).to_numpy(), np.searchsorted(numbers, ordered["dwell"].to_numpy())
+    rows = (
+        np.array([place[u] for u in ordered["unit"].astype(str)], dtype=np.intp),
+        np.searchsorted(numbers, ordered["dwell"].to_numpy()),
+    )
     table = _Table(ordered, rows, (len(units), len(numbers)))
     reference, force = _force(table)
     readings = Readings(
@@ -89,7 +91,9 @@ def measured(dwells: pd.DataFrame, history: pd.DataFrame | None = None) -> Measu
 class _Table:
     """Columns of a long table as (units, n, k) arrays; a missing dwell takes the other units' middle value where asked."""
 
-    def __init__(self, frame: pd.DataFrame, rows: tuple[Array, Array], shape: tuple[int, int]) -> None:
+    def __init__(
+        self, frame: pd.DataFrame, rows: tuple[NDArray[np.intp], NDArray[np.intp]], shape: tuple[int, int]
+    ) -> None:
         self.frame, self.rows, self.shape = frame, rows, shape
 
     def has(self, *names: str) -> bool:
@@ -188,7 +192,9 @@ def lot_of(found: Measured) -> Lot:
     output = readings.output / scale[:, None, :]
     there = readings.there
     error = np.where(there[..., None], _white_error(readings, scale, output), np.inf)
-    return Lot(found.state, np.where(there[..., None], output, 0.0), error, response)
+    felt = np.einsum("uij,unj->uni", response, found.state.force)
+    state = replace(found.state, felt=felt, memory={})
+    return Lot(state, np.where(there[..., None], output, 0.0), error, response)
 
 
 def _white_error(readings: Readings, scale: Array, output: Array) -> Array:
@@ -218,12 +224,6 @@ def _radial(found: Measured) -> Lot:
         forces.append(np.where(size > 0.0, corrected / np.where(size > 0.0, size, 1.0), (0.0, 0.0, 1.0)))
         outputs.append(corrected)
         errors.append(np.where(there, np.sqrt(np.mean((size[there] - 1.0) ** 2)), np.inf)[:, None] * np.ones(3))
-    state = State(
-        **{
-            **{k: v for k, v in vars(found.state).items() if k in State.__annotations__},
-            "force": np.stack(forces),
-            "memory": {},
-        }
-    )
+    state = replace(found.state, force=np.stack(forces), memory={})
     eye = np.broadcast_to(np.eye(3), (len(found.units), 3, 3))
     return Lot(state, np.stack(outputs), np.stack(errors), eye, radial=True)
