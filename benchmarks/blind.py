@@ -37,7 +37,7 @@ WEIGHTS = {
     "lot8_size2": 35, "lot8_size1": 35, "lot8_size05": 35, "lot8_size4": 35, "single_size2": 30,
     "lot4_size2": 10, "lot16_size2": 10, "station_size2": 20, "null_white": 60, "null_flicker": 60,
     "null_walk": 10, "null_single": 20, "pairs": 35, "triples": 25, "covariate_line": 15, "covariate_curve": 15,
-    "withheld": 21, "invisible": 18, "faults": 28,
+    "withheld": 21, "invisible": 18, "faults": 28, "bare_model": 6,
 }  # fmt: skip
 
 
@@ -147,6 +147,27 @@ def work(jobs: list[Job], processes: int) -> list[tuple[Job, Score, dict[str, An
     return done
 
 
+def failures(results: list[tuple[Job, Score, dict[str, Any], dict[str, Any]]]) -> list[str]:
+    """One line for each run that went wrong: where to find it, what hid, what was said."""
+    lines = []
+    for job, got, document, truth in results:
+        wrong = (
+            got.exact is False
+            or (got.named_something and got.scenario.startswith("null"))
+            or False
+            in {got.driver_right, got.fault_caught, got.none_of_catalogue, got.invisible_listed, got.scope_right}
+            or got.false_fault
+        )
+        if wrong:
+            variants = [effect["variant"] for effect in truth["effects"] if effect["variant"]]
+            spec = truth["spec"]
+            plan = f"{spec['plan']}/{spec['soaks']}x{spec['repeats']} 1/f {spec['flicker']:.1f} {spec['device']}"
+            said = " ".join("|".join(group) for group in got.named) or document.get("unexplained") or "nothing"
+            hid = ",".join([*got.truth, *variants, *spec["faults"]])
+            lines.append(f"{job.scenario}[{job.index}] {hid} -> {said} ({plan})")
+    return lines
+
+
 def save(folder: Path, results: list[tuple[Job, Score, dict[str, Any], dict[str, Any]]]) -> None:
     """Scores as Parquet, documents with truths as JSON lines."""
     folder.mkdir(parents=True, exist_ok=True)
@@ -183,6 +204,7 @@ def arguments() -> argparse.Namespace:
         "--method", action="append", choices=WAYS, help="ways to diagnose (repeatable); tumbleline is the default"
     )
     parser.add_argument("--cli", action="store_true", help="the same as --method cli")
+    parser.add_argument("--failures", action="store_true", help="list the runs that went wrong")
     parser.add_argument("--out", type=Path, help="folder for scores.parquet, runs.jsonl and figures.json")
     parser.add_argument(
         "--dump", type=Path, help="only write the runs into this folder, and their truth into FOLDER-truth"
@@ -208,6 +230,8 @@ def main() -> None:
             f"\n{way}: {len(results)} runs, seed {options.seed}, median {times[len(times) // 2]:.2f} s, longest {times[-1]:.2f} s"
         )
         print(text(figures[way]))
+        if options.failures:
+            print("\n".join(failures(results)))
     if options.out:
         save(options.out, everything)
         (options.out / "figures.json").write_text(json.dumps(figures, indent=1))

@@ -188,6 +188,7 @@ FIGURES = (
     Figure("invisible effect listed as unseen", ("invisible",), "invisible_listed", "100 %"),
     Figure("one effect: fresh run ≤ 1.05 of the true noise", LOTS, "fresh_ratio", "≥ 95 %", limit=FRESH_LIMIT),
     Figure("one effect: fresh run ≤ 1.05 of the true model's", LOTS, "oracle_ratio", "—", limit=FRESH_LIMIT),
+    Figure("bare model over temperature: exact", ("bare_model",), "exact", "—"),
     Figure("fault caught, unit blocked", ("faults",), "fault_caught", "100 %"),
     Figure("fault called by its name", ("faults",), "fault_named", "—"),
     Figure("false fault alarm on a clean run", CLEAN, "false_fault", "≤ 0.5 %"),

@@ -12,7 +12,6 @@ from .spec import Fault
 OUTPUTS = ["out_x", "out_y", "out_z"]
 LOST = -1  # the number of a dwell that the caller shall drop
 SCATTERS = ["sd_x", "sd_y", "sd_z"]
-POSE = {"swapped_dwells", "wrong_pose"}
 GAIN = {"wrong_units", "wrong_range"}
 Injector = Callable[[pd.DataFrame, str, float, np.random.Generator], Fault]
 FAULTS: dict[str, Injector] = {}

@@ -9,11 +9,11 @@ from dataclasses import replace
 import numpy as np
 
 from .device import KINDS
-from .faults import FAULTS
+from .faults import FAULTS, GAIN
 from .poses import PLANS, SOAKS
 from .run import Run, make_run
 from .scene import COVARIATES
-from .spec import Spec
+from .spec import STATIC_BASE, Spec
 
 GENERIC = ("fibonacci24", "twenty_six")
 EDGES = (*GENERIC, "eighteen")
@@ -43,6 +43,7 @@ HOMES: dict[str, Home] = {
     "encoder_harmonic": (GENERIC, ROUNDS), "axis_nonorthogonality": (EDGES, ROUNDS), "backlash": (GENERIC, ROUNDS),
 }  # fmt: skip
 STATION = ("level_error", "outer_encoder_offset", "encoder_harmonic", "axis_nonorthogonality", "backlash")
+REMEMBERED = ("thermal_lag", "thermal_rate", "thermal_hysteresis")  # need the temperature between the dwells
 WITHHELD: dict[str, Home] = {
     "withheld:tide": (GENERIC, ("one", "nine")),
     "withheld:touch": (("fibonacci24",), ("one", "three")),
@@ -100,6 +101,8 @@ def _settings(effects: tuple[str, ...]) -> dict[str, object]:
     extra: dict[str, object] = {}
     if "warm_up" in effects:
         extra["power_cycles"] = True
+    if set(REMEMBERED) & set(effects):
+        extra["history"] = True
     if {"backlash", "pose_hysteresis"} & set(effects):
         extra["shuffled_poses"] = True
     if set(STATION) & set(effects) or "magnetic" in effects or "withheld:bearing" in effects:
@@ -171,12 +174,29 @@ def _covariate(rng: np.random.Generator, shape: str) -> Run:
 def _faulty(rng: np.random.Generator, index: int) -> Run:
     name = FAULT_NAMES[index % len(FAULT_NAMES)]
     thermal = name == "stale_temperature"
-    device = {"device": "counts"} if name == "torn_words" else {}
-    hidden = {"effects": ("second_order",), "sizes": (2.0,)} if index % 3 == 0 else {}
+    alone = name != "units_swapped" and rng.random() < 0.2
+    extra: dict[str, object] = {"units": 1} if alone else {}
+    if name == "torn_words":
+        extra["device"] = "counts"
+    elif alone and name in GAIN:
+        extra["device"] = "mems"  # nobody can tell the units of one device whose sensitivity is unknown
+    if index % 3 == 0 and not alone:
+        extra |= {"effects": ("second_order",), "sizes": (2.0,)}
 
     def build() -> Spec:
         soaks = str(rng.choice(["five", "nine"] if thermal else ["one", "five", "nine"]))
-        return _plan(rng, str(rng.choice(EDGES)), soaks, faults=(name,), **hidden, **device)
+        return _plan(rng, str(rng.choice(EDGES)), soaks, faults=(name,), **extra)
+
+    return _search(rng, build)
+
+
+def _bare(rng: np.random.Generator, index: int) -> Run:
+    """A starting model without temperature, judged on a run over temperature."""
+    name = ("bias_temperature", "scale_temperature")[index % 2]
+
+    def build() -> Spec:
+        soaks = str(rng.choice(["three", *WARM]))
+        return _plan(rng, str(rng.choice(ANY)), soaks, effects=(name,), sizes=(2.0,), base=STATIC_BASE)
 
     return _search(rng, build)
 
@@ -203,6 +223,7 @@ SCENARIOS: dict[str, Callable[[np.random.Generator, int], Run]] = {
     "withheld": lambda rng, k: _from(WITHHELD, rng, k, 2.0, visible=True),
     "invisible": lambda rng, k: _from(INVISIBLE, rng, k, 4.0, visible=False),
     "faults": _faulty,
+    "bare_model": _bare,
 }
 
 

@@ -8,7 +8,7 @@ from scipy.special import erf
 from .memory import lag, play, preisach
 from .physics import Draw, Floats, Physics, hidden, signal
 from .scene import Scene
-from .timeline import GRID_S
+from .timeline import GRID_S, OFF_S
 
 REFERENCE_C = 25.0
 COARSE = 6  # hysteresis is followed every 30 s
@@ -124,7 +124,7 @@ def _kink(draw: Draw) -> Physics:
 def _warm_up(draw: Draw) -> Physics:
     """Electronics that warm towards equilibrium after switching on, and cool while off."""
     span = float(draw.scene.middle[-1] - draw.scene.middle[0])
-    tau = draw.log(60.0, max(120.0, min(3600.0, span / 3.0)))
+    tau = draw.log(60.0, max(120.0, min(OFF_S[0] / 3.0, span / 3.0)))
     each, size = draw.near(tau, 0.05), draw.each(3)[:, None, :]
 
     def act(scene: Scene, _force: Floats) -> Floats:
@@ -133,7 +133,7 @@ def _warm_up(draw: Draw) -> Physics:
         out = np.empty((draw.units, scene.grid.size))
         begins = np.append(line.power_on, np.inf)
         for k, begin in enumerate(line.power_on):
-            cold = 1.0 - (1.0 - cold) * np.exp(-line.power_gap[k] / (2.0 * each))
+            cold = 1.0 - (1.0 - cold) * np.exp(-line.power_gap[k] / each)
             on = (scene.grid >= begin) & (scene.grid < begins[k + 1])
             running = scene.grid[on] - begin
             out[:, on] = cold[:, None] * np.exp(-running / each[:, None])

@@ -16,6 +16,8 @@ GRID_S = 5.0
 TABLE_SPEED = 20.0  # degrees per second
 RAMP_K_PER_S = 2.5 / 60.0
 RAMP_CYCLES = 7
+CYCLES = 4  # times that power comes on in a run at one temperature
+OFF_S = (1800.0, 5400.0)
 LEGS_C = (25.0, 72.0, -8.0, 45.0)  # turning points of the run that measures while it ramps
 
 
@@ -59,7 +61,7 @@ def build(spec: Spec, rng: np.random.Generator) -> Timeline:
     commanded, start, wait = [], [], []
     for index, target in enumerate(soaks):
         if spec.power_cycles and index > 0:
-            gap = float(rng.uniform(600.0, 1800.0))
+            gap = float(rng.uniform(*OFF_S))
             now += gap
             power_on.append(now)
             power_gap.append(gap)
@@ -67,8 +69,8 @@ def build(spec: Spec, rng: np.random.Generator) -> Timeline:
         profile += [(now, profile[-1][1]), (now + ramp, target)]
         now += 30.0 if spec.power_cycles and len(soaks) == 1 else ramp + hold
         for round_index, poses in enumerate(_orders(spec, rng, visits)):
-            if spec.power_cycles and len(soaks) == 1 and round_index > 0:
-                gap = float(rng.uniform(600.0, 1800.0))
+            if spec.power_cycles and len(soaks) == 1 and round_index > 0 and round_index % -(-visits // CYCLES) == 0:
+                gap = float(rng.uniform(*OFF_S))
                 now += gap
                 power_on.append(now)
                 power_gap.append(gap)
