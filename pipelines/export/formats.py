@@ -36,8 +36,7 @@ typedef struct {{
 }} tumbleline_calibration;
 """
 
-C_TAIL = (
-    """
+C_TAIL = """
 /* Writes the specific force in g to force[3]; returns 0, or -1 where the response cannot be inverted. */
 static inline int tumbleline_correct(const tumbleline_calibration *c, const double output[3], double temperature_C,
                                      double force[3])
@@ -61,9 +60,7 @@ static inline int tumbleline_correct(const tumbleline_calibration *c, const doub
 }
 
 #endif
-"""
-    % ORDER
-)
+""".replace("ORDER", str(ORDER))
 
 
 def export_text(name: str, units: Sequence[UnitCalibration], run: str, nominal: float | None = None) -> str:
