@@ -19,14 +19,15 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-SHORTEST_S = 0.1
 RATIO = 3.0  # between time constants; a sum of Lorentzians spaced like this follows 1/f within 0.1 %
-TERMS = 11  # up to 0.1·3^10 s = 1.6 hours
+SHORTEST, LONGEST = -6, 10  # powers of the ratio around 0.1 s: from 0.14 ms to 1.6 hours
+TERMS = LONGEST - SHORTEST + 1
+FASTEST = 0.5  # sample periods; what changes faster is averaged out by the reader's decimation filter
 
 
 def flicker_time_constants() -> Array:
-    """Time constants of the Ornstein–Uhlenbeck processes that make flicker noise, (11,), s."""
-    return np.array([SHORTEST_S * RATIO**k for k in range(TERMS)])
+    """Time constants of the Ornstein–Uhlenbeck processes that make flicker noise, (17,), s."""
+    return np.array([0.1 * RATIO**k for k in range(SHORTEST, LONGEST + 1)])
 
 
 def flicker_variance(instability: float) -> float:
@@ -62,19 +63,21 @@ class Noise:
 
         White noise of the one-sided density n_d has the deviation n_d·sqrt(fs/2) per sample.
         """
-        z = self._draw(n, TERMS + 2)
-        total = self._density * math.sqrt(rate / 2.0) * z[..., TERMS + 1]
+        slow = np.flatnonzero(self._tau * rate >= FASTEST)
+        z = self._draw(n, 2 + (len(slow) if self._sigma > 0.0 else 0))
+        total = self._density * math.sqrt(rate / 2.0) * z[..., 0]
         if self._walk_step > 0.0:
-            steps = self._walk_step / math.sqrt(rate) * z[..., TERMS]
+            steps = self._walk_step / math.sqrt(rate) * z[..., 1]
             steps[0] += self._walk
             path = np.cumsum(steps, axis=0)
             self._walk = path[-1].copy()
             total += path
         if self._sigma > 0.0:
-            for k, keep in enumerate(np.exp(-1.0 / (rate * self._tau))):
+            for column, k in enumerate(slow, start=2):
+                keep = math.exp(-1.0 / (rate * self._tau[k]))
                 gain = self._sigma * math.sqrt(1.0 - keep**2)
                 start = (keep * self._flicker[..., k])[None]
-                path, _ = lfilter([gain], [1.0, -keep], z[..., k], axis=0, zi=start)
+                path, _ = lfilter([gain], [1.0, -keep], z[..., column], axis=0, zi=start)
                 self._flicker[..., k] = path[-1]
                 total += path
         return total
