@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from .chain import nominal_force
 from .device import Lot
-from .scene import Places, Scene
+from .scene import Places, Scene, powered_on
 from .sizing import reading
 from .spec import Spec
 from .timeline import GRID_S
@@ -67,7 +67,7 @@ def history(lot: Lot, places: Places, scene: Scene, rng: np.random.Generator) ->
     grid = scene.grid[::HISTORY_STEP] + GRID_S / 2.0
     units, count = scene.units, len(grid)
     noise = 2.0 * places.reading_noise * rng.standard_normal((units, count))
-    return pd.DataFrame(
+    table = pd.DataFrame(
         {
             "time_s": np.tile(grid, units),
             "chamber_C": np.tile(scene.chamber[::HISTORY_STEP], units),
@@ -76,3 +76,5 @@ def history(lot: Lot, places: Places, scene: Scene, rng: np.random.Generator) ->
             "unit_C": (scene.die[:, ::HISTORY_STEP] + places.reading_offset[:, None] + noise).ravel(),
         }
     )
+    on = np.tile(powered_on(scene.timeline, grid) > 0.0, units)  # a device without power tells no temperature
+    return table[on].reset_index(drop=True)

@@ -27,7 +27,7 @@ def play(series: Floats, width: Floats | float) -> Floats:
     return out
 
 
-def preisach(series: Floats, low: float, high: float, cells: int = 14) -> Floats:
+def preisach(series: Floats, low: float, high: float, cells: int = 24) -> Floats:
     """Preisach ensemble of evenly weighted relays between `low` and `high`, driven along the last axis; in -1…1."""
     levels = np.linspace(low, high, cells)
     up, down = (grid[np.triu_indices(cells, 1)] for grid in np.meshgrid(levels, levels, indexing="xy"))

@@ -82,6 +82,13 @@ class Scene:
         return at - self.timeline.power_on[np.searchsorted(self.timeline.power_on, at, side="right") - 1]
 
 
+def powered_on(timeline: Timeline, grid: Floats) -> Floats:
+    """1 where the devices have power, 0 where it is off, (G,)."""
+    last = np.searchsorted(timeline.power_on, grid, side="right")
+    following = np.append(timeline.power_on - timeline.power_gap, np.inf)[last]
+    return (grid < following).astype(float)
+
+
 def _chamber(timeline: Timeline, grid: Floats, places: Places, rng: np.random.Generator) -> Floats:
     target = np.interp(grid, timeline.profile[:, 0], timeline.profile[:, 1])
     air = lag(target, 90.0, GRID_S)
@@ -120,8 +127,9 @@ def build(spec: Spec, timeline: Timeline, places: Places, rng: np.random.Generat
     grid = np.arange(0.0, timeline.end + 2.0 * GRID_S, GRID_S)
     chamber = _chamber(timeline, grid, places, rng)
     fixture = np.stack([lag(chamber, float(tau), GRID_S) for tau in places.slot_lag])
-    running = grid - timeline.power_on[np.searchsorted(timeline.power_on, grid, side="right") - 1]
-    heat = places.self_heating[:, None] * (1.0 - np.exp(-running / 180.0))
+    powered = powered_on(timeline, grid)
+    powered[0] = 0.0
+    heat = places.self_heating[:, None] * lag(powered, 180.0, GRID_S)
     die = lag(fixture, places.die_lag, GRID_S) + heat
     first = np.round(timeline.start / GRID_S).astype(np.int64)
     last = first + max(1, round(timeline.dwell / GRID_S))
