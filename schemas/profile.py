@@ -103,6 +103,10 @@ class Profile(Strict):
         message = f"profile {self.name}: no register '{name}'; {did_you_mean(name, (r.name for r in self.registers))}"
         raise RecipeInvalid(message, key=name)
 
+    def has(self, name: str) -> bool:
+        """Whether there is a register of that name."""
+        return any(register.name == name for register in self.registers)
+
     def order(self, register: Register) -> WordOrder:
         """The word order that holds for a register."""
         return register.word_order or self.word_order

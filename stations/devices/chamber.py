@@ -11,6 +11,7 @@ if TYPE_CHECKING:
     from stations.devices.registers import Registers
 
 READ_BACK_K = 1e-3
+AUTOMATIC = "automatic"  # what a controller that has no register for its mode is taken to be in
 PLAUSIBLE_C = (-100.0, 250.0)
 
 
@@ -34,9 +35,11 @@ class ThermalChamber:
         """Sets the target in °C and makes sure that the controller has taken it."""
         self.check(temperature)
         self._registers.write("set_point", temperature)
+        profile = self._registers.profile
         found = self._registers.number("set_point")
-        mode = self._registers.text("actual_mode")
-        if abs(found - temperature) > READ_BACK_K or mode != "automatic":
+        mode = self._registers.text("actual_mode") if profile.has("actual_mode") else AUTOMATIC
+        step = profile.register("set_point").scale if profile.register("set_point").type != "float32" else 0.0
+        if abs(found - temperature) > READ_BACK_K + step / 2.0 or mode != AUTOMATIC:
             message = (
                 f"{self._registers.name}: set point {found:g} °C in mode {mode}, {temperature:g} °C in automatic is "
                 "needed; check the controller's panel"

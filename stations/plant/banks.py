@@ -5,7 +5,7 @@ from __future__ import annotations
 from functools import partial
 from typing import TYPE_CHECKING
 
-from stations.codec import NotEncodable, Value
+from stations.codec import NotEncodable, Value, named
 from stations.plant.bank import Bank, Busy
 from stations.profile_files import load_profile
 
@@ -72,18 +72,17 @@ def _axis(plant: Plant, axis: Axis, name: str) -> Bank:
 
 def _chamber(plant: Plant, name: str) -> Bank:
     profile, chamber = load_profile(name), plant.fixture.chamber
-    modes = profile.register("mode").enumeration
-    ramps = {"action": profile.register("ramp_action").enumeration["set_point"]}
 
     def mode() -> Value:
-        return modes["automatic" if chamber.running else "off"]
+        return "automatic" if chamber.running else "off"
 
     def command(values: dict[str, Value]) -> None:
         if "mode" in values:
-            if values["mode"] not in {modes["automatic"], modes["off"]}:
+            chosen = named(profile.register("mode"), _number(values, "mode"))
+            if chosen not in {"automatic", "off"}:
                 message = "mode: the simulated chamber knows automatic and off"
                 raise NotEncodable(message)
-            chamber.running = values["mode"] == modes["automatic"]
+            chamber.running = chosen == "automatic"
         if "set_point" in values:
             chamber.set_point = _number(values, "set_point")
         if "ramp_rate" in values:
@@ -92,12 +91,14 @@ def _chamber(plant: Plant, name: str) -> Bank:
     point = profile.register("set_point")
     sources = {
         "part_number": lambda: "TUMBLELINE-SIM",
+        "status": lambda: "static",
+        "decimals": lambda: 1,
         "mode": mode,
         "actual_mode": mode,
         "set_point_low": lambda: point.minimum or 0.0,
         "set_point_high": lambda: point.maximum or 0.0,
         "set_point": lambda: chamber.set_point,
-        "ramp_action": lambda: ramps["action"],
+        "ramp_action": lambda: "set_point",
         "ramp_scale": lambda: "per_minute",
         "ramp_rate": lambda: chamber.ramp_K_min,
         "power": lambda: 100.0 * chamber.power,

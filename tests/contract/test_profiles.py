@@ -13,14 +13,28 @@ from schemas.station import load_station
 from stations.codec import NotEncodable, encode
 from stations.devices.registers import Registers
 from stations.links.modbus import ModbusLink
+from stations.opening import open_station
 from stations.plant.preset import load_preset, preset_names
 from stations.plant.server import PlantServer
 from stations.profile_files import load_profile, profile_names
 
 
+@pytest.fixture(scope="module", params=profile_names())
+def name(request):
+    return request.param
+
+
+def station_with(name):
+    """The built-in station with its device of that kind behind this profile."""
+    config, kind = load_station(), load_profile(name).kind
+    places = {"axis": ("outer", "inner"), "slot": ("slots",)}.get(kind, (kind,))
+    changed = {place: getattr(config.devices, place).model_copy(update={"profile": name}) for place in places}
+    return config.model_copy(update={"devices": config.devices.model_copy(update=changed)})
+
+
 @pytest.fixture(scope="module")
-def served():
-    plant = plant_of(lot=lot_of(2))
+def served(name):
+    plant = plant_of(station_with(name), lot_of(2))
     plant.advance(12_345_678)
     with PlantServer(plant) as server:
         link = ModbusLink(server.host, server.port, timeout_s=5.0, read_attempts=1)
@@ -32,19 +46,16 @@ def devices_of(plant, name):
     return [device_id for device_id, bank in plant.banks.items() if bank.profile.name == name]
 
 
-@pytest.mark.parametrize("name", profile_names())
 def test_profile_names_itself_and_its_source(name):
     profile = load_profile(name)
     assert profile.name == name
     assert profile.source
 
 
-@pytest.mark.parametrize("name", profile_names())
 def test_some_device_of_the_built_in_station_answers_by_the_profile(name, served):
     assert devices_of(served[0], name)
 
 
-@pytest.mark.parametrize("name", profile_names())
 def test_every_readable_register_answers_inside_its_limits(name, served):
     plant, _, link = served
     for device_id in devices_of(plant, name):
@@ -59,7 +70,6 @@ def test_every_readable_register_answers_inside_its_limits(name, served):
                 assert registers.text(register.name) in register.enumeration
 
 
-@pytest.mark.parametrize("name", profile_names())
 def test_read_only_registers_refuse_to_be_written(name, served):
     plant, _, link = served
     device_id = devices_of(plant, name)[0]
@@ -69,7 +79,6 @@ def test_read_only_registers_refuse_to_be_written(name, served):
                 link.write(device_id, register.address, [0] * register.words, register.name)
 
 
-@pytest.mark.parametrize("name", profile_names())
 def test_addresses_beside_the_profile_are_refused(name, served):
     plant, _, link = served
     last = max(r.end for r in load_profile(name).registers)
@@ -77,7 +86,6 @@ def test_addresses_beside_the_profile_are_refused(name, served):
         link.read(devices_of(plant, name)[0], last, 1, "nothing")
 
 
-@pytest.mark.parametrize("name", profile_names())
 def test_values_outside_their_limits_are_refused_before_they_are_sent(name):
     profile = load_profile(name)
     for register in profile.registers:
@@ -93,9 +101,9 @@ def raw_socket(server):
         yield connection
 
 
-def test_words_on_the_wire_are_those_of_the_f4t_low_word_first(served):
-    plant, server, _ = served
-    with raw_socket(server) as connection:  # by hand: no library of either side
+def test_words_on_the_wire_are_those_of_the_f4t_low_word_first():
+    plant = plant_of()
+    with PlantServer(plant) as server, raw_socket(server) as connection:  # by hand: no library of either side
         connection.sendall(struct.pack(">HHHBBHH", 7, 0, 6, 3, 3, 2782, 2))
         answer = connection.recv(64)
     transaction, _, length, device_id, function, size, low, high = struct.unpack(">HHHBBBHH", answer)
@@ -104,12 +112,26 @@ def test_words_on_the_wire_are_those_of_the_f4t_low_word_first(served):
     assert found == plant.fixture.chamber.set_point
 
 
-def test_half_a_register_is_not_written(served):
+def test_half_a_register_is_not_written(name, served):
     plant, _, link = served
-    before = plant.fixture.chamber.set_point
-    with pytest.raises(StationRefused, match="exception 3"):
-        link.write(3, 2782, [0x41C8], "half a set point")
-    assert plant.fixture.chamber.set_point == before
+    device_id = devices_of(plant, name)[0]
+    for register in load_profile(name).registers:
+        if register.access != "read" and register.words > 1:
+            before = [plant.banks[device_id].read(r.address, r.words) for r in load_profile(name).registers]
+            with pytest.raises(StationRefused, match="exception 3"):
+                link.write(device_id, register.address, [0x41C8], f"half of {register.name}")
+            assert before == [plant.banks[device_id].read(r.address, r.words) for r in load_profile(name).registers]
+
+
+def test_chambers_of_every_profile_take_a_set_point_and_tell_it_back():
+    for name in profile_names():
+        if load_profile(name).kind != "chamber":
+            continue
+        lot = lot_of(1)
+        with open_station(station_with(name), lot) as station:
+            station.chamber.set_temperature(-12.3)
+            station.clock.sleep(3600.0)
+            assert station.chamber.temperature() == pytest.approx(-12.3, abs=0.1)
 
 
 PROFILE = """
