@@ -31,17 +31,17 @@ def planned_state(recipe: Recipe) -> State:
     chamber = np.repeat(np.asarray(recipe.temperatures_C), n)
     step = recipe.settle_s + recipe.dwell_s
     time = np.arange(soaks * n) * step + np.repeat(np.arange(soaks) + 1, n) * recipe.soak_min_s
-    wander = np.random.default_rng(0).normal(size=(3, time.size))
+    wander = np.random.default_rng(0).normal(size=(2, time.size))
     gravity = recipe.local_gravity_m_s2 / STANDARD_GRAVITY_M_S2
     return State(
         force=gravity * force_from_angles(outer, inner),
         time=time,
-        temperature=chamber + 0.05 * wander[0],
+        temperature=chamber,
         chamber=chamber,
         since_power=time,
-        since_move=np.full(time.size, recipe.settle_s) * (1.0 + 0.05 * wander[2]),
+        since_move=np.full(time.size, recipe.settle_s) * (1.0 + 0.05 * wander[0]),
         supply=NOMINAL_SUPPLY_V + SUPPLY_WANDER_V * wander[1],
-        vibration=QUIET_G * (1.0 + 0.1 * np.abs(wander[2])),
+        vibration=QUIET_G * (1.0 + 0.1 * np.abs(wander[0])),
         outer=outer,
         inner=inner,
         slot=np.zeros(()),

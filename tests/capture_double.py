@@ -1,15 +1,17 @@
 """A capture without a station: physics of a lot in a few lines, deterministic per record, with faults on request."""
 
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pandas as pd
 
 from inertial.frames import force_from_angles
-from pipelines.archive import Records
-from pipelines.job import Job
+from pipelines.archive import Archive, Records, Run
+from pipelines.job import Job, Request
 from pipelines.progress import Progress
+from pipelines.runner import Runner
 from schemas.recipe import Pose, Recipe
 
 LSB_PER_G = 256000.0
@@ -153,13 +155,37 @@ device = "adxl355"
 units = ["A1", "A2", "A3"]
 seed = 5
 local_gravity_m_s2 = 9.8123
-poses = "eighteen"
+poses = "nine"
 verification = [[35.0, 15.0], [105.0, -100.0]]
-temperatures_C = [0.0, 25.0, 50.0]
+temperatures_C = [0.0, 50.0]
 settle_s = 2.0
-dwell_s = 2.0
+dwell_s = 1.0
 rate_hz = 100.0
-static_record_s = 60.0
+static_record_s = 30.0
 effects = ["bias", "scale", "misalignment", "bias_temperature", "scale_temperature"]
 limits = "consumer"
 """
+
+
+def recipe_file(folder: Path, *changes: tuple[str, str], name: str = "small.toml") -> str:
+    """Path of the small recipe in a folder, with pieces of its text replaced."""
+    text = SMALL
+    for old, new in changes:
+        if old not in text:
+            raise ValueError(old)
+        text = text.replace(old, new)
+    path = folder / name
+    path.write_text(text, encoding="utf-8")
+    return str(path)
+
+
+def small_job(folder: Path, *changes: tuple[str, str], **request: Any) -> Job:
+    """The job of the small recipe."""
+    return Request(recipe=recipe_file(folder, *changes), **request).job()
+
+
+def small_run(folder: Path, faults: dict[str, str] | None = None, *changes: tuple[str, str]) -> Run:
+    """A finished run of the small recipe in an archive of its own."""
+    runner = Runner(small_job(folder, *changes), Archive(folder / "archive"), measure=CaptureDouble(faults or {}))
+    list(runner.all())
+    return runner.run

@@ -177,7 +177,7 @@ def _explained_by_force(rows: pd.DataFrame) -> NDArray[np.float64]:
         np.radians(rows["inner_deg"].to_numpy()),
     )
     soaks = (rows["soak"].to_numpy()[:, None] == np.unique(rows["soak"].to_numpy())).astype(float)
-    output = np.nan_to_num(rows[list(AXES)].to_numpy(dtype=float))
+    output = np.nan_to_num(rows[list(AXES)].to_numpy(dtype=float), posinf=0.0, neginf=0.0)
     inside = output - soaks @ np.linalg.lstsq(soaks, output, rcond=None)[0]
     design = np.column_stack([force, soaks])
     left = output - design @ np.linalg.lstsq(design, output, rcond=None)[0]

@@ -1,0 +1,135 @@
+"""Bad input and trouble, from the recipe to the result: one message, nobody else harmed, nothing issued for refused data."""
+
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+from capture_double import CaptureDouble, PulledPlug, small_job, small_run
+from typer.testing import CliRunner
+
+from pipelines.archive import Archive, Run
+from pipelines.cli import app
+from pipelines.cli.summary import exit_status, summary
+from pipelines.export import unit_calibrations
+from pipelines.report import render
+from pipelines.runner import Runner
+from schemas.errors import DataRejected, WrongUse
+
+TABLES_OF_RESULTS = ("dwells", "coefficients", "covariance", "residuals", "verification", "allan", "noise", "figures")
+
+
+@pytest.fixture(scope="module")
+def spoilt(tmp_path_factory: pytest.TempPathFactory) -> Run:
+    """A run in which A2 falls silent."""
+    return small_run(tmp_path_factory.mktemp("spoilt"), {"A2": "silent"})
+
+
+@pytest.fixture(scope="module")
+def sound(tmp_path_factory: pytest.TempPathFactory) -> Run:
+    """The same lot without trouble."""
+    return small_run(tmp_path_factory.mktemp("sound"))
+
+
+def test_a_unit_that_falls_silent_is_reported_and_the_others_go_on(spoilt: Run) -> None:
+    grades = spoilt.table("grades").set_index("unit")
+    assert grades["outcome"].to_dict() == {"A1": "pass", "A2": "refused", "A3": "pass"}
+    assert "stopped answering at record 3" in grades.loc["A2", "reasons"]
+
+
+def test_the_others_get_what_they_would_have_got(spoilt: Run, sound: Run) -> None:
+    wanted = sound.table("coefficients").query("unit != 'A2'").reset_index(drop=True)
+    pd.testing.assert_frame_equal(spoilt.table("coefficients"), wanted, rtol=1e-9)
+
+
+@pytest.mark.parametrize("table", TABLES_OF_RESULTS)
+def test_refused_data_never_have_a_result(spoilt: Run, table: str) -> None:
+    assert "A2" not in set(spoilt.table(table)["unit"])
+
+
+def test_refused_data_never_have_a_grade(spoilt: Run) -> None:
+    grades = spoilt.table("grades").set_index("unit")
+    assert grades.loc["A2", "grade"] == "none"
+
+
+def test_refused_data_are_never_exported(spoilt: Run) -> None:
+    with pytest.raises(WrongUse, match="the data of unit A2 were refused"):
+        unit_calibrations(spoilt, ("A2",), failed=True)
+    assert [c.unit for c in unit_calibrations(spoilt, (), failed=True)] == ["A1", "A3"]
+
+
+def test_the_report_names_the_refused_unit_and_gives_it_no_number(spoilt: Run) -> None:
+    page = render(spoilt)
+    assert "stopped answering at record 3" in page
+    assert 'id="A2"' not in page
+
+
+def test_a_lot_with_a_refused_unit_leaves_with_status_1(spoilt: Run, sound: Run) -> None:
+    assert exit_status(summary(spoilt)) == 1
+    assert exit_status(summary(sound)) == 0
+
+
+def test_a_lot_in_which_every_unit_is_refused_has_a_result_too(tmp_path: Path) -> None:
+    run = small_run(tmp_path, {"A1": "stuck", "A2": "nan", "A3": "dead"})
+    assert set(run.table("grades")["outcome"]) == {"refused"}
+    assert run.report.is_file()
+    with pytest.raises(WrongUse, match="no unit of run"):
+        unit_calibrations(run, (), failed=True)
+
+
+def test_a_station_that_delivers_no_time_is_refused(tmp_path: Path) -> None:
+    job = small_job(tmp_path)
+    records = Archive(tmp_path / "archive").capture(job.capture_id)
+    double = CaptureDouble()
+    samples, readings, history = double.record(job, 0, "dwell", 0, 0.0, job.recipe.poses[0])
+    samples.loc[5, "time_s"] = np.nan
+    with pytest.raises(DataRejected, match=r"samples: row 5 \(unit A1\), column time_s"):
+        records.put(0, samples, readings, history, b"")
+    assert records.finished() == set()
+
+
+@pytest.mark.parametrize("stop_after", [0, 1, 7, 22])
+def test_a_capture_that_was_cut_off_goes_on_and_ends_the_same(tmp_path: Path, sound: Run, stop_after: int) -> None:
+    archive, job = Archive(tmp_path / "archive"), small_job(tmp_path)
+    with pytest.raises(PulledPlug):
+        list(Runner(job, archive, measure=CaptureDouble(stop_after=stop_after)).all())
+    second = CaptureDouble()
+    runner = Runner(job, archive, measure=second)
+    list(runner.all())
+    assert len(second.measured) == job.recipe.wanted_records - stop_after
+    for name in sound.tables():
+        assert (runner.run.path / f"{name}.parquet").read_bytes() == (sound.path / f"{name}.parquet").read_bytes()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words", "status"),
+    [
+        (["run", "nosuch"], "no built-in recipe is called 'nosuch'", 2),
+        (["run", "production", "--units", "A,A"], "serial A is there twice", 2),
+        (["run", "production", "--units", ","], "serial '' is", 2),
+        (["run", "production", "--station", "none.toml"], "none.toml cannot be read", 2),
+        (["show", "nosuch"], "there is no run yet", 2),
+        (["export", "nosuch"], "there is no run yet", 2),
+        (["export", "--format", "hex"], "no format is called 'hex'", 2),
+    ],
+)
+def test_wrong_use_is_one_message_and_status_2(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, arguments: list[str], words: str, status: int
+) -> None:
+    from pipelines.cli import main
+
+    monkeypatch.setattr("sys.argv", ["tumbleline", *arguments, "--archive", str(tmp_path / "archive")])
+    with pytest.raises(SystemExit) as left:
+        main()
+    told = capsys.readouterr()
+    assert left.value.code == status
+    assert told.out == ""
+    assert words in told.err
+    assert "Traceback" not in told.err
+    assert len(told.err.strip().splitlines()) == 1
+
+
+def test_an_archive_that_cannot_be_written_is_told_before_anything_is_measured(tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("")
+    result = CliRunner().invoke(app, ["run", "--direct", "--archive", str(tmp_path / "file")])
+    assert "cannot be written" in str(result.exception)

@@ -1,0 +1,72 @@
+"""Limits, decision rules and grades."""
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from pipelines.recipes import sample_names
+from schemas.errors import RecipeInvalid
+from schemas.limits import GRADES, Limits, decide, grade_of, parse_limits
+
+TEXT = """
+name = "test"
+rule = "{rule}"
+[figures]
+bias_error_ug = {{ max = 100.0, unit = "µg" }}
+"""
+
+
+def limits(rule: str = "guarded_acceptance") -> Limits:
+    return parse_limits(TEXT.format(rule=rule), "limits test")
+
+
+@pytest.mark.parametrize(
+    ("value", "guarded", "simple"),
+    [
+        (80.0, "pass", "pass"),
+        (95.0, "conditional pass", "pass"),
+        (105.0, "conditional fail", "fail"),
+        (115.0, "fail", "fail"),
+        (-115.0, "fail", "fail"),
+    ],
+)
+def test_decides_by_the_agreed_rule(value: float, guarded: str, simple: str) -> None:
+    assert decide(limits(), "bias_error_ug", value, 5.0).outcome == guarded
+    assert decide(limits("simple_acceptance"), "bias_error_ug", value, 5.0).outcome == simple
+
+
+def test_names_value_uncertainty_limit_margin_and_rule() -> None:
+    decision = decide(limits(), "bias_error_ug", 130.0, 5.0)
+    assert decision.sentence == "bias_error_ug fail: 130 ± 10 µg, limit 100 µg, margin -30 µg"
+    assert decision.rule == "ILAC-G8:09/2019 guarded acceptance, w = U with k = 2"
+
+
+def test_refuses_a_limit_in_another_unit_than_its_figure() -> None:
+    with pytest.raises(RecipeInvalid, match="the limit is in mg, the figure is in µg"):
+        parse_limits(TEXT.format(rule="simple_acceptance").replace('"µg"', '"mg"'), "limits test")
+
+
+def test_names_close_figures() -> None:
+    with pytest.raises(RecipeInvalid, match="did you mean bias_error_ug"):
+        parse_limits(TEXT.format(rule="simple_acceptance").replace("bias_error_ug", "bias_eror_ug"), "limits test")
+
+
+def test_names_the_rules_where_one_is_unknown() -> None:
+    with pytest.raises(RecipeInvalid, match=r"rule.*guarded_acceptance"):
+        limits("none")
+
+
+@pytest.mark.parametrize(("value", "grade"), [(30.0, "navigation"), (150.0, "industrial"), (700.0, "consumer"), (1500.0, None)])
+def test_grades_by_the_bias_that_is_left(value: float, grade: str | None) -> None:
+    assert grade_of(value, 0.0, "guarded_acceptance") == grade
+
+
+@given(st.floats(0.0, 3000.0), st.floats(0.0, 500.0))
+def test_uncertainty_never_raises_a_grade(value: float, expanded: float) -> None:
+    order = [*GRADES, None]
+    sure, unsure = (grade_of(value, u, "guarded_acceptance") for u in (0.0, expanded))
+    assert order.index(unsure) >= order.index(sure)
+
+
+def test_there_are_limits_for_every_grade() -> None:
+    assert set(sample_names("limits-")) == set(GRADES)

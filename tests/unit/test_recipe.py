@@ -1,0 +1,170 @@
+"""Recipes: what is accepted, and that what is refused names the key and what to do."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from capture_double import recipe_file, small_job
+
+from pipelines.job import Request
+from pipelines.recipes import load_recipe, sample_names
+from schemas.errors import RecipeInvalid, WrongUse
+
+POSES = 'poses = "nine"'
+
+
+def refusal(folder: Path, *changes: tuple[str, str]) -> str:
+    with pytest.raises(RecipeInvalid) as caught:
+        small_job(folder, *changes)
+    return str(caught.value)
+
+
+@pytest.mark.parametrize("name", sample_names())
+def test_every_built_in_recipe_makes_a_job(name: str) -> None:
+    job = Request(recipe=name).job()
+    assert job.recipe.soak_min_s >= 900.0
+
+
+def test_the_main_job_is_the_one_of_the_figures() -> None:
+    recipe = load_recipe()
+    assert len(recipe.units) == 8
+    assert (len(recipe.poses), len(recipe.verification), len(recipe.temperatures_C)) == (24, 6, 3)
+    assert recipe.static_record_s == 1200.0
+
+
+def test_names_the_key_and_close_matches_of_a_typo(tmp_path: Path) -> None:
+    text = refusal(tmp_path, ("temperatures_C =", "temperature_C ="))
+    assert "unknown key 'temperature_C'" in text
+    assert "did you mean temperatures_C" in text
+
+
+def test_names_a_missing_key(tmp_path: Path) -> None:
+    assert "local_gravity_m_s2" in refusal(tmp_path, ("local_gravity_m_s2 = 9.8123\n", ""))
+
+
+def test_never_assumes_gravity(tmp_path: Path) -> None:
+    text = refusal(tmp_path, ("9.8123", "1.0"))
+    assert "local_gravity_m_s2" in text
+    assert "9.7" in text
+
+
+def test_names_close_plans(tmp_path: Path) -> None:
+    assert "did you mean fibonacci24" in refusal(tmp_path, (POSES, 'poses = "fibonaci24"'))
+
+
+def test_names_close_effects(tmp_path: Path) -> None:
+    assert "did you mean misalignment" in refusal(tmp_path, ('"misalignment"', '"misalignement"'))
+
+
+def test_names_close_limits(tmp_path: Path) -> None:
+    assert "did you mean consumer" in refusal(tmp_path, ('limits = "consumer"', 'limits = "consumr"'))
+
+
+def test_names_close_recipes() -> None:
+    with pytest.raises(RecipeInvalid, match="did you mean production"):
+        load_recipe("produktion")
+
+
+def test_refuses_poses_that_never_turn_z_over(tmp_path: Path) -> None:
+    text = refusal(tmp_path, (POSES, "poses = [[70, 0], [90, 90], [80, 180], [90, -90], [85, 45]]"))
+    assert text == "fit: poses span 0.34 g on z, the recipe needs 1.5 g; add poses with z up and z down"
+
+
+def test_refuses_temperatures_beyond_the_chamber(tmp_path: Path) -> None:
+    text = refusal(tmp_path, ("[0.0, 50.0]", "[0.0, 150.0]"))
+    assert "temperatures_C" in text
+    assert "150 °C" in text
+    assert "-40 to 85 °C" in text
+
+
+def test_refuses_angles_beyond_the_table(tmp_path: Path) -> None:
+    assert "poses (inner)" in refusal(tmp_path, ("[105.0, -100.0]", "[105.0, -1000.0]"))
+
+
+def test_refuses_a_short_soak_unless_somebody_answers_for_it(tmp_path: Path) -> None:
+    text = refusal(tmp_path, ("settle_s = 2.0", "settle_s = 2.0\nsoak_min_s = 60.0"))
+    assert "60 s" in text
+    assert "900 s" in text
+    small_job(tmp_path, ("settle_s = 2.0", "settle_s = 2.0\nsoak_min_s = 60.0\nallow_short_soak = true"))
+
+
+def test_refuses_too_few_samples(tmp_path: Path) -> None:
+    assert "50 samples per pose" in refusal(tmp_path, ("dwell_s = 1.0", "dwell_s = 0.5"))
+
+
+def test_refuses_verification_where_the_fit_has_been(tmp_path: Path) -> None:
+    text = refusal(tmp_path, ("[35.0, 15.0]", "[0.2, 15.0]"))
+    assert "pose v1 lies 0.20° from pose p" in text
+
+
+def test_refuses_a_model_that_the_plan_cannot_determine(tmp_path: Path) -> None:
+    text = refusal(tmp_path, ('"scale_temperature"]', '"scale_temperature", "gravity_value"]'))
+    assert "gravity_value" in text
+
+
+def test_refuses_temperature_terms_from_one_temperature(tmp_path: Path) -> None:
+    assert "bias_temperature" in refusal(tmp_path, ("[0.0, 50.0]", "[25.0]"))
+
+
+def test_refuses_limits_that_the_recipe_cannot_serve(tmp_path: Path) -> None:
+    assert "needs a static record" in refusal(tmp_path, ("static_record_s = 30.0", "static_record_s = 0.0"))
+    assert "needs verification poses" in refusal(
+        tmp_path, ("verification = [[35.0, 15.0], [105.0, -100.0]]", "verification = []")
+    )
+
+
+def test_refuses_a_serial_that_is_there_twice(tmp_path: Path) -> None:
+    with pytest.raises(WrongUse, match="serial A1 is there twice"):
+        small_job(tmp_path, units=("A1", "A2", "A1"))
+    assert "A1 is there twice" in refusal(tmp_path, ('["A1", "A2", "A3"]', '["A1", "A1"]'))
+
+
+def test_refuses_an_empty_lot(tmp_path: Path) -> None:
+    with pytest.raises(WrongUse, match="no unit is named"):
+        small_job(tmp_path, ('units = ["A1", "A2", "A3"]\n', ""))
+
+
+def test_refuses_an_empty_serial(tmp_path: Path) -> None:
+    with pytest.raises(WrongUse, match="serial '' is not usable"):
+        small_job(tmp_path, units=("A1", ""))
+
+
+def test_refuses_more_units_than_slots(tmp_path: Path) -> None:
+    with pytest.raises(WrongUse, match="9 units, the fixture has 8 slots"):
+        small_job(tmp_path, units=tuple(f"S{n}" for n in range(9)))
+
+
+def test_says_where_toml_breaks(tmp_path: Path) -> None:
+    assert "line 2" in refusal(tmp_path, ('name = "small"\n', 'name = "small\n'))
+
+
+def test_takes_poses_as_angles(tmp_path: Path) -> None:
+    angles = "poses = [[0, 0], [180, 0], [90, 0], [90, 90], [90, 180], [90, -90]]"
+    job = small_job(tmp_path, (POSES, angles))
+    assert [pose.name for pose in job.recipe.poses] == ["p1", "p2", "p3", "p4", "p5", "p6"]
+    assert np.isclose(job.recipe.poses[3].inner_deg, 90.0)
+
+
+def test_takes_the_model_from_a_file(tmp_path: Path) -> None:
+    model = '[model]\nname = "line"\nversion = 2\neffects = ["bias", "scale"]\n'
+    change = '[[change]]\nversion = 2\neffect = "scale"\nby = "QA"\nat = 2026-01-02\nwhy = "needed"\n'
+    (tmp_path / "line.toml").write_text(model + change, encoding="utf-8")
+    effects = 'effects = ["bias", "scale", "misalignment", "bias_temperature", "scale_temperature"]'
+    limits = '[figures]\nresidual_rms_ug = { max = 1e5, unit = "µg" }\n'
+    (tmp_path / "wide.toml").write_text('name = "wide"\n' + limits, encoding="utf-8")
+    changes = (effects, 'model = "line.toml"'), ('limits = "consumer"', 'limits = "wide.toml"')
+    recipe = small_job(tmp_path, *changes).recipe
+    assert (recipe.model_name, recipe.model_version, recipe.effects) == ("line", 2, ["bias", "scale"])
+
+
+def test_the_capture_is_shared_by_recipes_that_differ_in_the_model_only(tmp_path: Path) -> None:
+    one = small_job(tmp_path)
+    other = small_job(tmp_path, ('"scale_temperature"]', '"scale_temperature", "second_order"]'))
+    hotter = small_job(tmp_path, ("[0.0, 50.0]", "[0.0, 51.0]"))
+    assert one.capture_id == other.capture_id
+    assert one.capture_id != hotter.capture_id
+
+
+def test_a_fresh_measurement_is_a_capture_of_its_own(tmp_path: Path) -> None:
+    path = recipe_file(tmp_path)
+    assert Request(recipe=path).job().capture_id != Request(recipe=path, repeat=1).job().capture_id
