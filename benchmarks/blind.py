@@ -117,7 +117,11 @@ def one(job: Job) -> tuple[Job, Score, dict[str, Any], dict[str, Any]]:
     """The score of one job, with the document and the truth for those who look into failures."""
     run = case(job.scenario, job.index, job.seed)
     begin = time.perf_counter()
-    document, fresh = method(job.method)(run)
+    try:
+        document, fresh = method(job.method)(run)
+    except Exception as problem:
+        problem.add_note(f"blind: in {job.scenario}[{job.index}] of seed {job.seed}: {run.sealed.spec}")
+        raise
     seconds = time.perf_counter() - begin
     return (
         job,
