@@ -55,6 +55,11 @@ def play(signal: ArrayLike, half_width: float, start: float = 0.0) -> Array:
     return out
 
 
+def play_memory(signal: ArrayLike, half_width: float) -> Array:
+    """How much of the unknown state before the first point a play still holds, (..., m): 1 at first, 0 once it was taken up."""
+    return 0.5 * (play(signal, half_width, start=1.0) - play(signal, half_width, start=-1.0))
+
+
 def relaxation(time: ArrayLike, age: ArrayLike, kick: ArrayLike, tau: float) -> Array:
     """What is left, at each time, of all kicks so far: Σ kickₖ·exp(−(t − tₖ)/τ), (..., m).
 

@@ -91,7 +91,7 @@ class State:
         if self.temperature is None:
             return None
         if self.history is not None:
-            return _at_dwells(self.history.time, 60.0 * _slope(self.history.time, self.history.temperature), self.time)
+            return 60.0 * _smooth_slope(self.history.time, self.history.temperature, self.time)
         return 60.0 * _slope(self.time, self.temperature)
 
     @cached_property
@@ -162,6 +162,23 @@ def _slope(time: Array, values: Array) -> Array:
     t_before = np.concatenate([t[..., :1], t[..., :-1]], axis=-1)
     t_after = np.concatenate([t[..., 1:], t[..., -1:]], axis=-1)
     return (after - before) / np.maximum(t_after - t_before, 1e-9)
+
+
+_RATE_WINDOW = 60.0
+"""Half width in s over which a history's slope is taken: the noise of a thermometer read every few seconds is no rate."""
+
+
+def _smooth_slope(grid: Array, values: Array, time: Array) -> Array:
+    """Slope of the straight line through the values (..., m) within the window about each of the times (..., n), per s."""
+    step = float(np.median(np.diff(grid)))
+    half = max(1, round(_RATE_WINDOW / step))
+    offset = np.arange(-half, half + 1) * step
+    weights = offset / np.sum(offset**2)
+    padded = np.concatenate(
+        [np.repeat(values[..., :1], half, axis=-1), values, np.repeat(values[..., -1:], half, axis=-1)], axis=-1
+    )
+    slopes = np.apply_along_axis(lambda v: np.convolve(v, weights[::-1], mode="valid"), -1, padded)
+    return _at_dwells(grid, slopes, time)
 
 
 def _at_dwells(grid: Array, values: Array, time: Array) -> Array:

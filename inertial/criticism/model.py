@@ -53,6 +53,7 @@ class Model:
     def local(self) -> Array:
         """Rotated columns with coefficients by block, (blocks, n, p)."""
         found = [self._of(t) for t in self.terms if t.effect.scope != "station"]
+        found += [self.problem.start(t.effect, t.keywords) for t in self.terms if t.effect.scope != "station"]
         found += [self._loose(t) for t in self.terms if t.loose and t.effect.scope != "station"]
         if self._curves is not None:
             found.append(self._curves)
@@ -66,6 +67,7 @@ class Model:
         found = [self._of(t) for t in self.terms if t.effect.scope == "station"]
         if not found:
             return np.zeros((self.problem.blocks, self.problem.n, 0))
+        found += [self.problem.start(t.effect, t.keywords) for t in self.terms if t.effect.scope == "station"]
         return np.concatenate(found, axis=-1)
 
     def _of(self, term: Term) -> Array:

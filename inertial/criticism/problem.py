@@ -8,7 +8,6 @@ from itertools import product
 import numpy as np
 from numpy.typing import NDArray
 
-from inertial import design
 from inertial.criticism.noise import Basis, basis
 from inertial.criticism.space import Candidate
 from inertial.effects import SensorEffect
@@ -60,7 +59,8 @@ class Problem:
         self.n = n
         time = lot.state.time if lot.radial else np.repeat(lot.state.time, 3, axis=0)
         self.basis: Basis = basis(time, self._error())
-        self.y = self.basis.rotate(self._series()[..., None])[..., 0]
+        self.series = self._series()
+        self.y = self.basis.rotate(self.series[..., None])[..., 0]
         self._kept: dict[tuple[object, ...], Candidate] = {}
         self._room = _CACHE
 
@@ -88,15 +88,34 @@ class Problem:
 
     def columns(self, effect: AnyEffect, values: dict[str, float]) -> Array:
         """Columns of an effect by block, (blocks, n, p), g per unit of the coefficient; radial lots join the axes' columns."""
-        state = self.lot.state
         if isinstance(effect, SensorEffect):
-            axes = [effect.columns(state, axis, **values) for axis in range(3)]
-            axes = [np.broadcast_to(a, (*state.time.shape, a.shape[-1])) for a in axes]
-            if self.lot.radial:
-                weighted = [a * self._direction[..., i, None] for i, a in enumerate(axes)]
-                return np.concatenate(weighted, axis=-1)
-            return np.stack(axes, axis=1).reshape(self.blocks, self.n, -1)
-        seen = design.shared_columns([effect], state, {effect.id: values}, self.lot.response)
+            return self._by_axis([effect.columns(self.lot.state, axis, **values) for axis in range(3)])
+        return self._by_force(effect.force_change(self.lot.state, **values))
+
+    def start(self, effect: AnyEffect, values: dict[str, float]) -> Array:
+        """Rotated columns (blocks, n, k) of the unknown state of an effect's memory before the first dwell."""
+        if isinstance(effect, SensorEffect):
+            columns = self._by_axis([effect.start_columns(self.lot.state, axis, **values) for axis in range(3)])
+        else:
+            columns = self._by_force(effect.start_change(self.lot.state, **values))
+        # a state taken up before the second dwell leaves a column of one dwell only: it is kept, the dwell tells nothing then
+        return self.basis.rotate(columns) if columns.shape[-1] else columns
+
+    def _by_axis(self, axes: list[Array]) -> Array:
+        """Columns of three axes, each (units or 1, n, p), by block."""
+        state = self.lot.state
+        axes = [np.broadcast_to(a, (*state.time.shape, a.shape[-1])) for a in axes]
+        if self.lot.radial:
+            weighted = [a * self._direction[..., i, None] for i, a in enumerate(axes)]
+            return np.concatenate(weighted, axis=-1)
+        return np.stack(axes, axis=1).reshape(self.blocks, self.n, -1)
+
+    def _by_force(self, change: Array) -> Array:
+        """Changes of force (units or 1, n, 3, q) seen through every unit's response, by block."""
+        state = self.lot.state
+        seen = np.einsum(
+            "uij,unjq->uinq", self.lot.response, np.broadcast_to(change, (*state.force.shape, change.shape[-1]))
+        )
         seen = np.broadcast_to(seen, (state.time.shape[0], 3, self.n, seen.shape[-1]))
         if self.lot.radial:
             return np.einsum("uni,uinq->unq", self._direction, seen)

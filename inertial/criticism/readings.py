@@ -68,9 +68,9 @@ def robust_fit(force: Array, output: Array) -> Array:
     x = np.concatenate([np.ones((int(there.sum()), 1)), force[there]], axis=-1)
     y = output[there]
     weight = np.ones(len(y))
-    found: Array = np.zeros((4, 3))
+    found = np.zeros((4, 3))
     for turn in range(_ROUNDS):
-        found = np.asarray(np.linalg.lstsq(x * weight[:, None], y * weight[:, None], rcond=1e-9)[0])
+        found = np.linalg.lstsq(x * weight[:, None], y * weight[:, None], rcond=1e-9)[0].astype(np.float64)
         size = np.linalg.norm(y - x @ found, axis=1)
         middle = float(np.median(size))
         if middle <= 0.0:

@@ -30,6 +30,15 @@ class Backlash(StationEffect):
         sides = [_side(outer)[..., None] * about_outer, _side(inner)[..., None] * about_inner]
         return np.stack(sides, axis=-1)
 
+    def start_change(self, state: State, **nonlinear: float) -> Array:
+        del nonlinear
+        outer, inner = state.need("outer", self.id), state.need("inner", self.id)
+        force = frames.force_from_angles(outer, inner)
+        about_outer = frames.to_fixture((0.0, 1.0, 0.0), outer, inner)
+        about_inner = np.stack([force[..., 1], -force[..., 0], np.zeros_like(inner)], axis=-1)
+        memory = [operators.play_memory(angle, _PLAY_RAD)[..., None] for angle in (outer, inner)]
+        return np.stack([memory[0] * about_outer, memory[1] * about_inner], axis=-1)
+
     def names(self) -> tuple[str, ...]:
         return "backlash_outer", "backlash_inner"
 

@@ -112,6 +112,11 @@ class SensorEffect(Effect):
     def names(self, axis: int) -> tuple[str, ...]:
         """Names of the p coefficients of one axis."""
 
+    def start_columns(self, state: State, axis: int, **nonlinear: float) -> Array:
+        """What the state of a memory before the first dwell would add, (..., n, k); k = 0 without memory."""
+        del axis, nonlinear
+        return np.zeros((*state.time.shape, 0))
+
 
 class StationEffect(Effect):
     """An effect of the station: changes the specific force itself, by parameters that all units of a run share."""
@@ -125,6 +130,11 @@ class StationEffect(Effect):
     @abstractmethod
     def names(self) -> tuple[str, ...]:
         """Names of the q parameters."""
+
+    def start_change(self, state: State, **nonlinear: float) -> Array:
+        """What the state of a memory before the first dwell would add to the force: (..., n, 3, k); k = 0 without memory."""
+        del nonlinear
+        return np.zeros((*state.force.shape, 0))
 
 
 AnyEffect = SensorEffect | StationEffect

@@ -30,6 +30,10 @@ class CreepAfterMove(SensorEffect):
         )
         return stack(state, [left])
 
+    def start_columns(self, state: State, axis: int, *, tau: float, **nonlinear: float) -> Array:
+        del axis, nonlinear
+        return stack(state, [np.exp(-(state.time - state.time[..., :1]) / tau)])
+
     def names(self, axis: int) -> tuple[str, ...]:
         del axis
         return ("kC",)

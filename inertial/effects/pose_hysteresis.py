@@ -27,6 +27,10 @@ class PoseHysteresis(SensorEffect):
         inside = state.remember((self.id, axis, half_width), lambda: operators.play(state.force[..., axis], half_width))
         return stack(state, [inside])
 
+    def start_columns(self, state: State, axis: int, *, half_width: float, **nonlinear: float) -> Array:
+        del nonlinear
+        return stack(state, [operators.play_memory(state.force[..., axis], half_width)])
+
     def names(self, axis: int) -> tuple[str, ...]:
         del axis
         return ("kP",)

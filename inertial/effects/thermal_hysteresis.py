@@ -30,6 +30,15 @@ class ThermalHysteresis(SensorEffect):
         inside = state.temperature_operator((self.id, half_width), hysteresis)
         return stack(state, [inside])
 
+    def start_columns(self, state: State, axis: int, *, half_width: float, **nonlinear: float) -> Array:
+        del axis, nonlinear
+
+        def memory(time: Array, temperature: Array) -> Array:
+            del time
+            return operators.play_memory(temperature, half_width)
+
+        return stack(state, [state.temperature_operator((self.id, "start", half_width), memory)])
+
     def names(self, axis: int) -> tuple[str, ...]:
         del axis
         return ("kH",)

@@ -2,6 +2,8 @@
 
 from typing import ClassVar
 
+import numpy as np
+
 from inertial import operators
 from inertial.effects.base import Array, Nonlinear, SensorEffect, stack
 from inertial.state import State
@@ -29,6 +31,10 @@ class ThermalLag(SensorEffect):
 
         behind = state.temperature_operator((self.id, tau), lag)
         return stack(state, [behind, behind * (state.need("theta", self.id))])
+
+    def start_columns(self, state: State, axis: int, *, tau: float, **nonlinear: float) -> Array:
+        del axis, nonlinear
+        return stack(state, [np.exp(-(state.time - state.time[..., :1]) / tau)])
 
     def names(self, axis: int) -> tuple[str, ...]:
         del axis

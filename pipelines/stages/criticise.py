@@ -7,10 +7,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from inertial import effects as catalogue
-from inertial.criticism.diagnosis import Diagnosis, diagnose as diagnose_lot
+from inertial.criticism.diagnosis import Diagnosis
+from inertial.criticism.diagnosis import diagnose as diagnose_lot
 from inertial.criticism.faults import Fault, find_faults
 from inertial.criticism.proposals import proposals
 from inertial.errors import InertialError
+from pipelines.stages.compare import compare
 from pipelines.stages.measured import Measured, lot_of, measured
 from schemas.errors import DataRejected
 
@@ -18,6 +20,8 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     import pandas as pd
+
+__all__ = ["compare", "default_model", "diagnose", "document", "examined"]
 
 MICRO = 1e6
 DEFAULT = ("bias", "scale", "misalignment")

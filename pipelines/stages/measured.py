@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -177,15 +177,19 @@ def _history(history: pd.DataFrame, units: tuple[str, ...], time: Array) -> Hist
     return History(grid, np.stack(series))
 
 
-def lot_of(found: Measured) -> Lot:
+def lot_of(found: Measured, like: Measured | None = None) -> Lot:
     """The lot in g: outputs over a nominal scale, white standard errors, normalised response.
 
     Where only the norm of gravity is known, a nine-parameter fit gives the directions, and the lot is radial.
+
+    Parameters
+    ----------
+    like : the run whose nominal scale and response are used: coefficients of one run apply to another only so
     """
     readings = found.readings
     if found.reference == "norm":
-        return _radial(found)
-    coefficients = readings.fits
+        return _radial(found, like or found)
+    coefficients = (like or found).readings.fits
     scale = np.abs(np.diagonal(coefficients[:, :, 1:], axis1=1, axis2=2))
     scale = np.where(scale > 0.0, scale, 1.0)
     response = coefficients[:, :, 1:] / scale[:, :, None]
@@ -210,14 +214,14 @@ def _white_error(readings: Readings, scale: Array, output: Array) -> Array:
     return np.broadcast_to(np.maximum(pooled, 1e-12), readings.output.shape)
 
 
-def _radial(found: Measured) -> Lot:
+def _radial(found: Measured, like: Measured) -> Lot:
     from inertial.fits.ellipsoid import fit_ellipsoid
 
     readings = found.readings
     forces, outputs, errors = [], [], []
     for unit in range(len(found.units)):
         there = readings.there[unit]
-        fit = fit_ellipsoid(readings.output[unit, there])
+        fit = fit_ellipsoid(like.readings.output[unit, like.readings.there[unit]])
         corrected = np.zeros((there.size, 3))
         corrected[there] = fit.apply(readings.output[unit, there])
         size = np.linalg.norm(corrected, axis=1, keepdims=True)
