@@ -1,0 +1,82 @@
+"""A lot whose outputs wander between dwells: the errors of the coefficients are what they say."""
+
+import numpy as np
+import pytest
+
+from inertial import poses
+from inertial.errors import NotIdentified
+from inertial.fits.linear import fit_lot
+from inertial.fits.wander import fit_lot_with_wander
+from inertial.frames import force_from_angles
+from inertial.noise import generate
+from inertial.state import State
+
+EFFECTS = ("bias", "scale", "misalignment")
+UNITS, DWELLS, WHITE = 60, 48, 1e-5
+
+
+@pytest.fixture
+def plan() -> State:
+    angles = np.radians(poses.plan("fibonacci24"))
+    force = np.tile(force_from_angles(angles[:, 0], angles[:, 1]), (2, 1))
+    return State(force=force, time=np.arange(float(DWELLS)) * 30.0)
+
+
+def outputs(rng: np.random.Generator, plan: State, flicker: float, walk: float) -> np.ndarray:
+    shape = (UNITS, 3, 40 * DWELLS)  # long before the first dwell: the wander has no beginning
+    wander = generate.flicker(rng, shape, flicker)[..., -DWELLS:]
+    wander = wander + generate.random_walk(rng, (UNITS, 3, DWELLS), walk, 1.0)
+    noise = WHITE * rng.normal(size=(UNITS, DWELLS, 3))
+    return plan.force + np.swapaxes(wander, -1, -2) + noise
+
+
+def pulls(coefficients: np.ndarray, errors: np.ndarray) -> np.ndarray:
+    return (coefficients - [0.0, 1.0, 0.0, 0.0])[..., 1:] / errors[..., 1:]
+
+
+@pytest.mark.parametrize(("flicker", "walk"), [(1e-4, 0.0), (0.0, 3e-5), (1e-4, 2e-5)], ids=["flicker", "walk", "both"])
+def test_pulls_are_standard_normal_where_white_errors_are_far_too_small(
+    flicker: float, walk: float, plan: State, rng: np.random.Generator
+) -> None:
+    out = outputs(rng, plan, flicker, walk)
+    error = np.full(out.shape, WHITE)
+    found = fit_lot_with_wander(EFFECTS, plan, out, error)
+    plain = fit_lot(EFFECTS, plan, out, error)
+    assert np.std(pulls(plain.coefficients, plain.standard_errors)) > 2.0
+    ours = pulls(found.fit.coefficients, found.fit.standard_errors)
+    assert abs(ours.mean()) < 0.15
+    assert 0.88 < ours.std() < 1.12
+    assert np.std(found.fit.coefficients[..., 1]) < np.std(plain.coefficients[..., 1])
+
+
+def test_without_wander_it_is_the_weighted_fit(plan: State, rng: np.random.Generator) -> None:
+    out = outputs(rng, plan, 0.0, 0.0)
+    error = np.full(out.shape, WHITE)
+    found, plain = fit_lot_with_wander(EFFECTS, plan, out, error), fit_lot(EFFECTS, plan, out, error)
+    assert (found.flicker, found.walk) == (0.0, 0.0)
+    assert found.white == pytest.approx(1.0, abs=0.03)
+    np.testing.assert_allclose(found.fit.coefficients, plain.coefficients, atol=1e-12)
+
+
+def test_the_output_may_have_any_unit(plan: State, rng: np.random.Generator) -> None:
+    out = outputs(rng, plan, 1e-4, 0.0)
+    error = np.full(out.shape, WHITE)
+    in_g, in_counts = (fit_lot_with_wander(EFFECTS, plan, out * k, error * k).fit for k in (1.0, 256e3))
+    np.testing.assert_allclose(in_counts.coefficients, 256e3 * in_g.coefficients, rtol=1e-6, atol=1e-6)
+    np.testing.assert_allclose(in_counts.standard_errors, 256e3 * in_g.standard_errors, rtol=1e-6)
+    np.testing.assert_allclose(in_counts.residuals, 256e3 * in_g.residuals, rtol=1e-4, atol=1e-4)
+
+
+def test_refuses_a_reading_without_error(plan: State, rng: np.random.Generator) -> None:
+    error = np.full((UNITS, DWELLS, 3), WHITE)
+    error[3, 7, 1] = 0.0
+    with pytest.raises(NotIdentified, match="standard error is zero"):
+        fit_lot_with_wander(EFFECTS, plan, outputs(rng, plan, 0.0, 0.0), error)
+
+
+def test_refuses_effects_of_the_station(plan: State, rng: np.random.Generator) -> None:
+    angles = np.radians(np.tile(poses.plan("fibonacci24"), (2, 1)))
+    turned = State(force=plan.force, time=plan.time, outer=angles[:, 0], inner=angles[:, 1])
+    out = outputs(rng, plan, 0.0, 0.0)
+    with pytest.raises(NotIdentified, match="belongs to the station"):
+        fit_lot_with_wander((*EFFECTS, "level_error"), turned, out, np.full(out.shape, WHITE))
