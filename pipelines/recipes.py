@@ -69,13 +69,13 @@ def lot_of(recipe: Recipe, serials: Sequence[str], *, seed: int | None = None, r
     if not named:
         message = "lot: no unit is named, at least one is needed; give serial numbers with --units, or in the recipe"
         raise WrongUse(message)
-    twice = sorted({serial for serial in named if named.count(serial) > 1})
-    if twice:
-        message = f"lot: serial {', '.join(twice)} is there twice, each may be there once; correct the list of units"
-        raise WrongUse(message)
     bad = [serial for serial in named if not serial or not set(serial) <= _SERIAL or not serial[0].isalnum()]
     if bad:
         message = f"lot: serial '{bad[0]}' is not usable, letters, digits and . _ + - are needed; correct it"
+        raise WrongUse(message)
+    twice = sorted({serial for serial in named if named.count(serial) > 1})
+    if twice:
+        message = f"lot: serial {', '.join(twice)} is there twice, each may be there once; correct the list of units"
         raise WrongUse(message)
     units = [Unit(serial=serial, slot=slot) for slot, serial in enumerate(named)]
     return Lot(
