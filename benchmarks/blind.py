@@ -53,7 +53,8 @@ class Job:
 
 def in_process(run: Run) -> Answer:
     """The product's diagnosis, called as a function."""
-    from pipelines.stages.criticise import compare, diagnose
+    from pipelines.stages.compare import compare
+    from pipelines.stages.criticise import diagnose
 
     truth = run.sealed
     effects = list(truth.spec.base) if truth.spec.base else None
