@@ -1,5 +1,6 @@
 """The examples of the guide to importing run as printed there, on the real recordings."""
 
+import hashlib
 import json
 import os
 import re
@@ -9,6 +10,8 @@ import sys
 from pathlib import Path
 
 import pytest
+
+from pipelines.importers.exchange import read_dwells
 
 ROOT = Path(__file__).resolve().parents[2]
 GUIDE = (ROOT / "docs" / "how-to" / "import-your-data.md").read_text(encoding="utf-8")
@@ -41,7 +44,8 @@ def test_json_holds_the_whole_answer_and_nothing_else(shared_data: Path, tmp_pat
     done = run(EXAMPLES[0][0], shared_data, tmp_path / "archive", "--json")
     document = json.loads(done.stdout)
     assert document["adequate"] is True
-    assert document["source"]["sha256"] == "" or len(document["source"]["sha256"]) == 64
+    file = shared_data / "xsens-tumble" / "xsens_acc.mat.gz"
+    assert document["source"]["sha256"] == hashlib.sha256(file.read_bytes()).hexdigest()
     assert document["error"]["rms_ug"] < 102.0
 
 
@@ -54,3 +58,21 @@ def test_the_mapping_file_of_the_guide_does_the_same(shared_data: Path, tmp_path
     document = json.loads(run(command, shared_data, tmp_path / "archive").stdout)
     by_options = json.loads(run(EXAMPLES[0][0], shared_data, tmp_path / "archive", "--json").stdout)
     assert document == by_options
+
+
+def test_an_import_is_a_run_that_other_commands_read(shared_data: Path, tmp_path: Path) -> None:
+    archive = tmp_path / "archive"
+    run_id = json.loads(run(EXAMPLES[0][0], shared_data, archive, "--json").stdout)["run"]
+    dwells = read_dwells(run_id, archive=archive)
+    assert len(dwells) == 38
+    shown = json.loads(run(f"tumbleline show {run_id} coefficients --json", shared_data, archive).stdout)
+    assert {row["effect"] for row in shown["rows"]} == {"bias", "scale", "misalignment"}
+
+
+def test_a_refused_file_leaves_nothing_behind(shared_data: Path, tmp_path: Path) -> None:
+    archive = tmp_path / "archive"
+    done = run(EXAMPLES[4][0].replace("m/s^2", "g"), shared_data, archive)
+    assert done.returncode == 2
+    assert "looks like m/s^2" in done.stderr
+    assert "Traceback" not in done.stderr
+    assert not archive.exists()
