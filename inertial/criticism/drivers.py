@@ -16,6 +16,8 @@ Array = NDArray[np.float64]
 
 _KNOTS = 5
 _TIME_KNOTS = 8
+_CERTAIN = -600.0
+"""Logarithm of a probability below which drivers are told apart by the share they explain."""
 
 
 @dataclass(frozen=True)
@@ -151,7 +153,7 @@ def places(problem: Problem, drivers: list[Driver], space: Space, floor_variance
             share = float(np.clip((drop - rank * floor_variance) / excess, 0.0, 1.0))
             axes = _axes(problem, gain.by_block[:, 0], rank, floor_variance)
             found.append(Place(driver.name, axes, share, log_p_value(space, drop, rank), rank, drop))
-    return sorted(found, key=lambda p: p.log_p)
+    return sorted(found, key=lambda p: (max(p.log_p, _CERTAIN), -p.share))
 
 
 def _axes(problem: Problem, by_block: Array, rank: int, variance: float) -> tuple[str, ...]:

@@ -7,9 +7,10 @@ import importlib
 import importlib.util
 import pkgutil
 import sys
-from collections.abc import Iterable
+from collections.abc import Generator, Iterable
+from contextlib import contextmanager
 from functools import cache
-from importlib.metadata import entry_points
+from importlib.metadata import EntryPoint, entry_points
 from pathlib import Path
 from types import ModuleType
 
@@ -17,7 +18,18 @@ from inertial.effects.base import AnyEffect, Effect, Nonlinear, SensorEffect, St
 from inertial.effects.covariate import COVARIATE_PREFIX, Covariate
 from inertial.errors import InertialError, UnknownEffect
 
-__all__ = ["Effect", "Nonlinear", "SensorEffect", "StationEffect", "add_file", "catalogue", "get", "register"]
+__all__ = [
+    "Effect",
+    "Nonlinear",
+    "SensorEffect",
+    "StationEffect",
+    "add_file",
+    "additions_forgotten",
+    "built_in",
+    "catalogue",
+    "get",
+    "register",
+]
 
 _extra: dict[str, AnyEffect] = {}
 
@@ -32,8 +44,26 @@ def _built_in() -> dict[str, AnyEffect]:
     for info in pkgutil.iter_modules(__path__):
         _collect(importlib.import_module(f"{__name__}.{info.name}"), found)
     for point in entry_points(group="tumbleline.effects"):
-        _collect(point.load(), found)
+        _collect_point(point, found)
     return found
+
+
+def _collect_point(point: EntryPoint, found: dict[str, AnyEffect]) -> None:
+    """The effects of an installed package: its entry point names a module that defines them, or one effect class."""
+    try:
+        loaded = point.load()
+    except Exception as error:  # whatever another package raises is reported with the entry point's name
+        raise BrokenEffect(
+            f"entry point {point.name} = {point.value}: does not load ({error}); mend or remove that package"
+        ) from error
+    if isinstance(loaded, type) and issubclass(loaded, Effect) and hasattr(loaded, "id"):
+        if loaded.id in found:
+            raise BrokenEffect(f"{point.value}: effect id '{loaded.id}' is taken already; choose another id")
+        found[loaded.id] = loaded()  # type: ignore[assignment]  # an Effect with an id is one of its two kinds
+    elif not isinstance(loaded, ModuleType) or not _collect(loaded, found):
+        raise BrokenEffect(
+            f"entry point {point.name} = {point.value}: holds no effect; name a module or class that does"
+        )
 
 
 def _collect(module: ModuleType, found: dict[str, AnyEffect]) -> list[str]:
@@ -78,6 +108,22 @@ def get_all(names: Iterable[str]) -> list[AnyEffect]:
 def register(effect: AnyEffect) -> None:
     """Adds an effect made at run time (a formula of a model file) to the catalogue."""
     _extra[effect.id] = effect
+
+
+def built_in() -> dict[str, AnyEffect]:
+    """The effects of this package and of installed ones, without files and formulas added at run time."""
+    return dict(_built_in())
+
+
+@contextmanager
+def additions_forgotten() -> Generator[None]:
+    """A block after which files and formulas added inside it are forgotten."""
+    before = dict(_extra)
+    try:
+        yield
+    finally:
+        _extra.clear()
+        _extra.update(before)
 
 
 def add_file(path: str | Path) -> list[str]:
