@@ -79,6 +79,9 @@ def test_devices_feel_gravity_where_the_encoders_say(captured):
 def test_soaks_bring_every_unit_to_its_temperature_and_history_tells_how(captured):
     readings, history = captured.all(1), captured.all(2)
     assert abs(readings.query("soak == 1")["unit_C"] - 40.0).max() < 1.0
+    begins = readings.drop_duplicates("record").set_index("record")["start_s"].diff()
+    assert (begins[[1, 2, 4, 5]] < 30.0).all()  # within a soak, a pose follows the other
+    assert (begins[[3, 6]] > RECIPE.soak_min_s).all()
     assert history["time_s"].diff().dropna().min() >= 0.0
     times = history["time_s"].drop_duplicates()
     assert times.diff().dropna().max() <= 20.0

@@ -1,6 +1,8 @@
 """Trouble at the station: reported by name, never passed over, and the rest goes on."""
 
+import socket
 import threading
+from contextlib import contextmanager, suppress
 
 import numpy as np
 import pytest
@@ -158,6 +160,39 @@ def test_a_write_whose_answer_is_lost_is_sent_once():
         with pytest.raises(StationTimeout, match=r"device 11: no answer to 'write tail"):
             link.write(11, 42, [0, 0], "tail")
         assert link.read(10, 0, 1, "slots") == [8]
+        link.close()
+
+
+@contextmanager
+def deaf_server():
+    """A server that takes requests and answers nothing; gives its port and the requests so far."""
+    got = bytearray()
+    with socket.create_server(("127.0.0.1", 0)) as server:
+
+        def listen():
+            with suppress(OSError):
+                while True:
+                    connection, _ = server.accept()
+                    with connection:
+                        while part := connection.recv(256):
+                            got.extend(part)
+
+        thread = threading.Thread(target=listen, daemon=True)
+        thread.start()
+        yield server.getsockname()[1], got
+        server.shutdown(socket.SHUT_RDWR)
+    thread.join(5.0)
+
+
+def test_a_write_is_sent_once_and_a_read_as_often_as_allowed():
+    with deaf_server() as (port, got):
+        link = ModbusLink("127.0.0.1", port, timeout_s=0.2, read_attempts=2)
+        with pytest.raises(StationTimeout, match="no answer"):
+            link.write(3, 2782, [0, 0], "set point")
+        assert got.count(bytes.fromhex("03100ade0002")) == 1
+        with pytest.raises(StationTimeout, match="no answer"):
+            link.read(3, 2782, 2, "set point")
+        assert got.count(bytes.fromhex("03030ade0002")) == 2
         link.close()
 
 

@@ -15,7 +15,7 @@ def drive(cuts, *, look=False, state=None):
     story = (
         []
         if state
-        else [(1_500_000, 3, "set_point", 40.0), (5_250_001, 10, "rate", 100.0), (5_250_001, 10, "sampling", "running")]
+        else [(2_000_000, 3, "set_point", 40.0), (5_250_001, 10, "rate", 100.0), (5_250_001, 10, "sampling", "running")]
     )
     story += [(TOTAL_US - 3_000_000, 10, "sampling", "stopped")]
     times = sorted({*(c for c in cuts if c >= plant.now_us), *(t for t, *_ in story), TOTAL_US})
@@ -53,7 +53,7 @@ def test_chopped_sleeps_and_looks_leave_no_trace(cuts):
 def test_a_resumed_plant_goes_on_bit_for_bit(at):
     plant = plant_of(station_of(), lot_of(2), hidden=[Creep(), HysteresisPlay()])
     for time, device_id, name, value in [
-        (1_500_000, 3, "set_point", 40.0),
+        (2_000_000, 3, "set_point", 40.0),
         (5_250_001, 10, "rate", 100.0),
         (5_250_001, 10, "sampling", "running"),
     ]:
