@@ -1,6 +1,6 @@
 """The plant's future depends on its seed and on what was written when, and on nothing else."""
 
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from small_station import lot_of, plant_of, station_of, write
 
@@ -43,6 +43,7 @@ WHOLE = drive([])[1]
 
 
 @given(st.lists(st.integers(0, TOTAL_US), max_size=30))
+@example(list(range(0, TOTAL_US, 437_003)))
 @settings(max_examples=15, deadline=None)
 def test_chopped_sleeps_and_looks_leave_no_trace(cuts):
     assert drive(cuts, look=True)[1] == WHOLE
