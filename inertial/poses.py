@@ -37,14 +37,13 @@ def fibonacci(count: int) -> Array:
 
 
 def orthogonal24() -> Array:
-    """All 24 orientations of a cube: every face up, turned four ways about the vertical.
+    """Angles (24, 2) in degrees of all 24 orientations of a cube: every face up, four times.
 
-    A two-axis table reaches the four turns of a face only where they differ in its angles, so the turns about the
-    vertical are commanded as repeats with the outer axis from both sides and the inner axis in 90° steps.
+    Turns about the vertical change nothing in the force: on a two-axis table the lateral faces come twice, approached
+    anew, in place of the turns it cannot make.
     """
-    return np.array(
-        [(outer, inner) for outer in (-90.0, 0.0, 90.0, 180.0, -180.0, 270.0) for inner in (0.0, 90.0, 180.0, 270.0)]
-    )
+    turns = (0.0, 90.0, 180.0, 270.0)
+    return np.array([(outer, inner) for outer in (0.0, 90.0, -90.0, 180.0, 90.0, -90.0) for inner in turns])
 
 
 def _nine() -> Array:

@@ -17,7 +17,7 @@ class Estimate:
     """Coefficients of a model's terms in the blocks of a problem, from data whitened for white noise and wander.
 
     local : (blocks, p), shared : (q,), g per unit of the column; standard errors likewise. Behind the terms' own coefficients
-    stand those of the unknown state before the first dwell, which belong to this run alone.
+    stand those of the unknown state before the first dwell; a run of the same plan is taken to start alike.
     """
 
     terms: tuple[Term, ...]
@@ -46,9 +46,50 @@ def estimate(model: Model) -> Estimate:
         shared_error = np.sqrt(variance * np.diag(np.linalg.pinv(flat.T @ flat, rcond=1e-12)))
         y = y - z @ shared
     right = np.einsum("bnp,bn->bp", unit, y)
-    local = np.einsum("bpr,br->bp", inverse, right) / size
+    scaled = np.einsum("bpr,br->bp", inverse, right)
+    scaled = _pooled(model, unit, right, scaled, variance * inverse, size)
     errors = np.sqrt(variance * np.diagonal(inverse, axis1=-2, axis2=-1)) / size
-    return Estimate(model.terms, local, shared, errors, shared_error)
+    return Estimate(model.terms, scaled / size, shared, errors, shared_error)
+
+
+OWN = ("bias", "scale", "misalignment")
+"""Effects that differ from unit to unit by far more than their errors: nothing is learnt from the others."""
+
+_FEW_UNITS = 4
+
+
+def _pooled(model: Model, unit: Array, right: Array, scaled: Array, covariance: Array, size: Array) -> Array:
+    """Coefficients drawn towards the lot's mean as far as their scatter over the units is less than their errors.
+
+    Empirical Bayes with the moments of the lot (Efron & Morris, J. Am. Stat. Assoc. 70 (1975) 311): a coefficient that the run
+    determines poorly, and that units of one make share, is predicted better from all of them.
+    """
+    problem = model.problem
+    units = problem.lot.state.time.shape[0]
+    if units < _FEW_UNITS or problem.lot.radial:
+        return scaled
+    free = _shrinkable(model, scaled.shape[-1])
+    value = scaled / size
+    error2 = np.diagonal(covariance, axis1=-2, axis2=-1) / size**2
+    by_axis = value.reshape(units, 3, -1)
+    mean = by_axis.mean(axis=0)
+    scatter = ((by_axis - mean) ** 2).sum(axis=(0, 1)) / (3.0 * (units - 1))
+    between = np.maximum(scatter - error2.mean(axis=0), 1e-3 * error2.mean(axis=0))
+    variance = model.space.variance
+    precision = np.where(free, variance / (between * size**2), 0.0)
+    gram = np.swapaxes(unit, -1, -2) @ unit + np.einsum("bp,pr->bpr", precision, np.eye(size.shape[-1]))
+    centre = np.tile(mean, (units, 1)) * size
+    return np.linalg.solve(gram, (right + precision * centre)[..., None])[..., 0]
+
+
+def _shrinkable(model: Model, count: int) -> NDArray[np.bool_]:
+    """Which local coefficients are drawn together: those of the effects beyond bias, scale and misalignment."""
+    flags: list[bool] = []
+    for term in model.terms:
+        if term.effect.scope != "station":
+            columns = model.problem.columns(term.effect, term.keywords).shape[-1]
+            flags += [term.effect.id not in OWN] * (columns if term.first is None else min(term.first, columns))
+    return np.array([*flags, *[False] * (count - len(flags))], dtype=bool)
 
 
 def _free(unit: Array, inverse: Array, columns: Array) -> Array:
@@ -62,16 +103,15 @@ def residuals_of(problem: Problem, found: Estimate) -> Array:
     shared = [t for t in found.terms if t.effect.scope == "station"]
     left = problem.series.copy()
     if local:
-        columns = _columns(problem, local)
-        left -= np.einsum("bnp,bp->bn", columns, found.local[:, : columns.shape[-1]])
+        left -= np.einsum("bnp,bp->bn", _columns(problem, local), found.local)
     if shared:
-        columns = _columns(problem, shared)
-        left -= columns @ found.shared[: columns.shape[-1]]
+        left -= _columns(problem, shared) @ found.shared
     return np.where(np.isfinite(problem.basis.error), left, np.nan)
 
 
 def _columns(problem: Problem, terms: Sequence[Term]) -> Array:
-    return np.concatenate([problem.columns(t.effect, t.keywords)[..., : t.first] for t in terms], axis=-1)
+    own = [problem.columns(t.effect, t.keywords)[..., : t.first] for t in terms]
+    return np.concatenate([*own, *(problem.start(t.effect, t.keywords) for t in terms)], axis=-1)
 
 
 def rms(values: Array) -> float:

@@ -13,9 +13,12 @@ from inertial.criticism.drivers import Driver, Place, drivers_of, places
 from inertial.criticism.heldout import fit_rms, heldout_rms
 from inertial.criticism.model import Model, Term
 from inertial.criticism.problem import Lot, Problem
-from inertial.criticism.search import MATERIAL, NAMED_BELOW, Field, Rival, log_p_value, search, size_of, terms_of
+from inertial.criticism.search import NAMED_BELOW, Field, Rival, log_p_value, search, size_of, terms_of
 from inertial.effects.base import AnyEffect
 from inertial.effects.covariate import COVARIATE_PREFIX, Covariate
+
+UNEXPLAINED = 0.5
+"""Share of the floor below which a smooth dependence is left alone."""
 
 ADEQUATE_ABOVE = 0.05
 """Probability above which a model passes: the nominal rate of false alarms."""
@@ -163,7 +166,7 @@ def _beyond(problem: Problem, base: Model, final: Model, drivers: list[Driver]) 
 
 def _convincing(model: Model, driver: Driver, looks: int) -> bool:
     """Whether a driver is significant and large, the wander estimated with it inside: slow drivers and wander look alike."""
-    if _driver_size(model, driver) < 1.5 * MATERIAL * model.floor():
+    if _driver_size(model, driver) < UNEXPLAINED * model.floor():
         return False
     return _driver_log_p(model, driver) + np.log(looks) < np.log(NAMED_BELOW)
 

@@ -20,13 +20,12 @@ def residuals(problem: Problem, terms: Sequence[Term], train: NDArray[np.bool_])
     ----------
     train : (n,), dwells that are fitted; all are predicted
     """
-    lot_error = problem.basis.error
-    y = _plain(problem, problem.y[..., None])[..., 0]
+    y = problem.series
     local = [t for t in terms if t.effect.scope != "station"]
     shared = [t for t in terms if t.effect.scope == "station"]
     x = _stacked(problem, local)
     z = _stacked(problem, shared)
-    weight = np.where(np.isfinite(lot_error), 1.0 / lot_error, 0.0) * train
+    weight = np.where(np.isfinite(problem.error), 1.0 / problem.error, 0.0) * train
     solve = _solver(x, weight)
     if shared:
         free = (z - x @ solve(z)) * weight[..., None]
@@ -34,7 +33,7 @@ def residuals(problem: Problem, terms: Sequence[Term], train: NDArray[np.bool_])
         flat = free.reshape(-1, free.shape[-1])
         y = y - z @ np.linalg.lstsq(flat, target.reshape(-1), rcond=1e-9)[0]
     left = y - (x @ solve(y[..., None]))[..., 0]
-    return np.where(np.isfinite(lot_error), left, np.nan)
+    return np.where(np.isfinite(problem.error), left, np.nan)
 
 
 def heldout_rms(problem: Problem, terms: Sequence[Term]) -> float:
@@ -69,13 +68,6 @@ def _folds(problem: Problem) -> NDArray[np.intp]:
 def _stacked(problem: Problem, terms: Sequence[Term]) -> Array:
     found = [problem.columns(t.effect, t.keywords)[..., : t.first] for t in terms]
     return np.concatenate(found, axis=-1) if found else np.zeros((problem.blocks, problem.n, 0))
-
-
-def _plain(problem: Problem, rotated: Array) -> Array:
-    """Rotated values turned back, g."""
-    turned = np.matmul(np.swapaxes(problem.basis.turn, -1, -2), rotated)
-    error = np.where(np.isfinite(problem.basis.error), problem.basis.error, 0.0)
-    return turned * error[..., None]
 
 
 class _solver:  # noqa: N801  # a function with a prepared factor

@@ -53,7 +53,7 @@ class Model:
     def local(self) -> Array:
         """Rotated columns with coefficients by block, (blocks, n, p)."""
         found = [self._of(t) for t in self.terms if t.effect.scope != "station"]
-        found += [self.problem.start(t.effect, t.keywords) for t in self.terms if t.effect.scope != "station"]
+        found += [self._start(t) for t in self.terms if t.effect.scope != "station"]
         found += [self._loose(t) for t in self.terms if t.loose and t.effect.scope != "station"]
         if self._curves is not None:
             found.append(self._curves)
@@ -67,12 +67,17 @@ class Model:
         found = [self._of(t) for t in self.terms if t.effect.scope == "station"]
         if not found:
             return np.zeros((self.problem.blocks, self.problem.n, 0))
-        found += [self.problem.start(t.effect, t.keywords) for t in self.terms if t.effect.scope == "station"]
+        found += [self._start(t) for t in self.terms if t.effect.scope == "station"]
         return np.concatenate(found, axis=-1)
 
     def _of(self, term: Term) -> Array:
         columns = self.problem.rotated(term.effect, term.keywords)
         return columns if term.first is None else columns[..., : term.first]
+
+    def _start(self, term: Term) -> Array:
+        """Rotated columns of the unknown state of a term's memory before the first dwell."""
+        columns = self.problem.start(term.effect, term.keywords)
+        return self.problem.basis.rotate(columns) if columns.shape[-1] else columns
 
     def _loose(self, term: Term) -> Array:
         """Derivatives of a term's columns by its continuous nonlinear parameters: what a unit's own value would add."""

@@ -57,12 +57,21 @@ class Problem:
         units, n = lot.state.time.shape
         self.blocks = units if lot.radial else 3 * units
         self.n = n
-        time = lot.state.time if lot.radial else np.repeat(lot.state.time, 3, axis=0)
-        self.basis: Basis = basis(time, self._error())
+        self.error = self._error()
         self.series = self._series()
-        self.y = self.basis.rotate(self.series[..., None])[..., 0]
         self._kept: dict[tuple[object, ...], Candidate] = {}
         self._room = _CACHE
+
+    @cached_property
+    def basis(self) -> Basis:
+        """The rotation in which the noise of the dwells is diagonal."""
+        time = self.lot.state.time if self.lot.radial else np.repeat(self.lot.state.time, 3, axis=0)
+        return basis(time, self.error)
+
+    @cached_property
+    def y(self) -> Array:
+        """Rotated measurements, (blocks, n)."""
+        return self.basis.rotate(self.series[..., None])[..., 0]
 
     def _series(self) -> Array:
         """Measurements (blocks, n), g: outputs, or what the norm of the corrected output exceeds 1 g by."""
@@ -84,7 +93,7 @@ class Problem:
     @property
     def count(self) -> int:
         """Number of measurements."""
-        return self.basis.count
+        return int(np.isfinite(self.error).sum())
 
     def columns(self, effect: AnyEffect, values: dict[str, float]) -> Array:
         """Columns of an effect by block, (blocks, n, p), g per unit of the coefficient; radial lots join the axes' columns."""
@@ -93,13 +102,13 @@ class Problem:
         return self._by_force(effect.force_change(self.lot.state, **values))
 
     def start(self, effect: AnyEffect, values: dict[str, float]) -> Array:
-        """Rotated columns (blocks, n, k) of the unknown state of an effect's memory before the first dwell."""
+        """Columns (blocks, n, k) of the unknown state of an effect's memory before the first dwell."""
         if isinstance(effect, SensorEffect):
             columns = self._by_axis([effect.start_columns(self.lot.state, axis, **values) for axis in range(3)])
         else:
             columns = self._by_force(effect.start_change(self.lot.state, **values))
         # a state taken up before the second dwell leaves a column of one dwell only: it is kept, the dwell tells nothing then
-        return self.basis.rotate(columns) if columns.shape[-1] else columns
+        return columns
 
     def _by_axis(self, axes: list[Array]) -> Array:
         """Columns of three axes, each (units or 1, n, p), by block."""

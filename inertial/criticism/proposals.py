@@ -60,11 +60,12 @@ def _differences(problem: Problem, rest: list[Term], one: Term, other: Term) -> 
     state = lot.state
     units, n = state.time.shape
     wide = (units, count)
+    there = np.broadcast_to(frames.force_from_angles(outer, inner), (*wide, 3))
+    force = np.concatenate([state.force, there], axis=1)
     joined = replace(
         state,
-        force=np.concatenate(
-            [state.force, np.broadcast_to(frames.force_from_angles(outer, inner), (*wide, 3))], axis=1
-        ),
+        force=force,
+        felt=np.einsum("uij,unj->uni", lot.response, force),
         outer=_joined(state.outer, np.broadcast_to(outer, wide)),
         inner=_joined(state.inner, np.broadcast_to(inner, wide)),
         time=_joined(state.time, state.time[:, -1:] + 60.0 * np.arange(1, count + 1)),

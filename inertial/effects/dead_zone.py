@@ -20,7 +20,7 @@ class DeadZone(SensorEffect):
     breaker: ClassVar[str] = "a micro-tilt through zero"
     simplicity: ClassVar[int] = 22
     sharp: ClassVar[bool] = True
-    nonlinear: ClassVar[tuple[Nonlinear, ...]] = (Nonlinear("width", "g", 0.002, 0.5, "log", 10),)
+    nonlinear: ClassVar[tuple[Nonlinear, ...]] = (Nonlinear("width", "g", 1e-5, 0.5, "log", 12),)
 
     def columns(self, state: State, axis: int, *, width: float, **nonlinear: float) -> Array:
         del nonlinear

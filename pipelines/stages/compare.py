@@ -90,7 +90,9 @@ def _station(fitted: Estimate) -> list[dict[str, Any]]:
     names = [(t.effect.id, n) for t in fitted.terms if isinstance(t.effect, StationEffect) for n in t.effect.names()]
     return [
         {"effect": effect, "name": name, "value": float(value), "standard_error": float(error)}
-        for (effect, name), value, error in zip(names, fitted.shared, fitted.shared_error, strict=True)
+        for (effect, name), value, error in zip(
+            names, fitted.shared[: len(names)], fitted.shared_error[: len(names)], strict=True
+        )
     ]
 
 

@@ -1,0 +1,155 @@
+"""What a plan can see: the part of every effect that the base model leaves, its floor, and what it is mistaken for.
+
+The same columns that fit and diagnose decide, before any chamber time is spent.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from inertial import design
+from inertial import effects as catalogue
+from inertial.effects import SensorEffect
+from inertial.effects.base import AnyEffect
+from inertial.errors import MissingInput
+from inertial.state import State
+
+Array = NDArray[np.float64]
+
+SEEN = 0.01
+"""Part v below which an effect is taken as unseen."""
+
+ALIAS = 0.98
+"""Cosine of two effects' remaining columns above which the plan does not tell them apart."""
+
+_BASE = ("bias", "scale", "misalignment")
+
+
+@dataclass(frozen=True)
+class Sight:
+    """How a plan sees one effect.
+
+    left : v, RMS of the column after the base model over its RMS, 0 … 1; the best of its columns, axes and nonlinear values
+    by_axis : v per sensor axis, (3,)
+    floor : three-sigma floor of the coefficient, g per unit of the coefficient; infinite where unseen
+    alias : effects that it is not told from
+    """
+
+    effect: str
+    seen: bool
+    left: float
+    by_axis: tuple[float, float, float]
+    floor: float
+    alias: tuple[str, ...]
+    breaker: str
+
+    @property
+    def variance_inflation(self) -> float:
+        """1/v²; infinite where unseen."""
+        return 1.0 / self.left**2 if self.left > 0.0 else float("inf")
+
+
+def sights(state: State, base: Sequence[str], error: float, candidates: Sequence[str] | None = None) -> list[Sight]:
+    """How a plan sees every effect of the catalogue that is not in the base model.
+
+    Parameters
+    ----------
+    state : the planned dwells of one unit, (n,)
+    base : ids of the model that is fitted anyway
+    error : standard error of a dwell mean, g
+    candidates : ids to look at; the whole catalogue otherwise
+    """
+    span = _span(state, base)
+    names = [n for n in (candidates or catalogue.catalogue()) if n not in set(base)]
+    found: dict[str, _Remainder | None] = {}
+    for name in names:
+        found[name] = _remainder(catalogue.get(name), state, span)
+    aliases = _aliases({n: r for n, r in found.items() if r is not None and r.left > SEEN})
+    return [_sight(n, found[n], error, aliases.get(n, ())) for n in names]
+
+
+@dataclass(frozen=True)
+class _Remainder:
+    """Columns of an effect after the base model on the axis that sees it best, (3, n, p) over all axes."""
+
+    left: float
+    by_axis: tuple[float, float, float]
+    columns: Array
+    before: Array
+
+
+def _span(state: State, base: Sequence[str]) -> Array:
+    """Orthonormal bases of the base model per axis, (3, n, p)."""
+    sensor, _ = design.split(base or _BASE)
+    columns = design.local_columns(sensor, state, design.starting_values(sensor, state))
+    size = np.linalg.norm(columns, axis=-2, keepdims=True)
+    u, s, _ = np.linalg.svd(columns / np.where(size > 0.0, size, 1.0), full_matrices=False)
+    return u * (s > 1e-9)[..., None, :]
+
+
+def _remainder(effect: AnyEffect, state: State, span: Array) -> _Remainder | None:
+    """What the base model leaves of an effect at the values of its nonlinear parameters that leave most; None where it lacks input."""
+    best: _Remainder | None = None
+    try:
+        for values in _values(effect, state):
+            columns = _columns(effect, state, values)
+            after = columns - span @ (np.swapaxes(span, -1, -2) @ columns)
+            found = _measured(columns, after)
+            if best is None or found.left > best.left:
+                best = found
+    except MissingInput:
+        return None
+    return best
+
+
+def _measured(columns: Array, after: Array) -> _Remainder:
+    before = np.linalg.norm(columns, axis=-2)
+    rest = np.linalg.norm(after, axis=-2)
+    v = np.where(before > 1e-12, rest / np.where(before > 1e-12, before, 1.0), 0.0)
+    v = np.where(v < 1e-6, 0.0, v)
+    by_axis = v.max(axis=-1)
+    return _Remainder(float(v.max()), (float(by_axis[0]), float(by_axis[1]), float(by_axis[2])), after, before)
+
+
+def _values(effect: AnyEffect, state: State) -> list[Mapping[str, float]]:
+    from inertial.criticism.problem import grid_of  # noqa: PLC0415  # criticism stands above planning elsewhere
+
+    return list(grid_of(effect, state))
+
+
+def _columns(effect: AnyEffect, state: State, values: Mapping[str, float]) -> Array:
+    """Columns per axis, (3, n, p)."""
+    if isinstance(effect, SensorEffect):
+        axes = [
+            np.broadcast_to(c := effect.columns(state, a, **values), (*state.time.shape, c.shape[-1])) for a in range(3)
+        ]
+        return np.stack(axes)
+    return np.moveaxis(effect.force_change(state, **values), -2, 0)
+
+
+def _sight(name: str, found: _Remainder | None, error: float, alias: tuple[str, ...]) -> Sight:
+    breaker = catalogue.get(name).breaker
+    if found is None or found.left <= SEEN:
+        return Sight(name, False, 0.0 if found is None else found.left, (0.0, 0.0, 0.0), float("inf"), alias, breaker)
+    rest = np.linalg.norm(found.columns, axis=-2)
+    floor = 3.0 * error / float(np.max(rest))
+    return Sight(name, True, found.left, found.by_axis, floor, alias, breaker)
+
+
+def _aliases(seen: Mapping[str, _Remainder]) -> dict[str, tuple[str, ...]]:
+    """Effects whose remaining columns lie within one another's span, axis by axis."""
+    spans: dict[str, Array] = {}
+    for name, found in seen.items():
+        size = np.linalg.norm(found.columns, axis=-2, keepdims=True)
+        u, s, _ = np.linalg.svd(found.columns / np.where(size > 0.0, size, 1.0), full_matrices=False)
+        spans[name] = u * (s > SEEN)[..., None, :]
+    return {name: tuple(o for o in spans if o != name and _inside(spans[name], spans[o])) for name in spans}
+
+
+def _inside(one: Array, other: Array) -> bool:
+    """Whether every direction of one effect is within the other's span, to the alias cosine, on every axis that sees it."""
+    inner = np.linalg.norm(np.swapaxes(other, -1, -2) @ one, axis=-2)
+    there = np.linalg.norm(one, axis=-2) > 0.5
+    return bool(np.all(inner[there] > ALIAS)) and bool(there.any())
