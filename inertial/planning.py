@@ -90,18 +90,24 @@ def _span(state: State, base: Sequence[str]) -> Array:
 
 
 def _remainder(effect: AnyEffect, state: State, span: Array) -> _Remainder | None:
-    """What the base model leaves of an effect at the values of its nonlinear parameters that leave most; None where it lacks input."""
+    """What the base model leaves of an effect, at the nonlinear values that leave most; None where it lacks input."""
     best: _Remainder | None = None
     try:
         for values in _values(effect, state):
             columns = _columns(effect, state, values)
             after = columns - span @ (np.swapaxes(span, -1, -2) @ columns)
             found = _measured(columns, after)
-            if best is None or found.left > best.left:
-                best = found
+            best = found if best is None else _better(best, found)
     except MissingInput:
         return None
     return best
+
+
+def _better(one: _Remainder, other: _Remainder) -> _Remainder:
+    """Of two values of the nonlinear parameters the one that is left most, with the columns of the one with the lower floor."""
+    more = one if one.left >= other.left else other
+    clearer = max((one, other), key=lambda r: float(np.max(np.linalg.norm(r.columns, axis=-2))))
+    return _Remainder(more.left, more.by_axis, clearer.columns, clearer.before)
 
 
 def _measured(columns: Array, after: Array) -> _Remainder:

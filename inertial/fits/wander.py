@@ -13,7 +13,6 @@ from itertools import product
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import solve_triangular
-from scipy.optimize import minimize
 
 from inertial import design
 from inertial.criticism.noise import flicker_kernel
@@ -24,13 +23,13 @@ from inertial.state import State
 
 Array = NDArray[np.float64]
 
-_SHARES = (0.0, *np.geomspace(0.1, 1e5, 7).tolist())
-_LEAST = 1e-3
-"""Share of a kernel, over the white variance of a dwell, that makes no difference."""
-_SETTLED = 0.02
-_TRIALS = 60
+_STEP = 10.0
+_SHARES = (0.0, *(0.1 * _STEP ** np.arange(7)).tolist())
+_FINE = 12
+_FAR = 12.0
+"""Deviance above the lowest at which a pair of shares is out of the question."""
 _CHARGE = 4.0
-"""Deviance that a kind of wander must be worth to be believed."""
+"""Deviance that wander must be worth to be believed."""
 
 
 @dataclass(frozen=True)
@@ -153,26 +152,32 @@ class _Lot:
             deviance=float(deviance),
         )
 
-    def best_shares(self) -> tuple[float, ...]:
-        """Shares of least restricted deviance over the lot; zero for a kernel that the residuals do not need."""
-        kernels = range(len(self._kernels))
-        start = min(product(_SHARES, repeat=len(self._kernels)), key=self._deviance)
-        logs = np.log(np.maximum(start, _LEAST))
-        found = minimize(
-            lambda trial: self._deviance(np.exp(trial).tolist()),
-            logs,
-            method="Nelder-Mead",
-            options={
-                "initial_simplex": np.vstack([logs, *(logs + np.eye(len(logs))[k] for k in kernels)]),
-                "xatol": _SETTLED,
-                "fatol": _SETTLED,
-                "maxfev": _TRIALS,
-            },
-        )
-        full = tuple(np.exp(found.x).tolist())
-        fewer = [tuple(share * (i not in left) for i, share in enumerate(full)) for left in ((0, 1), (0,), (1,), ())]
-        charged = [self._deviance(shares) + _CHARGE * np.count_nonzero(shares) for shares in fewer]
-        return fewer[int(np.argmin(charged))]
+    def best_shares(self) -> tuple[float, float]:
+        """Shares of flicker and walk: their mean over the restricted likelihood; zero where the lot shows no wander.
+
+        A slow drift within one record may be either, and the likelihood is flat between the two: its peak jumps from one
+        answer to the other, its mean does not.
+        """
+        coarse = {pair: self._deviance(pair) for pair in product(_SHARES, repeat=2)}
+        lowest = min(coarse.values())
+        if coarse[0.0, 0.0] - lowest < _CHARGE:
+            return 0.0, 0.0
+        likely = np.array([pair for pair, deviance in coarse.items() if deviance - lowest < _FAR])
+        flicker, walk = (self._axis(likely[:, k]) for k in range(2))
+        pairs = np.array(list(product(flicker**2, walk**2)))
+        deviance = np.array([self._deviance(pair) for pair in pairs.tolist()])
+        near = pairs[deviance - deviance.min() < _FAR]
+        flicker, walk = (np.linspace(*np.sqrt([near[:, k].min(), near[:, k].max()]), _FINE) for k in range(2))
+        pairs = np.array(list(product(flicker**2, walk**2)))
+        deviance = np.array([self._deviance(pair) for pair in pairs.tolist()])
+        weight = np.exp(-0.5 * (deviance - deviance.min()))
+        mean = (weight @ pairs) / weight.sum()
+        return float(mean[0]), float(mean[1])
+
+    @staticmethod
+    def _axis(shares: Array) -> Array:
+        """Standard deviations to look at, one coarse step beyond those that are likely."""
+        return np.linspace(np.sqrt(shares.min() / _STEP), np.sqrt(max(float(shares.max()), _SHARES[1]) * _STEP), _FINE)
 
     def _deviance(self, shares: Sequence[float]) -> float:
         return self.solve(shares).deviance

@@ -22,6 +22,23 @@ ArchiveOption = Annotated[
 ]
 JsonOption = Annotated[bool, typer.Option("--json", help="Print one JSON document and nothing else.")]
 RunArgument = Annotated[str, typer.Argument(metavar="RUN", help="A run's name, its beginning, or 'latest'.")]
+DwellsArgument = Annotated[
+    str, typer.Argument(metavar="DWELLS", help="A file in the exchange format, or a run of the archive.")
+]
+EffectsOption = Annotated[
+    str,
+    typer.Option(
+        "--effects", metavar="a,b,c", help="The model as a list of effects; a plain or thermal one by default."
+    ),
+]
+ModelOption = Annotated[Path | None, typer.Option("--model", metavar="FILE", help="The model as a model file.")]
+HistoryOption = Annotated[
+    str, typer.Option("--history", metavar="FILE", help="Temperatures against time; a run of the archive has its own.")
+]
+EffectFileOption = Annotated[
+    list[Path] | None,
+    typer.Option("--effect-file", metavar="FILE.py", help="A Python file with effects of your own; may be repeated."),
+]
 
 STYLES = {"pass": "bold green", "fail": "bold red", "refused": "bold magenta"}
 
@@ -65,15 +82,22 @@ def rows(table: pd.DataFrame) -> list[dict[str, Any]]:
     return [plain(row) for row in table.to_dict("records")]
 
 
-def print_table(columns: Sequence[str], lines: Sequence[Sequence[str]], title: str = "") -> None:
-    """A table for people; numbers stand to the right."""
+def print_table(columns: Sequence[str], lines: Sequence[Sequence[str]], title: str = "", *, whole: int = 4) -> None:
+    """A table for people; numbers stand to the right, and the first ``whole`` columns are never broken."""
     from rich import box
     from rich.table import Table
 
     table = Table(title=title or None, box=box.SIMPLE_HEAD, title_justify="left")
     for number, column in enumerate(columns):
         numeric = all(_is_number(line[number]) for line in lines) and bool(lines)
-        table.add_column(column, justify="right" if numeric else "left", overflow="fold", no_wrap=number < 4)
+        widest = max((len(line[number]) for line in lines), default=0) if number == 0 else None
+        table.add_column(
+            column,
+            justify="right" if numeric else "left",
+            overflow="fold",
+            no_wrap=number == 0 or numeric,
+            min_width=widest,
+        )
     for line in lines:
         table.add_row(*line)
     console().print(table)
