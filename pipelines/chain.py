@@ -50,7 +50,7 @@ def _records(run: Run) -> Records:
 
 
 def _validate(job: Job, run: Run) -> Tables:
-    return {"verdicts": validate(_records(run).samples(), run.table("readings"), job.lot.units)}
+    return {"verdicts": validate(_records(run).samples(), run.table("readings"), job.lot.units, job.recipe.zero_output)}
 
 
 def _reduce(job: Job, run: Run) -> Tables:
@@ -93,7 +93,7 @@ STAGES: tuple[Stage, ...] = (
         name="validate",
         inputs=(RECORDS, "readings"),
         outputs=("verdicts",),
-        parameters=lambda job: {"lot": job.lot.model_dump(mode="json")},
+        parameters=lambda job: {"lot": job.lot.model_dump(mode="json"), "zero_output": job.recipe.zero_output},
         call=_validate,
         modules=("inertial", "schemas.tables", "pipelines.stages.validate"),
     ),
@@ -109,7 +109,10 @@ STAGES: tuple[Stage, ...] = (
         name="fit",
         inputs=("dwells",),
         outputs=("coefficients", "covariance", "residuals"),
-        parameters=lambda job: {"effects": job.recipe.effects},
+        parameters=lambda job: {
+            "effects": job.recipe.effects,
+            "formulas": [f.model_dump(mode="json") for f in job.recipe.formulas],
+        },
         call=_fit,
         modules=(*_SHARED, "pipelines.stages.fit"),
     ),

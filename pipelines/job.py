@@ -8,12 +8,12 @@ from typing import TYPE_CHECKING, Any
 
 from inertial.errors import InertialError
 from pipelines.archive.keys import digest
+from pipelines.models import read_model, refuse_unknown_effects, use_formulas
 from pipelines.planned import refuse_unidentified
-from pipelines.recipes import MAIN_JOB, load_limits, load_recipe, lot_of, refuse_unknown_effects
+from pipelines.recipes import MAIN_JOB, load_limits, load_recipe, lot_of
 from pipelines.stages.grade import refuse_limits_without_figures
 from schemas.errors import RecipeInvalid, WrongUse
 from schemas.limits import Limits
-from schemas.model import load_model
 from schemas.recipe import Lot, Recipe
 from schemas.station import SLOTS, StationConfig, load_station
 
@@ -26,6 +26,7 @@ ANALYSIS_KEYS = {
     "name",
     "description",
     "effects",
+    "formulas",
     "limits",
     "units",
     "seed",
@@ -43,6 +44,10 @@ class Job:
     limits: Limits
     lot: Lot
     station: StationConfig
+
+    def __post_init__(self) -> None:
+        """Formulas of the model are effects wherever this job is worked on."""
+        use_formulas(self.recipe.formulas, f"recipe {self.recipe.name}")
 
     @property
     def capture_id(self) -> str:
@@ -100,10 +105,11 @@ def job_of_run(run: Run, *, effects: Sequence[str] = (), model: Path | None = No
         message = "fit: --effects and --model are both given, one is needed; leave one out"
         raise WrongUse(message)
     if model is not None:
-        head = load_model(model).model
-        effects, names = head.effects, {"model_name": head.name, "model_version": head.version}
-        recipe = recipe.model_copy(update=names)
+        file = read_model(model)
+        effects, names = file.model.effects, {"model_name": file.model.name, "model_version": file.model.version}
+        recipe = recipe.model_copy(update={**names, "formulas": file.formula})
     if effects:
+        use_formulas(recipe.formulas, f"run {run.id}")
         refuse_unknown_effects(effects, "fit")
         recipe = recipe.model_copy(update={"effects": list(effects)})
     chosen = Limits.model_validate(about["limits"])

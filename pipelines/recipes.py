@@ -7,16 +7,15 @@ from __future__ import annotations
 
 from importlib.resources import files
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from inertial import effects, poses
-from inertial.errors import UnknownEffect
+from inertial import poses
 from inertial.frames import force_from_angles
+from pipelines.models import read_model, refuse_unknown_effects
 from schemas.errors import RecipeInvalid, WrongUse, close_matches, did_you_mean
 from schemas.limits import Limits, parse_limits, unknown_limits
-from schemas.model import load_model
 from schemas.recipe import Lot, Pose, Recipe, RecipeFile, Unit, parse_recipe, read_text
 
 if TYPE_CHECKING:
@@ -25,7 +24,6 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 MAIN_JOB = "production"
-SPAN_NEEDED_G = 1.5  # a scale factor from less than that rests on a fraction of the range it is used in
 SAME_POSE_DEG = 1.0
 AXES = ("x", "y", "z")
 
@@ -34,18 +32,16 @@ def load_recipe(name: str = MAIN_JOB) -> Recipe:
     """The recipe of a file, or the built-in one of this name, resolved and checked."""
     text, source, folder = _recipe_text(name)
     file = parse_recipe(text, source)
-    model_effects, model_name, version = _model(file, folder, source)
+    model = _model(file, folder, source)
     fit_poses = _resolve(file.poses, "p", "poses", source)
     verification = _resolve(file.verification, "v", "verification", source)
-    _refuse_flat_plan(fit_poses)
+    _refuse_flat_plan(fit_poses, file.span_min_g)
     _refuse_coincidence(fit_poses, verification, source)
     shared = file.model_dump(exclude={"poses", "verification", "static_pose", "model", "effects"})
     outer, inner = file.static_pose
     return Recipe(
         **shared,
-        effects=model_effects,
-        model_name=model_name,
-        model_version=version,
+        **model,
         poses=fit_poses,
         verification=verification,
         static_pose=Pose(name="static", outer_deg=outer, inner_deg=inner),
@@ -109,24 +105,18 @@ def _recipe_text(name: str) -> tuple[str, str, Path]:
     raise RecipeInvalid(message, close=close_matches(name, sample_names()))
 
 
-def _model(file: RecipeFile, folder: Path, source: str) -> tuple[list[str], str, int]:
-    """Effects, name and version of the model; name and version are empty for a list of effects."""
-    names, model_name, version = file.effects, "", 0
-    if file.model:
-        model = load_model(folder / file.model).model
-        names, model_name, version = model.effects, model.name, model.version
-    refuse_unknown_effects(names, f"{source}: key 'effects'")
-    return names, model_name, version
-
-
-def refuse_unknown_effects(names: Sequence[str], where: str) -> None:
-    """Refuse names that are no effect, with the close matches."""
-    for name in names:
-        try:
-            effects.get(name)
-        except UnknownEffect as problem:
-            message = f"{where}: unknown effect '{name}'; {did_you_mean(name, effects.catalogue())}"
-            raise RecipeInvalid(message, key="effects", close=problem.close) from None
+def _model(file: RecipeFile, folder: Path, source: str) -> dict[str, Any]:
+    """Effects, formulas, name and version of the model; name and version are empty for a list of effects."""
+    if not file.model:
+        refuse_unknown_effects(file.effects, f"{source}: key 'effects'")
+        return {"effects": file.effects}
+    model = read_model(folder / file.model)
+    return {
+        "effects": model.model.effects,
+        "formulas": model.formula,
+        "model_name": model.model.name,
+        "model_version": model.model.version,
+    }
 
 
 def _resolve(given: str | Sequence[Sequence[float]], letter: str, key: str, source: str) -> list[Pose]:
@@ -150,13 +140,13 @@ def directions(chosen: Sequence[Pose]) -> NDArray[np.float64]:
     return force_from_angles(angles[:, 0], angles[:, 1])
 
 
-def _refuse_flat_plan(chosen: Sequence[Pose]) -> None:
+def _refuse_flat_plan(chosen: Sequence[Pose], needed_g: float) -> None:
     spans = np.ptp(directions(chosen), axis=0)
     worst = int(np.argmin(spans))
-    if spans[worst] < SPAN_NEEDED_G:
+    if spans[worst] < needed_g:
         axis = AXES[worst]
         message = (
-            f"fit: poses span {spans[worst]:.2f} g on {axis}, the recipe needs {SPAN_NEEDED_G:g} g; "
+            f"fit: poses span {spans[worst]:.2f} g on {axis}, the recipe needs {needed_g:g} g; "
             f"add poses with {axis} up and {axis} down"
         )
         raise RecipeInvalid(message, key="poses")

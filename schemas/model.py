@@ -8,17 +8,21 @@ from typing import Annotated
 
 from pydantic import Field, ValidationError, model_validator
 
-from schemas.recipe import Strict, explain, parse_toml, read_text
+from schemas.recipe import FormulaSpec, Strict, explain, parse_toml, read_text
 
 
 class ModelChange(Strict):
-    """One step of a model's history: the version that it led to, the effect added or removed, by whom, when, why."""
+    """One step of a model's history: the version that it led to, the effect added or removed, by whom, when, why.
+
+    ``run`` is the run or file of dwells that the change was decided on.
+    """
 
     version: Annotated[int, Field(ge=1)]
     effect: str = ""
     by: Annotated[str, Field(min_length=1)]
     at: datetime | date
     why: Annotated[str, Field(min_length=1)]
+    run: str = ""
 
 
 class ModelHead(Strict):
@@ -30,9 +34,10 @@ class ModelHead(Strict):
 
 
 class ModelFile(Strict):
-    """A model as it stands in its file: ``[model]`` and one ``[[change]]`` per version."""
+    """A model as it stands in its file: ``[model]``, one ``[[change]]`` per version, and ``[[formula]]`` for its own effects."""
 
     model: ModelHead
+    formula: list[FormulaSpec] = Field(default_factory=list)
     change: list[ModelChange] = Field(default_factory=list)
 
     @model_validator(mode="after")
@@ -41,6 +46,11 @@ class ModelFile(Strict):
         twice = sorted({e for e in effects if effects.count(e) > 1})
         if twice:
             message = f"model.effects: {', '.join(twice)} is there twice, each may be there once; remove the second"
+            raise ValueError(message)
+        formulas = [formula.id for formula in self.formula]
+        again = sorted({f for f in formulas if formulas.count(f) > 1})
+        if again:
+            message = f"formula: {', '.join(again)} is there twice, each may be there once; rename the second"
             raise ValueError(message)
         versions = [change.version for change in self.change]
         if versions != sorted(set(versions)):
@@ -55,10 +65,14 @@ class ModelFile(Strict):
         return self
 
 
-def load_model(path: Path) -> ModelFile:
-    """The model of a file, or ``RecipeInvalid`` naming the key and what is needed."""
-    source = f"model {path.name}"
+def parse_model(text: str, source: str) -> ModelFile:
+    """The model of a TOML text, or ``RecipeInvalid`` naming the key and what is needed."""
     try:
-        return ModelFile.model_validate(parse_toml(read_text(path, "model"), source))
+        return ModelFile.model_validate(parse_toml(text, source))
     except ValidationError as problem:
         raise explain(problem, source, ModelFile) from None
+
+
+def load_model(path: Path) -> ModelFile:
+    """The model of a file, or ``RecipeInvalid`` naming the key and what is needed."""
+    return parse_model(read_text(path, "model"), f"model {path.name}")

@@ -28,6 +28,7 @@ if TYPE_CHECKING:
 
 SHORTEST_SOAK_S = 900.0  # at least 15 min of soak per temperature: the field's practice for static tests at ±1 °C
 FEWEST_SAMPLES = 100  # per pose
+LEAST_SPAN_G = 1.4  # of the poses on every axis; twelve edges reach 1.41, and a scale from less is an extrapolation
 
 Positive = Annotated[FiniteFloat, Field(gt=0.0)]
 NotNegative = Annotated[FiniteFloat, Field(ge=0.0)]
@@ -88,6 +89,7 @@ class _Measurement(Strict):
     """The keys that a recipe file and a resolved recipe share.
 
     ``zero_output`` is the nominal output at 0 g, in the output's unit; the zero-g offset is counted from it.
+    ``span_min_g`` is how far the poses must reach on every axis, largest minus smallest.
     """
 
     name: Annotated[str, Field(min_length=1, pattern=r"^[a-z0-9][a-z0-9._-]*$")]
@@ -103,6 +105,7 @@ class _Measurement(Strict):
     static_record_s: NotNegative = 0.0
     static_temperature_C: FiniteFloat = 25.0
     zero_output: FiniteFloat = 0.0
+    span_min_g: Positive = LEAST_SPAN_G
     effects: list[str] = []
     limits: str = "consumer"
     units: list[str] = []
@@ -132,6 +135,16 @@ class _Measurement(Strict):
         return values
 
 
+class FormulaSpec(Strict):
+    """An effect written as formulas, one per column; :mod:`inertial.expressions` says what may stand in them."""
+
+    id: Annotated[str, Field(pattern=r"^[a-z][a-z0-9_]*$")]
+    columns: Annotated[list[Annotated[str, Field(min_length=1)]], Field(min_length=1, max_length=12)]
+    why: str = ""
+    symbol: str = "c"
+    typical_ug: tuple[NotNegative, NotNegative] = (1.0, 10000.0)
+
+
 class RecipeFile(_Measurement):
     """A recipe as it stands in its file: poses by the name of a plan, or as [outer, inner] in degrees."""
 
@@ -156,6 +169,7 @@ class Recipe(_Measurement):
     static_pose: Pose
     model_name: str = ""
     model_version: int = 0
+    formulas: list[FormulaSpec] = []
 
     @property
     def wanted_records(self) -> int:

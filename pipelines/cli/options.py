@@ -82,7 +82,7 @@ def rows(table: pd.DataFrame) -> list[dict[str, Any]]:
     return [plain(row) for row in table.to_dict("records")]
 
 
-def print_table(columns: Sequence[str], lines: Sequence[Sequence[str]], title: str = "", *, whole: int = 4) -> None:
+def print_table(columns: Sequence[str], lines: Sequence[Sequence[str]], title: str = "", *, whole: int = 1) -> None:
     """A table for people; numbers stand to the right, and the first ``whole`` columns are never broken."""
     from rich import box
     from rich.table import Table
@@ -95,7 +95,7 @@ def print_table(columns: Sequence[str], lines: Sequence[Sequence[str]], title: s
             column,
             justify="right" if numeric else "left",
             overflow="fold",
-            no_wrap=number == 0 or numeric,
+            no_wrap=number < whole or numeric,
             min_width=widest,
         )
     for line in lines:

@@ -53,7 +53,7 @@ def read_dwells(source: str | Path, *, archive: str | Path | None = None) -> pd.
     WrongUse
         There is neither such a file nor such a run.
     """
-    if _is_file(source):
+    if is_file(source):
         frame, _ = files.read(Path(source))
         return checked(frame, where=Path(source).name)
     return checked(_from_run(source, archive, "dwells"), where=f"run {source}")
@@ -67,7 +67,7 @@ def read_history(source: str | Path, *, archive: str | Path | None = None) -> pd
     source : a file, or the name of a run in the archive
     archive : the archive's folder where `source` is a run
     """
-    if _is_file(source):
+    if is_file(source):
         frame, _ = files.read(Path(source))
         where = Path(source).name
     else:
@@ -99,7 +99,8 @@ def covariates(frame: pd.DataFrame) -> list[str]:
     return [name for name in frame.columns if name not in KNOWN and pd.api.types.is_numeric_dtype(frame[name])]
 
 
-def _is_file(source: str | Path) -> bool:
+def is_file(source: str | Path) -> bool:
+    """Whether dwells or a history are meant as a file, not as a run of the archive."""
     path = Path(source)
     looks_like_one = isinstance(source, Path) or "/" in str(source) or path.suffix != ""
     return path.is_file() or (looks_like_one and not _is_run_like(source))

@@ -1,0 +1,123 @@
+"""``tumbleline compare``: a model against the dwells it is fitted to, poses left out, and a fresh run."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from pipelines.cli.options import (
+    ArchiveOption,
+    DwellsArgument,
+    EffectFileOption,
+    EffectsOption,
+    HistoryOption,
+    JsonOption,
+    ModelOption,
+    console,
+    error_console,
+    print_json,
+    print_table,
+    short,
+)
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+POSES = 6
+
+
+def command(
+    dwells: DwellsArgument,
+    effects: EffectsOption = "",
+    model: ModelOption = None,
+    fresh: Annotated[
+        str,
+        typer.Option("--fresh", metavar="DWELLS2", help="The same units measured again: never fitted, only predicted."),
+    ] = "",
+    history: HistoryOption = "",
+    fresh_history: Annotated[
+        str, typer.Option("--fresh-history", metavar="FILE", help="Temperatures against time of the fresh run.")
+    ] = "",
+    effect_file: EffectFileOption = None,
+    archive: ArchiveOption = None,
+    *,
+    as_json: JsonOption = False,
+) -> None:
+    """Fit a model to dwells and tell its error there, on poses left out, and on a fresh run with the coefficients unchanged."""
+    from pipelines.cli.inputs import add_effect_files, both_runs
+    from pipelines.models import chosen_effects
+    from pipelines.stages.criticise import default_model
+
+    add_effect_files(effect_file)
+    chosen = chosen_effects(effects, model, "compare")
+    tables = both_runs(dwells, history, fresh, fresh_history, archive)
+    document = compared(chosen or default_model(tables[0]), *tables)
+    if as_json:
+        print_json(document)
+    else:
+        _print(document)
+
+
+def compared(
+    effects: list[str],
+    dwells: pd.DataFrame,
+    history: pd.DataFrame | None,
+    fresh: pd.DataFrame | None,
+    fresh_history: pd.DataFrame | None,
+) -> dict[str, Any]:
+    """The comparison, worked out on one thread: the matrices are small."""
+    from threadpoolctl import threadpool_limits
+
+    from pipelines.stages.criticise import compare
+
+    with threadpool_limits(1), error_console().status("fitting"):
+        return compare(dwells, effects, history, fresh, fresh_history)
+
+
+def _print(document: dict[str, Any]) -> None:
+    out = console()
+    out.print(f"model  {', '.join(document['effects'])}", markup=False, soft_wrap=True)
+    lines = [
+        ["fitted to these dwells", short(document["rms_ug"])],
+        ["poses left out", short(document["heldout_rms_ug"])],
+    ]
+    if document["fresh_rms_ug"] is not None:
+        lines.append(["fresh run, coefficients unchanged", short(document["fresh_rms_ug"])])
+    lines.append(["floor: the noise that is there", short(document["floor_ug"])])
+    print_table(["error", "rms\nµg"], lines)
+    out.print(
+        "The floor is the noise as this model sees it: what is missing counts as noise here; ask 'tumbleline diagnose'.",
+        style="dim",
+        soft_wrap=True,
+    )
+    fresh = document["fresh_rms_ug"] is not None
+    units = [
+        [u, short(e["rms_ug"]), short(e["fresh_rms_ug"])][: 3 if fresh else 2] for u, e in document["by_unit"].items()
+    ]
+    print_table(["unit", "rms\nµg", "fresh\nµg"][: 3 if fresh else 2], units)
+    poses = [
+        [" ".join(f"{v:+.2f}" for v in p["force"]), str(p["dwells"]), short(p["rms_ug"])]
+        for p in document["by_pose"][:POSES]
+    ]
+    if poses:
+        print_table(["force x y z\ng", "dwells", "rms\nµg"], poses, title="Worst poses")
+    _parameters(document)
+
+
+def _parameters(document: dict[str, Any]) -> None:
+    """Nonlinear parameters and those of the station."""
+    from inertial import effects
+
+    lines = [
+        [name, p.name, short(values[p.name]), "", p.unit]
+        for name, values in document["nonlinear"].items()
+        for p in effects.get(name).nonlinear
+        if p.name in values
+    ]
+    lines += [
+        [row["effect"], row["name"], short(1e6 * row["value"]), short(1e6 * row["standard_error"]), "µrad or µg/g"]
+        for row in document["station"]
+    ]
+    if lines:
+        print_table(["effect", "parameter", "value", "± 1σ", "unit"], lines)

@@ -1,0 +1,104 @@
+"""``tumbleline diagnose``: whether a model is adequate, where it fails, and which effect is missing."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from pipelines.cli.options import (
+    ArchiveOption,
+    DwellsArgument,
+    EffectFileOption,
+    EffectsOption,
+    HistoryOption,
+    JsonOption,
+    ModelOption,
+    error_console,
+    print_json,
+)
+from schemas.errors import DONE, PART_FAILED
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+    from inertial.criticism.diagnosis import Diagnosis
+
+
+def command(
+    dwells: DwellsArgument,
+    effects: EffectsOption = "",
+    model: ModelOption = None,
+    history: HistoryOption = "",
+    effect_file: EffectFileOption = None,
+    report: Annotated[
+        Path | None,
+        typer.Option("--report", metavar="FILE.html", help="Write the diagnosis with pictures, as one HTML file."),
+    ] = None,
+    archive: ArchiveOption = None,
+    *,
+    as_json: JsonOption = False,
+) -> None:
+    """Say whether a model is good enough, where it fails, and which physical effect is missing.
+
+    Exit status 0: the model is adequate. 1: it is not, or every unit has a data fault. 2: the input cannot be used.
+    """
+    from pipelines.cli.inputs import add_effect_files, dwells_and_history
+    from pipelines.models import chosen_effects
+
+    add_effect_files(effect_file)
+    judged = chosen_effects(effects, model, "diagnose")
+    table, temperatures = dwells_and_history(dwells, history, archive)
+    document, report_text = _diagnosed(table, temperatures, judged, dwells, wanted=report is not None)
+    if report is not None:
+        _write(report, report_text)
+    if as_json:
+        print_json(document)
+    else:
+        from pipelines.cli.verdict import print_diagnosis
+
+        print_diagnosis(document, source=dwells, model=model, listed=effects)
+    raise typer.Exit(DONE if document["adequate"] else PART_FAILED)
+
+
+def _diagnosed(
+    table: pd.DataFrame, history: pd.DataFrame | None, judged: list[str] | None, source: str, *, wanted: bool
+) -> tuple[dict[str, Any], str]:
+    """The document of a diagnosis, and its report where one is wanted."""
+    from threadpoolctl import threadpool_limits
+
+    from pipelines.stages.criticise import default_model, document, examined
+
+    with threadpool_limits(1), error_console().status("looking for what is missing"):
+        effects = judged or default_model(table)
+        found, faults, diagnosis = examined(table, history, effects)
+    told = {**document(found, faults, diagnosis), **_extras(found.units, effects, diagnosis)}
+    if not wanted:
+        return told, ""
+    with error_console().status("drawing the report"):
+        from pipelines.report.diagnosis import render_diagnosis
+
+        return told, render_diagnosis(told, found, diagnosis, source)
+
+
+def _extras(units: tuple[str, ...], effects: list[str], diagnosis: Diagnosis | None) -> dict[str, Any]:
+    """What the document says beyond its fixed keys: the model judged, breakers of what was unseen, the formula on offer."""
+    from inertial import effects as catalogue
+    from pipelines.stages.offers import as_toml, offer
+
+    extras: dict[str, Any] = {"effects": effects, "units": list(units), "breakers": {}, "offer": None}
+    if diagnosis is None:
+        return extras
+    extras["breakers"] = {name: catalogue.get(name).breaker for name in diagnosis.unseen}
+    if diagnosis.unexplained is not None:
+        formula = offer(diagnosis.unexplained, diagnosis.problem.lot.state)
+        extras["offer"] = None if formula is None else {**formula, "toml": as_toml(formula)}
+    return extras
+
+
+def _write(path: Path, text: str) -> None:
+    from pipelines.archive import files
+
+    files.publish(path, text.encode())
+    error_console().print(f"report: {path}", markup=False, soft_wrap=True)

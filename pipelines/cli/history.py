@@ -1,0 +1,123 @@
+"""``tumbleline history``: the error of a model, version by version, beside the floor."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from pipelines.cli.options import (
+    ArchiveOption,
+    EffectFileOption,
+    HistoryOption,
+    JsonOption,
+    console,
+    error_console,
+    print_json,
+    print_table,
+    short,
+)
+
+
+def command(
+    model: Annotated[Path, typer.Argument(metavar="MODEL", help="A model file.")],
+    dwells: Annotated[
+        str, typer.Option("--dwells", metavar="DWELLS", help="A file in the exchange format, or a run of the archive.")
+    ] = "",
+    fresh: Annotated[
+        str,
+        typer.Option("--fresh", metavar="DWELLS2", help="The same units measured again: never fitted, only predicted."),
+    ] = "",
+    history: HistoryOption = "",
+    fresh_history: Annotated[
+        str, typer.Option("--fresh-history", metavar="FILE", help="Temperatures against time of the fresh run.")
+    ] = "",
+    picture: Annotated[
+        Path | None, typer.Option("--picture", metavar="FILE.png", help="Draw it, as PNG, SVG or PDF.")
+    ] = None,
+    effect_file: EffectFileOption = None,
+    archive: ArchiveOption = None,
+    *,
+    as_json: JsonOption = False,
+) -> None:
+    """Show what each version of a model added, who, when, why, and the error on the run, on poses left out and on a fresh run.
+
+    Without --dwells only the changes are shown.
+    """
+    from pipelines.cli.compare import compared
+    from pipelines.cli.inputs import add_effect_files, both_runs
+    from pipelines.models import read_model, versions
+    from pipelines.stages.evolution import FIGURES, evolution, told
+
+    add_effect_files(effect_file)
+    found = read_model(model)
+    _refuse_picture(picture, dwells)
+    if dwells:
+        tables = both_runs(dwells, history, fresh, fresh_history, archive)
+        rows = evolution(versions(found), lambda names: compared(names, *tables))
+    else:
+        rows = [
+            {**told(version), **dict.fromkeys(FIGURES), "confirmed": None, "words": ""} for version in versions(found)
+        ]
+    if picture is not None:
+        from pipelines.report.evolution import draw_evolution
+
+        draw_evolution(rows, picture, found.model.name)
+        error_console().print(f"picture: {picture}", markup=False, soft_wrap=True)
+    if as_json:
+        print_json({"model": found.model.name, "file": str(model), "versions": rows})
+    else:
+        _print(rows, found.model.name)
+
+
+def _refuse_picture(picture: Path | None, dwells: str) -> None:
+    from schemas.errors import WrongUse
+
+    if picture is None:
+        return
+    if not dwells:
+        message = "history: --picture shows errors, they need --dwells; name the dwells too"
+        raise WrongUse(message)
+    if picture.suffix.lower() not in {".png", ".svg", ".pdf"}:
+        message = f"history: --picture {picture}: '{picture.suffix}' cannot be drawn; name a .png, .svg or .pdf file"
+        raise WrongUse(message)
+
+
+def _print(rows: list[dict[str, Any]], name: str) -> None:
+    out = console()
+    changes = [
+        [str(row["version"]), _change(row), row["by"], row["at"][:16].replace("T", " "), row["why"]] for row in rows
+    ]
+    print_table(["version", "change", "by", "when", "why"], changes, title=f"Model {name}", whole=2)
+    if rows[0]["rms_ug"] is None:
+        return
+    fresh = rows[0]["fresh_rms_ug"] is not None
+    keys = ["rms_ug", "heldout_rms_ug", *(["fresh_rms_ug"] if fresh else []), "floor_ug"]
+    heads = {
+        "rms_ug": "fitted\nµg",
+        "heldout_rms_ug": "left out\nµg",
+        "fresh_rms_ug": "fresh run\nµg",
+        "floor_ug": "floor\nµg",
+    }
+    errors = [[str(row["version"]), *(short(row[key]) for key in keys), row["words"]] for row in rows]
+    print_table(
+        ["version", *(heads[k] for k in keys), "judged by data that were not fitted"],
+        errors,
+        title="Error, rms",
+        whole=5,
+    )
+    out.print("floor: the noise as each version sees it; what is missing counts as noise there", style="dim")
+    unconfirmed = [name for row in rows if row["confirmed"] is False for name in row["added"]]
+    if unconfirmed:
+        out.print(
+            f"{', '.join(unconfirmed)}: no progress. What fits the run better and fresh data no better is not there; "
+            "take it out of the model.",
+            style="bold red",
+            soft_wrap=True,
+        )
+
+
+def _change(row: dict[str, Any]) -> str:
+    parts = [f"+ {name}" for name in row["added"]] + [f"− {name}" for name in row["removed"]]
+    return "\n".join(parts) or f"{len(row['effects'])} effects"

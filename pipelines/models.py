@@ -1,0 +1,201 @@
+"""Model files in use: their formulas become effects, their versions a history, and one more effect the next version."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import tomlkit
+
+from inertial import effects
+from inertial.effects.formula import Formula
+from inertial.errors import InertialError, UnknownEffect
+from pipelines.archive import files
+from schemas.errors import RecipeInvalid, WrongUse, did_you_mean
+from schemas.model import load_model, parse_model
+from schemas.recipe import read_text
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Mapping, Sequence
+    from datetime import datetime
+    from pathlib import Path
+
+    from tomlkit.items import Array, Table
+
+    from schemas.model import ModelChange, ModelFile
+    from schemas.recipe import FormulaSpec
+
+STARTING_MODEL = ("bias", "scale", "misalignment", "bias_temperature", "scale_temperature")
+"""What a new model file begins with: the standard thermal model."""
+
+
+@dataclass(frozen=True)
+class Step:
+    """One effect more: who adds it, when, why, and the run or file that showed it."""
+
+    effect: str
+    by: str
+    at: datetime
+    why: str
+    run: str = ""
+
+
+@dataclass(frozen=True)
+class Version:
+    """A version of a model: its effects, what was added to and removed from the one before, and the change that says why."""
+
+    number: int
+    effects: tuple[str, ...]
+    added: tuple[str, ...]
+    removed: tuple[str, ...]
+    change: ModelChange | None
+
+
+def read_model(path: Path) -> ModelFile:
+    """The model of a file, its formulas known as effects, every effect of it in the catalogue."""
+    model = load_model(path)
+    _use(model, f"model {path.name}")
+    return model
+
+
+def use_formulas(formulas: Iterable[FormulaSpec], where: str) -> None:
+    """Make the formulas of a file effects of the catalogue.
+
+    Raises
+    ------
+    RecipeInvalid
+        A formula is no formula, or its id belongs to an effect of the catalogue.
+    """
+    for spec in formulas:
+        if spec.id in effects.built_in():
+            message = f"{where}: formula '{spec.id}': the catalogue has an effect of that id; choose another id"
+            raise RecipeInvalid(message, key="formula.id")
+        try:
+            made = Formula(spec.id, spec.columns, why=spec.why, symbol=spec.symbol, typical_ug=spec.typical_ug)
+        except InertialError as problem:
+            message = f"{where}: {problem}"
+            raise RecipeInvalid(message, key="formula.columns") from None
+        effects.register(made)
+
+
+def refuse_unknown_effects(names: Sequence[str], where: str) -> None:
+    """Refuse names that are no effect, with the close matches."""
+    for name in names:
+        try:
+            effects.get(name)
+        except UnknownEffect as problem:
+            message = f"{where}: unknown effect '{name}'; {did_you_mean(name, effects.catalogue())}"
+            raise RecipeInvalid(message, key="effects", close=problem.close) from None
+
+
+def chosen_effects(listed: str, model: Path | None, where: str) -> list[str] | None:
+    """The model that a command was given, as a list of effects or as a file; None where it was given neither."""
+    if listed and model is not None:
+        message = f"{where}: --effects and --model are both given, one is needed; leave one out"
+        raise WrongUse(message)
+    if model is not None:
+        return list(read_model(model).model.effects)
+    names = list(dict.fromkeys(part.strip() for part in listed.split(",") if part.strip()))
+    refuse_unknown_effects(names, where)
+    return names or None
+
+
+def versions(model: ModelFile) -> list[Version]:
+    """Every version of a model, oldest first, by walking back from the last over the changes."""
+    now = list(model.model.effects)
+    found: list[Version] = []
+    for change in reversed(model.change):
+        effect = change.effect
+        before = [e for e in now if e != effect] if effect in now else [*now, *([effect] if effect else [])]
+        added, removed = tuple(e for e in now if e not in before), tuple(e for e in before if e not in now)
+        first = change is model.change[0]
+        found.append(Version(change.version, tuple(now), () if first else added, () if first else removed, change))
+        now = before
+    return found[::-1] or [Version(model.model.version, tuple(now), (), (), None)]
+
+
+def new_model(path: Path, names: Sequence[str], by: str, at: datetime) -> str:
+    """The text of a model file in its first version."""
+    refuse_unknown_effects(names, f"model {path.name}")
+    document = tomlkit.document()
+    document.add(
+        tomlkit.comment(
+            "A model: the effects that are fitted. 'tumbleline extend' adds one and says who, when and why."
+        )
+    )
+    head = tomlkit.table()
+    head.add("name", re.sub(r"[^a-z0-9._-]+", "-", path.stem.lower()).strip("-._") or "model")
+    head.add("version", 1)
+    head.add("effects", _listed(names))
+    document.add("model", head)
+    document.add("change", tomlkit.aot())
+    first = {"version": 1, "by": by, "at": at, "why": "the model to begin with"}
+    document["change"].append(_table(first))  # pyright: ignore[reportArgumentType, reportAttributeAccessIssue, reportUnknownMemberType]
+    return tomlkit.dumps(document)
+
+
+def extended(text: str, step: Step, source: str) -> tuple[str, ModelFile]:
+    """The text of the next version of a model, its comments kept, and the model as it then is.
+
+    Raises
+    ------
+    RecipeInvalid
+        The text is no model, the effect is in it already, or nothing is called so.
+    """
+    model = parse_model(text, source)
+    _use(model, source)
+    if step.effect in model.model.effects:
+        message = (
+            f"{source}: '{step.effect}' is in version {model.model.version} already; "
+            f"its effects are {', '.join(model.model.effects)}"
+        )
+        raise RecipeInvalid(message, key="model.effects")
+    refuse_unknown_effects([step.effect], source)
+    document = tomlkit.parse(text)
+    head = document["model"]
+    version = model.model.version + 1
+    head["version"] = version  # pyright: ignore[reportIndexIssue]
+    head["effects"].append(step.effect)  # pyright: ignore[reportIndexIssue, reportAttributeAccessIssue, reportUnknownMemberType]
+    changes = document.setdefault("change", tomlkit.aot())
+    if not model.change and model.model.version > 1:
+        known = {
+            "version": model.model.version,
+            "by": step.by,
+            "at": step.at,
+            "why": "as it was found, without a history",
+        }
+        changes.append(_table(known))
+    told = {"version": version, "effect": step.effect, "by": step.by, "at": step.at, "why": step.why}
+    changes.append(_table(told | ({"run": step.run} if step.run else {})))
+    new = tomlkit.dumps(document)
+    return new, parse_model(new, source)
+
+
+def publish_model(path: Path, text: str) -> None:
+    """Write a model file so that it is there whole or as it was before."""
+    files.publish(path, text.encode())
+
+
+def model_text(path: Path) -> str:
+    """The text of a model file."""
+    return read_text(path, "model")
+
+
+def _use(model: ModelFile, source: str) -> None:
+    use_formulas(model.formula, source)
+    refuse_unknown_effects(model.model.effects, f"{source}: key 'effects'")
+
+
+def _listed(names: Sequence[str]) -> Array:
+    listed = tomlkit.array()
+    listed.extend(names)
+    return listed.multiline(multiline=True)
+
+
+def _table(content: Mapping[str, object]) -> Table:
+    table = tomlkit.table()
+    table.trivia.indent = "\n"  # a blank line before each change
+    for key, value in content.items():
+        table.add(key, value)
+    return table

@@ -1,0 +1,67 @@
+"""What to add where a driver explains the excess and no effect of the catalogue does: a formula, ready for a model file."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from inertial.expressions import NAMES, QUANTITIES
+
+if TYPE_CHECKING:
+    from inertial.criticism.diagnosis import Unexplained
+    from inertial.state import State
+
+DRIVERS = {
+    "temperature_rate": "rate",
+    "unit_C": "temperature",
+    "time_s": "hours",
+    "chamber_C": "chamber",
+    "supply_V": "supply",
+    "vibration_g": "vibration",
+    "since_move_s": "since_move",
+    "since_power_s": "since_power",
+}
+"""Names of drivers, and what a formula calls them."""
+
+
+def offer(unexplained: Unexplained, state: State) -> dict[str, Any] | None:
+    """A formula that follows the driver: a line, or a cubic about the middle of its range; None for what is no one quantity.
+
+    Parameters
+    ----------
+    unexplained : as a diagnosis found it
+    state : the dwells it was found in
+    """
+    name = DRIVERS.get(unexplained.driver, unexplained.driver)
+    values = _values(name, state)
+    if values is None or not name.isidentifier():
+        return None
+    return {
+        "id": f"{name.lower()}_bias",
+        "columns": [name] if unexplained.shape == "line" else _cubic(name, values),
+        "why": f"the residuals follow {unexplained.driver}; the cause is not known yet",
+    }
+
+
+def as_toml(formula: dict[str, Any]) -> str:
+    """The formula as it is pasted into a model file."""
+    columns = ", ".join(f'"{c}"' for c in formula["columns"])
+    return f'[[formula]]\nid = "{formula["id"]}"\ncolumns = [{columns}]\nwhy = "{formula["why"]}"'
+
+
+def _values(name: str, state: State) -> np.ndarray | None:
+    if name in state.covariates:
+        return state.covariates[name]
+    if name not in NAMES or name not in QUANTITIES:
+        return None
+    attribute, factor, _ = QUANTITIES[name]
+    found = getattr(state, attribute)
+    return None if found is None else factor * found
+
+
+def _cubic(name: str, values: np.ndarray) -> list[str]:
+    """Powers of the quantity scaled to about −1 … 1: unscaled ones would be nearly the same column."""
+    low, high = float(np.min(values)), float(np.max(values))
+    scaled = f"(({name} - {0.5 * (low + high):.4g}) / {max(0.5 * (high - low), 1e-12):.3g})"
+    return [name, f"{scaled}**2", f"{scaled}**3"]
