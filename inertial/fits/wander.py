@@ -163,21 +163,27 @@ class _Lot:
         if coarse[0.0, 0.0] - lowest < _CHARGE:
             return 0.0, 0.0
         likely = np.array([pair for pair, deviance in coarse.items() if deviance - lowest < _FAR])
-        flicker, walk = (self._axis(likely[:, k]) for k in range(2))
+        flicker, walk = (_around(likely[:, k]) for k in range(2))
         pairs = np.array(list(product(flicker**2, walk**2)))
         deviance = np.array([self._deviance(pair) for pair in pairs.tolist()])
         near = pairs[deviance - deviance.min() < _FAR]
-        flicker, walk = (np.linspace(*np.sqrt([near[:, k].min(), near[:, k].max()]), _FINE) for k in range(2))
+        flicker, walk = (_between(near[:, k]) for k in range(2))
         pairs = np.array(list(product(flicker**2, walk**2)))
         deviance = np.array([self._deviance(pair) for pair in pairs.tolist()])
         weight = np.exp(-0.5 * (deviance - deviance.min()))
         mean = (weight @ pairs) / weight.sum()
         return float(mean[0]), float(mean[1])
 
-    @staticmethod
-    def _axis(shares: Array) -> Array:
-        """Standard deviations to look at, one coarse step beyond those that are likely."""
-        return np.linspace(np.sqrt(shares.min() / _STEP), np.sqrt(max(float(shares.max()), _SHARES[1]) * _STEP), _FINE)
-
     def _deviance(self, shares: Sequence[float]) -> float:
         return self.solve(shares).deviance
+
+
+def _around(shares: Array) -> Array:
+    """Standard deviations (_FINE,) to look at, one coarse step beyond those that are likely."""
+    low, high = float(shares.min()) / _STEP, max(float(shares.max()), _SHARES[1]) * _STEP
+    return np.linspace(low**0.5, high**0.5, _FINE)
+
+
+def _between(shares: Array) -> Array:
+    """Standard deviations (_FINE,) from the least to the largest of the shares."""
+    return np.linspace(float(shares.min()) ** 0.5, float(shares.max()) ** 0.5, _FINE)
