@@ -31,6 +31,8 @@ if TYPE_CHECKING:
 POLL_S = 0.1
 CLIENTS, START_LOCK, ADDRESS = "clients", "start.lock", "server.json"
 
+_started: list[subprocess.Popen[bytes]] = []  # they end by themselves; kept so that the interpreter does not complain
+
 
 def run_locally(request: Request, job: Job, archive: Archive, progress: Progress, told: Callable[[Done], None]) -> Run:
     """The run that the flow ``calibrate_lot`` made, on the server named by PREFECT_API_URL or on one of our own."""
@@ -91,6 +93,7 @@ def _start(home: Path) -> int:
             stderr=log,
             start_new_session=True,
         )
+    _started.append(process)
     end = time.monotonic() + STARTUP_S
     while not _answers(port):
         if process.poll() is not None or time.monotonic() > end:

@@ -36,7 +36,17 @@ class Fault(NamedTuple):
     reason: str
 
 
-def validate(samples: Iterable[pd.DataFrame], readings: pd.DataFrame, units: Sequence[Unit]) -> pd.DataFrame:
+class Scale(NamedTuple):
+    """Where an output can lie: nominal zero, full scale to both sides, and its unit."""
+
+    zero: float
+    full: float
+    unit: str
+
+
+def validate(
+    samples: Iterable[pd.DataFrame], readings: pd.DataFrame, units: Sequence[Unit], zero_output: float = 0.0
+) -> pd.DataFrame:
     """Verdicts: one row per unit of the lot with ``refused``, the fault found first, and all reasons.
 
     Parameters
@@ -44,11 +54,12 @@ def validate(samples: Iterable[pd.DataFrame], readings: pd.DataFrame, units: Seq
     samples : one table per record.
     readings : of the whole run.
     units : the lot, so that a unit which never answered has a verdict too.
+    zero_output : nominal output at 0 g, from which the full scale extends both ways; output unit.
     """
     faults = [*_silent(readings, units), *_reading_faults(readings)]
     means: list[pd.DataFrame] = []
     for record in samples:
-        faults += _sample_faults(record, readings)
+        faults += _sample_faults(record, readings, zero_output)
         means.append(record.groupby(["unit", "record"], sort=False)[list(AXES)].mean().reset_index())
     answered = readings[readings["status"] == "ok"]
     faults += _stale_temperatures(answered)
@@ -61,8 +72,8 @@ def _verdicts(faults: list[Fault], units: Sequence[Unit]) -> pd.DataFrame:
     rows = []
     for unit in units:
         own = [fault for fault in faults if fault.unit == unit.serial]
-        reasons = list(dict.fromkeys(fault.reason for fault in own))
-        shown = reasons[:3] + ([f"and {len(reasons) - 3} more"] if len(reasons) > 3 else [])
+        kinds = list(dict.fromkeys(fault.fault for fault in own))
+        shown = [_first_of([fault.reason for fault in own if fault.fault == kind]) for kind in kinds]
         rows.append(
             {
                 "unit": unit.serial,
@@ -73,6 +84,12 @@ def _verdicts(faults: list[Fault], units: Sequence[Unit]) -> pd.DataFrame:
             }
         )
     return pd.DataFrame(rows)
+
+
+def _first_of(reasons: list[str]) -> str:
+    """The first of several reasons of one kind, with the number of the others."""
+    others = len(set(reasons)) - 1
+    return reasons[0] + (f" (and {others} more like it)" if others else "")
 
 
 def _silent(readings: pd.DataFrame, units: Sequence[Unit]) -> list[Fault]:
@@ -100,7 +117,7 @@ def _reading_faults(readings: pd.DataFrame) -> list[Fault]:
     return faults
 
 
-def _sample_faults(samples: pd.DataFrame, readings: pd.DataFrame) -> list[Fault]:
+def _sample_faults(samples: pd.DataFrame, readings: pd.DataFrame, zero: float) -> list[Fault]:
     faults: list[Fault] = []
     here = readings[readings["record"].isin(samples["record"].unique()) & (readings["status"] == "ok")]
     groups = samples.groupby(["unit", "record"], sort=False).indices
@@ -108,13 +125,14 @@ def _sample_faults(samples: pd.DataFrame, readings: pd.DataFrame) -> list[Fault]
         place = f"in record {row.record} (pose {row.pose})"
         index = groups.get((row.unit, row.record), np.array([], dtype=np.int64))
         values = samples.iloc[index][list(AXES)].to_numpy(dtype=float)
-        found = _fault_of(values, float(row.full_scale), int(row.n), str(row.out_unit))  # pyright: ignore[reportArgumentType]
+        scale = Scale(zero, float(row.full_scale), str(row.out_unit))  # pyright: ignore[reportArgumentType]
+        found = _fault_of(values, scale, int(row.n))  # pyright: ignore[reportArgumentType]
         if found:
             faults.append(Fault(str(row.unit), found[0], f"{found[1]} {place}; {found[2]}"))
     return faults
 
 
-def _fault_of(values: NDArray[np.float64], full_scale: float, n: int, unit: str) -> tuple[str, str, str] | None:
+def _fault_of(values: NDArray[np.float64], scale: Scale, n: int) -> tuple[str, str, str] | None:
     """Fault, finding and remedy of one unit's samples (n, 3) in one record; None where there is none."""
     if len(values) < SAMPLES_KEPT * n or len(values) == 0:
         return "dropped_samples", f"{len(values)} samples of {n}", "measure again"
@@ -125,12 +143,12 @@ def _fault_of(values: NDArray[np.float64], full_scale: float, n: int, unit: str)
         return "not_finite", finding, "measure again"
     still = np.flatnonzero(np.ptp(values, axis=0) == 0.0)
     if len(values) >= FEWEST_TO_JUDGE and still.size:
-        finding = f"constant output {values[0, still[0]]:g} {unit} on {AXES[still[0]]}"
+        finding = f"constant output {values[0, still[0]]:g} {scale.unit} on {AXES[still[0]]}"
         return "stuck_output", finding, "check wiring and power of the slot"
-    clipped = np.argwhere(np.abs(values) >= full_scale)
-    if len(clipped) and full_scale > 0.0:
+    clipped = np.argwhere(np.abs(values - scale.zero) >= scale.full)
+    if len(clipped) and scale.full > 0.0:
         axis = clipped[0][1]
-        finding = f"{len(clipped)} samples at full scale ({full_scale:g} {unit}) on {AXES[axis]}"
+        finding = f"{len(clipped)} samples at full scale ({scale.full:g} {scale.unit} from zero) on {AXES[axis]}"
         return "clipped", finding, "choose a wider range"
     return None
 

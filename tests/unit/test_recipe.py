@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from capture_double import recipe_file, small_job
 
+from inertial.poses import NAMED
 from pipelines.job import Request
 from pipelines.recipes import load_recipe, sample_names
 from schemas.errors import RecipeInvalid, WrongUse
@@ -67,7 +68,17 @@ def test_names_close_recipes() -> None:
 
 def test_refuses_poses_that_never_turn_z_over(tmp_path: Path) -> None:
     text = refusal(tmp_path, (POSES, "poses = [[70, 0], [90, 90], [80, 180], [90, -90], [85, 45]]"))
-    assert text == "fit: poses span 0.34 g on z, the recipe needs 1.5 g; add poses with z up and z down"
+    assert text == "fit: poses span 0.34 g on z, the recipe needs 1.4 g; add poses with z up and z down"
+
+
+@pytest.mark.parametrize("plan", NAMED)
+def test_accepts_every_named_plan(tmp_path: Path, plan: str) -> None:
+    assert small_job(tmp_path, (POSES, f'poses = "{plan}"')).recipe.poses
+
+
+def test_a_recipe_may_ask_for_a_wider_span(tmp_path: Path) -> None:
+    text = refusal(tmp_path, (POSES, 'poses = "twelve"\nspan_min_g = 1.5'))
+    assert "span 1.41 g" in text
 
 
 def test_refuses_temperatures_beyond_the_chamber(tmp_path: Path) -> None:
