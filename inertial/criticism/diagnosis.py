@@ -13,7 +13,7 @@ from inertial.criticism.drivers import Driver, Place, drivers_of, places
 from inertial.criticism.heldout import fit_rms, heldout_rms
 from inertial.criticism.model import Model, Term
 from inertial.criticism.problem import Lot, Problem
-from inertial.criticism.search import NAMED_BELOW, Field, Rival, log_p_value, search, size_of, terms_of
+from inertial.criticism.search import NAMED_BELOW, Field, Rival, log_p_value, search, terms_of
 from inertial.effects.base import AnyEffect
 from inertial.effects.covariate import COVARIATE_PREFIX, Covariate
 
@@ -145,23 +145,25 @@ def _covariate(classes: Sequence[EffectClass]) -> Unexplained | None:
 
 
 def _beyond(problem: Problem, base: Model, final: Model, drivers: list[Driver]) -> tuple[Model, Unexplained | None]:
-    """What smooth dependence is left after the effects found; effects that only imitate it are taken back."""
+    """What smooth dependence is left after the effects found; effects that only imitate it are taken back.
+
+    Effects imitate a driver where its curve alone, in their place, leaves less than they do.
+    """
     convincing = [d for d in drivers if _convincing(final, d, len(drivers))]
     if not convincing:
         return final, None
     best = max(convincing, key=lambda d: _worth(final, d))
     held = {t.effect.id for t in base.terms}
-    left = _driver_size(final, best)
-    kept: list[Term] = []
-    for term in (t for t in final.terms if t.effect.id not in held):
-        rest = final.without(term.effect.id)
-        imitates = left > 0.35 * size_of(rest, term) and _inside(rest, term, best)
-        if not imitates:
-            kept.append(term)
-    log_p = _driver_log_p(final, best) + np.log(len(drivers))
+    added = [t for t in final.terms if t.effect.id not in held]
+    kept = [t for t in added if not _inside(final.without(t.effect.id), t, best)]
     shape = "line" if best.candidate.columns.shape[-1] == 1 else "curve"
-    model = final if len(kept) + len(base.terms) == len(final.terms) else Model(problem, [*base.terms, *kept])
-    return model, Unexplained(best.name, shape, float(log_p))
+    unexplained = Unexplained(best.name, shape, _driver_log_p(final, best) + float(np.log(len(drivers))))
+    if len(kept) == len(added):
+        return final, unexplained
+    without = Model(problem, [*base.terms, *kept])
+    instead = without.with_curves(best.candidate.columns[:, :, 0, :])
+    better = instead.at(final.share).rss < final.space.rss
+    return (without if better else final), unexplained
 
 
 def _convincing(model: Model, driver: Driver, looks: int) -> bool:

@@ -26,7 +26,7 @@ Look = Callable[[Readings], Iterator[Fault]]
 def find_faults(readings: Readings) -> list[Fault]:
     """Data faults of a lot, at most one kind per unit; a unit without one is fit for diagnosis."""
     found: dict[int, Fault] = {}
-    for look in LOOKS:
+    for look in LOOKS if readings.turned else STILL_LOOKS:
         for fault in look(readings):
             found.setdefault(fault.unit, fault)
     return [found[u] for u in sorted(found)]
@@ -276,6 +276,8 @@ def noisy(readings: Readings) -> Iterator[Fault]:
     ratio = readings.spread / np.where(typical > 0.0, typical, np.inf)
     common = np.nanmedian(ratio, axis=0, keepdims=True) if len(ratio) > 2 else np.ones((1, *ratio.shape[1:]))
     loud: NDArray[np.bool_] = np.logical_and(ratio > 5.0, ratio > 3.0 * common)
+    few = np.count_nonzero(loud.any(axis=-1), axis=1) < 3
+    loud &= ~(few[:, None, None] & (ratio < 10.0))  # one restless dwell is a transient, not a fault of the reading
     if readings.vibration is not None:
         level = np.nanmedian(readings.vibration, axis=1, keepdims=True)
         loud &= ~(readings.vibration > 2.0 * np.maximum(level, 1e-12))[..., None]
@@ -390,5 +392,8 @@ LOOKS: tuple[Look, ...] = (
     quantised,
     dropped,
 )
+
+STILL_LOOKS: tuple[Look, ...] = (truncated, clock, temperature_units, stale, noisy, quantised, dropped)
+"""Looks for a record in one pose: nothing is known of its response, and an output may well repeat."""
 
 __all__ = ["Fault", "Look", "find_faults", "lattice_step", "robust_fit"]

@@ -20,17 +20,16 @@ _SHARES = np.concatenate([[0.0], np.geomspace(0.02, 2e4, 13)])
 class Term:
     """An effect in a model, at values of its nonlinear parameters.
 
+    values : of nonlinear parameters and constants; one value, or one per sensor axis
     first : how many of its columns are used; None for all
-    steps : sizes of the nonlinear parameters' local columns, by name, that let every unit differ a little; empty for none
     """
 
     effect: AnyEffect
-    values: tuple[tuple[str, float], ...] = ()
+    values: tuple[tuple[str, float | tuple[float, ...]], ...] = ()
     first: int | None = None
-    loose: bool = False
 
     @property
-    def keywords(self) -> dict[str, float]:
+    def keywords(self) -> dict[str, float | tuple[float, ...]]:
         """Values as keywords of the effect's columns."""
         return dict(self.values)
 
@@ -54,7 +53,6 @@ class Model:
         """Rotated columns with coefficients by block, (blocks, n, p)."""
         found = [self._of(t) for t in self.terms if t.effect.scope != "station"]
         found += [self._start(t) for t in self.terms if t.effect.scope != "station"]
-        found += [self._loose(t) for t in self.terms if t.loose and t.effect.scope != "station"]
         if self._curves is not None:
             found.append(self._curves)
         if not found:
@@ -78,19 +76,6 @@ class Model:
         """Rotated columns of the unknown state of a term's memory before the first dwell."""
         columns = self.problem.start(term.effect, term.keywords)
         return self.problem.basis.rotate(columns) if columns.shape[-1] else columns
-
-    def _loose(self, term: Term) -> Array:
-        """Derivatives of a term's columns by its continuous nonlinear parameters: what a unit's own value would add."""
-        found: list[Array] = []
-        for parameter in term.effect.parameters(self.problem.lot.state):
-            if parameter.choices:
-                continue
-            value = term.keywords[parameter.name]
-            step = 0.02 * (value if parameter.scale != "linear" else parameter.high - parameter.low)
-            up = self.problem.rotated(term.effect, {**term.keywords, parameter.name: value + step})
-            down = self.problem.rotated(term.effect, {**term.keywords, parameter.name: value - step})
-            found.append((up - down)[..., : term.first])
-        return np.concatenate(found, axis=-1) if found else np.zeros((self.problem.blocks, self.problem.n, 0))
 
     def at(self, share: float) -> Space:
         """What the model leaves, whitened at a share of wander."""

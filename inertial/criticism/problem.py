@@ -1,6 +1,6 @@
 """A lot's dwells as series in g: one block per unit and axis, or one per unit where only the norm of gravity is known."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import product
@@ -18,6 +18,15 @@ Array = NDArray[np.float64]
 
 _CACHE = 30_000_000
 """Numbers of rotated columns kept between passes; beyond, they are made again: memory stays bounded for large lots."""
+
+
+Values = Mapping[str, float | tuple[float, ...]]
+"""Nonlinear parameters and constants by name: one value, or one per sensor axis."""
+
+
+def on_axis(values: Values, axis: int) -> dict[str, float]:
+    """The values that hold for one sensor axis."""
+    return {name: value[axis] if isinstance(value, tuple) else value for name, value in values.items()}
 
 
 @dataclass(frozen=True)
@@ -95,18 +104,19 @@ class Problem:
         """Number of measurements."""
         return int(np.isfinite(self.error).sum())
 
-    def columns(self, effect: AnyEffect, values: dict[str, float]) -> Array:
+    def columns(self, effect: AnyEffect, values: Values) -> Array:
         """Columns of an effect by block, (blocks, n, p), g per unit of the coefficient; radial lots join the axes' columns."""
         if isinstance(effect, SensorEffect):
-            return self._by_axis([effect.columns(self.lot.state, axis, **values) for axis in range(3)])
-        return self._by_force(effect.force_change(self.lot.state, **values))
+            return self._by_axis([effect.columns(self.lot.state, axis, **on_axis(values, axis)) for axis in range(3)])
+        return self._by_force(effect.force_change(self.lot.state, **on_axis(values, 0)))
 
-    def start(self, effect: AnyEffect, values: dict[str, float]) -> Array:
+    def start(self, effect: AnyEffect, values: Values) -> Array:
         """Columns (blocks, n, k) of the unknown state of an effect's memory before the first dwell."""
         if isinstance(effect, SensorEffect):
-            columns = self._by_axis([effect.start_columns(self.lot.state, axis, **values) for axis in range(3)])
+            state = self.lot.state
+            columns = self._by_axis([effect.start_columns(state, axis, **on_axis(values, axis)) for axis in range(3)])
         else:
-            columns = self._by_force(effect.start_change(self.lot.state, **values))
+            columns = self._by_force(effect.start_change(self.lot.state, **on_axis(values, 0)))
         # a state taken up before the second dwell leaves a column of one dwell only: it is kept, the dwell tells nothing then
         return columns
 
@@ -130,11 +140,11 @@ class Problem:
             return np.einsum("uni,uinq->unq", self._direction, seen)
         return seen.reshape(self.blocks, self.n, -1)
 
-    def rotated(self, effect: AnyEffect, values: dict[str, float]) -> Array:
+    def rotated(self, effect: AnyEffect, values: Values) -> Array:
         """Rotated columns (blocks, n, p) of an effect."""
         return self.basis.rotate(self.columns(effect, values))
 
-    def candidate(self, effect: AnyEffect, grid: list[dict[str, float]], *, first: int | None = None) -> Candidate:
+    def candidate(self, effect: AnyEffect, grid: Sequence[Values], *, first: int | None = None) -> Candidate:
         """Rotated columns of an effect over values of its nonlinear parameters; ``first`` keeps only so many columns an axis."""
         key = (effect.id, len(grid), tuple(grid[0].items()), tuple(grid[-1].items()))
         kept = self._kept.get(key)

@@ -8,6 +8,8 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
+STANDARD_GRAVITY = 9.80665
+_TURNED = 0.05
 _ROUNDS = 12
 _TUKEY = 4.685
 
@@ -42,9 +44,28 @@ class Readings:
         return there
 
     @cached_property
+    def turned(self) -> bool:
+        """Whether the poses turn enough to tell a response from a bias; else faults of response cannot be looked for."""
+        x = np.concatenate([np.ones((*self.force.shape[1:2], 1)), self.force[0]], axis=-1)
+        return bool(np.linalg.svd(x, compute_uv=False)[-1] > _TURNED * np.sqrt(len(x)))
+
+    @cached_property
     def fits(self) -> Array:
-        """Robust bias and response of every unit, (units, 3, 4): columns 1, fx, fy, fz; output unit."""
+        """Robust bias and response of every unit, (units, 3, 4): columns 1, fx, fy, fz; output unit.
+
+        Where the poses do not turn, the response is the nominal one of the output's unit.
+        """
+        if not self.turned:
+            return np.stack([self._nominal(f, o) for f, o in zip(self.force, self.output, strict=True)])
         return np.stack([robust_fit(f, o) for f, o in zip(self.force, self.output, strict=True)])
+
+    def _nominal(self, force: Array, output: Array) -> Array:
+        """Bias at the nominal response, (3, 4): 1 for g, 9.80665 for m/s², else the norm of the mean output."""
+        known = {"g": 1.0, "m/s^2": STANDARD_GRAVITY}
+        typical = float(np.linalg.norm(np.nanmedian(output, axis=0)))
+        scale = known.get(self.unit_name or "", typical if typical > 0.0 else 1.0)
+        bias = np.nanmedian(output - scale * force, axis=0)
+        return np.concatenate([bias[:, None], scale * np.eye(3)], axis=1)
 
     @cached_property
     def scale(self) -> Array:

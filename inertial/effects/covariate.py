@@ -10,18 +10,19 @@ from inertial.state import State
 
 COVARIATE_PREFIX = "covariate:"
 
-_FEW = 7
+_KNOTS = np.linspace(-1.0, 1.0, 6)
+_FEW = 8
 """Below this many distinct values a curve is not told from a line."""
 
 
 class Covariate(SensorEffect):
     """Dependence of the bias on a recorded column: a line, or a smooth curve where the column takes enough values.
 
-    The curve is a cubic with Legendre polynomials over the range met in the run; beyond that range it is not to be trusted.
+    The curve is a natural cubic spline over the range met in the run, straight beyond it.
     """
 
     symbol: ClassVar[str] = "kc"
-    equation: ClassVar[str] = "kc1·z + kc2·P2(z) + kc3·P3(z), z the column scaled to −1 … 1"
+    equation: ClassVar[str] = "kc1·z + Σ kcj·Nj(z), z the column scaled to −1 … 1, Nj a natural cubic spline"
     source: ClassVar[str] = "an empirical dependence: no physics is claimed"
     typical_ug: ClassVar[tuple[float, float]] = (1.0, 10000.0)
     hides_behind: ClassVar[tuple[str, ...]] = ()
@@ -42,19 +43,27 @@ class Covariate(SensorEffect):
         return {
             "centre": 0.5 * (low + high),
             "half_range": max(0.5 * (high - low), 1e-12),
-            "degree": 3.0 if self.curve and many else 1.0,
+            "degree": float(_KNOTS.size - 1) if self.curve and many else 1.0,
         }
 
     def columns(
         self, state: State, axis: int, *, centre: float, half_range: float, degree: float, **nonlinear: float
     ) -> Array:
-        """Legendre polynomials of the scaled column, (..., n, degree)."""
+        """A line, and the curved functions of the spline, of the scaled column: (..., n, degree)."""
         del axis, nonlinear
         z = (state.need(self.column, self.id) - centre) / half_range
-        polynomials = [z, 1.5 * z**2 - 0.5, 2.5 * z**3 - 1.5 * z]
-        return stack(state, polynomials[: int(degree)])
+        return stack(state, [z, *_natural(z)][: int(degree)])
 
     def names(self, axis: int) -> tuple[str, ...]:
         """Names of the coefficients."""
         del axis
-        return ("kc1", "kc2", "kc3") if self.curve else ("kc1",)
+        return tuple(f"kc{k + 1}" for k in range(_KNOTS.size - 1)) if self.curve else ("kc1",)
+
+
+def _natural(z: Array) -> list[Array]:
+    """Curved functions of a natural cubic spline. Hastie, Tibshirani, Friedman: Elements of Statistical Learning, eq. 5.4."""
+
+    def d(k: int) -> Array:
+        return (np.maximum(z - _KNOTS[k], 0.0) ** 3 - np.maximum(z - _KNOTS[-1], 0.0) ** 3) / (_KNOTS[-1] - _KNOTS[k])
+
+    return [d(k) - d(_KNOTS.size - 2) for k in range(_KNOTS.size - 2)]

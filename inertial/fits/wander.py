@@ -170,7 +170,9 @@ class _Lot:
         flicker, walk = (_between(near[:, k]) for k in range(2))
         pairs = np.array(list(product(flicker**2, walk**2)))
         deviance = np.array([self._deviance(pair) for pair in pairs.tolist()])
-        weight = np.exp(-0.5 * (deviance - deviance.min()))
+        # half of the belief beforehand is that a kind of wander is not there at all
+        belief = np.prod(np.where(pairs > 0.0, 1.0, _FINE - 1.0), axis=1)
+        weight = belief * np.exp(-0.5 * (deviance - deviance.min()))
         mean = (weight @ pairs) / weight.sum()
         return float(mean[0]), float(mean[1])
 
