@@ -26,7 +26,7 @@ FLOOR = "#009e73"
 
 def draw_evolution(rows: list[dict[str, Any]], path: Path, name: str) -> None:
     """Write the picture: errors of every version beside the floor of the last; what is not confirmed is marked."""
-    with mpl.rc_context(STYLE):  # pyright: ignore[reportArgumentType]
+    with mpl.rc_context(STYLE):
         figure = Figure(figsize=(max(6.4, 2.2 + 1.5 * len(rows)), 4.6), layout="constrained")
         place = figure.subplots()
         draw(place, rows)

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from importlib.resources import files
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from jinja2 import Environment, StrictUndefined
 
 from pipelines.report.numbers import plain, with_uncertainty
 from pipelines.report.plots import check_plots, lot_plot, model_plots
+from pipelines.report.templates import template
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -40,10 +39,7 @@ def render(run: Run) -> str:
     limit = _limit(run, "verification_norm_ug")
     units = [_unit(row, tables, limit) for row in grades.to_dict("records")]
     calibrated = [unit["unit"] for unit in units if unit["outcome"] != "refused"]
-    template = Environment(
-        autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
-    ).from_string((files("pipelines.report") / "page.html").read_text(encoding="utf-8"))
-    return template.render(
+    return template("page.html").render(
         run=run.id,
         about=run.about,
         recipe=run.about["recipe"],

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import io
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import matplotlib as mpl
 import numpy as np
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 AXES = ("x", "y", "z")
 COLOURS = {"x": "#0072b2", "y": "#d55e00", "z": "#009e73"}  # told apart by the colour-blind too (Okabe and Ito)
 WIDTH_IN = 11.5
-STYLE = {
+STYLE: dict[Any, Any] = {
     "font.size": 10.0,
     "axes.spines.top": False,
     "axes.spines.right": False,
@@ -50,7 +50,7 @@ def model_plots(dwells: pd.DataFrame, residuals: pd.DataFrame) -> str:
         largest = 1.08 * float(residuals["residual_ug"].abs().max())
         for row in (1, 2):
             grid[row, 0].set_ylim(-largest, largest)
-        return _svg(figure)
+        return svg(figure)
 
 
 def check_plots(residuals: pd.DataFrame, verification: pd.DataFrame, allan: pd.DataFrame, limit_ug: float) -> str:
@@ -66,7 +66,7 @@ def check_plots(residuals: pd.DataFrame, verification: pd.DataFrame, allan: pd.D
             _verification(places.pop(0), verification, limit_ug)
         if len(allan):
             _allan(places.pop(0), allan)
-        return _svg(figure)
+        return svg(figure)
 
 
 def lot_plot(verification: pd.DataFrame, units: list[str], limit_ug: float) -> str:
@@ -84,7 +84,7 @@ def lot_plot(verification: pd.DataFrame, units: list[str], limit_ug: float) -> s
         place.set_xticks(range(len(units)), units)
         place.set(ylabel="|a| − g / µg", xlim=(-0.6, len(units) - 0.4))
         place.grid(visible=False, axis="x")
-        return _svg(figure)
+        return svg(figure)
 
 
 def _response(place: Axes, own: pd.DataFrame, axis: str, unit: str, colours: list[tuple[float, ...]]) -> None:
@@ -167,7 +167,8 @@ def _slope_guides(place: Axes, allan: pd.DataFrame) -> None:
     place.set_ylim(low, high)
 
 
-def _svg(figure: Figure) -> str:
+def svg(figure: Figure) -> str:
+    """A figure as SVG text that stands inside a page."""
     sink = io.StringIO()
     figure.savefig(sink, format="svg", metadata={"Date": None, "Creator": None})
     text = sink.getvalue()

@@ -1,0 +1,97 @@
+"""The report of a diagnosis: one HTML file that opens without a network."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from inertial import effects
+from pipelines.report.diagnosis_plots import driver_plots, model_plot, pose_maps
+from pipelines.report.numbers import plain
+from pipelines.report.residuals import drivers_shown, left_by
+from pipelines.report.templates import template
+
+if TYPE_CHECKING:
+    from inertial.criticism.diagnosis import Diagnosis
+    from inertial.criticism.search import Rival
+    from pipelines.stages.measured import Measured
+
+MICRO = 1e6
+_LEVELS = ((1e-299, "< 1e−299"), (0.0, ""))
+
+
+def render_diagnosis(document: dict[str, Any], found: Measured, diagnosis: Diagnosis | None, source: str) -> str:
+    """The report as one HTML text that needs no other file.
+
+    Parameters
+    ----------
+    document : the diagnosis for programs, with its extras
+    found, diagnosis : the readings and what was found in them; None where every unit has a data fault
+    source : what the dwells were called
+    """
+    faulty = {unit for fault in document["blocked_by"] for unit in fault["units"]}
+    sound = tuple(unit for unit in found.units if unit not in faulty)
+    return template("diagnosis.html").render(
+        source=source,
+        document=document,
+        sound=sound,
+        faulty=sorted(faulty),
+        classes=[_class(group, document) for group in document["classes"]],
+        unseen=[(name, document["breakers"][name]) for name in document["unseen"]],
+        pictures=None if diagnosis is None else _pictures(diagnosis, sound),
+        ladder=[] if diagnosis is None else _ladder(diagnosis.ladder),
+        number=plain,
+        chance=chance,
+    )
+
+
+def chance(p: float | None) -> str:
+    """A probability for people."""
+    if p is None:
+        return ""
+    if p <= 1e-299:
+        return "< 1e−299"
+    return plain(p, 2) if p > 1e-3 else f"{p:.0e}".replace("-", "−")
+
+
+def _class(group: dict[str, Any], document: dict[str, Any]) -> dict[str, Any]:
+    simplest = next((name for name in document["recommended"] if name in group["effects"]), group["effects"][0])
+    chosen = effects.get(simplest)
+    values = [f"{p.name} = {plain(group['nonlinear'].get(p.name, float('nan')))} {p.unit}" for p in chosen.nonlinear]
+    members = [
+        {"id": name, "symbol": effects.get(name).symbol, "equation": effects.get(name).equation}
+        for name in group["effects"]
+    ]
+    return {**group, "members": members, "recommended": simplest, "values": ", ".join(values)}
+
+
+def _pictures(diagnosis: Diagnosis, units: tuple[str, ...]) -> dict[str, Any]:
+    lot = diagnosis.problem.lot
+    left = left_by(diagnosis, units)
+    drivers = drivers_shown(diagnosis)
+    return {
+        "unit": left.unit,
+        "several": len(units) > 1,
+        "added": left.before is not left.after,
+        "model": model_plot(left, lot.state, lot.output, MICRO * diagnosis.floor),
+        "maps": pose_maps(left, lot.state),
+        "drivers": driver_plots(left, drivers, lot.state.temperature) if drivers else "",
+    }
+
+
+def _ladder(rivals: tuple[Rival, ...]) -> list[dict[str, Any]]:
+    """The candidates of the first step, best first, with how far each is behind."""
+    if not rivals:
+        return []
+    best, most = rivals[0].cost, max(1e-12, *(r.drop for r in rivals))
+    return [
+        {
+            "id": r.term.effect.id,
+            "symbol": r.term.effect.symbol,
+            "coefficients": r.rank,
+            "drop": plain(r.drop),
+            "width": f"{100.0 * max(r.drop, 0.0) / most:.1f}",
+            "behind": plain(r.cost - best),
+            "exponent": plain(-r.log_p / 2.302585) if r.log_p > -1e6 else "> 300",
+        }
+        for r in rivals
+    ]

@@ -1,0 +1,156 @@
+"""What a model leaves before and after the missing effects are added, laid out for pictures."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from inertial.criticism.comparison import estimate, residuals_of
+from inertial.criticism.drivers import curve, drivers_of
+
+if TYPE_CHECKING:
+    from inertial.criticism.diagnosis import Diagnosis
+
+Array = NDArray[np.float64]
+
+MICRO = 1e6
+ALWAYS = ("unit_C", "time_s", "temperature_rate", "since_move_s")
+_MOST = 7
+_ALIKE = 0.995
+_SOAK_APART = 1.0
+_KNOTS = 5
+
+
+@dataclass(frozen=True)
+class Left:
+    """Residuals of a lot in µg, (units, axes, n); NaN where a dwell is missing.
+
+    axes : "x", "y", "z", or "norm" alone
+    shown : place of the unit whose residuals fall most, or are largest where nothing was added
+    """
+
+    units: tuple[str, ...]
+    axes: tuple[str, ...]
+    before: Array
+    after: Array
+    shown: int
+
+    @property
+    def unit(self) -> str:
+        """The unit that is shown."""
+        return self.units[self.shown]
+
+
+@dataclass(frozen=True)
+class Series:
+    """A driver's values (units, n), or (units, n, 3) where it is one per axis, with a label for people."""
+
+    name: str
+    label: str
+    values: Array
+
+
+def left_by(diagnosis: Diagnosis, units: tuple[str, ...]) -> Left:
+    """Residuals before and after, by generalised least squares with each model's own noise."""
+    problem = diagnosis.problem
+    axes = ("norm",) if problem.lot.radial else ("x", "y", "z")
+    shape = (len(units), len(axes), problem.n)
+    before = MICRO * residuals_of(problem, estimate(diagnosis.base)).reshape(shape)
+    after = before if not added(diagnosis) else MICRO * residuals_of(problem, estimate(diagnosis.final)).reshape(shape)
+    sizes = np.nanmean(before**2, axis=(1, 2))
+    fallen = sizes - np.nanmean(after**2, axis=(1, 2)) if added(diagnosis) else sizes
+    return Left(units, axes, before, after, int(np.argmax(fallen)))
+
+
+def added(diagnosis: Diagnosis) -> list[str]:
+    """Ids of the effects that the diagnosis added."""
+    held = {t.effect.id for t in diagnosis.base.terms}
+    return [t.effect.id for t in diagnosis.final.terms if t.effect.id not in held]
+
+
+LABELS = {
+    "unit_C": "temperature of the unit / °C",
+    "chamber_C": "temperature of the chamber / °C",
+    "temperature_rate": "rate of temperature / K/min",
+    "time_s": "time / h",
+    "since_move_s": "time since the last move / s",
+    "since_power_s": "time since power-on / h",
+    "supply_V": "supply / V",
+    "vibration_g": "vibration / g rms",
+    "approach": "change of force at the move before / g",
+}
+
+
+def drivers_shown(diagnosis: Diagnosis) -> list[Series]:
+    """Drivers worth a picture: those the model fails along, then temperature, time, rate and wait where they vary."""
+    state = diagnosis.problem.lot.state
+    known = {d.name: d.values for d in drivers_of(diagnosis.problem)}
+    if "approach" in known:
+        known["approach"] = state.force_step
+    first = [] if diagnosis.unexplained is None else [diagnosis.unexplained.driver]
+    wanted = dict.fromkeys([*first, *(p.driver for p in diagnosis.where[:5]), *ALWAYS])
+    found: list[Series] = []
+    for name in wanted:
+        values = known.get(name)
+        if values is not None and not any(_alike(values, other.values) for other in found):
+            found.append(
+                Series(name, LABELS.get(name, name), values / (3600.0 if "/ h" in LABELS.get(name, "") else 1.0))
+            )
+    return found[:_MOST]
+
+
+def _alike(one: Array, other: Array) -> bool:
+    """Whether two drivers tell the same: elapsed time and time since power-on often do."""
+    if one.shape != other.shape:
+        return False
+    return bool(abs(np.corrcoef(one.ravel(), other.ravel())[0, 1]) > _ALIKE)
+
+
+def band(x: Array, y: Array) -> tuple[Array, Array, Array]:
+    """Smooth curve through points with its 95 % band: (places, low, high); empty where there are too few."""
+    there = np.isfinite(x) & np.isfinite(y)
+    x, y = x[there], y[there]
+    if x.size < 3 * _KNOTS or np.unique(np.round(x, 9)).size < 3:
+        return np.zeros(0), np.zeros(0), np.zeros(0)
+    groups = _groups(x)
+    places = np.linspace(x.min(), x.max(), 80) if groups > 3 else np.unique(x)
+    both = _basis(np.concatenate([x, places]), x.size, groups)
+    design, at = both[: x.size], both[x.size :]
+    found, _, rank, _ = np.linalg.lstsq(design, y, rcond=1e-9)
+    left = y - design @ found
+    variance = float(left @ left) / max(x.size - int(rank), 1)
+    spread = 1.96 * np.sqrt(variance * np.einsum("ij,jk,ik->i", at, np.linalg.pinv(design.T @ design, rcond=1e-10), at))
+    return places, at @ found - spread, at @ found + spread
+
+
+def _groups(values: Array) -> int:
+    """Number of groups that values fall into, parted by gaps of a twentieth of their range: soaks, mostly."""
+    gaps = np.diff(np.sort(values))
+    return 1 + int(np.count_nonzero(gaps > 0.05 * np.ptp(values)))
+
+
+def _basis(values: Array, count: int, groups: int) -> Array:
+    """Constant and smooth curve, knots from the first ``count`` values; a polynomial where values come in few groups.
+
+    Between groups nothing holds a spline.
+    """
+    if groups > 2 * _KNOTS or groups == 1:
+        return np.concatenate([np.ones((values.size, 1)), curve(values, _KNOTS)], axis=-1)
+    low, high = float(values[:count].min()), float(values[:count].max())
+    z = 2.0 * (values - low) / max(high - low, 1e-12) - 1.0
+    return np.stack([z**k for k in range(min(4, max(groups, 2)))], axis=-1)
+
+
+def direction(temperature: Array) -> NDArray[np.int64]:
+    """Whether each dwell was reached heating (1), cooling (−1) or neither (0), (n,), from temperatures (n,) in °C."""
+    out = np.zeros(temperature.size, dtype=np.int64)
+    held = temperature[0]
+    for k in range(1, temperature.size):
+        step = temperature[k] - held
+        moved = abs(step) > _SOAK_APART
+        out[k] = int(np.sign(step)) if moved else out[k - 1]
+        held = temperature[k] if moved else held
+    return out
