@@ -51,6 +51,9 @@ class Job:
     method: str
 
 
+Result = tuple[Job, Score, dict[str, Any], dict[str, Any]]  # with the document and the truth
+
+
 def in_process(run: Run) -> Answer:
     """The product's diagnosis, called as a function."""
     from pipelines.stages.compare import compare
@@ -114,7 +117,7 @@ def method(name: str) -> Method:
     return BASELINES[name]
 
 
-def one(job: Job) -> tuple[Job, Score, dict[str, Any], dict[str, Any]]:
+def one(job: Job) -> Result:
     """The score of one job, with the document and the truth for those who look into failures."""
     run = case(job.scenario, job.index, job.seed)
     begin = time.perf_counter()
@@ -140,19 +143,17 @@ def deal(scenarios: list[str], runs: int, *, each: bool) -> Iterator[tuple[str, 
             yield name, index
 
 
-def work(jobs: list[Job], processes: int) -> list[tuple[Job, Score, dict[str, Any], dict[str, Any]]]:
-    """All jobs done, in their order, with a line of progress on standard error."""
-    done = []
+def work(jobs: list[Job], processes: int) -> Iterator[Result]:
+    """Each job's result as it is done, in their order, with a line of progress on standard error."""
     with ProcessPoolExecutor(processes) as pool:
         results = pool.map(one, jobs) if processes > 1 else map(one, jobs)
-        for result in results:
-            done.append(result)
-            print(f"\r{len(done)}/{len(jobs)} {result[0].scenario:20}", end="", file=sys.stderr, flush=True)
+        for count, result in enumerate(results, 1):
+            print(f"\r{count}/{len(jobs)} {result[0].scenario:20}", end="", file=sys.stderr, flush=True)
+            yield result
     print(file=sys.stderr)
-    return done
 
 
-def failures(results: list[tuple[Job, Score, dict[str, Any], dict[str, Any]]]) -> list[str]:
+def failures(results: list[Result]) -> list[str]:
     """One line for each run that went wrong: where to find it, what hid, what was said."""
     lines = []
     for job, got, document, truth in results:
@@ -173,7 +174,7 @@ def failures(results: list[tuple[Job, Score, dict[str, Any], dict[str, Any]]]) -
     return lines
 
 
-def save(folder: Path, results: list[tuple[Job, Score, dict[str, Any], dict[str, Any]]]) -> None:
+def save(folder: Path, results: list[Result]) -> None:
     """Scores as Parquet, documents with truths as JSON lines."""
     folder.mkdir(parents=True, exist_ok=True)
     rows = [{"method": j.method, "index": j.index, "seed": j.seed} | s.row() for j, s, _, _ in results]
@@ -224,22 +225,32 @@ def main() -> None:
     if options.dump:
         dump(options.dump, iter(cases), options.seed)
         return
-    figures = {}
-    everything = []
-    for way in options.method or ["cli" if options.cli else "tumbleline"]:
-        results = work([Job(name, index, options.seed, way) for name, index in cases], options.jobs)
-        everything += results
-        figures[way] = table(s for _, s, _, _ in results)
-        times = sorted(s.seconds for _, s, _, _ in results)
-        print(
-            f"\n{way}: {len(results)} runs, seed {options.seed}, median {times[len(times) // 2]:.2f} s, longest {times[-1]:.2f} s"
-        )
-        print(text(figures[way]))
-        if options.failures:
-            print("\n".join(failures(results)))
-    if options.out:
-        save(options.out, everything)
-        (options.out / "figures.json").write_text(json.dumps(figures, indent=1))
+    figures: dict[str, list[dict[str, Any]]] = {}
+    everything: list[Result] = []
+    try:
+        for way in options.method or ["cli" if options.cli else "tumbleline"]:
+            jobs = [Job(name, index, options.seed, way) for name, index in cases]
+            results: list[Result] = []
+            for result in work(jobs, options.jobs):
+                results.append(result)
+                everything.append(result)
+            figures[way] = table(s for _, s, _, _ in results)
+            show(way, results, options.seed)
+            if options.failures:
+                print("\n".join(failures(results)))
+    finally:  # a diagnosis that fails in the last run does not take the others with it
+        if options.out and everything:
+            save(options.out, everything)
+            (options.out / "figures.json").write_text(json.dumps(figures, indent=1))
+
+
+def show(way: str, results: list[Result], seed: int) -> None:
+    """Prints the table of figures of one way to diagnose."""
+    times = sorted(s.seconds for _, s, _, _ in results)
+    print(
+        f"\n{way}: {len(results)} runs, seed {seed}, median {times[len(times) // 2]:.2f} s, longest {times[-1]:.2f} s"
+    )
+    print(text(table(s for _, s, _, _ in results)), flush=True)
 
 
 if __name__ == "__main__":

@@ -1,0 +1,61 @@
+"""Hidden effects, found from the measurements alone: a small suite on every run of the tests, a large one in `make test-slow`."""
+
+import pytest
+from score import Score, score, table, text
+from truth import Run, case
+
+from pipelines.stages.criticise import diagnose
+
+SEED = 5
+SMALL = {
+    "lot8_size2": 5, "single_size2": 2, "null_white": 2, "null_flicker": 2, "pairs": 1, "covariate_line": 1, "withheld": 1,
+    "invisible": 1, "faults": 2, "bare_model": 1,
+}  # fmt: skip
+LARGE = {
+    "lot8_size2": 70, "lot8_size1": 70, "lot8_size4": 35, "single_size2": 60, "null_white": 60, "null_flicker": 60, "pairs": 35,
+    "triples": 25, "covariate_line": 15, "covariate_curve": 15, "withheld": 21, "invisible": 18, "faults": 32,
+}  # fmt: skip
+
+
+def diagnosed(run: Run, scenario: str) -> Score:
+    spec = run.sealed.spec
+    document = diagnose(run.dwells, history=run.history if spec.history else None, effects=spec.base)
+    return score(document, run.sealed, scenario=scenario)
+
+
+def figures(deal: dict[str, int]) -> tuple[dict[str, float], list[Score]]:
+    """Percentages of the table by title, and the scores behind them."""
+    scores = [diagnosed(case(name, index, SEED), name) for name, count in deal.items() for index in range(count)]
+    rows = table(scores)
+    print(text(rows))  # noqa: T201 - shown when the suite fails
+    return {row["figure"]: row["value"] for row in rows}, scores
+
+
+def test_names_what_hides_and_nothing_where_nothing_hides():
+    shares, scores = figures(SMALL)
+    missed = [(s.scenario, s.truth, s.named) for s in scores if s.exact is False]
+    assert len(missed) <= 2, missed
+    assert shares["null, white: an effect named"] == 0.0
+    assert shares["null, strong 1/f: an effect named"] == 0.0
+    assert shares["invisible effect named"] == 0.0
+    assert shares["invisible effect listed as unseen"] == 100.0
+    assert shares["fault caught, unit blocked"] == 100.0
+    assert shares["false fault alarm on a clean run"] == 0.0
+    assert shares["unknown covariate, line: driver named"] == 100.0
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(3600)
+def test_keeps_its_figures_over_hundreds_of_runs():
+    shares, _ = figures(LARGE)
+    assert shares["lots of 8: truth in its class, size 2"] >= 97.0
+    assert shares["lots of 8: exact, size 2"] >= 93.0
+    assert shares["lots of 8: exact, size 1"] >= 90.0
+    assert shares["single units: exact, size 2"] >= 88.0
+    assert shares["null, white: an effect named"] <= 1.7
+    assert shares["null, strong 1/f: an effect named"] <= 1.7
+    assert shares["two effects: exact"] >= 80.0
+    assert shares["three effects: exact"] >= 60.0
+    assert shares["invisible effect named"] == 0.0
+    assert shares["fault caught, unit blocked"] == 100.0
+    assert shares["false fault alarm on a clean run"] <= 0.5
