@@ -185,11 +185,11 @@ def errors(data: Measured) -> None:
     )
 
 
-WHY = """Why this differs from the notes: before calibration the simulated units have what data sheets give as turn-on offset,
-sensitivity error and axis misalignment (8 mg, 0.3 %, 3 mrad for the MEMS part), while the notes' figures start from units
-that are trimmed already. After it, what remains is what the true coefficients would leave: the wander of the output
-(bias instability and random walk of the same table) between the calibration and the check, which no calibration removes;
-the notes give the smaller of that and the noise of one reading without saying over which time."""
+WHY = """Why this differs from the notes. Before: the simulated units carry the presets' turn-on offset, sensitivity error,
+misalignment and slot rotation (ADXL355: 8 mg, 0.3 %, 3 mrad, 1 mrad, one sigma); the notes do not say what their "before"
+contains. After: what the true coefficients would leave is printed beside it, so the remainder is wander of the output
+during the run (bias instability, random walk), which coefficients cannot take out; the notes do not say over which time
+theirs is meant."""
 
 
 def rms(values: Array) -> float:

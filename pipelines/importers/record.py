@@ -66,8 +66,10 @@ def imported(table: pd.DataFrame, mapping: Mapping, where: str) -> Imported:
     first, last, labels = _stretches(columns, output, time, mapping)
     first, last, labels = _wanted(first, last, labels, mapping, where)
     dwells = _means(samples, first, last, labels, tuple(extras), mapping) if first else None
+    record = np.zeros(len(samples), dtype=np.int64)
     for number, (a, b) in enumerate(zip(first, last, strict=True)):
-        samples.iloc[a:b, samples.columns.get_loc("record")] = number + 1
+        record[a:b] = number + 1
+    samples["record"] = record
     return Imported(samples, dwells, out_unit, remarks)
 
 
