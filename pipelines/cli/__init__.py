@@ -59,7 +59,7 @@ class _Commands(TyperGroup):
     def list_commands(self, ctx: Context) -> list[str]:
         """Names of the commands."""
         del ctx
-        return list(COMMANDS)
+        return [*COMMANDS]  # the module cli.list hides the built-in of that name here once it is imported
 
     def get_command(self, ctx: Context, cmd_name: str) -> Command | None:
         """The command of this name."""
