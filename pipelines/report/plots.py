@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import matplotlib as mpl
 import numpy as np
 from matplotlib.figure import Figure
-from matplotlib.ticker import EngFormatter
+from matplotlib.ticker import EngFormatter, FuncFormatter, NullLocator
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -152,6 +152,9 @@ def _allan(place: Axes, allan: pd.DataFrame) -> None:
         place.plot(own["tau_s"], own["deviation_ug"], "o", color=COLOURS[axis], markersize=3.5, label=axis)
         place.plot(own["tau_s"], own["fitted_ug"], "-", color=COLOURS[axis], linewidth=1.2)
     place.set(xscale="log", yscale="log", title="Allan deviation", xlabel="averaging time / s", ylabel="σ / µg")
+    for scale in (place.xaxis, place.yaxis):  # minor ticks and typeset powers cost more than the curves themselves
+        scale.set_minor_locator(NullLocator())
+        scale.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
     _slope_guides(place, allan)
     place.legend(loc="upper right", ncols=3, frameon=False, handletextpad=0.1, columnspacing=0.8)
 
@@ -165,6 +168,9 @@ def _slope_guides(place: Axes, allan: pd.DataFrame) -> None:
     last = allan.loc[allan["tau_s"] == tau[1], "deviation_ug"].mean()
     place.plot(tau, last * np.sqrt(tau / tau[1]), ":", color="#777777", linewidth=1.0, label="_slope +½")
     place.set_ylim(low, high)
+    first_tick = 10.0 ** np.floor(np.log10(low))
+    ticks = first_tick * np.array([1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0, 200.0, 500.0])
+    place.set_yticks(ticks[(ticks >= low) & (ticks <= high)])
 
 
 def svg(figure: Figure) -> str:
