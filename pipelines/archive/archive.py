@@ -125,9 +125,7 @@ class Run:
         if name not in tables.TABLES:
             message = f"archive: no table is called '{name}'; {did_you_mean(name, tables.TABLES)}"
             raise WrongUse(message)
-        return files.read_table(
-            path, name, self.manifest(name)["sha256"] if path.is_file() else None
-        )
+        return files.read_table(path, name, self.manifest(name)["sha256"] if path.is_file() else None)
 
     def manifest(self, name: str) -> dict[str, Any]:
         """The manifest of a table."""
@@ -173,9 +171,7 @@ class Archive:
         if self.root.is_dir() and any(self.root.iterdir()):
             message = f"archive: {self.root} holds other files and no archive; give an empty or new folder"
             raise ArchiveUnusable(message)
-        files.publish(
-            mark, files.json_bytes({"product": "tumbleline", "format": FORMAT})
-        )
+        files.publish(mark, files.json_bytes({"product": "tumbleline", "format": FORMAT}))
 
     def open_run(self, name: str, about: Mapping[str, Any], decisive: object) -> Run:
         """The run named for ``name`` and the hash of what decides its result: found, or begun.
@@ -188,9 +184,7 @@ class Archive:
         run = Run(self, f"{name}-{digest(decisive)[:10]}")
         if not (run.path / "run.json").is_file():
             self.prepare()
-            files.publish(
-                run.path / "run.json", files.json_bytes({**provenance(), **about})
-            )
+            files.publish(run.path / "run.json", files.json_bytes({**provenance(), **about}))
         return run
 
     def capture(self, capture_id: str) -> Records:
@@ -202,9 +196,7 @@ class Archive:
         ids = [info.id for info in self.runs()]
         if name == "latest" and ids:
             return Run(self, ids[-1])
-        found = [run_id for run_id in ids if run_id == name] or [
-            i for i in ids if name and i.startswith(name)
-        ]
+        found = [run_id for run_id in ids if run_id == name] or [i for i in ids if name and i.startswith(name)]
         if len(found) == 1:
             return Run(self, found[0])
         where = f"archive {self.root}"
@@ -225,9 +217,7 @@ class Archive:
         folder = self.root / "runs"
         if not folder.is_dir():
             return []
-        infos = [
-            _info(Run(self, path.parent.name)) for path in folder.glob("*/run.json")
-        ]
+        infos = [_info(Run(self, path.parent.name)) for path in folder.glob("*/run.json")]
         return sorted(infos, key=lambda info: (info.started, info.id))
 
     def _refuse_other_format(self, mark: Mapping[str, Any]) -> None:
@@ -251,10 +241,7 @@ def provenance() -> dict[str, Any]:
 
 def _info(run: Run) -> RunInfo:
     about = run.about
-    stages = dict.fromkeys(
-        files.read_json(run.path / f"{name}.json").get("stage", "")
-        for name in run.tables()
-    )
+    stages = dict.fromkeys(files.read_json(run.path / f"{name}.json").get("stage", "") for name in run.tables())
     lot = about.get("lot", {})
     return RunInfo(
         id=run.id,

@@ -52,9 +52,7 @@ def sha256(path: Path) -> str:
 def table_bytes(name: str, frame: pd.DataFrame, version: int) -> bytes:
     """A table as Parquet: zstd, no index, no library notes, the table's name and schema version in the metadata."""
     table = pa.Table.from_pandas(frame, preserve_index=False)
-    table = table.replace_schema_metadata(
-        {TABLE_MARK: name.encode(), SCHEMA_MARK: str(version).encode()}
-    )
+    table = table.replace_schema_metadata({TABLE_MARK: name.encode(), SCHEMA_MARK: str(version).encode()})
     sink = pa.BufferOutputStream()
     pq.write_table(table, sink, compression="zstd", compression_level=3)
     return sink.getvalue().to_pybytes()
@@ -99,9 +97,7 @@ def read_json(path: Path) -> dict[str, Any]:
 
 def json_bytes(content: dict[str, Any]) -> bytes:
     """Canonical JSON: keys sorted, UTF-8, one newline at the end."""
-    return (
-        json.dumps(content, sort_keys=True, indent=1, ensure_ascii=False) + "\n"
-    ).encode()
+    return (json.dumps(content, sort_keys=True, indent=1, ensure_ascii=False) + "\n").encode()
 
 
 def publish(path: Path, data: bytes) -> None:

@@ -18,15 +18,11 @@ LIBRARIES = ("numpy", "scipy", "pandas", "pyarrow", "pandera")
 
 def digest(content: object) -> str:
     """Hash of a JSON-able value, independent of the order of its keys; hexadecimal."""
-    text = json.dumps(
-        content, sort_keys=True, ensure_ascii=False, separators=(",", ":")
-    )
+    text = json.dumps(content, sort_keys=True, ensure_ascii=False, separators=(",", ":"))
     return hashlib.sha256(text.encode()).hexdigest()
 
 
-def stage_key(
-    stage: str, inputs: Mapping[str, str], parameters: Mapping[str, Any], code: str
-) -> str:
+def stage_key(stage: str, inputs: Mapping[str, str], parameters: Mapping[str, Any], code: str) -> str:
     """The key under which a stage's outputs are stored.
 
     Parameters

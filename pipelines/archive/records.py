@@ -61,9 +61,7 @@ class Records:
         about = {"record": record, "order": order, "schema": tables.VERSION}
         hashes = {name: sha256(data).hexdigest() for name, data in content.items()}
         manifest = files.json_bytes({**about, "content": hashes})
-        files.publish_folder(
-            self.path / f"{record:05d}", {**content, "record.json": manifest}
-        )
+        files.publish_folder(self.path / f"{record:05d}", {**content, "record.json": manifest})
         for old in state.parent.glob("*.bin"):
             if old != state:
                 old.unlink()
@@ -73,20 +71,13 @@ class Records:
         folders = list(self._folders())
         if not folders:
             return None
-        last = max(
-            folders, key=lambda folder: files.read_json(folder / "record.json")["order"]
-        )
+        last = max(folders, key=lambda folder: files.read_json(folder / "record.json")["order"])
         state = self._state_path(int(last.name))
         return state.read_bytes() if state.is_file() else None
 
     def hash(self) -> str:
         """Hash of everything captured, in order of record."""
-        return digest(
-            {
-                f.name: files.read_json(f / "record.json")["content"]
-                for f in self._folders()
-            }
-        )
+        return digest({f.name: files.read_json(f / "record.json")["content"] for f in self._folders()})
 
     def samples(self) -> Iterator[pd.DataFrame]:
         """The samples, one table per record in order of record: a lot's samples never lie in memory together."""
@@ -95,10 +86,7 @@ class Records:
 
     def gathered(self, part: str) -> pd.DataFrame:
         """Readings, history or samples of all records in one table."""
-        parts = [
-            files.read_table(folder / f"{part}.parquet", part)
-            for folder in self._folders()
-        ]
+        parts = [files.read_table(folder / f"{part}.parquet", part) for folder in self._folders()]
         kept = [frame for frame in parts if len(frame)] or parts[:1]
         return pd.concat(kept, ignore_index=True)
 
