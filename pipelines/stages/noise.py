@@ -47,11 +47,11 @@ def noise(
         terms = fit_terms(curve)
     except ValueError as problem:
         raise DataRejected(str(problem)) from None
-    terms = _limits_where_unexplained(curve, terms)
+    terms = limits_where_unexplained(curve, terms)
     return {"allan": _curve_rows(calibration.units, curve, terms), "noise": _term_rows(calibration.units, terms)}
 
 
-def _limits_where_unexplained(curve: AllanCurve, terms: Terms) -> Terms:
+def limits_where_unexplained(curve: AllanCurve, terms: Terms) -> Terms:
     """The terms, with mere upper limits for channels whose curve no mixture of the five terms explains.
 
     Each term alone can be no larger than the whole curve anywhere: N ≤ min σ·√τ, B ≤ min σ/0.664, K ≤ min σ·√(3/τ), …
