@@ -158,7 +158,7 @@ def _refuse_coincidence(fit: Sequence[Pose], verification: Sequence[Pose], sourc
         return
     cosines = np.clip(directions(verification) @ directions(fit).T, -1.0, 1.0)
     apart = np.degrees(np.arccos(cosines))
-    row, column = np.unravel_index(int(np.argmin(apart)), apart.shape)
+    row, column = divmod(int(np.argmin(apart)), apart.shape[1])
     if apart[row, column] < SAME_POSE_DEG:
         message = (
             f"{source}: key 'verification': pose {verification[row].name} lies {apart[row, column]:.2f}° from pose "

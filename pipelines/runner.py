@@ -20,7 +20,7 @@ from pipelines.progress import silent
 from schemas.errors import OperatorNeeded
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Generator, Iterator
     from pathlib import Path
 
     from pipelines.job import Job
@@ -89,8 +89,9 @@ class Runner:
                 self.measure(self.job, records, self.progress)
                 records.complete()
         inputs = {RECORDS: records.hash()}
-        about = {"inputs": inputs, "parameters": {"capture": self.job.capture_id}, "code": ""}
-        key = stage_key("capture", inputs, about["parameters"], "")
+        parameters = {"capture": self.job.capture_id}
+        about = {"inputs": inputs, "parameters": parameters, "code": ""}
+        key = stage_key("capture", inputs, parameters, "")
         if not self.run.has(("readings", "history"), key):
             outputs = {name: records.gathered(name) for name in ("readings", "history")}
             self.run.save("capture", key, outputs, about)
@@ -120,7 +121,7 @@ class Runner:
 
 
 @contextmanager
-def _alone(folder: Path) -> Iterator[None]:
+def _alone(folder: Path) -> Generator[None, None, None]:
     """A block in which no other process captures into the folder; the system frees it when a process dies."""
     with files.writing(folder):
         folder.mkdir(parents=True, exist_ok=True)

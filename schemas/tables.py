@@ -7,7 +7,7 @@ Every table has a schema version that travels with its file.
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pandas as pd
@@ -325,6 +325,6 @@ def _needed(problem: SchemaError) -> str:
     return words.split(": ", 1)[-1].replace("_", " ")
 
 
-def _row(frame: pd.DataFrame, index: object) -> str:
+def _row(frame: pd.DataFrame, index: Any) -> str:
     unit = f" (unit {frame['unit'].loc[index]})" if "unit" in frame.columns else ""
     return f"row {index}{unit}"

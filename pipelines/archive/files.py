@@ -21,7 +21,7 @@ import pyarrow.parquet as pq
 from schemas.errors import ArchiveUnusable
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Generator
 
     import pandas as pd
 
@@ -31,7 +31,7 @@ TEMPORARY = ".tmp-"
 
 
 @contextmanager
-def writing(path: Path) -> Iterator[None]:
+def writing(path: Path) -> Generator[None, None, None]:
     """A block that writes under ``path``; what the system refuses becomes one message."""
     try:
         yield

@@ -11,7 +11,7 @@ import typer
 from pipelines.cli.options import ArchiveOption, JsonOption, error_console, print_json
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
+    from collections.abc import Callable, Generator
 
     from pipelines.progress import Progress
     from pipelines.runner import Done
@@ -73,7 +73,7 @@ def _serials(text: str) -> tuple[str, ...]:
 
 
 @contextmanager
-def _shown() -> Iterator[tuple[Progress, Callable[[Done], None]]]:
+def _shown() -> Generator[tuple[Progress, Callable[[Done], None]], None, None]:
     """A progress bar for the capture and a line per stage, on standard error."""
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from pipelines.cli.options import STYLES, console, plain, print_table, short
+from pipelines.rows import rows_of
 from schemas.errors import DONE, PART_FAILED
 
 if TYPE_CHECKING:
@@ -29,7 +30,7 @@ LEGEND = (
 def summary(run: Run) -> dict[str, Any]:
     """What a run came to: per unit outcome, grade, reasons and figures; the yield; where the report is."""
     grades, figures = run.table("grades"), run.table("figures")
-    units = [_unit(row, figures) for row in grades.sort_values("slot").to_dict("records")]
+    units = [_unit(row, figures) for row in rows_of(grades.sort_values("slot"))]
     passed = sum(unit["outcome"] == "pass" for unit in units)
     return {
         "run": run.id,
@@ -53,7 +54,7 @@ def _unit(row: dict[str, Any], figures: pd.DataFrame) -> dict[str, Any]:
             **row,
             "figures": {
                 f["figure"]: {k: f[k] for k in ("value", "uncertainty", "limit", "unit_text", "outcome", "rule")}
-                for f in own.to_dict("records")
+                for f in rows_of(own)
             },
         }
     )

@@ -67,9 +67,9 @@ def unit_calibrations(run: Run, serials: tuple[str, ...], *, failed: bool) -> li
     calibration = read_calibration(run.table("coefficients"), run.table("covariance"))
     dwells = run.table("dwells")
     out_unit = str(dwells["out_unit"].iloc[0])
-    spans = dwells.groupby("unit")["unit_C"].agg(["min", "max"])
+    measured = {unit: dwells.loc[dwells["unit"] == unit, "unit_C"].to_numpy(dtype=float) for unit in chosen}
     return [
-        _one(calibration, unit, grades.loc[unit].to_dict(), out_unit, (spans.loc[unit, "min"], spans.loc[unit, "max"]))
+        _one(calibration, unit, grades.loc[unit].to_dict(), out_unit, (measured[unit].min(), measured[unit].max()))
         for unit in chosen
     ]
 

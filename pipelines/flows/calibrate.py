@@ -24,7 +24,7 @@ from pipelines.runner import Done, Runner
 from schemas.errors import LinkLost, StationTimeout
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
+    from collections.abc import Callable, Generator
 
     from pipelines.progress import Progress
 
@@ -36,7 +36,7 @@ _listeners: list[tuple[Progress, Callable[[Done], None]]] = []
 
 
 @contextmanager
-def listening(progress: Progress, told: Callable[[Done], None]) -> Iterator[None]:
+def listening(progress: Progress, told: Callable[[Done], None]) -> Generator[None, None, None]:
     """A block in which flows of this process tell how far they are."""
     _listeners.append((progress, told))
     try:

@@ -10,10 +10,11 @@ from pathlib import Path
 from typing import Any
 
 import yaml
-from prefect import flow
+from prefect import Flow, flow
 from prefect.client.schemas.schedules import CronSchedule
 from prefect.deployments.runner import RunnerDeployment
 
+NOT_HERE = "deployments are registered from code that is not asynchronous"
 ROOT = Path(__file__).resolve().parents[2]
 
 
@@ -25,6 +26,8 @@ def register(path: Path) -> list[str]:
 
 def _register(item: dict[str, Any]) -> str:
     source = flow.from_source(source=str(ROOT), entrypoint=item["entrypoint"])
+    if not isinstance(source, Flow):
+        raise TypeError(NOT_HERE)
     deployment = source.to_deployment(
         name=item["name"],
         description=item["description"],
@@ -35,8 +38,7 @@ def _register(item: dict[str, Any]) -> str:
         work_pool_name=item["work_pool"]["name"],
     )
     if not isinstance(deployment, RunnerDeployment):
-        message = "deployments are registered from code that is not asynchronous"
-        raise TypeError(message)
+        raise TypeError(NOT_HERE)
     deployment.apply(work_pool_name=item["work_pool"]["name"])
     return f"{deployment.flow_name}/{deployment.name}"
 

@@ -21,7 +21,7 @@ from pipelines.flows.settings import STARTUP_S, settings
 from schemas.errors import StationTimeout
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
+    from collections.abc import Callable, Generator
 
     from pipelines.archive import Archive, Run
     from pipelines.job import Job, Request
@@ -52,13 +52,13 @@ def _run(request: Request, job: Job, archive: Archive, progress: Progress, told:
     close_dead_runs(name)
     with listening(progress, told):
         named = calibrate_lot.with_options(flow_run_name=name)
-        run_id = named(**request.parameters(), archive=str(archive.root.resolve()))
+        run_id = str(named(**request.parameters(), archive=str(archive.root.resolve())))
     settle_history(name, len(ORDER))
     return archive.run(run_id)
 
 
 @contextmanager
-def local_server(home: Path) -> Iterator[dict[str, str]]:
+def local_server(home: Path) -> Generator[dict[str, str], None, None]:
     """The environment of a server that runs for as long as this block, shared with others who want it."""
     (home / CLIENTS).mkdir(parents=True, exist_ok=True)
     client = home / CLIENTS / f"{os.getpid()}-{uuid.uuid4().hex[:8]}"

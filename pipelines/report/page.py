@@ -9,6 +9,7 @@ import numpy as np
 from pipelines.report.numbers import plain, with_uncertainty
 from pipelines.report.plots import check_plots, lot_plot, model_plots
 from pipelines.report.templates import template
+from pipelines.rows import rows_of
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -37,7 +38,7 @@ def render(run: Run) -> str:
     tables |= {name: run.table(name) for name in ("allan", "noise", "figures", "grades")}
     grades = tables["grades"].sort_values("slot")
     limit = _limit(run, "verification_norm_ug")
-    units = [_unit(row, tables, limit) for row in grades.to_dict("records")]
+    units = [_unit(row, tables, limit) for row in rows_of(grades)]
     calibrated = [unit["unit"] for unit in units if unit["outcome"] != "refused"]
     return template("page.html").render(
         run=run.id,
@@ -65,8 +66,8 @@ def _unit(row: dict[str, Any], tables: dict[str, pd.DataFrame], limit: float) ->
     fitted = own["dwells"][own["dwells"]["kind"] == "dwell"]
     return {
         **shown,
-        "figures": [_figure(f) for f in own["figures"].to_dict("records")],
-        "short": {f["figure"]: plain(f["value"]) for f in own["figures"].to_dict("records")},
+        "figures": [_figure(f) for f in rows_of(own["figures"])],
+        "short": {f["figure"]: plain(f["value"]) for f in rows_of(own["figures"])},
         "coefficients": _coefficients(own["coefficients"]),
         "noise": _noise(own["noise"]),
         "plots": [
@@ -76,7 +77,7 @@ def _unit(row: dict[str, Any], tables: dict[str, pd.DataFrame], limit: float) ->
     }
 
 
-def _figure(row: dict[str, Any]) -> dict[str, str]:
+def _figure(row: dict[str, Any]) -> dict[str, Any]:
     value, expanded = with_uncertainty(row["value"], row["uncertainty"])
     limited = bool(np.isfinite(row["limit"]))
     return {
@@ -94,7 +95,7 @@ def _coefficients(rows: pd.DataFrame) -> list[dict[str, Any]]:
     """One line per coefficient with its three axes side by side."""
     lines: dict[tuple[str, int], dict[str, Any]] = {}
     seen: dict[tuple[str, str], int] = {}
-    for row in rows.to_dict("records"):
+    for row in rows_of(rows):
         place = seen.get((row["effect"], row["axis"]), 0)
         seen[row["effect"], row["axis"]] = place + 1
         line = lines.setdefault(
@@ -119,7 +120,7 @@ def _noise(rows: pd.DataFrame) -> list[dict[str, Any]]:
         own = rows[rows["term"] == term]
         if own.empty:
             continue
-        cells = {row["axis"]: _noise_cell(row) for row in own.to_dict("records")}
+        cells = {row["axis"]: _noise_cell(row) for row in rows_of(own)}
         lines.append({"name": name, "unit": own["unit_text"].iloc[0], "cells": cells})
     return lines
 

@@ -15,14 +15,6 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 AXES = ("x", "y", "z")
-QUANTITIES = {
-    "temperature": "unit_C",
-    "chamber": "chamber_C",
-    "since_power": "since_power_s",
-    "since_move": "since_move_s",
-    "supply": "supply_V",
-    "vibration": "vibration_g",
-}
 
 
 @dataclass(frozen=True)
@@ -98,5 +90,10 @@ def _state(ordered: pd.DataFrame, units: int) -> State:
         outer=None if outer is None else np.radians(outer),
         inner=None if inner is None else np.radians(inner),
         slot=None if slot is None else slot[:, 0],
-        **{name: optional(column) for name, column in QUANTITIES.items()},
+        temperature=optional("unit_C"),
+        chamber=optional("chamber_C"),
+        since_power=optional("since_power_s"),
+        since_move=optional("since_move_s"),
+        supply=optional("supply_V"),
+        vibration=optional("vibration_g"),
     )

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from scipy.stats import norm
 
+from pipelines.rows import rows_of
 from pipelines.stages.noise import B_BOUND
 
 if TYPE_CHECKING:
@@ -73,7 +74,7 @@ def _verification(rows: pd.DataFrame) -> Iterator[Figure]:
     What the calibration leaves is the figure's value, not its uncertainty: that is the noise of the reading. The ratio
     is to the two-sided quantile of a normal distribution, 1 % shared by all dwells.
     """
-    worst = rows.loc[rows["error_ug"].abs().idxmax()]
+    worst = rows.iloc[int(np.argmax(np.abs(rows["error_ug"].to_numpy())))]
     yield Figure("verification_norm_ug", abs(float(worst["error_ug"])), float(worst["reading_ug"]))
     quantile = float(norm.isf(0.5 * ALARM / len(rows)))
     allowed = (rows["error_ug"].abs() / (quantile * rows["uncertainty_ug"])).max()
@@ -102,7 +103,7 @@ def _noise(rows: pd.DataFrame) -> Iterator[Figure]:
     """Noise figures of the worst axis; a term that is not identified counts with its upper limit."""
     terms = (("velocity_random_walk_ug_rtHz", "N"), ("bias_instability_ug", "B"), ("rate_random_walk_ug_rts", "K"))
     for name, symbol in terms:
-        found = [_noise_term(name, row, rows) for row in rows[rows["term"] == symbol].to_dict("records")]
+        found = [_noise_term(name, row, rows) for row in rows_of(rows[rows["term"] == symbol])]
         yield max(found, key=lambda figure: figure.value)
 
 
