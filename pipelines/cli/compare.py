@@ -56,7 +56,7 @@ def command(
     if as_json:
         print_json(document)
     else:
-        _print(document)
+        print_comparison(document)
 
 
 def compared(
@@ -75,7 +75,8 @@ def compared(
         return compare(dwells, effects, history, fresh, fresh_history)
 
 
-def _print(document: dict[str, Any]) -> None:
+def print_comparison(document: dict[str, Any], poses: int = POSES) -> None:
+    """Print a comparison for people, with so many of the worst poses."""
     out = console()
     out.print(f"model  {', '.join(document['effects'])}", markup=False, soft_wrap=True)
     lines = [
@@ -96,12 +97,12 @@ def _print(document: dict[str, Any]) -> None:
         [u, short(e["rms_ug"]), short(e["fresh_rms_ug"])][: 3 if fresh else 2] for u, e in document["by_unit"].items()
     ]
     print_table(["unit", "rms\nµg", "fresh\nµg"][: 3 if fresh else 2], units)
-    poses = [
+    worst = [
         [" ".join(f"{v:+.2f}" for v in p["force"]), str(p["dwells"]), short(p["rms_ug"])]
-        for p in document["by_pose"][:POSES]
+        for p in document["by_pose"][:poses]
     ]
-    if poses:
-        print_table(["force x y z\ng", "dwells", "rms\nµg"], poses, title="Worst poses")
+    if worst:
+        print_table(["force x y z\ng", "dwells", "rms\nµg"], worst, title="Worst poses")
     _parameters(document)
 
 

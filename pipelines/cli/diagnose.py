@@ -50,19 +50,19 @@ def command(
     add_effect_files(effect_file)
     judged = chosen_effects(effects, model, "diagnose")
     table, temperatures = dwells_and_history(dwells, history, archive)
-    document, report_text = _diagnosed(table, temperatures, judged, dwells, wanted=report is not None)
+    document, report_text = diagnosed(table, temperatures, judged, dwells, wanted=report is not None)
     if report is not None:
-        _write(report, report_text)
+        write_report(report, report_text)
     if as_json:
         print_json(document)
     else:
         from pipelines.cli.verdict import print_diagnosis
 
-        print_diagnosis(document, source=dwells, model=model, listed=effects)
+        print_diagnosis(document, source=dwells, model=model)
     raise typer.Exit(DONE if document["adequate"] else PART_FAILED)
 
 
-def _diagnosed(
+def diagnosed(
     table: pd.DataFrame, history: pd.DataFrame | None, judged: list[str] | None, source: str, *, wanted: bool
 ) -> tuple[dict[str, Any], str]:
     """The document of a diagnosis, and its report where one is wanted."""
@@ -97,7 +97,8 @@ def _extras(units: tuple[str, ...], effects: list[str], diagnosis: Diagnosis | N
     return extras
 
 
-def _write(path: Path, text: str) -> None:
+def write_report(path: Path, text: str) -> None:
+    """Write a report so that it is there whole or not at all, and say where."""
     from pipelines.archive import files
 
     files.publish(path, text.encode())

@@ -12,13 +12,13 @@ if TYPE_CHECKING:
     from rich.console import Console
 
 
-def print_diagnosis(document: dict[str, Any], *, source: str, model: Path | None, listed: str) -> None:
+def print_diagnosis(document: dict[str, Any], *, source: str, model: Path | None) -> None:
     """Print a diagnosis.
 
     Parameters
     ----------
     source : the dwells as they were named on the command line
-    model, listed : the model as it was given there
+    model : the model file as it was given there
     """
     out = console()
     out.print(verdict(document), style="bold green" if document["adequate"] else "bold red", soft_wrap=True)
@@ -26,7 +26,7 @@ def print_diagnosis(document: dict[str, Any], *, source: str, model: Path | None
     _where(document["where"])
     _classes(document)
     _unexplained(out, document, model)
-    _next_command(out, document, source, model, listed)
+    _next_command(out, document, source, model)
     _unseen(document)
     _measurements(document["next_measurements"])
 
@@ -136,14 +136,14 @@ def _unexplained(out: Console, document: dict[str, Any], model: Path | None) -> 
         )
 
 
-def _next_command(out: Console, document: dict[str, Any], source: str, model: Path | None, listed: str) -> None:
+def _next_command(out: Console, document: dict[str, Any], source: str, model: Path | None) -> None:
     if not document["recommended"]:
         return
     from pipelines.models import STARTING_MODEL
 
     file = str(model or "model.toml")
-    judged = listed or ",".join(document["effects"])
-    start = "" if model or judged == ",".join(STARTING_MODEL) else f" --effects {judged}"
+    judged = ",".join(document["effects"])
+    start = "" if (model and model.exists()) or judged == ",".join(STARTING_MODEL) else f" --effects {judged}"
     out.print("\nNext:", style="bold")
     for place, name in enumerate(document["recommended"]):
         out.print(f"  tumbleline extend {file} {name}{start if place == 0 else ''}", markup=False, soft_wrap=True)

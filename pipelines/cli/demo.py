@@ -1,0 +1,238 @@
+"""``tumbleline demo``: an effect is hidden in the simulated station; find it, add it, watch the error fall, see what it was."""
+
+from __future__ import annotations
+
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from pipelines.cli.options import JsonOption, console, error_console, print_json, print_table, short
+
+if TYPE_CHECKING:
+    from collections.abc import Generator
+
+    from pipelines.demo.measure import Measured
+    from pipelines.demo.scenes import Scene
+    from pipelines.progress import Progress
+
+
+def command(
+    effect: Annotated[
+        str,
+        typer.Option("--effect", metavar="NAME|random", help="What to hide, by the name of its physics or its effect."),
+    ] = "random",
+    seed: Annotated[int | None, typer.Option("--seed", min=0, help="Makes the game repeatable.")] = None,
+    folder: Annotated[
+        Path, typer.Option("--folder", metavar="DIR", help="Where measurements, model and report are written.")
+    ] = Path("demo"),
+    *,
+    auto: Annotated[bool, typer.Option("--auto", help="Run through without asking.")] = False,
+    by_hand: Annotated[
+        bool, typer.Option("--by-hand", help="Only measure and write the files; you play with the commands yourself.")
+    ] = False,
+    as_json: JsonOption = False,
+) -> None:
+    """Hide an effect in the simulated station and find it from the measurements: compare, diagnose, extend, compare.
+
+    The same lot is measured twice; the second run is fresh data that no fit sees.
+    """
+    from pipelines.archive.files import writing
+    from pipelines.demo.measure import measure
+    from pipelines.demo.scenes import scene
+
+    drawn = _seed() if seed is None else seed
+    hidden = scene(effect, drawn)
+    with writing(folder):
+        folder.mkdir(parents=True, exist_ok=True)
+        (folder / "model.toml").unlink(missing_ok=True)
+    with _bar() as progress:
+        lot = measure(hidden, drawn, progress)
+    lot.write(folder)
+    if by_hand:
+        _hand_over(folder, hidden, as_json=as_json)
+        return
+    game = _Game(folder, hidden, lot, asks=not (auto or as_json), quiet=as_json)
+    document = game.play()
+    if as_json:
+        print_json({"seed": drawn, **document})
+
+
+def _seed() -> int:
+    import secrets
+
+    return secrets.randbelow(100000)
+
+
+@contextmanager
+def _bar() -> Generator[Progress]:
+    """Two bars on standard error, one for each run of the lot."""
+    from rich.progress import Progress as Bars
+
+    with Bars(console=error_console(), transient=True) as bars:
+        bar = bars.add_task("measuring the lot twice", total=None)
+
+        def told(done: int, total: int, note: str) -> None:
+            bars.update(bar, completed=done, total=total, description=f"measuring  {note}")
+
+        yield told
+
+
+def _hand_over(folder: Path, hidden: Scene, *, as_json: bool) -> None:
+    names = ("dwells", "history", "fresh", "fresh-history")
+    if as_json:
+        print_json({"folder": str(folder), "files": [f"{n}.parquet" for n in names], "effects": list(hidden.model)})
+        return
+    out = console()
+    out.print(
+        f"Measured twice; something is hidden in it. In {folder}: {', '.join(f'{n}.parquet' for n in names)}.",
+        soft_wrap=True,
+    )
+    out.print("Begin with", soft_wrap=True)
+    out.print(f"  {_command('diagnose', folder, hidden.model)}", markup=False, soft_wrap=True)
+
+
+def _command(name: str, folder: Path, model: tuple[str, ...] | None) -> str:
+    """A command to type, on the files of the game."""
+    chosen = f"--effects {','.join(model)}" if model else f"--model {folder / 'model.toml'}"
+    fresh = f" --fresh {folder / 'fresh.parquet'} --fresh-history {folder / 'fresh-history.parquet'}"
+    start = f"tumbleline {name} {folder / 'dwells.parquet'} {chosen} --history {folder / 'history.parquet'}"
+    return start + (fresh if name == "compare" else f" --report {folder / 'report.html'}")
+
+
+class _Game:
+    """One round: compare, diagnose, extend, compare, reveal."""
+
+    def __init__(self, folder: Path, hidden: Scene, lot: Measured, *, asks: bool, quiet: bool) -> None:
+        self.folder, self.hidden, self.lot, self.asks, self.quiet = folder, hidden, lot, asks, quiet
+        self.model = list(hidden.model)
+
+    def play(self) -> dict[str, Any]:
+        """The game from beginning to end; what came of it."""
+        self._say(
+            f"Four units were measured on the simulated station, {self.lot.dwells['dwell'].nunique()} dwells each, and then once "
+            "more. The station or the devices have an effect that the model does not know."
+        )
+        before = self._compare("1. How good is the model?", first=True)
+        diagnosis = self._diagnose()
+        added = self._extend(diagnosis["recommended"])
+        after = self._compare("4. And with it?", first=False) if added else before
+        found = {name for group in diagnosis["classes"] for name in group["effects"]}
+        document = {
+            "hidden": {"kind": self.hidden.kind, "effect": self.hidden.effect, "physics": self.hidden.truth},
+            "classes": [group["effects"] for group in diagnosis["classes"]],
+            "recommended": diagnosis["recommended"],
+            "unseen": diagnosis["unseen"],
+            "added": added,
+            "found": self.hidden.effect in found,
+            "before": _errors(before),
+            "after": _errors(after),
+            "folder": str(self.folder),
+        }
+        self._reveal(document)
+        return document
+
+    def _compare(self, title: str, *, first: bool) -> dict[str, Any]:
+        from pipelines.cli.compare import compared, print_comparison
+
+        self._step(title, _command("compare", self.folder, self.hidden.model if first else None))
+        lot = self.lot
+        document = compared(self.model, lot.dwells, lot.history, lot.fresh, lot.fresh_history)
+        if not self.quiet:
+            print_comparison(document, poses=0)
+        return document
+
+    def _diagnose(self) -> dict[str, Any]:
+        from pipelines.cli.diagnose import diagnosed, write_report
+        from pipelines.cli.verdict import print_diagnosis
+
+        self._step("2. What is missing?", _command("diagnose", self.folder, self.hidden.model))
+        source = str(self.folder / "dwells.parquet")
+        document, report = diagnosed(self.lot.dwells, self.lot.history, self.model, source, wanted=True)
+        write_report(self.folder / "report.html", report)
+        if not self.quiet:
+            file = self.folder / "model.toml"
+            print_diagnosis(document, source=source, model=file)
+        return document
+
+    def _extend(self, recommended: list[str]) -> list[str]:
+        """The effects added, written to the model file one version each."""
+        chosen = self._asked_for(recommended)
+        file = self.folder / "model.toml"
+        self._step(
+            "3. Add it.", "\n  ".join(f"tumbleline extend {file} {name}" for name in chosen) or "(nothing to add)"
+        )
+        self.model = list(_write_model(file, self.hidden.model, chosen))
+        return chosen
+
+    def _asked_for(self, recommended: list[str]) -> list[str]:
+        """The effects the player wants to add: those recommended, or others."""
+        from pipelines.models import refuse_unknown_effects
+
+        if not self.asks:
+            return recommended
+        answer = typer.prompt("\nWhich effects shall be added (a,b,c)?", default=",".join(recommended) or "none")
+        names = [part.strip() for part in str(answer).split(",") if part.strip() not in {"", "none"}]
+        refuse_unknown_effects(names, "demo")
+        return [name for name in names if name not in self.hidden.model]
+
+    def _reveal(self, document: dict[str, Any]) -> None:
+        if self.quiet:
+            return
+        self._step("5. What was hidden?", "")
+        out = console()
+        out.print(
+            f"{self.hidden.truth} ({self.hidden.kind}): {self.hidden.effect}",
+            style="bold",
+            markup=False,
+            soft_wrap=True,
+        )
+        named = ", ".join(" or ".join(group) for group in document["classes"]) or "nothing"
+        if document["found"]:
+            out.print(f"The diagnosis named {named}. Found.", style="bold green", markup=False, soft_wrap=True)
+        elif self.hidden.effect in document["unseen"]:
+            text = f"The diagnosis named {named}, and listed {self.hidden.effect} among what this plan could not have seen."
+            out.print(text, style="bold yellow", markup=False, soft_wrap=True)
+        else:
+            out.print(f"The diagnosis named {named}. Not found.", style="bold red", markup=False, soft_wrap=True)
+        lines = [
+            [when, *(short(document[key][f]) for f in ("rms_ug", "fresh_rms_ug"))]
+            for when, key in (("before", "before"), ("after", "after"))
+        ]
+        print_table(["error, rms", "this run\nµg", "fresh run\nµg"], lines)
+        out.print(f"Everything is in {self.folder}: dwells, model.toml and report.html.", markup=False, soft_wrap=True)
+
+    def _step(self, title: str, line: str) -> None:
+        if self.asks:
+            typer.prompt("\nEnter goes on", default="", show_default=False, prompt_suffix=" ")
+        if not self.quiet:
+            console().print(f"\n[bold cyan]{title}[/bold cyan]")
+            if line:
+                console().print(f"  {line}", style="dim", markup=False, soft_wrap=True)
+
+    def _say(self, text: str) -> None:
+        if not self.quiet:
+            console().print(text)
+
+
+def _errors(document: dict[str, Any]) -> dict[str, Any]:
+    return {name: document[name] for name in ("rms_ug", "heldout_rms_ug", "fresh_rms_ug", "floor_ug")}
+
+
+def _write_model(file: Path, start: tuple[str, ...], chosen: list[str]) -> tuple[str, ...]:
+    """The model's file with one version per effect; its effects."""
+    from datetime import UTC, datetime
+
+    from pipelines.models import Step, extended, new_model, publish_model
+
+    now = datetime.now(UTC).replace(microsecond=0)
+    text = new_model(file, start, "demo", now)
+    effects = tuple(start)
+    for name in chosen:
+        text, model = extended(
+            text, Step(name, "demo", now, "the diagnosis names it", "dwells.parquet"), f"model {file.name}"
+        )
+        effects = tuple(model.model.effects)
+    publish_model(file, text)
+    return effects

@@ -1,0 +1,131 @@
+"""A lot measured twice on the simulated station, with an effect hidden in it.
+
+The station is the production one down to its registers; only what nature does in it is made up. The diagnosis is given the
+dwells and nothing else.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pandas as pd
+
+from inertial import poses
+from pipelines.demo.scenes import Scene
+from pipelines.progress import silent
+from pipelines.recipes import load_recipe
+from pipelines.stages.capture import capture
+from pipelines.stages.reduce import reduce
+from schemas.errors import WrongUse
+from schemas.recipe import Lot, Pose, Recipe, Unit
+from schemas.station import Hidden, Soak, StationConfig, load_station
+from stations import open_station
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from pipelines.progress import Progress
+
+UNITS = 4
+QUIET = {
+    "noise_density_ug": 8.0,
+    "bias_instability_ug": 1.5,
+    "rate_random_walk_ug": 0.003,
+    "linearity_pct_fs": 0.0,
+}
+"""A good part of its kind: with the noise of the data sheet most effects would take days to show."""
+
+
+@dataclass(frozen=True)
+class Measured:
+    """A lot measured twice: dwells and temperatures of the run, and of the fresh one."""
+
+    dwells: pd.DataFrame
+    history: pd.DataFrame
+    fresh: pd.DataFrame
+    fresh_history: pd.DataFrame
+
+    def write(self, folder: Path) -> None:
+        """The four tables as Parquet files."""
+        for name in ("dwells", "history", "fresh", "fresh_history"):
+            getattr(self, name).to_parquet(folder / f"{name.replace('_', '-')}.parquet", index=False)
+
+
+def measure(chosen: Scene, seed: int, progress: Progress = silent) -> Measured:
+    """The lot measured on the simulated station with the effect in it, and once more with fresh noise."""
+    recipe = _recipe(chosen)
+    tables = [*_once(recipe, chosen, seed, 0, progress), *_once(recipe, chosen, seed, 1, progress)]
+    return Measured(*tables)
+
+
+@dataclass
+class _Kept:
+    """What a capture delivers, in memory: a demonstration has nothing to resume."""
+
+    samples: list[pd.DataFrame] = field(default_factory=list)
+    readings: list[pd.DataFrame] = field(default_factory=list)
+    history: list[pd.DataFrame] = field(default_factory=list)
+
+    def finished(self) -> set[int]:
+        """Nothing was there before."""
+        return set()
+
+    def put(
+        self, record: int, samples: pd.DataFrame, readings: pd.DataFrame, history: pd.DataFrame, station_state: bytes
+    ) -> None:
+        """Keep one record."""
+        del record, station_state
+        self.samples.append(samples)
+        self.readings.append(readings)
+        self.history.append(history)
+
+    def last_state(self) -> bytes | None:
+        """No state of an earlier capture."""
+        return None
+
+
+def _once(recipe: Recipe, chosen: Scene, seed: int, repeat: int, progress: Progress) -> list[pd.DataFrame]:
+    """Dwells and temperatures of one run."""
+    units = [Unit(serial=f"DEMO-{k + 1}", slot=k) for k in range(UNITS)]
+    lot = Lot(units=units, device=recipe.device, seed=seed, repeat=repeat)
+    kept = _Kept()
+    with open_station(_station(chosen, seed), lot) as station:
+        capture(station, recipe, lot, kept, progress=progress)
+    accepted = pd.DataFrame({"unit": [u.serial for u in units], "refused": False})
+    readings = pd.concat(kept.readings, ignore_index=True)
+    dwells = reduce(kept.samples, readings, accepted, recipe.local_gravity_m_s2)
+    return [dwells, pd.concat([h for h in kept.history if len(h)], ignore_index=True)]
+
+
+def _recipe(chosen: Scene) -> Recipe:
+    rng = np.random.default_rng(20)
+    angles = np.concatenate([rng.permutation(poses.plan(chosen.plan)) for _ in range(chosen.repeats)])
+    wanted: dict[str, Any] = {
+        "name": f"demo-{chosen.kind.replace('_', '-')}",
+        "description": "a small plan of the demonstration",
+        "poses": [Pose(name=f"p{k + 1:03d}", outer_deg=o, inner_deg=i) for k, (o, i) in enumerate(angles.tolist())],
+        "verification": [],
+        "temperatures_C": list(chosen.temperatures),
+        "soak_min_s": 900.0 if chosen.soak == Soak() else 1.0,
+        "allow_short_soak": True,
+        "settle_s": chosen.settle_s,
+        "dwell_s": 4.0,
+        "rate_hz": 25.0,
+        "static_record_s": 0.0,
+        "effects": list(chosen.model),
+    }
+    return load_recipe().model_copy(update=wanted)
+
+
+def _station(chosen: Scene, seed: int) -> StationConfig:
+    plain = load_station()
+    simulation = plain.simulation
+    steady = {} if len(chosen.temperatures) > 1 else {"bias_tempco_ug_per_K": 2.0, "scale_tempco_ppm_per_K": 4.0}
+    if simulation is None:
+        message = "demo: the built-in station is not a simulated one; restore stations/simulated.toml"
+        raise WrongUse(message)
+    hidden = [Hidden(kind=chosen.kind, figures=chosen.figures)]
+    changed = simulation.model_copy(update={"seed": seed, "hidden": hidden, "preset_overrides": QUIET | steady})
+    return plain.model_copy(update={"simulation": changed, "soak": chosen.soak})
