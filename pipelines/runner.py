@@ -68,10 +68,10 @@ class Runner:
         with threadpool_limits(1):
             if name == "capture":
                 reused = self._capture()
-            elif name == "report":
-                reused = self._report()
             else:
-                reused = self._compute(BY_NAME[name])
+                with _alone(self.run.path, wait=True):
+                    files.sweep(self.run.path)
+                    reused = self._report() if name == "report" else self._compute(BY_NAME[name])
         return Done(name, reused, time.perf_counter() - start)
 
     def _decisive(self) -> dict[str, Any]:
@@ -121,14 +121,17 @@ class Runner:
 
 
 @contextmanager
-def _alone(folder: Path) -> Generator[None, None, None]:
-    """A block in which no other process captures into the folder; the system frees it when a process dies."""
+def _alone(folder: Path, *, wait: bool = False) -> Generator[None, None, None]:
+    """A block in which no other process writes into the folder; the system frees it when a process dies.
+
+    A capture lasts hours, so a second one is refused; a stage lasts seconds, so a second one waits.
+    """
     with files.writing(folder):
         folder.mkdir(parents=True, exist_ok=True)
         lock = (folder / "lock").open("w")
     with lock:
         try:
-            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            fcntl.flock(lock, fcntl.LOCK_EX | (0 if wait else fcntl.LOCK_NB))
         except BlockingIOError:
             message = f"capture: another process is measuring this lot into {folder}; wait for it, or stop it"
             raise OperatorNeeded(message) from None

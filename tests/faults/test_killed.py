@@ -15,7 +15,16 @@ MORE_RESULTS = ("allan", "noise", "figures", "grades")
 
 
 def start(folder: Path) -> subprocess.Popen[bytes]:
-    command = [sys.executable, "-m", "pipelines.cli", "run", recipe_file(folder), "--direct", "--archive", str(folder / "archive")]
+    command = [
+        sys.executable,
+        "-m",
+        "pipelines.cli",
+        "run",
+        recipe_file(folder),
+        "--direct",
+        "--archive",
+        str(folder / "archive"),
+    ]
     return subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
 
 

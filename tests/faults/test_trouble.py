@@ -116,7 +116,12 @@ def test_a_capture_that_was_cut_off_goes_on_and_ends_the_same(tmp_path: Path, so
     ],
 )
 def test_wrong_use_is_one_message_and_status_2(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, arguments: list[str], words: str, status: int
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+    arguments: list[str],
+    words: str,
+    status: int,
 ) -> None:
     from pipelines.cli import main
 

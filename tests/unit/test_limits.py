@@ -56,7 +56,9 @@ def test_names_the_rules_where_one_is_unknown() -> None:
         limits("none")
 
 
-@pytest.mark.parametrize(("value", "grade"), [(30.0, "navigation"), (150.0, "industrial"), (700.0, "consumer"), (1500.0, None)])
+@pytest.mark.parametrize(
+    ("value", "grade"), [(30.0, "navigation"), (150.0, "industrial"), (700.0, "consumer"), (1500.0, None)]
+)
 def test_grades_by_the_bias_that_is_left(value: float, grade: str | None) -> None:
     assert grade_of(value, 0.0, "guarded_acceptance") == grade
 

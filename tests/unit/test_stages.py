@@ -84,7 +84,9 @@ def test_lack_of_fit_widens_the_uncertainty(run: Run) -> None:
     dwells = run.table("dwells")
     bent = dwells.assign(out_x=dwells["out_x"] + 3000.0 * dwells["force_x"] ** 2)
     effects = ["bias", "scale", "misalignment", "bias_temperature", "scale_temperature"]
-    straight, wider = (fit(table, effects)["coefficients"].set_index(["unit", "axis", "effect"]) for table in (dwells, bent))
+    straight, wider = (
+        fit(table, effects)["coefficients"].set_index(["unit", "axis", "effect"]) for table in (dwells, bent)
+    )
     ratio = (wider["standard_error"] / straight["standard_error"]).loc[("A1", "x", "bias")]
     assert ratio > 3.0
 

@@ -39,7 +39,9 @@ def test_refuses_words_where_numbers_are_needed() -> None:
 
 
 def test_refuses_a_unit_of_output_that_it_does_not_know() -> None:
-    frame = pd.DataFrame({"unit": ["A"], "slot": [0], "outcome": ["good"], "grade": [""], "reasons": [""], "rule": [""]})
+    frame = pd.DataFrame(
+        {"unit": ["A"], "slot": [0], "outcome": ["good"], "grade": [""], "reasons": [""], "rule": [""]}
+    )
     with pytest.raises(DataRejected, match=r"row 0 \(unit A\), column outcome: found good"):
         tables.check("grades", frame)
 
