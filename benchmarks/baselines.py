@@ -32,6 +32,12 @@ class Fit:
     parameters: int
 
 
+def _library(run: Run) -> Library:
+    """The candidates for the run, on the starting model and with the history that its specification gives to everybody."""
+    spec = run.sealed.spec
+    return library(run.dwells, run.history if spec.history else None, bare=spec.base is not None)
+
+
 def _pooled(data: Library, names: list[str]) -> Fit:
     """Least squares of the named candidates for every unit and axis of the lot."""
     chi2, parameters = 0.0, 0
@@ -62,7 +68,7 @@ def _forward(data: Library, judge: Callable[[Fit, Fit, int], float]) -> list[str
 
 def bic(run: Run) -> tuple[dict[str, Any], float | None]:
     """Pooled forward selection; the noise is unknown and BIC decides."""
-    data = library(run.dwells, run.history)
+    data = _library(run)
     count = sum(output.size for output in data.output)
 
     def gain(before: Fit, after: Fit, _left: int) -> float:
@@ -73,7 +79,7 @@ def bic(run: Run) -> tuple[dict[str, Any], float | None]:
 
 def bonferroni(run: Run) -> tuple[dict[str, Any], float | None]:
     """Pooled forward selection by F against pure error of repeated poses, Bonferroni at 1 % over the candidates."""
-    data = library(run.dwells, run.history)
+    data = _library(run)
     variance, dof = data.pure_error()
 
     def gain(before: Fit, after: Fit, left: int) -> float:
@@ -86,7 +92,7 @@ def bonferroni(run: Run) -> tuple[dict[str, Any], float | None]:
 
 def _sparse(run: Run, choose: Callable[[Floats, Floats, Library], Floats]) -> tuple[dict[str, Any], float | None]:
     """A baseline that regresses each axis of each unit sparsely and names what most of them keep."""
-    data = library(run.dwells, run.history)
+    data = _library(run)
     votes: dict[str, float] = dict.fromkeys(data.names, 0.0)
     for unit in range(data.units):
         for axis in range(3):
@@ -140,7 +146,7 @@ def lasso(run: Run) -> tuple[dict[str, Any], float | None]:
 
 def _fresh_rms(data: Library, run: Run, names: list[str]) -> float:
     """RMS in µg of the fresh run's errors with the coefficients of this one."""
-    fresh = library(run.fresh, run.fresh_history, like=data)
+    fresh = library(run.fresh, run.fresh_history if run.sealed.spec.history else None, like=data)
     squares = []
     for unit in range(data.units):
         for axis in range(3):

@@ -180,6 +180,10 @@ FORMS: dict[str, Columns] = {
         (d.array("supply_V") - 3.3) * c for c in (np.ones(len(d.force)), d.force[:, i])
     ],
 }
+THERMAL_FORMS: dict[str, Columns] = {
+    "bias_temperature": lambda d, _i: [d.theta],
+    "scale_temperature": lambda d, i: [d.theta * d.force[:, i]],
+}
 STATION_FORMS: dict[str, Columns] = {
     "magnetic": _field,
     "level_error": _level,
@@ -228,7 +232,7 @@ class Library:
                 centre, span = self.covariates[name]
                 parts = [(d.array(name.partition(":")[2]) - centre) / span]
             else:
-                parts = (FORMS | STATION_FORMS)[name](d, axis)
+                parts = (FORMS | THERMAL_FORMS | STATION_FORMS)[name](d, axis)
             self.cache[key] = np.column_stack(parts)
         return self.cache[key]
 
@@ -248,8 +252,13 @@ class Library:
         return (total / dof, float(dof)) if dof >= 10 else (white, 1e6)
 
 
-def library(dwells: pd.DataFrame, history: pd.DataFrame | None = None, like: Library | None = None) -> Library:
-    """The library of a lot; `like` gives a fresh run the scales of the run whose coefficients it shall get."""
+def library(
+    dwells: pd.DataFrame, history: pd.DataFrame | None = None, like: Library | None = None, *, bare: bool = False
+) -> Library:
+    """The library of a lot; `like` gives a fresh run the scales of another.
+
+    `bare` keeps temperature out of the starting model, among the candidates.
+    """
     units = [part.sort_values("dwell").reset_index(drop=True) for _, part in dwells.groupby("unit", sort=True)]
     courses = [None if history is None else history[history["unit"] == part["unit"].iloc[0]] for part in units]
     lots = [Dwells(part, course) for part, course in zip(units, courses, strict=True)]
@@ -262,7 +271,7 @@ def library(dwells: pd.DataFrame, history: pd.DataFrame | None = None, like: Lib
     thermal = max(float(np.ptp(d.theta)) for d in lots) > SPAN_K
     extra = [name for name in dwells.columns if name not in KNOWN and pd.api.types.is_numeric_dtype(dwells[name])]
     scales = {f"covariate:{name}": (float(dwells[name].mean()), float(dwells[name].std()) or 1.0) for name in extra}
-    names = [*FORMS, *scales]
+    names = [*FORMS, *(THERMAL_FORMS if thermal and bare else ()), *scales]
     if "outer_deg" in dwells:
         names += list(STATION_FORMS)
-    return Library(lots, float(np.median(slopes)), thermal, names, scales)
+    return Library(lots, float(np.median(slopes)), thermal and not bare, names, scales)
