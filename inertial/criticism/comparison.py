@@ -76,10 +76,12 @@ def _pooled(model: Model, unit: Array, right: Array, scaled: Array, covariance: 
     scatter = ((by_axis - mean) ** 2).sum(axis=(0, 1)) / (3.0 * (units - 1))
     between = np.maximum(scatter - error2.mean(axis=0), 1e-3 * error2.mean(axis=0))
     variance = model.space.variance
-    precision = np.where(free, variance / (between * size**2), 0.0)
+    there = free & (between > 0.0)
+    precision = np.where(there, variance / (np.where(there, between, 1.0) * size**2), 0.0)
     gram = np.swapaxes(unit, -1, -2) @ unit + np.einsum("bp,pr->bpr", precision, np.eye(size.shape[-1]))
     centre = np.tile(mean, (units, 1)) * size
-    return np.linalg.solve(gram, (right + precision * centre)[..., None])[..., 0]
+    drawn = np.linalg.pinv(gram, rcond=1e-10, hermitian=True) @ (right + precision * centre)[..., None]
+    return drawn[..., 0].astype(np.float64)
 
 
 def _shrinkable(model: Model, count: int) -> NDArray[np.bool_]:

@@ -11,9 +11,10 @@ from inertial.criticism.adequacy import adequacy
 from inertial.criticism.classes import EffectClass, class_of
 from inertial.criticism.drivers import Driver, Place, drivers_of, places
 from inertial.criticism.heldout import fit_rms, heldout_rms
-from inertial.criticism.model import Model, Term
+from inertial.criticism.model import Model
 from inertial.criticism.problem import Lot, Problem
-from inertial.criticism.search import NAMED_BELOW, Field, Rival, log_p_value, search, terms_of
+from inertial.criticism.search import NAMED_BELOW, Field, Found, Rival, log_p_value, search, terms_of
+from inertial.criticism.unknown import Suspect, better_curve, suspects
 from inertial.effects.base import AnyEffect
 from inertial.effects.covariate import COVARIATE_PREFIX, Covariate
 
@@ -82,11 +83,10 @@ def diagnose(lot: Lot, effects: Sequence[str], rng: Generator) -> Diagnosis:
     drivers = drivers_of(problem)
     unseen = _unseen(field, base, candidates)
     log_p = adequacy(field, drivers, base.space, rng)
-    found = search(field, base)
+    suspected = suspects(problem)
+    found = search(field, base, stop=lambda chosen: better_curve(base, chosen, suspected) is not None)
     adequate = log_p >= np.log(ADEQUATE_ABOVE) and not found.added
-    final, unexplained = found.model, None
-    if not adequate:
-        final, unexplained = _beyond(problem, base, final, drivers)
+    final, unexplained = (found.model, None) if adequate else _beyond(base, found, drivers, suspected)
     classes = _classes(field, base, final)
     named = _named(problem, base, classes)
     if unexplained is None:
@@ -144,26 +144,24 @@ def _covariate(classes: Sequence[EffectClass]) -> Unexplained | None:
     return None
 
 
-def _beyond(problem: Problem, base: Model, final: Model, drivers: list[Driver]) -> tuple[Model, Unexplained | None]:
-    """What smooth dependence is left after the effects found; effects that only imitate it are taken back.
-
-    Effects imitate a driver where its curve alone, in their place, leaves less than they do.
-    """
+def _beyond(
+    base: Model, found: Found, drivers: list[Driver], suspected: list[Suspect]
+) -> tuple[Model, Unexplained | None]:
+    """The effects that stand, and the driver that is left: effects that only imitate a curve of one driver are taken back."""
+    instead = better_curve(base, found.added, suspected) if found.added else None
+    if instead is not None:
+        fit, kept = instead
+        space = fit.model.space
+        drop = max(base.at(fit.model.share).rss - space.rss, 0.0)
+        log_p = log_p_value(base.at(fit.model.share), drop, fit.rank) + float(np.log(len(suspected)))
+        return Model(base.problem, [*base.terms, *kept]), Unexplained(fit.driver, "curve", log_p)
+    final = found.model
     convincing = [d for d in drivers if _convincing(final, d, len(drivers))]
     if not convincing:
         return final, None
     best = max(convincing, key=lambda d: _worth(final, d))
-    held = {t.effect.id for t in base.terms}
-    added = [t for t in final.terms if t.effect.id not in held]
-    kept = [t for t in added if not _inside(final.without(t.effect.id), t, best)]
     shape = "line" if best.candidate.columns.shape[-1] == 1 else "curve"
-    unexplained = Unexplained(best.name, shape, _driver_log_p(final, best) + float(np.log(len(drivers))))
-    if len(kept) == len(added):
-        return final, unexplained
-    without = Model(problem, [*base.terms, *kept])
-    instead = without.with_curves(best.candidate.columns[:, :, 0, :])
-    better = instead.at(final.share).rss < final.space.rss
-    return (without if better else final), unexplained
+    return final, Unexplained(best.name, shape, _driver_log_p(final, best) + float(np.log(len(drivers))))
 
 
 def _convincing(model: Model, driver: Driver, looks: int) -> bool:
@@ -192,13 +190,3 @@ def _driver_size(model: Model, driver: Driver) -> float:
     white = float(np.mean(error[np.isfinite(error)] ** 2))
     beyond = float(gain.drop[0]) * white - model.floor() ** 2 * float(gain.rank[0])
     return float(np.sqrt(max(beyond, 0.0) / model.problem.count))
-
-
-def _inside(model: Model, term: Term, driver: Driver) -> bool:
-    """Whether a smooth curve of the driver reproduces nine tenths of what a term explains."""
-    before = model.at(0.0)
-    wanted = model.problem.candidate(term.effect, [term.keywords], first=term.first)
-    alone = float(before.gain(wanted).drop[0])
-    local = np.concatenate([model.local, driver.candidate.columns[:, :, 0, :]], axis=-1)
-    after = type(before)(model.problem.basis, 0.0, model.problem.y, local, model.shared)
-    return float(after.gain(wanted).drop[0]) < 0.2 * alone

@@ -50,8 +50,8 @@ def drivers_of(problem: Problem) -> list[Driver]:
     state = problem.lot.state
     found = [
         Driver(name, _by_block(problem, curve(values, knots)), values)
-        for name, values, knots in _quantities(state)
-        if _varies(values)
+        for name, values, knots in quantities(state)
+        if varies(values)
     ]
     pose = _pose_columns(state, most=max(4, (problem.n - 8) // 3))
     if pose.shape[-1]:
@@ -62,7 +62,8 @@ def drivers_of(problem: Problem) -> list[Driver]:
     return found
 
 
-def _quantities(state: State) -> list[tuple[str, Array, int]]:
+def quantities(state: State) -> list[tuple[str, Array, int]]:
+    """Name, values (units, n) and number of knots of every recorded quantity."""
     fields: dict[str, Array | None] = {
         "unit_C": state.temperature,
         "temperature_rate": state.temperature_rate,
@@ -81,7 +82,8 @@ def _quantities(state: State) -> list[tuple[str, Array, int]]:
     ]
 
 
-def _varies(values: Array) -> bool:
+def varies(values: Array) -> bool:
+    """Whether a quantity takes more than one value."""
     return bool(np.ptp(values) > 1e-9 * max(1.0, float(np.max(np.abs(values)))))
 
 

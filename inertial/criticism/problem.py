@@ -108,7 +108,7 @@ class Problem:
         """Columns of an effect by block, (blocks, n, p), g per unit of the coefficient; radial lots join the axes' columns."""
         if isinstance(effect, SensorEffect):
             return self._by_axis([effect.columns(self.lot.state, axis, **on_axis(values, axis)) for axis in range(3)])
-        return self._by_force(effect.force_change(self.lot.state, **on_axis(values, 0)))
+        return self.seen(effect.force_change(self.lot.state, **on_axis(values, 0)))
 
     def start(self, effect: AnyEffect, values: Values) -> Array:
         """Columns (blocks, n, k) of the unknown state of an effect's memory before the first dwell."""
@@ -116,7 +116,7 @@ class Problem:
             state = self.lot.state
             columns = self._by_axis([effect.start_columns(state, axis, **on_axis(values, axis)) for axis in range(3)])
         else:
-            columns = self._by_force(effect.start_change(self.lot.state, **on_axis(values, 0)))
+            columns = self.seen(effect.start_change(self.lot.state, **on_axis(values, 0)))
         # a state taken up before the second dwell leaves a column of one dwell only: it is kept, the dwell tells nothing then
         return columns
 
@@ -129,7 +129,7 @@ class Problem:
             return np.concatenate(weighted, axis=-1)
         return np.stack(axes, axis=1).reshape(self.blocks, self.n, -1)
 
-    def _by_force(self, change: Array) -> Array:
+    def seen(self, change: Array) -> Array:
         """Changes of force (units or 1, n, 3, q) seen through every unit's response, by block."""
         state = self.lot.state
         seen = np.einsum(

@@ -1,6 +1,6 @@
 """The search for missing effects: forward with the noise estimated anew, and back again over what was chosen."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -105,14 +105,19 @@ def log_p_value(space: Space, drop: float, rank: int) -> float:
     return float(stats.f.logsf((drop / rank) / (left / after), rank, after))
 
 
-def search(field: Field, base: Model) -> Found:
-    """The effects that the measurements call for beyond a base model."""
+def search(field: Field, base: Model, stop: Callable[[Sequence[Term]], bool]) -> Found:
+    """The effects that the measurements call for beyond a base model.
+
+    Parameters
+    ----------
+    stop : asked before a third and every further effect: whether those chosen only imitate something else
+    """
     model, chosen, ladder = base, [], ()
     for _ in range(_MOST):
         rivals = _contest(field, model)
         ladder = ladder or tuple(rivals)
         best = next((r for r in rivals if convincing(field, model, r)), None)
-        if best is None:
+        if best is None or (len(chosen) >= 2 and stop(chosen)):
             break
         chosen.append(best.term)
         model = model.with_term(best.term)

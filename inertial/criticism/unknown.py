@@ -1,0 +1,187 @@
+"""Physics that is in no catalogue: one curve of one driver that does better than the effects that would have to imitate it."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from inertial import frames
+from inertial.criticism.curves import CurveFit, cost_of_model, fit_curve
+from inertial.criticism.drivers import curve, quantities, varies
+from inertial.criticism.model import Model, Term
+from inertial.criticism.problem import Problem
+from inertial.criticism.space import Candidate
+from inertial.effects.covariate import COVARIATE_PREFIX
+
+Array = NDArray[np.float64]
+
+_KNOTS = 9
+_TIME_KNOTS = 12
+_HARMONICS = 5
+_CYCLES = np.arange(1.0, 14.1, 0.5)
+_LEVELS = 14
+_CENTRES = np.linspace(0.0, 1.0, 21)
+_WIDTHS = (0.02, 0.05, 0.1)
+_SHARPEST = 3
+
+OTHERS = 60.0
+"""Penalised chi-square that an effect must bring beside a curve to stay."""
+
+OTHERS_SHARE = 0.1
+"""Share of what the curve brings that an effect beside it must bring as well."""
+
+DOUBT = {0: 0.0, 1: 40.0, 2: 20.0}
+"""Penalised chi-square by which a curve must beat so many effects: physics that is known is believed first."""
+
+DOUBT_SHARE = 0.15
+"""Share of what a curve explains that one effect must leave over before the curve is believed instead."""
+
+
+@dataclass(frozen=True)
+class Suspect:
+    """A driver, and columns flexible enough for any smooth dependence on it.
+
+    values : (blocks, n), the driver itself, 0 … 1 over the run; None where there is no one quantity
+    """
+
+    driver: str
+    candidate: Candidate
+    values: Array | None = None
+
+
+def suspects(problem: Problem) -> list[Suspect]:
+    """Every driver that varies in a lot, as columns of a flexible curve."""
+    state = problem.lot.state
+    found: list[Suspect] = []
+    for name, values, _ in quantities(state):
+        if varies(values):
+            knots = _TIME_KNOTS if name in {"time_s", "since_power_s"} else _KNOTS
+            each = _unit_range(values if problem.lot.radial else np.repeat(values, 3, axis=0))
+            found.append(Suspect(name, _alike(problem, _flexible(values, knots)), each))
+    if not problem.lot.radial:
+        own = np.stack([state.along(axis) for axis in range(3)], axis=1).reshape(problem.blocks, problem.n)
+        found.append(Suspect("pose", _rotated(problem, curve(own, _KNOTS)), _unit_range(own)))
+        found += _table(problem)
+    found += [Suspect("time_s", _alike(problem, _swing(state.time, c))) for c in _CYCLES]
+    return found
+
+
+def better_curve(base: Model, chosen: Sequence[Term], field: Sequence[Suspect]) -> tuple[CurveFit, list[Term]] | None:
+    """The curve that explains a lot better than the effects chosen, with those it leaves standing; None if none does."""
+    held = {t.effect.id.removeprefix(COVARIATE_PREFIX) for t in chosen}
+    whole = cost_of_model(Model(base.problem, [*base.terms, *chosen], near=base.share))
+    bare = cost_of_model(base)
+    promising = [s for s in _promising(base, field) if s.driver not in held]
+    fits = [fit_curve(base, s.driver, s.candidate) for s in promising]
+    fits += [f for s in promising[:_SHARPEST] if (f := _sharp(base, s)) is not None]
+    if not fits:
+        return None
+    best = min(fits, key=lambda f: f.cost)
+    kept: list[Term] = []
+    if len(chosen) > 1:
+        best, kept = _with_others(base, chosen, field, best, max(OTHERS, OTHERS_SHARE * (bare - best.cost)))
+    replaced = len(chosen) - len(kept)
+    doubt = DOUBT.get(replaced, 0.0)
+    if replaced == 1:
+        doubt = max(doubt, DOUBT_SHARE * (bare - best.cost))
+    return (best, kept) if replaced and best.cost + doubt < whole else None
+
+
+def _promising(base: Model, field: Sequence[Suspect]) -> list[Suspect]:
+    """The suspects whose own curves, block by block, take off most; the rest cannot win."""
+    space = base.space
+    worth = [float(np.max(space.gain(s.candidate).drop)) for s in field]
+    order = np.argsort(worth)[::-1]
+    return [field[i] for i in order[:6]]
+
+
+def _with_others(
+    base: Model, chosen: Sequence[Term], field: Sequence[Suspect], best: CurveFit, worth: float
+) -> tuple[CurveFit, list[Term]]:
+    """The best curve again beside effects that it does not replace: no functions of its own driver, and worth the room."""
+    suspect = [s for s in field if s.driver == best.driver]
+    kept: list[Term] = []
+    for term in chosen:
+        if _function_of(base, term, suspect[0]):
+            continue
+        beside = Model(base.problem, [*base.terms, *kept, term], near=base.share)
+        tried = [fit_curve(beside, s.driver, s.candidate) for s in suspect[:2]]
+        tried += [f for s in suspect[:1] if (f := _sharp(beside, s)) is not None]
+        again = min(tried, key=lambda f: f.cost)
+        if again.cost < best.cost - worth:
+            best, kept = again, [*kept, term]
+    return best, kept
+
+
+def _function_of(base: Model, term: Term, suspect: Suspect) -> bool:
+    """Whether a flexible curve of the driver, block by block, reproduces nine tenths of a term's columns."""
+    columns = base.problem.rotated(term.effect, term.keywords)[..., : term.first]
+    before = base.at(0.0)
+    whole = np.concatenate([base.local, suspect.candidate.columns[:, :, 0, :]], axis=-1)
+    after = type(before)(base.problem.basis, 0.0, base.problem.y, whole, base.shared)
+    left = [float(np.sum(s._project(columns / s.spread[..., None]) ** 2)) for s in (before, after)]  # noqa: SLF001
+    return left[1] < 0.1 * left[0]
+
+
+def _sharp(model: Model, suspect: Suspect) -> CurveFit | None:
+    """The best bump or hinge of a driver beside a model: features narrower than a smooth curve can follow."""
+    if suspect.values is None:
+        return None
+    z = suspect.values
+    shapes = [np.exp(-0.5 * ((z - c) / w) ** 2) for w in _WIDTHS for c in _CENTRES]
+    shapes += [np.maximum(z - c, 0.0) for c in _CENTRES] + [(z > c).astype(float) for c in _CENTRES]
+    rotated = model.problem.basis.rotate(np.stack(shapes, axis=-1))
+    gain = model.space.gain(Candidate(rotated[..., None], shared=False))
+    best = int(np.argmax(gain.drop))
+    if not gain.rank[best]:
+        return None
+    column = rotated[..., best : best + 1]
+    fitted = model.with_curves(column)
+    return CurveFit(suspect.driver, fitted, int(gain.rank[best]) + 2, cost_of_model(fitted, extra=2))
+
+
+def _unit_range(values: Array) -> Array:
+    """Values over the run's range, 0 … 1."""
+    return (values - values.min()) / max(float(np.ptp(values)), 1e-12)
+
+
+def _flexible(values: Array, knots: int) -> Array:
+    """A level for each group of values where they come in a few groups (soaks), else a spline: (units, n, d)."""
+    order = np.sort(values, axis=None)
+    gaps = np.diff(order)
+    edges = order[:-1][gaps > 0.03 * np.ptp(order)] + 0.5 * gaps[gaps > 0.03 * np.ptp(order)]
+    if 2 <= edges.size < _LEVELS:
+        return np.stack([(values > e).astype(float) for e in edges], axis=-1)
+    return curve(values, knots)
+
+
+def _alike(problem: Problem, columns: Array) -> Candidate:
+    """Columns (units, n, d), the same for every axis."""
+    each = columns if problem.lot.radial else np.repeat(columns, 3, axis=0)
+    return _rotated(problem, np.broadcast_to(each, (problem.blocks, problem.n, columns.shape[-1])))
+
+
+def _rotated(problem: Problem, columns: Array, *, shared: bool = False) -> Candidate:
+    return Candidate(problem.basis.rotate(columns)[:, :, None, :], shared=shared)
+
+
+def _swing(time: Array, cycles: float) -> Array:
+    """Sine and cosine of so many cycles in the run."""
+    phase = 2.0 * np.pi * cycles * (time - time.min()) / max(float(np.ptp(time)), 1.0)
+    return np.stack([np.sin(phase), np.cos(phase)], axis=-1)
+
+
+def _table(problem: Problem) -> list[Suspect]:
+    """Rotations of the fixture that depend on one table angle, the same for all units."""
+    state = problem.lot.state
+    if state.outer is None or state.inner is None:
+        return []
+    found: list[Suspect] = []
+    for name, angle in (("outer_deg", state.outer), ("inner_deg", state.inner)):
+        if np.ptp(angle) > 0.1:
+            turns = [h for k in range(1, _HARMONICS + 1) for h in (np.sin(k * angle), np.cos(k * angle))]
+            tilts = [frames.to_fixture(v, state.outer, state.inner) for v in ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0))]
+            change = np.stack([t[..., None] * v for t in turns for v in tilts], axis=-1)
+            found.append(Suspect(name, _rotated(problem, problem.seen(change), shared=True)))
+    return found
