@@ -10,6 +10,8 @@ Array = NDArray[np.float64]
 
 UP: tuple[float, float, float] = (0.0, 0.0, 1.0)
 
+_ROUNDING = 1e-14
+
 
 def rotation_x(angle: ArrayLike) -> Array:
     """Rotation matrices about x, shape (..., 3, 3), for ``angle`` (...) in rad."""
@@ -46,7 +48,12 @@ def to_fixture(vector: ArrayLike, outer: ArrayLike, inner: ArrayLike) -> Array:
 
 def force_from_angles(outer: ArrayLike, inner: ArrayLike, up: ArrayLike = UP) -> Array:
     """Specific force in the fixture's frame, (..., 3) in g, at table angles ``outer``, ``inner`` (...) in rad."""
-    return to_fixture(up, outer, inner)
+    return without_rounding(to_fixture(up, outer, inner))
+
+
+def without_rounding(force: Array) -> Array:
+    """A specific force in g with what rounding left of zeros made zero: the cosine of 90° is 6e‑17, not a force to fit."""
+    return np.where(np.abs(force) < _ROUNDING, 0.0, force)
 
 
 def angles_from_force(force: ArrayLike) -> tuple[Array, Array]:

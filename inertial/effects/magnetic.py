@@ -10,7 +10,10 @@ from inertial.state import State
 
 
 class Magnetic(SensorEffect):
-    """Response to the laboratory's horizontal magnetic field, seen as it turns in the fixture's frame."""
+    """Response to the laboratory's horizontal magnetic field, seen as it turns in the fixture's frame.
+
+    The outer axis lies along the laboratory's x, which the fixture's z therefore never sees: five columns, not six.
+    """
 
     id: ClassVar[str] = "magnetic"
     symbol: ClassVar[str] = "B"
@@ -26,8 +29,8 @@ class Magnetic(SensorEffect):
         outer, inner = state.need("outer", self.id), state.need("inner", self.id)
         north = frames.to_fixture((1.0, 0.0, 0.0), outer, inner)
         east = frames.to_fixture((0.0, 1.0, 0.0), outer, inner)
-        return np.concatenate([north, east], axis=-1)
+        return np.concatenate([north[..., :2], east], axis=-1)
 
     def names(self, axis: int) -> tuple[str, ...]:
         del axis
-        return tuple(f"B{direction}{a}" for direction in "12" for a in AXES)
+        return (*(f"B1{a}" for a in AXES[:2]), *(f"B2{a}" for a in AXES))

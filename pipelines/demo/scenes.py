@@ -83,7 +83,7 @@ SCENES: tuple[Scene, ...] = (
         temperatures=SWINGS,
         soak=HURRIED,
     ),
-    Scene("creep", "creep_after_move", "a suspension of which a part comes late", {"size": 150e-6, "tau": 30.0}),
+    Scene("creep", "creep_after_move", "a suspension of which a part comes late", {"size": 50e-6, "tau": 30.0}),
     Scene(
         "level_error",
         "level_error",
@@ -95,7 +95,7 @@ SCENES: tuple[Scene, ...] = (
         "vibration_rectification",
         "vibration_rectification",
         "an asymmetric spring that turns vibration into a steady force",
-        {"coefficient": 2e4},
+        {"coefficient": 6e4},
         plan="nine",
         repeats=1,
         temperatures=LOOP,

@@ -127,7 +127,7 @@ def _stated_unit(dwells: pd.DataFrame) -> str | None:
 
 def _force(table: _Table) -> tuple[str, Array]:
     if table.has(*FORCE):
-        return "force", _filled(table.raw(FORCE))
+        return "force", frames.without_rounding(_filled(table.raw(FORCE)))
     if table.has("outer_deg", "inner_deg"):
         angles = np.radians(_filled(table.raw(("outer_deg", "inner_deg"))))
         return "angles", frames.force_from_angles(angles[..., 0], angles[..., 1])

@@ -1,0 +1,280 @@
+"""Every effect of the catalogue keeps the contract of effects; they are found by themselves, and none is exempt."""
+
+import inspect
+from dataclasses import replace
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from inertial import effects, poses
+from inertial.criticism.problem import grid_of
+from inertial.effects import SensorEffect, StationEffect
+from inertial.effects.base import AnyEffect
+from inertial.errors import NotIdentified
+from inertial.fits.linear import fit_lot
+from inertial.frames import force_from_angles
+from inertial.state import State
+from pipelines.docs import page
+from pipelines.export.polynomials import ACROSS, BIAS, SCALE
+from pipelines.stages.criticise import diagnose
+
+EVERY = sorted(effects.built_in())
+BASE = ("bias", "scale", "misalignment")
+LOOP = (25.0, 45.0, 60.0, 44.0, 26.0, 5.0, -10.0, 6.0, 24.0)
+GONE = 1e-6
+"""Share of a column that is left where the model absorbs it wholly."""
+
+
+def plan_state(plan: str, temperatures: tuple[float, ...], *, units: int = 2) -> State:
+    """A lot on a plan with everything recorded and everything moving that a plan can move."""
+    rng = np.random.default_rng(7)
+    rounds = [rng.permutation(poses.plan(plan)) for _ in temperatures]
+    angles = np.radians(np.concatenate(rounds))
+    n = len(angles)
+    outer, inner = np.broadcast_to(angles.T[:, None, :], (2, units, n))
+    wait = rng.uniform(2.0, 60.0, (units, n))
+    time = np.cumsum(60.0 + wait[:1], axis=1) + np.repeat(900.0 * np.arange(len(temperatures)), n // len(temperatures))
+    time = np.broadcast_to(time, (units, n)).copy()
+    chamber = np.repeat(temperatures, n // len(temperatures)) * np.ones((units, 1))
+    settling = np.exp(-(np.arange(n) % (n // len(temperatures))) / 4.0)
+    return State(
+        force=force_from_angles(outer, inner),
+        time=time,
+        temperature=chamber + 0.8 * settling * np.sign(np.gradient(chamber, axis=1) + 1e-9),
+        chamber=chamber,
+        since_power=time - time[:, :1] + 30.0,
+        since_move=wait,
+        supply=3.3 + 0.02 * rng.standard_normal((units, n)),
+        vibration=1e-4 * rng.uniform(0.2, 3.0, (units, n)),
+        outer=outer.copy(),
+        inner=inner.copy(),
+        slot=np.arange(units, dtype=float),
+    )
+
+
+RICH = plan_state("fibonacci24", LOOP)
+RICH = replace(RICH, felt=RICH.force)  # sensors without misalignment: what they feel is what is commanded
+
+
+def values_of(effect: AnyEffect, state: State) -> dict[str, float]:
+    """Values from the middle of the grids of an effect's nonlinear parameters, with its constants."""
+    grid = grid_of(effect, state)
+    return grid[len(grid) // 2]
+
+
+def all_columns(effect: AnyEffect, state: State, values: dict[str, float]) -> np.ndarray:
+    """Columns of the three axes in one array, (3, units, n, p)."""
+    if isinstance(effect, SensorEffect):
+        return np.stack([np.broadcast_to(c, (*state.time.shape, c.shape[-1])) for c in
+                         (effect.columns(state, axis, **values) for axis in range(3))])  # fmt: skip
+    assert isinstance(effect, StationEffect)
+    change = effect.force_change(state, **values)
+    return np.moveaxis(np.broadcast_to(change, (*state.force.shape, change.shape[-1])), -2, 0)
+
+
+def absorbed_share(columns: np.ndarray, base: np.ndarray) -> float:
+    """Largest share of any column that a model's columns (n, q) leave over, over the axes of one unit."""
+    q, _ = np.linalg.qr(base)
+    size = np.linalg.norm(columns, axis=-2)
+    left = np.linalg.norm(columns - q @ (np.swapaxes(q, 0, 1) @ columns), axis=-2)
+    return float(np.max(np.where(size > 1e-12, left / np.where(size > 1e-12, size, 1.0), 0.0)))
+
+
+def least_left(columns: np.ndarray, base: np.ndarray) -> float:
+    """Smallest share of a combination of columns (n, p) of equal size that a model leaves over; 0 for an empty one."""
+    size = np.linalg.norm(columns, axis=-2)
+    if np.any(size < 1e-12):
+        return 0.0
+    q, _ = np.linalg.qr(base)
+    left = columns / size
+    left = left - q @ (q.T @ left)
+    return float(np.linalg.svd(left, compute_uv=False)[-1])
+
+
+@pytest.mark.parametrize("name", EVERY)
+def test_columns_have_a_name_each_and_are_finite(name: str) -> None:
+    effect = effects.get(name)
+    columns = all_columns(effect, RICH, values_of(effect, RICH))
+    names = [effect.names(axis) for axis in range(3)] if isinstance(effect, SensorEffect) else [effect.names()] * 3
+    assert np.isfinite(columns).all()
+    assert [len(n) for n in names] == [columns.shape[-1]] * 3
+    assert columns.shape[:-1] == (3, *RICH.time.shape)
+
+
+@pytest.mark.parametrize("name", EVERY)
+def test_start_columns_are_finite_and_fit_the_dwells(name: str) -> None:
+    effect = effects.get(name)
+    values = values_of(effect, RICH)
+    if isinstance(effect, SensorEffect):
+        start = effect.start_columns(RICH, 0, **values)
+        assert np.broadcast_shapes(start.shape[:-1], RICH.time.shape) == RICH.time.shape
+    else:
+        start = effect.start_change(RICH, **values)
+        assert np.broadcast_shapes(start.shape[:-1], RICH.force.shape) == RICH.force.shape
+    assert np.isfinite(start).all()
+
+
+@pytest.mark.parametrize("name", EVERY)
+def test_says_nothing_where_nothing_changes(name: str) -> None:
+    """The same pose, temperature, supply and instant again and again: whatever a column says then is a bias."""
+    n = RICH.time.shape[-1]
+    still = {
+        key: np.repeat(getattr(RICH, key)[:, 5:6], n, axis=1)
+        for key in (
+            "felt",
+            "force",
+            "time",
+            "temperature",
+            "chamber",
+            "since_power",
+            "since_move",
+            "supply",
+            "vibration",
+            "outer",
+            "inner",
+        )
+    }
+    effect = effects.get(name)
+    columns = all_columns(effect, replace(RICH, **still, memory={}), values_of(effect, RICH))
+    assert np.ptp(columns, axis=-2).max(initial=0.0) < 1e-9
+
+
+@pytest.mark.parametrize("name", EVERY)
+def test_every_nonlinear_parameter_changes_the_columns(name: str) -> None:
+    effect = effects.get(name)
+    for parameter in effect.parameters(RICH):
+        grid = parameter.grid()
+        assert grid.size > 1
+        assert parameter.low <= grid.min() <= grid.max() <= parameter.high
+        values = values_of(effect, RICH)
+        seen = [all_columns(effect, RICH, {**values, parameter.name: float(v)}) for v in (grid[0], grid[-1])]
+        assert not np.allclose(seen[0], seen[1], rtol=1e-6, atol=1e-12), parameter.name
+
+
+@pytest.mark.parametrize("name", EVERY)
+def test_a_document_says_what_it_is(name: str) -> None:
+    effect = effects.get(name)
+    assert (inspect.getdoc(effect) or "").strip().endswith(".") or "." in (inspect.getdoc(effect) or "")
+    assert effect.symbol
+    assert effect.equation
+    assert effect.source
+    assert effect.breaker
+    low, high = effect.typical_ug
+    assert 0.0 <= low <= high
+    assert {other for other in effect.hides_behind if not other.startswith("covariate:")} <= set(EVERY)
+    assert f"### {name}\n" in page()
+
+
+def test_the_reference_is_up_to_date() -> None:
+    from pipelines.docs import PAGE
+
+    assert PAGE.read_text(encoding="utf-8") == page(), "write it again with 'python -m pipelines.docs'"
+
+
+def model_columns(names: list[str], state: State, axis: int) -> np.ndarray:
+    return np.concatenate([effects.get(n).columns(state, axis)[0] for n in names], axis=-1)
+
+
+@pytest.mark.parametrize("name", EVERY)
+def test_is_recovered_where_the_plan_sees_it_and_refused_where_not(name: str, rng: np.random.Generator) -> None:
+    effect = effects.get(name)
+    base = [n for n in BASE if n != name]
+    values = values_of(effect, RICH)
+    columns = all_columns(effect, RICH, values)
+    seen = [least_left(columns[axis, 0], model_columns(base, RICH, axis)) for axis in range(3)]
+    shows = min(seen) if isinstance(effect, SensorEffect) else max(seen)
+    output = RICH.force
+    size = np.maximum(np.max(np.abs(columns), axis=(0, 1, 2)), 1e-12)
+    truth = 1e-3 * rng.uniform(0.5, 1.0, (3, columns.shape[-1])) / size
+    if isinstance(effect, StationEffect):
+        truth = np.repeat(truth[:1], 3, axis=0)
+    output = output + np.moveaxis(np.einsum("aunp,ap->aun", columns, truth), 0, -1)
+    fitted = [*base, name]
+    if shows < GONE:
+        with pytest.raises(NotIdentified):
+            fit_lot(fitted, RICH, output, nonlinear={name: values})
+        return
+    found = fit_lot(fitted, RICH, output, nonlinear={name: values})
+    second_order = 1e-3 * 1e-3  # a station's effect goes through K, which is itself found beside it
+    assert np.max(np.abs(found.residuals)) < (1e-8 if isinstance(effect, SensorEffect) else second_order)
+    if isinstance(effect, StationEffect):
+        assert np.allclose(found.shared, truth[0], rtol=5e-3, atol=1e-8)
+    if isinstance(effect, SensorEffect) and name not in BASE:
+        at = [k for k, (e, _) in enumerate(found.names[0]) if e == name]
+        assert np.allclose(found.coefficients[..., at], truth, rtol=1e-4, atol=1e-8)
+
+
+def six_faces() -> pd.DataFrame:
+    """Dwells on the six faces at one temperature, three rounds, four units, white noise; only what is required is recorded."""
+    rng = np.random.default_rng(3)
+    angles = np.tile(poses.plan("six"), (3, 1))
+    force = force_from_angles(*np.radians(angles).T)
+    rows = []
+    for unit in range(4):
+        gain = np.eye(3) + 3e-3 * rng.standard_normal((3, 3))
+        out = 5e-3 * rng.standard_normal(3) + force @ gain.T + 5e-6 * rng.standard_normal(force.shape)
+        for k, (f, o) in enumerate(zip(force, out, strict=True)):
+            rows.append(
+                {
+                    "unit": f"U{unit}", "dwell": k, "time_s": 30.0 * k, **dict(zip(("out_x", "out_y", "out_z"), o, strict=True)),
+                    **dict(zip(("force_x", "force_y", "force_z"), f, strict=True)), "n": 400,
+                    **dict.fromkeys(("sd_x", "sd_y", "sd_z"), 1e-4),
+                }
+            )  # fmt: skip
+    return pd.DataFrame(rows)
+
+
+@pytest.fixture(scope="module")
+def diagnosis_of_six_faces() -> dict:
+    return diagnose(six_faces(), effects=list(BASE))
+
+
+@pytest.mark.parametrize("name", [n for n in EVERY if n not in BASE])
+def test_is_reported_unseen_on_six_faces_exactly_where_it_cannot_show(name: str, diagnosis_of_six_faces: dict) -> None:
+    from inertial.errors import MissingInput
+    from pipelines.stages.measured import lot_of, measured
+
+    state = lot_of(measured(six_faces())).state
+    effect = effects.get(name)
+    shows = False
+    try:
+        for values in grid_of(effect, state):
+            columns = all_columns(effect, state, values)
+            for axis in range(3):
+                shows |= absorbed_share(columns[axis, 0], model_columns(list(BASE), state, axis)) > 1e-5
+    except MissingInput:
+        shows = False
+    assert (name in diagnosis_of_six_faces["unseen"]) == (not shows)
+
+
+def test_what_six_faces_hide_is_what_was_published(diagnosis_of_six_faces: dict) -> None:
+    hidden = {
+        "cross_coupling",
+        "third_order",
+        "odd_quadratic",
+        "bias_asymmetry",
+        "fifth_order",
+        "gravity_value",
+        "slot_rotation",
+    }
+    assert hidden <= set(diagnosis_of_six_faces["unseen"])
+    assert not {"second_order", "scale_asymmetry"} & set(diagnosis_of_six_faces["unseen"])
+
+
+@pytest.mark.parametrize("name", EVERY)
+def test_export_holds_it_or_says_that_it_does_not(name: str) -> None:
+    """Effects beyond polynomials in temperature are told of in what is exported, never dropped silently."""
+    from types import SimpleNamespace
+
+    from pipelines.export.polynomials import _one
+
+    p = len(effects.get(name).names(0)) if isinstance(effects.get(name), SensorEffect) else 0
+    fitted = SimpleNamespace(
+        units=["U1"], effects=[*BASE, name],
+        value=lambda effect: np.full((1, 3, p), 0.25) if effect == name and p else np.zeros((1, 3, 0)),
+    )  # fmt: skip
+    one = _one(fitted, "U1", {"outcome": "pass", "grade": "A"}, "g", (0.0, 40.0))
+    kept = name in {*BIAS, *SCALE, *ACROSS}
+    assert (name in one.left_out) != kept
+    assert bool(np.any(one.bias) or np.any(one.response)) == kept
