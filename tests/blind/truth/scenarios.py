@@ -43,6 +43,12 @@ HOMES: dict[str, Home] = {
     "encoder_harmonic": (GENERIC, ROUNDS), "axis_nonorthogonality": (EDGES, ROUNDS), "backlash": (GENERIC, ROUNDS),
 }  # fmt: skip
 STATION = ("level_error", "outer_encoder_offset", "encoder_harmonic", "axis_nonorthogonality", "backlash")
+ENTANGLED = (  # pairs of which one spans the other, whatever their amplitudes
+    {"backlash", "pose_hysteresis"},
+    {"magnetic", "level_error"},
+    {"magnetic", "outer_encoder_offset"},
+    {"level_error", "outer_encoder_offset"},
+)
 REMEMBERED = ("thermal_lag", "thermal_rate", "thermal_hysteresis")  # need the temperature between the dwells
 WITHHELD: dict[str, Home] = {
     "withheld:tide": (GENERIC, ("one", "nine")),
@@ -133,7 +139,7 @@ def _hidden(rng: np.random.Generator, count: int, size: float, first: str | None
             if other not in picked:
                 picked.append(other)
         home = _home(rng, [HOMES[name] for name in picked])
-        if home is None or ("backlash" in picked and "pose_hysteresis" in picked):
+        if home is None or any(pair <= set(picked) for pair in ENTANGLED):
             return None
         chosen = tuple(picked)
         return _plan(rng, *home, effects=chosen, sizes=(size,) * count, **(_settings(chosen) | extra))
