@@ -98,7 +98,10 @@ def by_command_line(run: Run) -> Answer:
     """The product's diagnosis through files and the command line."""
     with tempfile.TemporaryDirectory() as folder:
         dwells, history, fresh, _ = write(run, Path(folder))
-        document = _command("diagnose", str(dwells), "--history", str(history))
+        spec = run.sealed.spec
+        known = ["--history", str(history)] if spec.history else []
+        judged = ["--effects", ",".join(spec.base)] if spec.base else []
+        document = _command("diagnose", str(dwells), *known, *judged)
         if run.sealed.faults:
             return document, None
         model = ",".join([*run.sealed.base, *document["recommended"]])
