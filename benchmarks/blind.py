@@ -97,15 +97,16 @@ def _command(*arguments: str) -> dict[str, Any]:
 def by_command_line(run: Run) -> Answer:
     """The product's diagnosis through files and the command line."""
     with tempfile.TemporaryDirectory() as folder:
-        dwells, history, fresh, _ = write(run, Path(folder))
+        dwells, history, fresh, fresh_history = write(run, Path(folder))
         spec = run.sealed.spec
         known = ["--history", str(history)] if spec.history else []
+        again = ["--fresh-history", str(fresh_history)] if spec.history else []
         judged = ["--effects", ",".join(spec.base)] if spec.base else []
         document = _command("diagnose", str(dwells), *known, *judged)
         if run.sealed.faults:
             return document, None
         model = ",".join([*run.sealed.base, *document["recommended"]])
-        compared = _command("compare", str(dwells), "--effects", model, "--fresh", str(fresh))
+        compared = _command("compare", str(dwells), "--effects", model, "--fresh", str(fresh), *known, *again)
         return document, float(compared["fresh_rms_ug"])
 
 
