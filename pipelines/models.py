@@ -109,10 +109,12 @@ def versions(model: ModelFile) -> list[Version]:
         effect = change.effect
         before = [e for e in now if e != effect] if effect in now else [*now, *([effect] if effect else [])]
         added, removed = tuple(e for e in now if e not in before), tuple(e for e in before if e not in now)
-        first = change is model.change[0]
-        found.append(Version(change.version, tuple(now), () if first else added, () if first else removed, change))
+        found.append(Version(change.version, tuple(now), added, removed, change))
         now = before
-    return found[::-1] or [Version(model.model.version, tuple(now), (), (), None)]
+    if not found or found[-1].added or found[-1].removed:  # the changes do not tell of the model that it began with
+        number = found[-1].number - 1 if found else model.model.version
+        found.append(Version(number, tuple(now), (), (), None))
+    return found[::-1]
 
 
 def new_model(path: Path, names: Sequence[str], by: str, at: datetime) -> str:
@@ -158,7 +160,7 @@ def extended(text: str, step: Step, source: str) -> tuple[str, ModelFile]:
     head["version"] = version  # pyright: ignore[reportIndexIssue]
     head["effects"].append(step.effect)  # pyright: ignore[reportIndexIssue, reportAttributeAccessIssue, reportUnknownMemberType]
     changes = document.setdefault("change", tomlkit.aot())
-    if not model.change and model.model.version > 1:
+    if not model.change:
         known = {
             "version": model.model.version,
             "by": step.by,

@@ -19,6 +19,7 @@ from pipelines.cli.options import (
     print_json,
     print_table,
     short,
+    short_values,
 )
 
 if TYPE_CHECKING:
@@ -111,7 +112,7 @@ def _parameters(document: dict[str, Any]) -> None:
     from inertial import effects
 
     lines = [
-        [name, p.name, short(values[p.name]), "", p.unit]
+        [name, p.name, short_values(values[p.name]), "", p.unit]
         for name, values in document["nonlinear"].items()
         for p in effects.get(name).nonlinear
         if p.name in values

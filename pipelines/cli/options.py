@@ -117,3 +117,10 @@ def short(value: float | None, digits: int = 3) -> str:
     if -3 <= places <= 6:
         return f"{round(value, places):.{max(places, 0)}f}"
     return f"{value:.{digits - 1}e}"
+
+
+def short_values(value: float | Sequence[float] | None) -> str:
+    """A number, or one per axis, for people."""
+    if isinstance(value, list | tuple):
+        return " / ".join(short(float(v)) for v in value)
+    return short(value)  # pyright: ignore[reportArgumentType]  # not a sequence any more

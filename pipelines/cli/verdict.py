@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from pipelines.cli.options import console, print_table, short
+from pipelines.cli.options import console, print_table, short, short_values
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -98,7 +98,9 @@ def _classes(document: dict[str, Any]) -> None:
     for group in document["classes"]:
         simplest = effects.get(recommended_of(document, group))
         names = "\n".join(f"{name} ({effects.get(name).symbol})" for name in group["effects"])
-        values = ", ".join(f"{p.name} = {short(group['nonlinear'].get(p.name))} {p.unit}" for p in simplest.nonlinear)
+        values = ", ".join(
+            f"{p.name} = {short_values(group['nonlinear'].get(p.name))} {p.unit}" for p in simplest.nonlinear
+        )
         size = short(group["size_ug"]) + ("" if group["plausible"] else " (!)")
         errors = short(group["rms_after_ug"]), short(group["heldout_after_ug"])
         lines.append([names, simplest.scope, size, chance(group["p_value"]), *errors, values])

@@ -95,7 +95,7 @@ SCENES: tuple[Scene, ...] = (
         "vibration_rectification",
         "vibration_rectification",
         "an asymmetric spring that turns vibration into a steady force",
-        {"coefficient": 6e4},
+        {"coefficient": 2.5e4},
         plan="nine",
         repeats=1,
         temperatures=LOOP,

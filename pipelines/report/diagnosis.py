@@ -56,12 +56,19 @@ def chance(p: float | None) -> str:
 def _class(group: dict[str, Any], document: dict[str, Any]) -> dict[str, Any]:
     simplest = next((name for name in document["recommended"] if name in group["effects"]), group["effects"][0])
     chosen = effects.get(simplest)
-    values = [f"{p.name} = {plain(group['nonlinear'].get(p.name, float('nan')))} {p.unit}" for p in chosen.nonlinear]
+    values = [f"{p.name} = {_value(group['nonlinear'].get(p.name))} {p.unit}" for p in chosen.nonlinear]
     members = [
         {"id": name, "symbol": effects.get(name).symbol, "equation": effects.get(name).equation}
         for name in group["effects"]
     ]
     return {**group, "members": members, "recommended": simplest, "values": ", ".join(values)}
+
+
+def _value(value: float | tuple[float, ...] | list[float] | None) -> str:
+    """A number, or one per axis."""
+    if isinstance(value, list | tuple):
+        return " / ".join(plain(float(v)) for v in value)
+    return "" if value is None else plain(value)
 
 
 def _pictures(diagnosis: Diagnosis, units: tuple[str, ...]) -> dict[str, Any]:

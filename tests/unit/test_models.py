@@ -1,0 +1,130 @@
+"""Versions of model files: extended, read back, walked through."""
+
+from datetime import UTC, datetime
+
+import pytest
+
+from inertial import effects
+from pipelines.models import Step, chosen_effects, extended, new_model, read_model, versions
+from pipelines.stages.evolution import evolution
+from schemas.errors import RecipeInvalid, WrongUse
+
+NOW = datetime(2026, 5, 4, 12, 0, tzinfo=UTC)
+COMMENTED = """\
+# Of line 3.
+[model]
+name = "line"
+version = 1
+effects = ["bias", "scale"]  # to begin with
+
+[[formula]]
+id = "wet"
+columns = ["humidity_pct"]
+why = "Moisture."
+"""
+
+
+@pytest.fixture(autouse=True)
+def forgotten():
+    with effects.additions_forgotten():
+        yield
+
+
+def step(effect, **more):
+    return Step(effect, "A. Tester", NOW, "the residuals say so", **more)
+
+
+def test_the_next_version_keeps_comments_and_says_who_when_and_why():
+    text, model = extended(COMMENTED, step("third_order", run="run-7"), "model line.toml")
+    assert "# Of line 3." in text
+    assert "# to begin with" in text
+    assert model.model.version == 2
+    assert model.model.effects == ["bias", "scale", "third_order"]
+    last = model.change[-1]
+    assert (last.version, last.effect, last.by, last.at, last.why, last.run) == (
+        2, "third_order", "A. Tester", NOW, "the residuals say so", "run-7",
+    )  # fmt: skip
+
+
+def test_a_formula_and_a_covariate_can_be_added():
+    text, _ = extended(COMMENTED, step("wet"), "model line.toml")
+    _, model = extended(text, step("covariate:pressure_hPa"), "model line.toml")
+    assert model.model.effects[-2:] == ["wet", "covariate:pressure_hPa"]
+    assert model.model.version == 3
+
+
+@pytest.mark.parametrize(
+    ("effect", "message"), [("third_ordr", "did you mean third_order"), ("scale", "'scale' is in version 1 already")]
+)
+def test_refuses_what_is_unknown_or_there(effect, message):
+    with pytest.raises(RecipeInvalid, match=message):
+        extended(COMMENTED, step(effect), "model line.toml")
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ('"humidity_pct"', '"sqr(humidity_pct)"', "formula wet: unknown function 'sqr'; did you mean sqrt"),
+        ('id = "wet"', 'id = "third_order"', "the catalogue has an effect of that id"),
+        ('id = "wet"', 'id = "Wet one"', "formula.0.id"),
+        ('columns = ["humidity_pct"]', "columns = []", "formula.0.columns"),
+    ],
+)
+def test_refuses_a_formula_that_is_none(tmp_path, old, new, message):
+    path = tmp_path / "line.toml"
+    path.write_text(COMMENTED.replace(old, new), encoding="utf-8")
+    with pytest.raises(RecipeInvalid, match=message):
+        read_model(path)
+
+
+def test_walks_through_the_versions(tmp_path):
+    text = new_model(tmp_path / "My Model.toml", ["bias", "scale"], "A. Tester", NOW)
+    for name in ("misalignment", "third_order"):
+        text, model = extended(text, step(name), "model")
+    found = versions(model)
+    assert model.model.name == "my-model"
+    assert [v.effects for v in found] == [
+        ("bias", "scale"), ("bias", "scale", "misalignment"), ("bias", "scale", "misalignment", "third_order"),
+    ]  # fmt: skip
+    assert [v.added for v in found] == [(), ("misalignment",), ("third_order",)]
+
+
+def test_a_removed_effect_is_told_as_removed():
+    text, model = extended(COMMENTED, step("third_order"), "model")
+    gone = text.replace('"third_order"]', "]").replace("version = 2\neffects", "version = 3\neffects")
+    gone += '\n[[change]]\nversion = 3\neffect = "third_order"\nby = "B"\nat = 2026-06-01\nwhy = "not confirmed"\n'
+    from schemas.model import parse_model
+
+    gone = gone.replace('scale", ]', 'scale"]')
+    found = versions(parse_model(gone, "model"))
+    assert [v.removed for v in found][-1] == ("third_order",)
+    assert "third_order" in found[-2].effects
+    assert model.model.version == 2
+
+
+def test_effects_and_model_together_are_refused(tmp_path):
+    with pytest.raises(WrongUse, match="leave one out"):
+        chosen_effects("bias", tmp_path / "m.toml", "compare")
+
+
+def errors(fit, heldout, fresh):
+    return {"rms_ug": fit, "heldout_rms_ug": heldout, "fresh_rms_ug": fresh, "floor_ug": 5.0}
+
+
+def test_an_effect_that_is_not_there_is_no_progress():
+    text, _ = extended(COMMENTED, step("third_order"), "model")
+    _, model = extended(text, step("warm_up"), "model")
+    told = {2: errors(15.0, 16.0, 15.5), 3: errors(5.0, 5.2, 5.1), 4: errors(4.9, 5.3, 5.12)}
+    rows = evolution(versions(model), lambda names: told[len(names)])
+    assert [row["confirmed"] for row in rows] == [None, True, False]
+    assert (
+        "NOT confirmed: warm_up fits the run better, but the error does not fall on the fresh run" in rows[-1]["words"]
+    )
+
+
+def test_without_a_fresh_run_poses_left_out_decide():
+    _, model = extended(COMMENTED, step("third_order"), "model")
+    told = {2: errors(15.0, 16.0, None), 3: errors(14.0, 16.1, None)}
+    rows = evolution(versions(model), lambda names: told[len(names)])
+    assert rows[-1]["confirmed"] is False
+    assert "on poses left out" in rows[-1]["words"]
