@@ -162,8 +162,9 @@ def driver_plots(left: Left, drivers: list[Series], temperature: Array | None) -
                 if row == 0:
                     place.set_title(axis if axis == "norm" else f"axis {axis}")
             grid[row, 0].set_ylabel("residual / µg")
-        if left.before is not left.after:
-            _legend(figure, grid[0, -1])
+        turned = temperature is not None and any(series.name == "unit_C" for series in drivers)
+        if turned or left.before is not left.after:
+            _legend(figure, grid[0, -1], colours=left.before is not left.after, marks=turned)
         return svg(figure)
 
 
@@ -185,9 +186,8 @@ def _against(place: Axes, x: Array, left: Left, column: int, temperature: Array 
             place.plot(places, 0.5 * (low + high), color=colour, linewidth=1.4)
 
 
-def _legend(figure: Figure, place: Axes) -> None:
-    handles = [
-        place.plot([], [], ".", color=c, label=n, markersize=8)[0] for c, n in ((BEFORE, "before"), (AFTER, "after"))
-    ]
-    handles += [place.plot([], [], m, color="#777777", label=n, markersize=5)[0] for _, m, n in MARKS[:2]]
+def _legend(figure: Figure, place: Axes, *, colours: bool, marks: bool) -> None:
+    shown = [(".", BEFORE, "before", 8), (".", AFTER, "after", 8)] if colours else []
+    shown += [(mark, "#777777", name, 5) for _, mark, name in MARKS[:2]] if marks else []
+    handles = [place.plot([], [], mark, color=c, label=name, markersize=size)[0] for mark, c, name, size in shown]
     figure.legend(handles=handles, loc="outside upper right", ncols=4, frameon=False, handletextpad=0.1)

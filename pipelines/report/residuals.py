@@ -18,6 +18,9 @@ Array = NDArray[np.float64]
 
 MICRO = 1e6
 ALWAYS = ("unit_C", "time_s", "temperature_rate", "since_move_s")
+STILL = {"unit_C": 1.0, "temperature_rate": 0.1, "since_move_s": 0.5}
+"""Ranges below which a driver is not worth a picture, unless the model fails along it."""
+
 _MOST = 7
 _ALIKE = 0.995
 _SOAK_APART = 1.0
@@ -91,11 +94,13 @@ def drivers_shown(diagnosis: Diagnosis) -> list[Series]:
     if "approach" in known:
         known["approach"] = state.force_step
     first = [] if diagnosis.unexplained is None else [diagnosis.unexplained.driver]
-    wanted = dict.fromkeys([*first, *(p.driver for p in diagnosis.where[:5]), *ALWAYS])
+    told = [*first, *(p.driver for p in diagnosis.where[:5])]
+    wanted = dict.fromkeys([*told, *ALWAYS])
     found: list[Series] = []
     for name in wanted:
         values = known.get(name)
-        if values is not None and not any(_alike(values, other.values) for other in found):
+        still = name not in told and values is not None and float(np.ptp(values)) < STILL.get(name, 0.0)
+        if values is not None and not still and not any(_alike(values, other.values) for other in found):
             found.append(
                 Series(name, LABELS.get(name, name), values / (3600.0 if "/ h" in LABELS.get(name, "") else 1.0))
             )
