@@ -14,7 +14,7 @@ from inertial.errors import InertialError, UnknownEffect
 from pipelines.archive import files
 from schemas.errors import RecipeInvalid, WrongUse, did_you_mean
 from schemas.model import load_model, parse_model
-from schemas.recipe import read_text
+from schemas.recipe import FormulaSpec, read_text
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence
@@ -23,8 +23,8 @@ if TYPE_CHECKING:
 
     from tomlkit.items import Array, Table
 
+    from pipelines.archive import Run
     from schemas.model import ModelChange, ModelFile
-    from schemas.recipe import FormulaSpec
 
 STARTING_MODEL = ("bias", "scale", "misalignment", "bias_temperature", "scale_temperature")
 """What a new model file begins with: the standard thermal model."""
@@ -77,6 +77,12 @@ def use_formulas(formulas: Iterable[FormulaSpec], where: str) -> None:
             message = f"{where}: {problem}"
             raise RecipeInvalid(message, key="formula.columns") from None
         effects.register(made)
+
+
+def use_formulas_of(run: Run) -> None:
+    """Make the formulas that an archived run was fitted with effects of the catalogue."""
+    kept = run.about.get("recipe", {}).get("formulas", [])
+    use_formulas([FormulaSpec.model_validate(spec) for spec in kept], f"run {run.id}")
 
 
 def refuse_unknown_effects(names: Sequence[str], where: str) -> None:

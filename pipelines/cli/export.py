@@ -28,6 +28,7 @@ def command(
     """Write coefficients: bias b and response K as polynomials in temperature, to apply as a = K⁻¹(ã − b)."""
     from pipelines.archive import Archive
     from pipelines.export import FORMATS, export_text, unit_calibrations
+    from pipelines.models import use_formulas_of
     from schemas.errors import WrongUse, did_you_mean
 
     form = "json" if as_json else form
@@ -35,6 +36,7 @@ def command(
         message = f"export: no format is called '{form}'; {did_you_mean(form, FORMATS)}"
         raise WrongUse(message)
     found = Archive(archive).run(run)
+    use_formulas_of(found)
     serials = tuple(serial.strip() for serial in units.split(",")) if units else ()
     text = export_text(form, unit_calibrations(found, serials, failed=failed), found.id, nominal)
     if output is None:

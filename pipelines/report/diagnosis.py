@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from inertial import effects
 from pipelines.report.diagnosis_plots import driver_plots, model_plot, pose_maps
 from pipelines.report.numbers import plain
@@ -11,12 +13,14 @@ from pipelines.report.residuals import drivers_shown, left_by
 from pipelines.report.templates import template
 
 if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
     from inertial.criticism.diagnosis import Diagnosis
     from inertial.criticism.search import Rival
     from pipelines.stages.measured import Measured
 
 MICRO = 1e6
-_LEVELS = ((1e-299, "< 1e−299"), (0.0, ""))
+FEWEST_POSES = 4  # fewer make no map
 
 
 def render_diagnosis(document: dict[str, Any], found: Measured, diagnosis: Diagnosis | None, source: str) -> str:
@@ -33,14 +37,14 @@ def render_diagnosis(document: dict[str, Any], found: Measured, diagnosis: Diagn
     return template("diagnosis.html").render(
         source=source,
         document=document,
-        sound=sound,
-        faulty=sorted(faulty),
+        units=len(found.units),
         classes=[_class(group, document) for group in document["classes"]],
         unseen=[(name, document["breakers"][name]) for name in document["unseen"]],
         pictures=None if diagnosis is None else _pictures(diagnosis, sound),
         ladder=[] if diagnosis is None else _ladder(diagnosis.ladder),
         number=plain,
         chance=chance,
+        equal=equal,
     )
 
 
@@ -51,6 +55,12 @@ def chance(p: float | None) -> str:
     if p <= 1e-299:
         return "< 1e−299"
     return plain(p, 2) if p > 1e-3 else f"{p:.0e}".replace("-", "−")
+
+
+def equal(p: float) -> str:
+    """A probability with its sign: equal, or below the smallest that is told."""
+    text = chance(p)
+    return text if text.startswith("<") else f"= {text}"
 
 
 def _class(group: dict[str, Any], document: dict[str, Any]) -> dict[str, Any]:
@@ -80,9 +90,14 @@ def _pictures(diagnosis: Diagnosis, units: tuple[str, ...]) -> dict[str, Any]:
         "several": len(units) > 1,
         "added": left.before is not left.after,
         "model": model_plot(left, lot.state, lot.output, MICRO * diagnosis.floor),
-        "maps": pose_maps(left, lot.state),
+        "maps": pose_maps(left, lot.state) if _poses(lot.state.force) >= FEWEST_POSES else "",
         "drivers": driver_plots(left, drivers, lot.state.temperature) if drivers else "",
     }
+
+
+def _poses(force: NDArray[np.float64]) -> int:
+    """Number of different poses."""
+    return len(np.unique(np.round(force[0], 2), axis=0))
 
 
 def _ladder(rivals: tuple[Rival, ...]) -> list[dict[str, Any]]:

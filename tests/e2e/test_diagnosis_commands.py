@@ -324,3 +324,56 @@ def test_the_demonstration_names_close_matches(command, tmp_path):
     status, _, err = command("demo", "--effect", "cubic_transfr", "--auto", "--folder", tmp_path / "game")
     assert (status, "did you mean cubic_transfer" in err) == (2, True)
     assert not (tmp_path / "game").exists()
+
+
+def test_a_run_of_the_archive_brings_its_own_history(command, tmp_path):
+    from capture_double import small_run
+
+    run = small_run(tmp_path)
+    where = ("--archive", run.archive.root)
+    assert "history" in run.tables()
+    status, out, _ = command("compare", "latest", "--fresh", run.id, "--json", *where)
+    document = json.loads(out)
+    assert status == 0
+    assert document["fresh_rms_ug"] == pytest.approx(document["rms_ug"], rel=1e-6)
+    status, out, _ = command("diagnose", run.id, "--json", *where)
+    assert status in {0, 1}
+    assert set(json.loads(out)) >= KEYS
+    status, _, err = command("diagnose", "no-such-run", *where)
+    assert (status, "no run is called 'no-such-run'" in err) == (2, True)
+
+
+def test_a_formula_is_fitted_by_the_chain_and_told_of_by_export(command, tmp_path):
+    from capture_double import small_run
+
+    run = small_run(tmp_path)
+    where = ("--archive", run.archive.root)
+    model = tmp_path / "model.toml"
+    text = (
+        '[model]\nname = "line"\nversion = 1\n'
+        'effects = ["bias", "scale", "misalignment", "bias_temperature", "scale_temperature", "curl"]\n'
+        '[[formula]]\nid = "curl"\ncolumns = ["fj*fk*maximum(fj, 0)"]\n'
+    )
+    model.write_text(text, encoding="utf-8")
+    status, out, err = command("fit", run.id, "--model", model, "--json", *where)
+    assert status in {0, 1}, err
+    again = json.loads(out)["run"]
+    assert again != run.id
+    with effects.additions_forgotten():
+        effects._extra.clear()
+        status, out, err = command("show", again, "coefficients", "--json", *where)
+        assert "curl" in {row["effect"] for row in json.loads(out)["rows"]}, err
+        status, out, err = command("export", again, "--failed", "--json", *where)
+    assert status == 0, err
+    assert "curl" in out
+
+
+def test_a_player_may_add_something_else(command, monkeypatch, tmp_path):
+    import io
+
+    monkeypatch.setattr(sys, "stdin", io.StringIO("\n\nfifth_order\n\n\n\n\n"))
+    status, out, err = command("demo", "--effect", "cubic_transfer", "--seed", "3", "--folder", tmp_path / "game")
+    assert status == 0, err
+    assert "a spring that hardens" in out
+    assert "Found." in out
+    assert "fifth_order" in (tmp_path / "game" / "model.toml").read_text(encoding="utf-8")
