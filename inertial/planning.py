@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from inertial import design
 from inertial import effects as catalogue
 from inertial.effects import SensorEffect
-from inertial.effects.base import AnyEffect
+from inertial.effects.base import AnyEffect, excited
 from inertial.errors import MissingInput
 from inertial.state import State
 
@@ -128,10 +128,8 @@ def _values(effect: AnyEffect, state: State) -> list[Mapping[str, float]]:
 def _columns(effect: AnyEffect, state: State, values: Mapping[str, float]) -> Array:
     """Columns per axis, (3, n, p)."""
     if isinstance(effect, SensorEffect):
-        axes = [
-            np.broadcast_to(c := effect.columns(state, a, **values), (*state.time.shape, c.shape[-1])) for a in range(3)
-        ]
-        return np.stack(axes)
+        axes = [excited(effect, effect.columns(state, axis, **values)) for axis in range(3)]
+        return np.stack([np.broadcast_to(c, (*state.time.shape, c.shape[-1])) for c in axes])
     return np.moveaxis(effect.force_change(state, **values), -2, 0)
 
 

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from inertial.criticism.model import Model, Term
-from inertial.criticism.search import Field, cost_of, log_p_value, refine, size_of
+from inertial.criticism.search import Field, cost_of, freedom, log_p_value, refine, size_of
 from inertial.criticism.space import Candidate, Space
 
 TOLD_APART = 10.0
@@ -94,5 +94,5 @@ def _score(field: Field, space: Space, variance: float, term: Term) -> float:
 
 def _penalised(field: Field, term: Term, drop: float, rank: int, variance: float) -> float:
     columns = max(1, round(rank / field.problem.blocks))
-    nonlinear = len(term.effect.parameters(field.problem.lot.state))
+    nonlinear = freedom(term)
     return -drop / variance + cost_of(rank, columns, nonlinear)

@@ -35,7 +35,9 @@ def estimate(model: Model) -> Estimate:
     size = np.sqrt(np.einsum("bnp,bnp->bp", x, x))
     size = np.where(size > 0.0, size, 1.0)
     unit = x / size[:, None, :]
-    inverse: Array = np.linalg.pinv(np.swapaxes(unit, -1, -2) @ unit, rcond=1e-10, hermitian=True).astype(np.float64)
+    inverse: Array = np.linalg.pinv(np.swapaxes(unit, -1, -2) @ unit, rcond=CONDITION, hermitian=True).astype(
+        np.float64
+    )
     shared, shared_error = np.zeros(0), np.zeros(0)
     variance = model.space.variance
     if z.shape[-1]:
@@ -51,6 +53,9 @@ def estimate(model: Model) -> Estimate:
     errors = np.sqrt(variance * np.diagonal(inverse, axis1=-2, axis2=-1)) / size
     return Estimate(model.terms, scaled / size, shared, errors, shared_error)
 
+
+CONDITION = 1e-8
+"""Directions of the scaled normal matrix below this are the jitter of the angles, not physics: they get no coefficient."""
 
 OWN = ("bias", "scale", "misalignment")
 """Effects that differ from unit to unit by far more than their errors: nothing is learnt from the others."""
@@ -80,7 +85,7 @@ def _pooled(model: Model, unit: Array, right: Array, scaled: Array, covariance: 
     precision = np.where(there, variance / (np.where(there, between, 1.0) * size**2), 0.0)
     gram = np.swapaxes(unit, -1, -2) @ unit + np.einsum("bp,pr->bpr", precision, np.eye(size.shape[-1]))
     centre = np.tile(mean, (units, 1)) * size
-    drawn = np.linalg.pinv(gram, rcond=1e-10, hermitian=True) @ (right + precision * centre)[..., None]
+    drawn = np.linalg.pinv(gram, rcond=CONDITION, hermitian=True) @ (right + precision * centre)[..., None]
     return drawn[..., 0].astype(np.float64)
 
 

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inertial.criticism.model import Model
-from inertial.criticism.search import PER_COEFFICIENT, PER_COLUMN
+from inertial.criticism.search import PER_COEFFICIENT, cost_of_model
 from inertial.criticism.space import Candidate, Space
 
 Array = NDArray[np.float64]
@@ -18,7 +18,7 @@ _TURNS = 8
 class CurveFit:
     """A common curve beside a model.
 
-    column : (blocks, n, 1), rotated: the curve, whose size each block fits; for a station's driver the sum of its columns
+    model : the model with the curve in it
     rank : coefficients spent, sizes and shape together
     cost : penalised deviance, on the scale of the search
     """
@@ -31,38 +31,21 @@ class CurveFit:
 
 def fit_curve(model: Model, driver: str, candidate: Candidate) -> CurveFit:
     """The best common curve of a driver beside a model, with the share of wander estimated anew."""
-    share = model.share
-    fitted = model
-    rank = 0
+    if candidate.shared:
+        fitted = model.with_shared_curves(candidate.columns[:, :, 0, :])
+        return CurveFit(driver, fitted, fitted.space.shared_rank, cost_of_model(fitted))
+    share, fitted, rank = model.share, model, 0
     for _ in range(2):
-        space = model.at(share)
-        column, rank = _curve(space, candidate)
+        column, rank = _curve(model.at(share), candidate)
         fitted = model.with_curves(column)
         share = fitted.share
-    return CurveFit(driver, fitted, rank, cost_of_model(fitted, extra=rank - _sizes(candidate)))
-
-
-def _sizes(candidate: Candidate) -> int:
-    return 1 if candidate.shared else candidate.columns.shape[0]
-
-
-def cost_of_model(model: Model, extra: int = 0) -> float:
-    """Penalised deviance of a model: the fewer coefficients and effects, the better."""
-    space, problem = model.space, model.problem
-    logdet = float(np.sum(np.log(space.spread**2))) * (problem.blocks / space.spread.shape[0])
-    deviance = problem.count * np.log(max(space.rss, 1e-300) / problem.count) + logdet
-    coefficients = space.local_rank + space.shared_rank + extra
-    nonlinear = sum(len(t.effect.parameters(problem.lot.state)) for t in model.terms)
-    return float(deviance + PER_COEFFICIENT * (coefficients + nonlinear) + PER_COLUMN * model.local.shape[-1])
+    shape = rank - candidate.columns.shape[0]
+    return CurveFit(driver, fitted, rank, cost_of_model(fitted) + PER_COEFFICIENT * shape)
 
 
 def _curve(space: Space, candidate: Candidate) -> tuple[Array, int]:
     """Rotated column (blocks, n, 1) of the common curve that takes off most, and the coefficients it spends."""
     whole = candidate.columns[:, :, 0, :]
-    if candidate.shared:
-        # a shared driver has one shape and one size: its best sum of columns is given to every block at its own scale
-        shape = _shared_shape(space, whole)
-        return (whole @ shape)[..., None], whole.shape[-1]
     free = space._project(whole / space.spread[..., None])  # noqa: SLF001  # the package's own projection
     target = space.residual
     gram = np.swapaxes(free, -1, -2) @ free
@@ -86,8 +69,3 @@ def _principal(gram: Array, right: Array, ridge: Array) -> Array:
     _, _, directions = np.linalg.svd(own @ root, full_matrices=False)
     shape = np.linalg.solve(root.T, directions[0])
     return shape / max(float(np.linalg.norm(shape)), 1e-300)
-
-
-def _shared_shape(space: Space, whole: Array) -> Array:
-    free = space._project(whole / space.spread[..., None]).reshape(-1, whole.shape[-1])  # noqa: SLF001
-    return np.linalg.lstsq(free, space.residual.reshape(-1), rcond=1e-6)[0].astype(np.float64)

@@ -11,9 +11,9 @@ from inertial.criticism.adequacy import adequacy
 from inertial.criticism.classes import EffectClass, class_of
 from inertial.criticism.drivers import Driver, Place, drivers_of, places
 from inertial.criticism.heldout import fit_rms, heldout_rms
-from inertial.criticism.model import Model
+from inertial.criticism.model import Model, Term
 from inertial.criticism.problem import Lot, Problem
-from inertial.criticism.search import NAMED_BELOW, Field, Found, Rival, log_p_value, search, terms_of
+from inertial.criticism.search import NAMED_BELOW, Field, Found, Rival, anything, log_p_value, search, terms_of
 from inertial.criticism.unknown import Suspect, better_curve, suspects
 from inertial.effects.base import AnyEffect
 from inertial.effects.covariate import COVARIATE_PREFIX, Covariate
@@ -84,7 +84,7 @@ def diagnose(lot: Lot, effects: Sequence[str], rng: Generator) -> Diagnosis:
     unseen = _unseen(field, base, candidates)
     log_p = adequacy(field, drivers, base.space, rng)
     suspected = suspects(problem)
-    found = search(field, base, stop=lambda chosen: better_curve(base, chosen, suspected) is not None)
+    found = search(field, base, stop=lambda chosen: _imitates(field, base, chosen, suspected))
     adequate = log_p >= np.log(ADEQUATE_ABOVE) and not found.added
     final, unexplained = (found.model, None) if adequate else _beyond(base, found, drivers, suspected)
     classes = _classes(field, base, final)
@@ -108,6 +108,12 @@ def diagnose(lot: Lot, effects: Sequence[str], rng: Generator) -> Diagnosis:
         unseen=unseen,
         ladder=found.ladder,
     )
+
+
+def _imitates(field: Field, base: Model, chosen: Sequence[Term], suspected: list[Suspect]) -> bool:
+    """Whether a curve of one driver does better than the effects chosen so far, and leaves nothing else to be found."""
+    instead = better_curve(base, chosen, suspected)
+    return instead is not None and not anything(field, instead[0].model)
 
 
 def _unseen(field: Field, base: Model, candidates: Sequence[AnyEffect]) -> tuple[str, ...]:

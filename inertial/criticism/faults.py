@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import linear_sum_assignment
 
-from inertial.criticism.readings import Array, Readings, robust_fit
+from inertial.criticism.readings import Array, Readings, exchanged, find_split, robust_fit
 
 
 @dataclass(frozen=True)
@@ -126,64 +126,46 @@ def _longest_repeat(row: Array) -> tuple[int, int]:
     return best
 
 
+def changed_units(readings: Readings) -> Iterator[Fault]:
+    """A calibration that changes during the run: to that of another unit (cables exchanged), or to another range."""
+    splits = {
+        u: s for u in range(len(readings.force)) if (s := find_split(readings.force[u], readings.output[u])) is not None
+    }
+    for unit, split in splits.items():
+        places = tuple(range(split.place, _length(readings, unit)))
+        partner = next((v for v, other in splits.items() if v != unit and exchanged(split, other)), None)
+        if partner is not None:
+            yield Fault(
+                "units_swapped",
+                unit,
+                places,
+                f"from dwell {split.place} on it carries the calibration of unit {partner}",
+            )
+        elif not 0.75 < split.ratio < 1.33:
+            yield Fault(
+                "wrong_range", unit, places, f"scale changes by a factor {split.ratio:.3g} at dwell {split.place}"
+            )
+
+
+def _length(readings: Readings, unit: int) -> int:
+    """Number of dwells up to the last one a unit has."""
+    return int(np.flatnonzero(readings.there[unit])[-1]) + 1
+
+
 def scale_units(readings: Readings) -> Iterator[Fault]:
-    """A unit whose scale is far from its lot's, or that changes range during the run."""
+    """A unit whose scale is far from its lot's."""
     scale = readings.scale
-    stated_g = readings.unit_name == "g"
     for unit in range(scale.size):
-        alone = 1.0 if stated_g else float(scale[unit])
+        alone = 1.0 if readings.unit_name == "g" else float(scale[unit])
         others = float(np.median(np.delete(scale, unit))) if scale.size > 2 else alone
         ratio = float(scale[unit]) / others
         if not 0.75 < ratio < 1.33:
             yield Fault(_kind(ratio), unit, (), f"scale is {ratio:.4g} times that of the lot")
-            continue
-        split = _range_change(readings.force[unit], readings.output[unit])
-        if split is not None:
-            place, change = split
-            places = np.arange(place, scale_length(readings, unit))
-            yield Fault(
-                "wrong_range", unit, _places(places), f"scale changes by a factor {change:.3g} at dwell {place}"
-            )
-
-
-def scale_length(readings: Readings, unit: int) -> int:
-    """Number of dwells up to the last one a unit has."""
-    return int(np.flatnonzero(readings.there[unit])[-1]) + 1
 
 
 def _kind(ratio: float) -> str:
     octaves = np.log2(ratio)
     return "wrong_range" if abs(octaves - round(octaves)) < 0.06 and abs(round(octaves)) <= 4 else "wrong_units"
-
-
-def _range_change(force: Array, output: Array) -> tuple[int, float] | None:
-    """Place and factor of a change of scale in the middle of a run; None where both sides agree."""
-    there = np.flatnonzero(np.isfinite(output).all(axis=-1))
-    least = 6
-    if there.size < 2 * least:
-        return None
-    places = np.unique(np.linspace(least, there.size - least, 24).round().astype(int))
-    errors = [_sides(force[there], output[there], int(p)) for p in places]
-    whole = _misfit(force[there], output[there])[0]
-    best = int(np.argmin([e[0] for e in errors]))
-    misfit, ratio = errors[best]
-    changed = not 0.75 < ratio < 1.33
-    if changed and misfit < 0.1 * whole:
-        return int(there[places[best]]), ratio
-    return None
-
-
-def _sides(force: Array, output: Array, place: int) -> tuple[float, float]:
-    before, one = _misfit(force[:place], output[:place])
-    after, two = _misfit(force[place:], output[place:])
-    return before + after, two / max(one, 1e-300)
-
-
-def _misfit(force: Array, output: Array) -> tuple[float, float]:
-    """Sum of squares of a plain fit of bias and response, and its scale."""
-    x = np.concatenate([np.ones((len(force), 1)), force], axis=-1)
-    found = np.linalg.lstsq(x, output, rcond=1e-9)[0]
-    return float(np.sum((output - x @ found) ** 2)), float(np.sqrt(np.sum(found[1:] ** 2) / 3.0))
 
 
 def flipped(readings: Readings) -> Iterator[Fault]:
@@ -381,6 +363,7 @@ LOOKS: tuple[Look, ...] = (
     clock,
     temperature_units,
     stuck,
+    changed_units,
     dead,
     scale_units,
     flipped,

@@ -40,13 +40,20 @@ class Model:
     Parameters
     ----------
     near : a share of wander near which this model's is looked for
-    curves : (blocks, n, d), rotated columns of a smooth driver that is no effect
+    curves, shared_curves : (blocks, n, d), rotated columns of a driver that is no effect, sized by block or for all blocks
     """
 
     def __init__(
-        self, problem: Problem, terms: Sequence[Term], *, near: float | None = None, curves: Array | None = None
+        self,
+        problem: Problem,
+        terms: Sequence[Term],
+        *,
+        near: float | None = None,
+        curves: Array | None = None,
+        shared_curves: Array | None = None,
     ) -> None:
-        self.problem, self.terms, self._near, self._curves = problem, tuple(terms), near, curves
+        self.problem, self.terms, self._near = problem, tuple(terms), near
+        self._curves, self._shared_curves = curves, shared_curves
 
     @cached_property
     def local(self) -> Array:
@@ -63,6 +70,8 @@ class Model:
     def shared(self) -> Array:
         """Rotated columns with coefficients of all blocks, (blocks, n, q)."""
         found = [self._of(t) for t in self.terms if t.effect.scope == "station"]
+        if self._shared_curves is not None:
+            found.append(self._shared_curves)
         if not found:
             return np.zeros((self.problem.blocks, self.problem.n, 0))
         found += [self._start(t) for t in self.terms if t.effect.scope == "station"]
@@ -119,17 +128,33 @@ class Model:
         n = kernel.shape[0]
         return float(np.trace(kernel) / n - kernel.sum() / n**2)
 
+    def _variant(
+        self, terms: Sequence[Term], curves: Array | None = None, shared_curves: Array | None = None
+    ) -> "Model":
+        """Another model near this one; curves are kept unless others are given."""
+        return Model(
+            self.problem,
+            terms,
+            near=self.share,
+            curves=self._curves if curves is None else curves,
+            shared_curves=self._shared_curves if shared_curves is None else shared_curves,
+        )
+
     def with_term(self, term: Term) -> "Model":
         """The model with one more term."""
-        return Model(self.problem, [*self.terms, term], near=self.share)
+        return self._variant([*self.terms, term])
 
     def with_curves(self, columns: Array) -> "Model":
-        """The model with the columns (blocks, n, d) of a smooth driver."""
-        return Model(self.problem, self.terms, near=self.share, curves=columns)
+        """The model with the columns (blocks, n, d) of a driver, sized by block."""
+        return self._variant(self.terms, curves=columns)
+
+    def with_shared_curves(self, columns: Array) -> "Model":
+        """The model with the columns (blocks, n, d) of a driver, whose coefficients all blocks share."""
+        return self._variant(self.terms, shared_curves=columns)
 
     def without(self, effect_id: str) -> "Model":
         """The model less one effect."""
-        return Model(self.problem, [t for t in self.terms if t.effect.id != effect_id], near=self.share)
+        return self._variant([t for t in self.terms if t.effect.id != effect_id])
 
 
 def _vertex(x: Array, y: Array) -> float:

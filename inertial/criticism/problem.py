@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from inertial.criticism.noise import Basis, basis
 from inertial.criticism.space import Candidate
 from inertial.effects import SensorEffect
-from inertial.effects.base import AnyEffect
+from inertial.effects.base import AnyEffect, excited
 from inertial.state import State
 
 Array = NDArray[np.float64]
@@ -107,7 +107,9 @@ class Problem:
     def columns(self, effect: AnyEffect, values: Values) -> Array:
         """Columns of an effect by block, (blocks, n, p), g per unit of the coefficient; radial lots join the axes' columns."""
         if isinstance(effect, SensorEffect):
-            return self._by_axis([effect.columns(self.lot.state, axis, **on_axis(values, axis)) for axis in range(3)])
+            state = self.lot.state
+            axes = [effect.columns(state, axis, **on_axis(values, axis)) for axis in range(3)]
+            return self._by_axis([excited(effect, columns) for columns in axes])
         return self.seen(effect.force_change(self.lot.state, **on_axis(values, 0)))
 
     def start(self, effect: AnyEffect, values: Values) -> Array:

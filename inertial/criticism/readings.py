@@ -107,3 +107,63 @@ def robust_fit(force: Array, output: Array) -> Array:
 
 def _biweight(u: Array) -> Array:
     return np.where(u < 1.0, 1.0 - u**2, 0.0)
+
+
+@dataclass(frozen=True)
+class Split:
+    """A change of calibration in the middle of a run.
+
+    place : first dwell after it; before, after : (4, 3), bias and response on both sides; ratio : of the scales
+    """
+
+    place: int
+    before: Array
+    after: Array
+
+    @property
+    def ratio(self) -> float:
+        """Scale after over scale before."""
+        one, two = (float(np.sqrt(np.sum(k[1:] ** 2))) for k in (self.before, self.after))
+        return two / max(one, 1e-300)
+
+
+_LEAST = 6
+_BETTER = 0.05
+
+
+def find_split(force: Array, output: Array) -> Split | None:
+    """The place where two calibrations explain a run far better than one; None where one does.
+
+    Two plain fits must leave less than a twentieth of the squares that one leaves, and differ by more than a hundredth of
+    the scale: nothing physical changes a sensor so.
+    """
+    there = np.flatnonzero(np.isfinite(output).all(axis=-1))
+    if there.size < 2 * _LEAST + 1:
+        return None
+    f, y = force[there], output[there]
+    whole = _plain_fit(f, y)[1]
+    places = np.arange(_LEAST, there.size - _LEAST)
+    coarse = places[:: max(1, places.size // 24)]
+    errors = [_plain_fit(f[:p], y[:p])[1] + _plain_fit(f[p:], y[p:])[1] for p in coarse]
+    centre = int(coarse[int(np.argmin(errors))])
+    near = places[np.abs(places - centre) <= max(1, places.size // 24)]
+    errors = [_plain_fit(f[:p], y[:p])[1] + _plain_fit(f[p:], y[p:])[1] for p in near]
+    best = int(near[int(np.argmin(errors))])
+    before, after = _plain_fit(f[:best], y[:best])[0], _plain_fit(f[best:], y[best:])[0]
+    apart = float(np.max(np.abs(after - before))) > 0.01 * float(np.sqrt(np.sum(before[1:] ** 2) / 3.0))
+    return Split(int(there[best]), before, after) if min(errors) < _BETTER * whole and apart else None
+
+
+def _plain_fit(force: Array, output: Array) -> tuple[Array, float]:
+    x = np.concatenate([np.ones((len(force), 1)), force], axis=-1)
+    found = np.linalg.lstsq(x, output, rcond=1e-9)[0].astype(np.float64)
+    return found, float(np.sum((output - x @ found) ** 2))
+
+
+def exchanged(one: Split, other: Split) -> bool:
+    """Whether two units took over each other's calibration at the same place."""
+    if abs(one.place - other.place) > 2:
+        return False
+    own = float(np.linalg.norm(one.after - one.before)) + float(np.linalg.norm(other.after - other.before))
+    crossed = float(np.linalg.norm(one.after - other.before)) + float(np.linalg.norm(other.after - one.before))
+    return crossed < 0.3 * own

@@ -123,7 +123,13 @@ def search(field: Field, base: Model, stop: Callable[[Sequence[Term]], bool]) ->
         model = model.with_term(best.term)
         if len(chosen) > 1:
             model, chosen = _reexamine(field, base, model, chosen)
+    model, chosen = _taken_apart(field, base, model, chosen)
     return Found(model, tuple(chosen), ladder)
+
+
+def anything(field: Field, model: Model) -> bool:
+    """Whether any effect is still called for beyond a model."""
+    return any(convincing(field, model, r) for r in _contest(field, model))
 
 
 def convincing(field: Field, model: Model, rival: Rival) -> bool:
@@ -143,9 +149,9 @@ def size_of(model: Model, term: Term) -> float:
     return float(np.sqrt(max(float(gain.drop[0]) * white - noise, 0.0) / model.problem.count))
 
 
-def _contest(field: Field, model: Model) -> list[Rival]:
+def _contest(field: Field, model: Model, barred: str = "") -> list[Rival]:
     """Rivals by their penalised likelihood, the finalists with the noise estimated anew beside them."""
-    leave = {t.effect.id for t in model.terms}
+    leave = {*(t.effect.id for t in model.terms), barred}
     count = field.problem.count
     tried: dict[str, tuple[float, int, int | None]] = {}
     for factor in _SHARES_TRIED:
@@ -187,11 +193,16 @@ def judge(field: Field, model: Model, term: Term, share: float) -> Rival:
     gain = space.gain(field.problem.candidate(term.effect, [term.keywords], first=term.first))
     drop, rank = float(gain.drop[0]), int(gain.rank[0])
     columns = max(1, round(rank / field.problem.blocks))
-    nonlinear = len(term.effect.parameters(field.problem.lot.state))
+    nonlinear = freedom(term)
     count = field.problem.count
     logdet = float(np.sum(np.log(space.spread**2))) * (field.problem.blocks / space.spread.shape[0])
     deviance = count * np.log(max(space.rss - drop, 1e-300) / count) + logdet
     return Rival(term, drop, rank, float(deviance + cost_of(rank, columns, nonlinear)), log_p_value(space, drop, rank))
+
+
+def freedom(term: Term) -> int:
+    """Number of nonlinear parameters that were found from the data: one, or three where the axes have their own."""
+    return sum(len(v) if isinstance(v, tuple) else 1 for v in term.keywords.values()) if term.effect.nonlinear else 0
 
 
 def refine(model: Model, term: Term, share: float) -> Term:
@@ -295,6 +306,36 @@ def _reexamine(field: Field, base: Model, model: Model, chosen: list[Term]) -> t
         chosen = [*others, best.term]
         model = Model(field.problem, [*base.terms, *chosen], near=model.share)
     return model, chosen
+
+
+def _taken_apart(field: Field, base: Model, model: Model, chosen: list[Term]) -> tuple[Model, list[Term]]:
+    """Each effect of several columns once more against two simpler ones that together do what it does."""
+    for term in tuple(chosen):
+        columns = field.problem.candidate(term.effect, [term.keywords], first=term.first).columns.shape[-1]
+        if columns < 2 or term.effect.scope == "station":
+            continue
+        others = [t for t in chosen if t is not term]
+        pair: list[Term] = []
+        rest = Model(field.problem, [*base.terms, *others], near=model.share)
+        for _ in range(2):
+            rivals = [r for r in _contest(field, rest, barred=term.effect.id) if convincing(field, rest, r)]
+            if not rivals:
+                break
+            pair.append(rivals[0].term)
+            rest = rest.with_term(rivals[0].term)
+        if len(pair) == 2 and cost_of_model(rest) < cost_of_model(model):
+            model, chosen = rest, [*others, *pair]
+    return model, chosen
+
+
+def cost_of_model(model: Model) -> float:
+    """Penalised deviance of a whole model: the fewer coefficients and columns, the better."""
+    space, problem = model.space, model.problem
+    logdet = float(np.sum(np.log(space.spread**2))) * (problem.blocks / space.spread.shape[0])
+    deviance = problem.count * np.log(max(space.rss, 1e-300) / problem.count) + logdet
+    nonlinear = sum(freedom(t) for t in model.terms)
+    columns = model.local.shape[-1] + model.shared.shape[-1]
+    return float(deviance + cost_of(space.local_rank + space.shared_rank, columns, nonlinear))
 
 
 def terms_of(effects: Sequence[AnyEffect], problem: Problem) -> list[Term]:

@@ -7,10 +7,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inertial import frames
-from inertial.criticism.curves import CurveFit, cost_of_model, fit_curve
+from inertial.criticism.curves import CurveFit, fit_curve
 from inertial.criticism.drivers import curve, quantities, varies
 from inertial.criticism.model import Model, Term
 from inertial.criticism.problem import Problem
+from inertial.criticism.search import PER_COEFFICIENT, cost_of_model
 from inertial.criticism.space import Candidate
 from inertial.effects.covariate import COVARIATE_PREFIX
 
@@ -138,7 +139,7 @@ def _sharp(model: Model, suspect: Suspect) -> CurveFit | None:
         return None
     column = rotated[..., best : best + 1]
     fitted = model.with_curves(column)
-    return CurveFit(suspect.driver, fitted, int(gain.rank[best]) + 2, cost_of_model(fitted, extra=2))
+    return CurveFit(suspect.driver, fitted, int(gain.rank[best]) + 2, cost_of_model(fitted) + 2.0 * PER_COEFFICIENT)
 
 
 def _unit_range(values: Array) -> Array:

@@ -58,6 +58,7 @@ class Effect(ABC):
     breaker : what to measure so that it shows
     simplicity : rank among effects that the data cannot tell apart; the lowest is recommended
     sharp : whether it answers to the force along the sensor's own axis so sharply that misalignment matters
+    vanishing : RMS of a column below which a plan does not excite it: products that only the angles' jitter keeps from zero
     primary : number of leading columns that stand for a simpler form of the effect; None where there is none
     """
 
@@ -72,6 +73,7 @@ class Effect(ABC):
     simplicity: ClassVar[int] = 50
     primary: ClassVar[int | None] = None
     sharp: ClassVar[bool] = False
+    vanishing: ClassVar[float] = 0.0
     nonlinear: ClassVar[tuple[Nonlinear, ...]] = ()
 
     def parameters(self, state: State) -> tuple[Nonlinear, ...]:
@@ -135,6 +137,14 @@ class StationEffect(Effect):
         """What the state of a memory before the first dwell would add to the force: (..., n, 3, k); k = 0 without memory."""
         del nonlinear
         return np.zeros((*state.force.shape, 0))
+
+
+def excited(effect: "Effect", columns: Array) -> Array:
+    """Columns (..., n, p) with those that the plan does not excite set to zero."""
+    if effect.vanishing <= 0.0:
+        return columns
+    rms = np.sqrt(np.mean(columns**2, axis=tuple(range(columns.ndim - 1))))
+    return np.where(rms < effect.vanishing, 0.0, columns)
 
 
 AnyEffect = SensorEffect | StationEffect

@@ -17,6 +17,7 @@ class CrossAxisQuadratic(SensorEffect):
     hides_behind: ClassVar[tuple[str, ...]] = ("bias", "second_order")
     breaker: ClassVar[str] = "general directions; K2 + Kpp + Koo is one with the bias as a sum"
     simplicity: ClassVar[int] = 18
+    vanishing: ClassVar[float] = 1e-3
 
     def columns(self, state: State, axis: int, **nonlinear: float) -> Array:
         del nonlinear

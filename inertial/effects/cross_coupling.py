@@ -17,6 +17,7 @@ class CrossCoupling(SensorEffect):
     hides_behind: ClassVar[tuple[str, ...]] = ()
     breaker: ClassVar[str] = "edges and general directions; β off the multiples of 90°, where fx·fy is zero"
     simplicity: ClassVar[int] = 15
+    vanishing: ClassVar[float] = 1e-3
 
     def columns(self, state: State, axis: int, **nonlinear: float) -> Array:
         del nonlinear

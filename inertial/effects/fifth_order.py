@@ -17,10 +17,11 @@ class FifthOrder(SensorEffect):
     hides_behind: ClassVar[tuple[str, ...]] = ("third_order", "odd_quadratic")
     breaker: ClassVar[str] = "poses with |fi| near 0.5 and 0.75 g, or a centrifuge"
     simplicity: ClassVar[int] = 17
+    sharp: ClassVar[bool] = True
 
     def columns(self, state: State, axis: int, **nonlinear: float) -> Array:
         del nonlinear
-        f = state.force[..., axis]
+        f = state.along(axis)
         return stack(state, [f**5])
 
     def names(self, axis: int) -> tuple[str, ...]:

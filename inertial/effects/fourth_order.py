@@ -17,10 +17,11 @@ class FourthOrder(SensorEffect):
     hides_behind: ClassVar[tuple[str, ...]] = ("second_order", "scale_asymmetry")
     breaker: ClassVar[str] = "poses with |fi| between 0.2 and 0.8 g, or a centrifuge"
     simplicity: ClassVar[int] = 16
+    sharp: ClassVar[bool] = True
 
     def columns(self, state: State, axis: int, **nonlinear: float) -> Array:
         del nonlinear
-        f = state.force[..., axis]
+        f = state.along(axis)
         return stack(state, [f**4])
 
     def names(self, axis: int) -> tuple[str, ...]:

@@ -19,10 +19,11 @@ class OddQuadratic(SensorEffect):
     hides_behind: ClassVar[tuple[str, ...]] = ("third_order", "fifth_order", "bias_asymmetry")
     breaker: ClassVar[str] = "poses with |fi| near 0.24 g"
     simplicity: ClassVar[int] = 13
+    sharp: ClassVar[bool] = True
 
     def columns(self, state: State, axis: int, **nonlinear: float) -> Array:
         del nonlinear
-        f = state.force[..., axis]
+        f = state.along(axis)
         return stack(state, [f * np.abs(f)])
 
     def names(self, axis: int) -> tuple[str, ...]:

@@ -17,10 +17,11 @@ class SecondOrder(SensorEffect):
     hides_behind: ClassVar[tuple[str, ...]] = ("scale_asymmetry", "fourth_order", "cross_axis_quadratic")
     breaker: ClassVar[str] = "poses on edges or in general directions (on faces fi² and |fi| are one column)"
     simplicity: ClassVar[int] = 10
+    sharp: ClassVar[bool] = True
 
     def columns(self, state: State, axis: int, **nonlinear: float) -> Array:
         del nonlinear
-        f = state.force[..., axis]
+        f = state.along(axis)
         return stack(state, [f**2])
 
     def names(self, axis: int) -> tuple[str, ...]:

@@ -17,11 +17,12 @@ class SecondOrderTemperature(SensorEffect):
     hides_behind: ClassVar[tuple[str, ...]] = ()
     breaker: ClassVar[str] = "nine poses or more at three temperatures or more"
     simplicity: ClassVar[int] = 19
+    sharp: ClassVar[bool] = True
 
     def columns(self, state: State, axis: int, **nonlinear: float) -> Array:
         del nonlinear
         theta = state.need("theta", self.id)
-        f = state.force[..., axis]
+        f = state.along(axis)
         return stack(state, [theta * f**2])
 
     def names(self, axis: int) -> tuple[str, ...]:

@@ -17,10 +17,11 @@ class ThirdOrder(SensorEffect):
     hides_behind: ClassVar[tuple[str, ...]] = ("scale", "odd_quadratic", "fifth_order")
     breaker: ClassVar[str] = "poses with |fi| near 0.24, 0.5 and 0.75 g, or a centrifuge"
     simplicity: ClassVar[int] = 11
+    sharp: ClassVar[bool] = True
 
     def columns(self, state: State, axis: int, **nonlinear: float) -> Array:
         del nonlinear
-        f = state.force[..., axis]
+        f = state.along(axis)
         return stack(state, [f**3])
 
     def names(self, axis: int) -> tuple[str, ...]:
