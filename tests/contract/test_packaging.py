@@ -1,0 +1,161 @@
+"""What is shipped is what is there; nothing tracked names a machine; links in the documents lead somewhere."""
+
+import fnmatch
+import re
+import subprocess
+import tomllib
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[2]
+SHIPPED = ("inertial", "schemas", "stations", "pipelines")
+LOCKS = sorted(ROOT.glob("requirements-*.lock"))
+SETUP = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["tool"]["setuptools"]
+
+MACHINE = re.compile(r"(?<![\w.~])/(?:work|tmp|root|home)/")
+INDEX = re.compile(
+    r"\b(?:[\w-]+[.])*(?:pypi|pythonhosted|npmjs|npmmirror|anaconda|crates|debian|ubuntu|artifactory)[.](?:org|com|io)\b"
+    r"|--(?:extra-)?index-url[ =]\S|--find-links[ =]\S",
+    re.IGNORECASE,
+)
+LINK = re.compile(r"!?\[[^\]]*\]\(([^)\s]+)\)")
+
+
+def tracked(*patterns: str) -> list[Path]:
+    """Files that git tracks and that are there, plus those not ignored that would be added next."""
+    done = subprocess.run(
+        ["git", "ls-files", "--cached", "--others", "--exclude-standard", "-z", "--", *patterns],
+        cwd=ROOT,
+        capture_output=True,
+        check=False,
+    )
+    if done.returncode:
+        pytest.skip("not a git checkout: what is tracked is not known")
+    return [p for name in done.stdout.decode().split("\0") if name and (p := ROOT / name).is_file()]
+
+
+def text_of(path: Path) -> str:
+    """Content of a text file; empty for pictures and other binary files."""
+    data = path.read_bytes()
+    return "" if b"\0" in data else data.decode("utf-8")
+
+
+def test_the_packages_listed_are_the_packages_on_disk() -> None:
+    found = {
+        ".".join(path.parent.relative_to(ROOT).parts) for top in SHIPPED for path in (ROOT / top).rglob("__init__.py")
+    }
+    assert set(SETUP["packages"]) == found
+    assert len(SETUP["packages"]) == len(set(SETUP["packages"]))
+
+
+def test_every_folder_with_modules_is_a_package() -> None:
+    bare = {path.parent for top in SHIPPED for path in (ROOT / top).rglob("*.py")}
+    assert [str(folder.relative_to(ROOT)) for folder in bare if not (folder / "__init__.py").is_file()] == []
+
+
+def is_shipped(path: Path) -> bool:
+    """Whether a pattern of the package data covers a file that is no module."""
+    for package, patterns in SETUP["package-data"].items():
+        folder = ROOT.joinpath(*package.split("."))
+        if folder in path.parents:
+            name = path.relative_to(folder)
+            if any(
+                len(name.parts) == pattern.count("/") + 1 and fnmatch.fnmatch(str(name), pattern)
+                for pattern in patterns
+            ):
+                return True
+    return False
+
+
+def test_every_data_file_of_a_package_is_shipped() -> None:
+    data = [path for path in tracked(*SHIPPED) if path.suffix != ".py"]
+    assert data
+    assert [str(path.relative_to(ROOT)) for path in data if not is_shipped(path)] == []
+
+
+def test_every_pattern_of_package_data_finds_something() -> None:
+    for package, patterns in SETUP["package-data"].items():
+        folder = ROOT.joinpath(*package.split("."))
+        assert [pattern for pattern in patterns if not any(folder.glob(pattern))] == []
+
+
+@pytest.mark.parametrize("path", tracked(), ids=lambda p: str(p.relative_to(ROOT)))
+def test_a_file_names_no_index_and_no_path_of_a_machine(path: Path) -> None:
+    text = text_of(path)
+    for pattern in (MACHINE, INDEX):
+        found = pattern.search(text)
+        assert found is None, f"{found[0]!r} in line {text[: found.start()].count(chr(10)) + 1}"
+
+
+def test_the_patterns_find_what_they_are_for() -> None:
+    slash = "/"
+    for text in (f"see {slash}work/x", f"'{slash}tmp/x'", f"{slash}root/.venv"):
+        assert MACHINE.search(text)
+    dot = "."
+    for text in (f"https://pypi{dot}org/simple", f"files{dot}pythonhosted{dot}org", "--index-" + "url https://a"):
+        assert INDEX.search(text)
+    assert not MACHINE.search("docs/work/x")
+    assert not INDEX.search("uv pip compile --no-emit-index-url --no-annotate")
+
+
+@pytest.mark.parametrize("path", LOCKS, ids=lambda p: p.name)
+def test_a_lock_has_a_version_and_hashes_for_everything_and_no_address(path: Path) -> None:
+    text = path.read_text(encoding="utf-8")
+    assert "://" not in text
+    entries = re.split(r"\n(?=\S)", text.strip())
+    assert len(entries) > 20
+    assert [e.splitlines()[0] for e in entries if not re.match(r"[\w.-]+(\[[\w,-]+\])?==\S+", e)] == []
+    assert [e.splitlines()[0] for e in entries if "--hash=sha256:" not in e] == []
+
+
+def test_the_locks_hold_every_dependency_of_the_project() -> None:
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    extras = project["optional-dependencies"]
+    wanted = {"run": ("build",), "dev": ("build", "dev"), "bench": ("build", "dev", "bench")}
+    for lock, parts in wanted.items():
+        held = {
+            m.lower() for m in re.findall(r"^([\w.-]+)", (ROOT / f"requirements-{lock}.lock").read_text(), re.MULTILINE)
+        }
+        needed = [*project["dependencies"], *(item for part in parts for item in extras[part])]
+        names = {re.match(r"[\w.-]+", item)[0].lower() for item in needed}
+        assert names - held == set()
+
+
+def anchors(path: Path) -> set[str]:
+    """Anchors of a page's headings, as the usual renderers make them."""
+    heads = re.findall(r"^#+ +(.*)$", text_of(path), re.MULTILINE)
+    return {
+        re.sub(r"[^\w\- ]", "", head.replace("&lt;", "").replace("&gt;", "").lower()).replace(" ", "-")
+        for head in heads
+    }
+
+
+@pytest.mark.parametrize("path", tracked("*.md"), ids=lambda p: str(p.relative_to(ROOT)))
+def test_every_link_of_a_page_leads_somewhere(path: Path) -> None:
+    text = re.sub(r"^```.*?^```$", "", text_of(path), flags=re.DOTALL | re.MULTILINE)
+    for target in LINK.findall(text):
+        if target.startswith(("https://", "http://")):
+            continue
+        name, _, anchor = target.partition("#")
+        there = (path.parent / name).resolve() if name else path
+        assert there.exists(), f"{target}: nothing is there"
+        assert ROOT in there.parents, f"{target}: leaves the project"
+        if anchor and there.suffix == ".md":
+            assert anchor in anchors(there), f"{target}: {there.name} has no such heading"
+
+
+def test_every_page_of_the_documents_is_reached_from_their_index() -> None:
+    seen, left = set(), [ROOT / "README.md", ROOT / "docs" / "README.md"]
+    while left:
+        page = left.pop()
+        if page in seen or page.suffix != ".md" or not page.is_file():
+            continue
+        seen.add(page)
+        left += [
+            (page.parent / target.partition("#")[0]).resolve()
+            for target in LINK.findall(text_of(page))
+            if "://" not in target
+        ]
+    lost = [str(p.relative_to(ROOT)) for p in tracked("docs/*.md") if p not in seen]
+    assert lost == []
