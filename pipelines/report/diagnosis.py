@@ -16,7 +16,6 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from inertial.criticism.diagnosis import Diagnosis
-    from inertial.criticism.search import Rival
     from pipelines.stages.measured import Measured
 
 MICRO = 1e6
@@ -41,7 +40,7 @@ def render_diagnosis(document: dict[str, Any], found: Measured, diagnosis: Diagn
         classes=[_class(group, document) for group in document["classes"]],
         unseen=[(name, document["breakers"][name]) for name in document["unseen"]],
         pictures=None if diagnosis is None else _pictures(diagnosis, sound),
-        ladder=[] if diagnosis is None else _ladder(diagnosis.ladder),
+        ladder=[] if diagnosis is None else _ladder(diagnosis),
         number=plain,
         chance=chance,
         equal=equal,
@@ -100,8 +99,9 @@ def _poses(force: NDArray[np.float64]) -> int:
     return len(np.unique(np.round(force[0], 2), axis=0))
 
 
-def _ladder(rivals: tuple[Rival, ...]) -> list[dict[str, Any]]:
-    """The candidates of the first step, best first, with how far each is behind."""
+def _ladder(diagnosis: Diagnosis) -> list[dict[str, Any]]:
+    """The candidates of the first step, best first, with how far each is behind; χ² over the variance that is left at last."""
+    rivals, variance = diagnosis.ladder, diagnosis.final.space.variance
     if not rivals:
         return []
     best, most = rivals[0].cost, max(1e-12, *(r.drop for r in rivals))
@@ -110,7 +110,7 @@ def _ladder(rivals: tuple[Rival, ...]) -> list[dict[str, Any]]:
             "id": r.term.effect.id,
             "symbol": r.term.effect.symbol,
             "coefficients": r.rank,
-            "drop": plain(r.drop),
+            "drop": plain(r.drop / variance),
             "width": f"{100.0 * max(r.drop, 0.0) / most:.1f}",
             "behind": plain(r.cost - best),
             "exponent": plain(-r.log_p / 2.302585) if r.log_p > -1e6 else "> 300",

@@ -47,8 +47,8 @@ def model_plot(left: Left, state: State, output: Array, floor_ug: float) -> str:
 def _response(place: Axes, left: Left, state: State, output: Array) -> None:
     for axis, name in enumerate(left.axes):
         if name == "norm":
-            place.plot(np.linalg.norm(output[left.shown], axis=-1), ".", color=AFTER, markersize=4)
-            place.set(xlabel="dwell", ylabel="norm of the output / g", title=f"{left.unit}: corrected output")
+            place.plot(1e6 * (np.linalg.norm(output[left.shown], axis=-1) - 1.0), ".", color=AFTER, markersize=4)
+            place.set(xlabel="dwell", ylabel="norm of the output less 1 g / µg", title=f"{left.unit}: corrected output")
             return
         force = state.force[left.shown, :, axis]
         place.plot(force, output[left.shown, :, axis], ".", color=AXIS_COLOURS[name], markersize=4, label=name)
@@ -84,13 +84,14 @@ def _quantiles(place: Axes, left: Left, floor_ug: float, *, something: bool) -> 
         normal = stats.norm.ppf((np.arange(ordered.size) + 0.5) / ordered.size)
         place.plot(normal[::step], ordered[::step], ".", color=colour, markersize=3, label=label)
     place.set(xlabel="quantile of pure noise", ylabel="residual over the floor", title="all units: residuals and noise")
-    place.legend(frameon=False, handletextpad=0.1, markerscale=2.5)
+    if something:
+        place.legend(frameon=False, handletextpad=0.1, markerscale=2.5)
 
 
 def pose_maps(left: Left, state: State) -> str:
     """Mean residual of the shown unit at every pose on the whole sphere, before and after, on one scale."""
-    rows = [(left.before, "before"), (left.after, "after")]
-    rows = rows[:1] if left.before is left.after else rows
+    rows = [(left.before, ", before"), (left.after, ", after")]
+    rows = [(left.before, "")] if left.before is left.after else rows
     poses, means = _by_pose(state.force[left.shown], [values[left.shown] for values, _ in rows])
     largest = float(np.max(np.abs(means[0]))) or 1.0
     with mpl.rc_context({**STYLE, "axes.grid": False}):
@@ -99,7 +100,7 @@ def pose_maps(left: Left, state: State) -> str:
         for row, (_, title) in enumerate(rows):
             for column, axis in enumerate(left.axes):
                 _map(grid[row, column], poses, means[row][column], largest)
-                grid[row, column].set_title(f"{axis if axis == 'norm' else f'axis {axis}'}, {title}", pad=16)
+                grid[row, column].set_title(f"{axis if axis == 'norm' else f'axis {axis}'}{title}", pad=16)
         colours = ScalarMappable(Normalize(-largest, largest), "RdBu_r")
         bar = figure.colorbar(colours, ax=grid, shrink=0.75, aspect=26, pad=0.015)
         bar.set_label("mean residual / µg")
