@@ -29,7 +29,7 @@ def station_change(effects: Sequence[str], state: State, shared: Array, nonlinea
     _, station = design.split(effects)
     if not station:
         return np.zeros(state.force.shape)
-    changes = np.concatenate([e.force_change(state, **nonlinear.get(e.id, {})) for e in station], axis=-1)
+    changes = np.concatenate([e.force_change(state, **design.on_axis(nonlinear, e.id)) for e in station], axis=-1)
     return changes @ shared
 
 

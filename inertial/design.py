@@ -1,6 +1,7 @@
 """Design matrices of a model: the columns of its effects, and the names of their coefficients."""
 
 from collections.abc import Mapping, Sequence
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,8 +12,13 @@ from inertial.effects.base import AnyEffect
 from inertial.state import State
 
 Array = NDArray[np.float64]
-Values = Mapping[str, Mapping[str, float]]
-"""Nonlinear parameters and constants by effect id."""
+Values = Mapping[str, Mapping[str, Any]]
+"""Nonlinear parameters and constants by effect id: one number, or a tuple of one per sensor axis."""
+
+
+def on_axis(values: Values, effect: str, axis: int = 0) -> dict[str, float]:
+    """The values of an effect that hold for one sensor axis."""
+    return {name: v[axis] if isinstance(v, tuple) else v for name, v in values.get(effect, {}).items()}
 
 
 def split(names: Sequence[str]) -> tuple[list[SensorEffect], list[StationEffect]]:
@@ -42,7 +48,8 @@ def starting_values(effects: Sequence[AnyEffect], state: State) -> dict[str, dic
 def local_columns(effects: Sequence[SensorEffect], state: State, values: Values) -> Array:
     """Columns of the sensor's effects, (..., 3, n, p), g per unit of the coefficient; p counts the same on every axis."""
     axes = [
-        np.concatenate([e.columns(state, axis, **values.get(e.id, {})) for e in effects], axis=-1) for axis in range(3)
+        np.concatenate([e.columns(state, axis, **on_axis(values, e.id, axis)) for e in effects], axis=-1)
+        for axis in range(3)
     ]
     return np.stack(np.broadcast_arrays(*axes), axis=-3)
 
@@ -54,7 +61,7 @@ def shared_columns(effects: Sequence[StationEffect], state: State, values: Value
     ----------
     response : (..., 3, 3), output per g: the matrix K of each unit
     """
-    changes = np.concatenate([e.force_change(state, **values.get(e.id, {})) for e in effects], axis=-1)
+    changes = np.concatenate([e.force_change(state, **on_axis(values, e.id)) for e in effects], axis=-1)
     return np.einsum("...ij,...njq->...inq", response, changes)
 
 

@@ -58,14 +58,16 @@ def _reduce(job: Job, run: Run) -> Tables:
     return {"dwells": reduce(_records(run).samples(), *tables, job.recipe.local_gravity_m_s2)}
 
 
+_VERIFIED = ("dwells", "history", "coefficients", "covariance", "predictions")
+
+
 def _fit(job: Job, run: Run) -> Tables:
-    return fit(run.table("dwells"), job.recipe.effects)
+    return fit(run.table("dwells"), run.table("history"), job.recipe.effects)
 
 
 def _verify(job: Job, run: Run) -> Tables:
     del job
-    tables = (run.table(name) for name in ("dwells", "coefficients", "covariance", "residuals"))
-    return {"verification": verify(*tables)}
+    return verify(*(run.table(name) for name in _VERIFIED))
 
 
 def _noise(job: Job, run: Run) -> Tables:
@@ -74,7 +76,7 @@ def _noise(job: Job, run: Run) -> Tables:
     return noise(_records(run).samples(), *tables)
 
 
-_EVIDENCE = ("verdicts", "coefficients", "covariance", "residuals", "verification", "noise")
+_EVIDENCE = ("verdicts", "coefficients", "covariance", "residuals", "verification", "verification_poses", "noise")
 
 
 def _grade(job: Job, run: Run) -> Tables:
@@ -107,19 +109,19 @@ STAGES: tuple[Stage, ...] = (
     ),
     Stage(
         name="fit",
-        inputs=("dwells",),
-        outputs=("coefficients", "covariance", "residuals"),
+        inputs=("dwells", "history"),
+        outputs=("coefficients", "covariance", "residuals", "predictions", "wander"),
         parameters=lambda job: {
             "effects": job.recipe.effects,
             "formulas": [f.model_dump(mode="json") for f in job.recipe.formulas],
         },
         call=_fit,
-        modules=(*_SHARED, "pipelines.stages.fit"),
+        modules=(*_SHARED, "pipelines.stages.fit", "pipelines.stages.profile"),
     ),
     Stage(
         name="verify",
-        inputs=("dwells", "coefficients", "covariance", "residuals"),
-        outputs=("verification",),
+        inputs=_VERIFIED,
+        outputs=("verification", "verification_poses"),
         parameters=_none,
         call=_verify,
         modules=(*_SHARED, "pipelines.stages.verify"),

@@ -37,13 +37,15 @@ def load_recipe(name: str = MAIN_JOB) -> Recipe:
     verification = _resolve(file.verification, "v", "verification", source)
     _refuse_flat_plan(fit_poses, file.span_min_g)
     _refuse_coincidence(fit_poses, verification, source)
-    shared = file.model_dump(exclude={"poses", "verification", "static_pose", "model", "effects"})
+    shared = file.model_dump(
+        exclude={"poses", "verification", "verification_repeats", "static_pose", "model", "effects"}
+    )
     outer, inner = file.static_pose
     return Recipe(
         **shared,
         **model,
         poses=fit_poses,
-        verification=verification,
+        verification=verification * file.verification_repeats,
         static_pose=Pose(name="static", outer_deg=outer, inner_deg=inner),
     )
 

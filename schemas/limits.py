@@ -29,6 +29,7 @@ Outcome = Literal["pass", "conditional pass", "conditional fail", "fail"]
 
 FIGURES: Mapping[str, str] = {
     "verification_norm_ug": "µg",
+    "verification_dwell_ug": "µg",
     "verification_ratio": "1",
     "bias_error_ug": "µg",
     "residual_rms_ug": "µg",

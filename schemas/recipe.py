@@ -146,10 +146,15 @@ class FormulaSpec(Strict):
 
 
 class RecipeFile(_Measurement):
-    """A recipe as it stands in its file: poses by the name of a plan, or as [outer, inner] in degrees."""
+    """A recipe as it stands in its file: poses by the name of a plan, or as [outer, inner] in degrees.
+
+    ``verification_repeats`` is how often the verification poses are gone through at every temperature: the mean of a pose's
+    dwells tells what the calibration leaves, one dwell alone what the device has wandered besides.
+    """
 
     poses: str | Annotated[list[Angles], Field(min_length=1)]
     verification: str | list[Angles] = []
+    verification_repeats: Annotated[int, Field(ge=1, le=20)] = 1
     static_pose: Angles = [0.0, 0.0]
     model: str = ""
 

@@ -175,11 +175,33 @@ TABLES: dict[str, Table] = {
             "dwell": _whole(),
             "axis": _text(*AXES),
             "pose": _text(),
-            **_numbers(("force_g", "residual_ug", "standard_error_ug")),
+            **_numbers(("force_g", "residual_ug", "standard_error_ug", "expected_ug")),
             **_gaps(("unit_C",)),
         },
-        finite=("residual_ug", "force_g", "standard_error_ug"),
+        finite=("residual_ug", "force_g", "standard_error_ug", "expected_ug"),
         key=("unit", "dwell", "axis"),
+    ),
+    "predictions": Table(
+        {
+            "unit": _text(),
+            "axis": _text(*AXES),
+            "dwell": _whole(),
+            "other": _whole(),
+            "covariance_ug2": _number(),
+        },
+        finite=("covariance_ug2",),
+        key=("unit", "axis", "dwell", "other"),
+    ),
+    "wander": Table(
+        {
+            "unit": _text(),
+            "axis": _text(*AXES),
+            "method": _text("wander", "birge"),
+            **_numbers(("white_ug", "flicker_ug", "walk_ug", "lack_of_fit")),
+            "dof": _whole(),
+        },
+        finite=("white_ug", "flicker_ug", "walk_ug", "lack_of_fit"),
+        key=("unit", "axis"),
     ),
     "verification": Table(
         {
@@ -206,6 +228,11 @@ TABLES: dict[str, Table] = {
             "error_z_ug",
         ),
         key=("unit", "dwell"),
+    ),
+    "verification_poses": Table(
+        {"unit": _text(), "pose": _text(), "dwells": _whole(1), **_numbers(("error_ug", "uncertainty_ug"))},
+        finite=("error_ug", "uncertainty_ug"),
+        key=("unit", "pose"),
     ),
     "allan": Table(
         {

@@ -3,38 +3,45 @@
 White-noise standard errors sd/√n leave out that a real output wanders from dwell to dwell; fitted with them alone, the
 errors of the coefficients come out several times too small. Here the covariance of the dwell means is white + 1/f +
 random walk, the strengths estimated by restricted maximum likelihood over all units and axes of the lot, and
-coefficients, errors and residuals follow from it.
+coefficients, errors and residuals follow from it. A unit and axis that the model fits far worse than the others takes no
+part in the noise, and has its errors widened by its own lack of fit (Birge ratio; GUM type B).
 """
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from itertools import product
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import solve_triangular
+from scipy import stats
 
 from inertial import design
 from inertial.criticism.noise import flicker_kernel
 from inertial.design import Values
 from inertial.errors import NotIdentified
+from inertial.fits.generalised import Series, Solved
 from inertial.fits.linear import LotFit, fit_lot
 from inertial.state import State
 
 Array = NDArray[np.float64]
 
-_STEP = 10.0
-_SHARES = (0.0, *(0.1 * _STEP ** np.arange(7)).tolist())
-_FINE = 12
-_FAR = 12.0
-"""Deviance above the lowest at which a pair of shares is out of the question."""
-_CHARGE = 4.0
-"""Deviance that wander must be worth to be believed."""
+_LACKING = 1e-4
+"""Probability, over all units and axes, below which the scatter of one is lack of fit and not noise."""
+
+_STEP = 1e-3
+"""Relative step for the derivative by a nonlinear parameter."""
 
 
 @dataclass(frozen=True)
 class WanderFit:
-    """A fit with the noise that it found."""
+    """A fit with the noise that it found.
+
+    noise : (..., n, 3), standard deviation of the noise of one dwell, white and wander, output unit
+    expected : (..., n, 3), standard deviation that the residual of each dwell should have, output unit
+    predicted : (..., 3, m, m), covariance of the residuals of the m dwells that were left out, output unit squared: their noise,
+        what of it the fit's own dwells show, and the coefficients together
+    lack_of_fit : (..., 3), variance of a unit and axis over that of the lot's noise where it is significant, else one
+    nonlinear_error : standard errors of nonlinear parameters that were given, by effect id
+    """
 
     fit: LotFit
     """Coefficients with covariance and chi-square under white noise and wander."""
@@ -44,6 +51,11 @@ class WanderFit:
     """Variance of the 1/f wander over that of the white part."""
     walk_share: float
     """Variance that a random walk gathers over the whole record, over that of the white part."""
+    noise: Array
+    expected: Array
+    predicted: Array
+    lack_of_fit: Array
+    nonlinear_error: dict[str, dict[str, float]]
 
     @property
     def flicker(self) -> float:
@@ -62,17 +74,33 @@ def walk_kernel(time: Array) -> Array:
     return np.minimum(since[:, None], since) / max(float(since.max()), 1e-9)
 
 
+def wander_kernels(time: Array) -> tuple[Array, Array]:
+    """Covariances (n, n) of 1/f wander and random walk of variance one at times (n,), s.
+
+    Wander slower than the record is, for the record, the bias itself.
+    """
+    return flicker_kernel(time, slowest=1.0), walk_kernel(time)
+
+
 def fit_lot_with_wander(
-    effects: Sequence[str], state: State, output: Array, standard_error: Array, *, nonlinear: Values | None = None
+    effects: Sequence[str],
+    state: State,
+    output: Array,
+    standard_error: Array,
+    *,
+    nonlinear: Values | None = None,
+    used: NDArray[np.bool_] | None = None,
 ) -> WanderFit:
-    """Generalised least-squares fit of a model of sensor effects to the dwells of a lot.
+    """Generalised least-squares fit of a model to the dwells of a lot.
 
     Parameters
     ----------
-    effects : ids of the model; of the sensor, none of the station
+    effects : ids of the model
     state : the dwells, measured at the same times by all units
     output : (..., n, 3), mean output of each dwell, output unit
     standard_error : (..., n, 3), sd/√n, output unit; every one finite and positive
+    nonlinear : values of nonlinear parameters that were found on the same dwells; their errors enter those of the coefficients
+    used : (n,), the dwells that are fitted; the others only have residuals. All where None
 
     Raises
     ------
@@ -83,109 +111,178 @@ def fit_lot_with_wander(
         raise NotIdentified(
             "wander: a standard error is zero or infinite; give each dwell the resolution of its output"
         )
-    plain = fit_lot(effects, state, output, standard_error, nonlinear=nonlinear)
-    if plain.shared.size:
-        raise NotIdentified(f"wander: {plain.shared_names[0][0]} belongs to the station; fit it with fit_lot")
-    sensor, _ = design.split(effects)
-    h = design.local_columns(sensor, state, plain.nonlinear)
-    z = np.swapaxes(output, -1, -2)
-    error = np.swapaxes(np.broadcast_to(standard_error, output.shape), -1, -2)
-    level = np.sqrt(np.mean(error**2, axis=-1, keepdims=True))
+    error = np.broadcast_to(standard_error, output.shape)
+    there = np.ones(output.shape[-2], dtype=bool) if used is None else used
+    plain = fit_lot(effects, state, output, np.where(there[:, None], error, np.inf), nonlinear=nonlinear)
+    if np.any(plain.dof <= 0):
+        raise NotIdentified(
+            f"wander: {int(there.sum())} dwells for {plain.coefficients.shape[-1]} coefficients per axis leave nothing to "
+            "judge the noise by; add poses or temperatures"
+        )
+    columns = _Columns(plain, state, nonlinear or {})
+    z, error = np.swapaxes(output, -1, -2), np.swapaxes(error, -1, -2)
+    level = np.sqrt(np.mean(error[..., there] ** 2, axis=-1, keepdims=True))
     profile = np.sqrt(np.mean((error / level) ** 2, axis=tuple(range(error.ndim - 1))))
     time = np.reshape(np.broadcast_to(state.time, error[..., 0, :].shape), (-1, error.shape[-1]))[0]
-    # wander slower than the record is, for the record, the bias itself
-    lot = _Lot(h, z / level, profile, (flicker_kernel(time, slowest=1.0), walk_kernel(time)))
-    shares = lot.best_shares()
-    solved = lot.solve(shares)
-    inside = np.asarray(np.einsum("...np,...p->...n", h, solved.theta), dtype=np.float64)
-    residual = z - inside * level
+    kernels = wander_kernels(time)
+    cut = tuple(k[np.ix_(there, there)] for k in kernels)
+    shared = columns.shared / level[..., None]
+    series = Series(columns.local[..., there, :], shared[..., there, :], (z / level)[..., there], profile[there], cut)
+    shares, solved = _solve(series)
+    stretch = lack_of_fit(solved.squares / solved.variance, series.dof)
+    covariance = np.diag(profile**2) + sum(s * k for s, k in zip(shares, kernels, strict=True))
+    # nonlinear parameters stay as given: what a step of theirs would take off goes back to the other coefficients
+    station, steps = np.split(solved.shared, [columns.station])
+    back = shared[..., there, columns.station :] @ steps
+    theta = (solved.theta + np.einsum("...pn,...n->...p", solved.gain, back)) * level
+    inside = np.einsum("...np,...p->...n", columns.local, theta) + columns.shared[..., : columns.station] @ station
+    wide = np.sqrt(solved.variance * stretch)[..., None] * level
+    left = _Left(columns.local, shared, solved, covariance, there)
     found = replace(
         plain,
-        coefficients=solved.theta * level,
-        covariance=solved.variance * solved.inverse * level[..., None] ** 2,
-        residuals=np.swapaxes(residual, -1, -2),
+        coefficients=theta,
+        covariance=_covariance(shared[..., there, :], solved) * wide[..., None] ** 2,
+        shared=station,
+        shared_covariance=solved.variance * solved.shared_inverse[: columns.station, : columns.station],
+        residuals=np.swapaxes(z - inside, -1, -2),
         chi2=solved.squares / solved.variance,
     )
-    return WanderFit(found, float(np.sqrt(solved.variance)), *shares)
+    return WanderFit(
+        fit=found,
+        white=float(np.sqrt(solved.variance)),
+        flicker_share=shares[0],
+        walk_share=shares[1],
+        noise=np.swapaxes(wide * np.sqrt(np.diagonal(covariance)), -1, -2),
+        expected=np.swapaxes(wide * left.spread(), -1, -2),
+        predicted=left.predicted() * wide[..., None] ** 2,
+        lack_of_fit=stretch,
+        nonlinear_error=columns.errors(solved),
+    )
+
+
+def lack_of_fit(chi2: Array, dof: int) -> Array:
+    """Birge ratio squared of every block, where its scatter is more than noise of the lot's size makes; one elsewhere."""
+    far = stats.chi2.isf(_LACKING / chi2.size, dof)
+    return np.where(chi2 > far, chi2 / dof, 1.0)
+
+
+def _solve(series: Series) -> tuple[tuple[float, float], Solved]:
+    """Shares of wander and the solution at them, the noise from the blocks that the model fits like the rest.
+
+    The scatter of the samples is a lower bound: where less than it is left, the fit is the weighted one.
+    """
+    shares = series.best_shares()
+    solved = series.solve(shares)
+    middle = stats.chi2.median(series.dof) / np.median(solved.squares)
+    lacking = lack_of_fit(solved.squares * middle, series.dof) > 1.0
+    if lacking.any() and not lacking.all():
+        series.sound = ~lacking
+        shares = series.best_shares()
+        solved = series.solve(shares)
+    if solved.variance * (1.0 + sum(shares)) < 1.0:
+        shares = (0.0, 0.0)
+        solved = replace(series.solve(shares), variance=1.0)
+    return shares, solved
+
+
+def _covariance(shared: Array, solved: Solved) -> Array:
+    """Covariance (..., 3, p, p) of the blocks' coefficients over the variance, that of the shared ones within it."""
+    if not solved.shared.size:
+        return solved.inverse + np.zeros((*solved.theta.shape, 1))
+    across = solved.gain @ shared
+    return solved.inverse + across @ solved.shared_inverse @ np.swapaxes(across, -1, -2)
 
 
 @dataclass(frozen=True)
-class _Solved:
-    theta: Array
-    inverse: Array
-    squares: Array
-    variance: float
-    deviance: float
+class _Left:
+    """What a fit leaves, over the variance of the white part: with y = Hθ + v and θ̂ = θ + G·v the residual is v − H·G·v.
+
+    h : (..., 3, n, p); s : (..., 3, n, q), of parameters that all share, which add their errors to predictions
+    covariance : (n, n), of the noise; there : (n,), the dwells of the fit
+    """
+
+    h: Array
+    s: Array
+    solved: Solved
+    covariance: Array
+    there: NDArray[np.bool_]
+
+    def spread(self) -> Array:
+        """Standard deviations of the residuals of all dwells, (..., 3, n)."""
+        with_used = np.matmul(self.solved.gain, self.covariance[self.there])
+        square = np.diagonal(self.covariance) - 2.0 * np.einsum("...np,...pn->...n", self.h, with_used)
+        square = square + np.einsum("...np,...pq,...nq->...n", self.h, self.solved.inverse, self.h)
+        return np.sqrt(np.maximum(square, 0.0))
+
+    def predicted(self) -> Array:
+        """Covariance (..., 3, m, m) of the residuals of the dwells that are left out."""
+        out = ~self.there
+        h, s = self.h[..., out, :], self.s[..., out, :]
+        cross = np.matmul(h, np.matmul(self.solved.gain, self.covariance[np.ix_(self.there, out)]))
+        square = self.covariance[np.ix_(out, out)] - cross - np.swapaxes(cross, -1, -2)
+        square = square + np.matmul(h, np.matmul(self.solved.inverse, np.swapaxes(h, -1, -2)))
+        if self.solved.shared.size:
+            left = s - np.matmul(h, self.solved.gain @ self.s[..., self.there, :])
+            square = square + left @ self.solved.shared_inverse @ np.swapaxes(left, -1, -2)
+        return square
 
 
-class _Lot:
-    """Least squares of the lot, with each unit's and axis' values in units of its standard error."""
+class _Columns:
+    """Columns of a model at all dwells: those of the blocks, those of the station, and derivatives by nonlinear parameters.
 
-    def __init__(self, h: Array, z: Array, profile: Array, kernels: tuple[Array, ...]) -> None:
-        scale = np.sqrt(np.mean(h**2, axis=-2, keepdims=True))
-        self._scale = np.where(scale > 0.0, scale, 1.0)
-        self._h, self._z, self._kernels = h / self._scale, z, kernels
-        self._white = np.diag(profile**2)
+    local : (..., 3, n, p); shared : (..., 3, n, q), output unit, the station's first; station : how many those are
+    """
 
-    def solve(self, shares: Sequence[float]) -> _Solved:
-        """Coefficients, their unscaled covariance and the restricted deviance at shares of the kernels."""
-        covariance = self._white + sum(share * kernel for share, kernel in zip(shares, self._kernels, strict=True))
-        root = np.linalg.cholesky(covariance)
-        whiten = solve_triangular(root, np.eye(len(root)), lower=True)
-        h, z = np.matmul(whiten, self._h), np.matmul(self._z, whiten.T)
-        gram = np.swapaxes(h, -1, -2) @ h
-        inverse = np.linalg.inv(gram)
-        right = np.matmul(np.swapaxes(h, -1, -2), z[..., None])
-        theta = np.matmul(inverse, right)[..., 0]
-        squares = np.sum((z - np.matmul(h, theta[..., None])[..., 0]) ** 2, axis=-1)
-        blocks, (n, p) = squares.size, h.shape[-2:]
-        dof = blocks * (n - p)
-        variance = float(np.sum(squares)) / dof
-        gram_term = np.sum(np.broadcast_to(np.linalg.slogdet(gram)[1], squares.shape))
-        deviance = dof * np.log(variance) + 2.0 * blocks * np.sum(np.log(np.diagonal(root))) + gram_term
-        size = self._scale[..., 0, :]
-        return _Solved(
-            theta=theta / size,
-            inverse=inverse / (size[..., :, None] * size[..., None, :]),
-            squares=squares,
-            variance=variance,
-            deviance=float(deviance),
-        )
+    def __init__(self, plain: LotFit, state: State, given: Values) -> None:
+        self._plain, self._state = plain, state
+        self._sensor, self._station = design.split(plain.effects)
+        self._response = plain.response()
+        self.local = design.local_columns(self._sensor, state, plain.nonlinear)
+        shape = np.broadcast_shapes(self.local.shape[:-1], plain.coefficients[..., 0, None].shape)
+        shared = self._shared(plain.nonlinear)
+        self.station = 0 if shared is None else shared.shape[-1]
+        self._free = self._parameters(given)
+        slopes = [self._slope(*one) for one in self._free]
+        parts = [np.broadcast_to(part, (*shape, part.shape[-1])) for part in ([] if shared is None else [shared])]
+        parts += [np.broadcast_to(slope, shape)[..., None] for slope in slopes]
+        self.shared = np.concatenate(parts, axis=-1) if parts else np.zeros((*shape, 0))
 
-    def best_shares(self) -> tuple[float, float]:
-        """Shares of flicker and walk: their mean over the restricted likelihood; zero where the lot shows no wander.
+    def _shared(self, values: Values) -> Array | None:
+        return design.shared_columns(self._station, self._state, values, self._response) if self._station else None
 
-        A slow drift within one record may be either, and the likelihood is flat between the two: its peak jumps from one
-        answer to the other, its mean does not.
-        """
-        coarse = {pair: self._deviance(pair) for pair in product(_SHARES, repeat=2)}
-        lowest = min(coarse.values())
-        if coarse[0.0, 0.0] - lowest < _CHARGE:
-            return 0.0, 0.0
-        likely = np.array([pair for pair, deviance in coarse.items() if deviance - lowest < _FAR])
-        flicker, walk = (_around(likely[:, k]) for k in range(2))
-        pairs = np.array(list(product(flicker**2, walk**2)))
-        deviance = np.array([self._deviance(pair) for pair in pairs.tolist()])
-        near = pairs[deviance - deviance.min() < _FAR]
-        flicker, walk = (_between(near[:, k]) for k in range(2))
-        pairs = np.array(list(product(flicker**2, walk**2)))
-        deviance = np.array([self._deviance(pair) for pair in pairs.tolist()])
-        # half of the belief beforehand is that a kind of wander is not there at all
-        belief = np.prod(np.where(pairs > 0.0, 1.0, _FINE - 1.0), axis=1)
-        weight = belief * np.exp(-0.5 * (deviance - deviance.min()))
-        mean = (weight @ pairs) / weight.sum()
-        return float(mean[0]), float(mean[1])
+    def _parameters(self, given: Values) -> list[tuple[str, str, int | None]]:
+        """(effect, parameter, axis) of every continuous nonlinear parameter given; no axis where one value serves all."""
+        free: list[tuple[str, str, int | None]] = []
+        for effect in (*self._sensor, *self._station):
+            for parameter in effect.parameters(self._state):
+                if parameter.choices or parameter.name not in given.get(effect.id, {}):
+                    continue
+                by_axis = isinstance(given[effect.id][parameter.name], tuple)
+                free += [(effect.id, parameter.name, axis) for axis in (range(3) if by_axis else (None,))]
+        return free
 
-    def _deviance(self, shares: Sequence[float]) -> float:
-        return self.solve(shares).deviance
+    def _slope(self, effect: str, name: str, axis: int | None) -> Array:
+        """Change of the model's output (..., 3, n) per unit of a nonlinear parameter."""
+        value = self._plain.nonlinear[effect][name]
+        middle = value if axis is None or not isinstance(value, tuple) else value[axis]
+        step = _STEP * max(abs(middle), 1e-6)
+        ends = [self._output(effect, name, axis, middle + sign * step) for sign in (1.0, -1.0)]
+        return (ends[0] - ends[1]) / (2.0 * step)
 
+    def _output(self, effect: str, name: str, axis: int | None, value: float) -> Array:
+        old = self._plain.nonlinear[effect][name]
+        new = value if axis is None or not isinstance(old, tuple) else (*old[:axis], value, *old[axis + 1 :])
+        values = {**self._plain.nonlinear, effect: {**self._plain.nonlinear[effect], name: new}}
+        state = replace(self._state, memory={})
+        out = np.einsum("...np,...p->...n", design.local_columns(self._sensor, state, values), self._plain.coefficients)
+        shared = self._shared(values)
+        return out if shared is None else out + shared @ self._plain.shared
 
-def _around(shares: Array) -> Array:
-    """Standard deviations (_FINE,) to look at, one coarse step beyond those that are likely."""
-    low, high = float(shares.min()) / _STEP, max(float(shares.max()), _SHARES[1]) * _STEP
-    return np.linspace(low**0.5, high**0.5, _FINE)
-
-
-def _between(shares: Array) -> Array:
-    """Standard deviations (_FINE,) from the least to the largest of the shares."""
-    return np.linspace(float(shares.min()) ** 0.5, float(shares.max()) ** 0.5, _FINE)
+    def errors(self, solved: Solved) -> dict[str, dict[str, float]]:
+        """Standard errors of the nonlinear parameters that were given; the largest where axes differ."""
+        spread = np.sqrt(solved.variance * np.diagonal(solved.shared_inverse))[self.station :]
+        found: dict[str, dict[str, float]] = {}
+        for (effect, name, _), one in zip(self._free, spread.tolist(), strict=True):
+            own = found.setdefault(effect, {})
+            own[name] = max(own.get(name, 0.0), one)
+        return found

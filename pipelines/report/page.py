@@ -18,7 +18,8 @@ if TYPE_CHECKING:
 
 COVERAGE = 2.0
 TITLES = {
-    "verification_norm_ug": "largest | |a| − g | on poses not used",
+    "verification_norm_ug": "largest | |a| − g | of a pose not used, mean of its dwells",
+    "verification_dwell_ug": "largest | |a| − g | of a single dwell there",
     "verification_ratio": "largest error over what the uncertainty allows",
     "bias_error_ug": "rms error of the worst axis on poses not used",
     "residual_rms_ug": "rms residual of the fit",

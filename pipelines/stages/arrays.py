@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from inertial.state import State
+from inertial.state import History, State
 from schemas.errors import DataRejected
 
 if TYPE_CHECKING:
@@ -15,27 +15,38 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 AXES = ("x", "y", "z")
+HISTORY_POINTS = 4000
 
 
 @dataclass(frozen=True)
 class LotArrays:
     """Dwells of a lot.
 
-    units : serials, in order; dwells : (n,) numbers; poses : (n,) names
+    units : serials, in order; dwells : (n,) numbers; poses, kinds : (n,) names
     output, standard_error : (units, n, 3), output unit; the error is that of white noise, sd/√n
     """
 
     units: tuple[str, ...]
     dwells: NDArray[np.int64]
     poses: tuple[str, ...]
+    kinds: NDArray[np.str_]
     state: State
     output: NDArray[np.float64]
     standard_error: NDArray[np.float64]
     out_unit: str
 
+    def of_kind(self, kind: str) -> NDArray[np.bool_]:
+        """Which dwells are of a kind, (n,)."""
+        return np.asarray(self.kinds == kind)
 
-def lot_arrays(dwells: pd.DataFrame) -> LotArrays:
+
+def lot_arrays(dwells: pd.DataFrame, history: pd.DataFrame | None = None) -> LotArrays:
     """The dwells of a lot as arrays, for units that were all measured in the same dwells.
+
+    Parameters
+    ----------
+    dwells : of all kinds, so that what an effect remembers of the dwell before is there
+    history : temperatures between the dwells
 
     Raises
     ------
@@ -60,7 +71,8 @@ def lot_arrays(dwells: pd.DataFrame) -> LotArrays:
         units=units,
         dwells=numbers,
         poses=tuple(first["pose"].astype(str)),
-        state=_state(ordered, len(units)),
+        kinds=first["kind"].to_numpy(dtype=np.str_),
+        state=_state(ordered, units, history),
         output=_grid(ordered, [f"out_{axis}" for axis in AXES], len(units)),
         standard_error=_standard_error(ordered, len(units)),
         out_unit=out_units[0],
@@ -76,17 +88,17 @@ def _standard_error(ordered: pd.DataFrame, units: int) -> NDArray[np.float64]:
     return spread / np.sqrt(_grid(ordered, ["n"], units))
 
 
-def _state(ordered: pd.DataFrame, units: int) -> State:
+def _state(ordered: pd.DataFrame, units: tuple[str, ...], history: pd.DataFrame | None) -> State:
     def optional(column: str) -> NDArray[np.float64] | None:
         if column not in ordered.columns or ordered[column].isna().any():
             return None
-        return _grid(ordered, [column], units)[..., 0]
+        return _grid(ordered, [column], len(units))[..., 0]
 
     outer, inner = optional("outer_deg"), optional("inner_deg")
     slot = optional("slot")
     return State(
-        force=_grid(ordered, [f"force_{axis}" for axis in AXES], units),
-        time=_grid(ordered, ["time_s"], units)[..., 0],
+        force=_grid(ordered, [f"force_{axis}" for axis in AXES], len(units)),
+        time=_grid(ordered, ["time_s"], len(units))[..., 0],
         outer=None if outer is None else np.radians(outer),
         inner=None if inner is None else np.radians(inner),
         slot=None if slot is None else slot[:, 0],
@@ -96,4 +108,20 @@ def _state(ordered: pd.DataFrame, units: int) -> State:
         since_move=optional("since_move_s"),
         supply=optional("supply_V"),
         vibration=optional("vibration_g"),
+        history=None if history is None else _history(history, units),
     )
+
+
+def _history(history: pd.DataFrame, units: tuple[str, ...]) -> History | None:
+    """Temperatures of every unit on one time grid; None where a unit has none."""
+    own = history[history["unit_C"].notna()]
+    by_unit = {str(unit): rows for unit, rows in own.groupby("unit") if len(rows) > 1}
+    if not set(units) <= set(by_unit):
+        return None
+    times = own["time_s"].to_numpy(dtype=float)
+    grid = np.linspace(times.min(), times.max(), min(HISTORY_POINTS, np.unique(times).size))
+    series = [
+        np.interp(grid, rows["time_s"].to_numpy(dtype=float), rows["unit_C"].to_numpy(dtype=float))
+        for rows in (by_unit[unit].sort_values("time_s") for unit in units)
+    ]
+    return History(grid, np.stack(series))

@@ -15,7 +15,7 @@ from inertial.state import State
 from schemas.errors import DataRejected
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Mapping, Sequence
 
     from numpy.typing import NDArray
 
@@ -31,14 +31,14 @@ class Calibration:
     """Coefficients of a lot.
 
     coefficients : (units, 3, p), output unit per unit of the column; covariance : (units, 3, p, p)
-    nonlinear : values by effect id; shared : (q,), parameters of the station
+    nonlinear : values by effect id, one or one per axis; shared : (q,), parameters of the station
     """
 
     units: tuple[str, ...]
     effects: tuple[str, ...]
     coefficients: NDArray[np.float64]
     covariance: NDArray[np.float64]
-    nonlinear: dict[str, dict[str, float]]
+    nonlinear: dict[str, dict[str, Any]]
     shared: NDArray[np.float64]
 
     @property
@@ -70,7 +70,13 @@ def column_names(model: Sequence[str]) -> tuple[tuple[tuple[str, str], ...], ...
     return tuple(design.local_names(sensor, axis) for axis in range(3))
 
 
-def coefficient_rows(units: Sequence[str], fit: LotFit, covariance: NDArray[np.float64], out_unit: str) -> pd.DataFrame:
+def coefficient_rows(
+    units: Sequence[str],
+    fit: LotFit,
+    covariance: NDArray[np.float64],
+    out_unit: str,
+    nonlinear_error: Mapping[str, Mapping[str, float]],
+) -> pd.DataFrame:
     """The long table of coefficients: one row per unit, axis and coefficient; what all axes share has axis ``*``."""
     errors = np.sqrt(np.diagonal(covariance, axis1=-2, axis2=-1))
     texts = {effect.id: unit_texts(effect, out_unit) for effect in design.split(fit.effects)[0]}
@@ -83,7 +89,7 @@ def coefficient_rows(units: Sequence[str], fit: LotFit, covariance: NDArray[np.f
                 seen[effect] += 1
                 value, error = fit.coefficients[u, axis, column], errors[u, axis, column]
                 rows.append(_row(unit, letter, effect, name, (value, error), texts[effect][place]))
-        rows += _shared_rows(unit, fit)
+        rows += _shared_rows(unit, fit, nonlinear_error)
     return pd.DataFrame(rows)
 
 
@@ -99,7 +105,7 @@ def _row(unit: str, axis: str, effect: str, name: str, value: tuple[float, float
     }
 
 
-def _shared_rows(unit: str, fit: LotFit) -> list[dict[str, Any]]:
+def _shared_rows(unit: str, fit: LotFit, nonlinear_error: Mapping[str, Mapping[str, float]]) -> list[dict[str, Any]]:
     errors = np.sqrt(np.diagonal(fit.shared_covariance)) if fit.shared.size else np.zeros(0)
     rows = [
         _row(unit, ALL_AXES, effect, name, (fit.shared[q], errors[q]), "rad")
@@ -107,7 +113,10 @@ def _shared_rows(unit: str, fit: LotFit) -> list[dict[str, Any]]:
     ]
     for effect, values in fit.nonlinear.items():
         known = {parameter.name: parameter.unit for parameter in effects.get(effect).nonlinear}
-        rows += [_row(unit, ALL_AXES, effect, n, (v, 0.0), known.get(n, "")) for n, v in values.items()]
+        for name, value in values.items():
+            error, text = nonlinear_error.get(effect, {}).get(name, 0.0), known.get(name, "")
+            by_axis = zip(AXES, value, strict=True) if isinstance(value, tuple) else ((ALL_AXES, value),)
+            rows += [_row(unit, axis, effect, name, (one, error), text) for axis, one in by_axis]
     return rows
 
 
@@ -133,7 +142,10 @@ def read_calibration(coefficients: pd.DataFrame, covariance: pd.DataFrame) -> Ca
     model = tuple(dict.fromkeys(coefficients["effect"].astype(str)))
     names = column_names(model)
     p = len(names[0])
-    own = coefficients[coefficients["axis"] != ALL_AXES]
+    linear = {pair for axis in names for pair in axis}
+    pairs = zip(coefficients["effect"].astype(str), coefficients["name"].astype(str), strict=True)
+    is_linear = np.array([pair in linear for pair in pairs], dtype=bool)
+    own = coefficients[(coefficients["axis"] != ALL_AXES) & is_linear]
     if len(own) != len(units) * 3 * p:
         message = f"coefficients: {len(own)} rows, the model needs {len(units) * 3 * p}; run the fit again"
         raise DataRejected(message)
@@ -142,23 +154,25 @@ def read_calibration(coefficients: pd.DataFrame, covariance: pd.DataFrame) -> Ca
     values = covariance["value"].to_numpy().reshape(len(units), 3, -1)
     matrix[:, :, row, column] = values
     matrix[:, :, column, row] = values
-    shared, nonlinear = _read_shared(coefficients[coefficients["unit"] == units[0]], model)
+    common = coefficients[(coefficients["unit"] == units[0]) & ~is_linear]
+    shared, nonlinear = _read_shared(common, model)
     return Calibration(units, model, own["value"].to_numpy().reshape(len(units), 3, p), matrix, nonlinear, shared)
 
 
-def _read_shared(rows: pd.DataFrame, model: Sequence[str]) -> tuple[NDArray[np.float64], dict[str, dict[str, float]]]:
+def _read_shared(common: pd.DataFrame, model: Sequence[str]) -> tuple[NDArray[np.float64], dict[str, dict[str, Any]]]:
+    """Parameters of the station, and nonlinear parameters: a tuple where they are one per axis."""
     shared: list[float] = []
-    nonlinear: dict[str, dict[str, float]] = {}
-    common = rows[rows["axis"] == ALL_AXES]
+    nonlinear: dict[str, dict[str, Any]] = {}
     for name in model:
         effect = effects.get(name)
         station = effect.names() if isinstance(effect, StationEffect) else ()
         for row in common[common["effect"] == name].itertuples():
+            value, own = float(row.value), nonlinear.setdefault(name, {})  # pyright: ignore[reportArgumentType]
             if row.name in station:
-                shared.append(float(row.value))  # pyright: ignore[reportArgumentType]
+                shared.append(value)
             else:
-                nonlinear.setdefault(name, {})[str(row.name)] = float(row.value)  # pyright: ignore[reportArgumentType]
-    return np.array(shared), nonlinear
+                own[str(row.name)] = value if row.axis == ALL_AXES else (*own.get(str(row.name), ()), value)
+    return np.array(shared), {name: values for name, values in nonlinear.items() if values}
 
 
 def unit_texts(effect: SensorEffect, out_unit: str) -> list[str]:

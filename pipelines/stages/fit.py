@@ -1,17 +1,21 @@
-"""Fit of a model to the dwells of a lot: coefficients, covariance and residuals for every accepted unit."""
+"""Fit of a model to the dwells of a lot: coefficients, covariance, residuals and the noise between dwells."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 import pandas as pd
 
+from inertial import design
 from inertial.errors import InertialError
-from inertial.fits.linear import fit_lot
+from inertial.fits.linear import LotFit, felt_force, fit_lot
+from inertial.fits.wander import WanderFit, fit_lot_with_wander
 from pipelines.stages.arrays import AXES, LotArrays, lot_arrays
 from pipelines.stages.calibration import coefficient_rows, covariance_rows
 from pipelines.stages.empty import empty_table
+from pipelines.stages.profile import profiled
 from schemas.errors import DataRejected
 
 if TYPE_CHECKING:
@@ -19,57 +23,183 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from inertial.fits.linear import LotFit
+    Array = NDArray[np.float64]
 
 MICRO = 1e6
+FEWEST_TO_SPARE = 10  # degrees of freedom of the lot, below which nothing can be said of the kind of its noise
 
 
-def fit(dwells: pd.DataFrame, effects: Sequence[str]) -> dict[str, pd.DataFrame]:
-    """Coefficients, covariance and residuals of the recipe's effects for every unit of a lot.
+@dataclass(frozen=True)
+class _Noisy:
+    """A fit, and what its residuals say of the noise; arrays in the output's unit.
 
-    The white-noise error sd/√n of a dwell is a lower bound: where the residuals are larger, for wander between dwells
-    or for what the model lacks, the covariance is scaled by χ²/ν (Birge ratio squared; GUM type B for lack of fit).
-    Tables without rows come back where no unit was accepted.
+    noise, expected : (units, n, 3), standard deviations of one dwell's noise, and of its residual
+    predicted : (units, 3, m, m), covariance of what is left of the m dwells for verification
+    flicker, walk, white : (units, 3), standard deviations; walk at the end of the record
+    lack_of_fit : (units, 3), variance over that of the noise, one where it is no larger
     """
-    measured = dwells[dwells["kind"] == "dwell"]
-    if measured.empty:
+
+    method: Literal["wander", "birge"]
+    fit: LotFit
+    noise: Array
+    expected: Array
+    predicted: Array
+    white: Array
+    flicker: Array
+    walk: Array
+    lack_of_fit: Array
+    nonlinear_error: dict[str, dict[str, float]]
+
+
+def fit(dwells: pd.DataFrame, history: pd.DataFrame, effects: Sequence[str]) -> dict[str, pd.DataFrame]:
+    """Coefficients, covariance, residuals and noise of the recipe's effects for every unit of a lot.
+
+    The white-noise error sd/√n of a dwell is a lower bound. What wanders between dwells is estimated with the coefficients
+    (method ``wander``); where there are too few dwells for that, the covariance is scaled by χ²/ν (method ``birge``: Birge
+    ratio squared). The table ``wander`` says which. Tables without rows come back where no unit was accepted.
+
+    Parameters
+    ----------
+    dwells : of every kind; those for verification are not fitted, and only pass on the conditions that came before
+    history : temperatures between the dwells
+    """
+    if not np.any(dwells["kind"] == "dwell"):
         return _nothing()
-    lot = lot_arrays(measured)
+    lot = lot_arrays(dwells[dwells["kind"].isin(["dwell", "verification"])], history)
     try:
-        found = fit_lot(effects, lot.state, lot.output, lot.standard_error)
+        found = _fitted(lot, effects)
     except InertialError as problem:
         raise DataRejected(str(problem)) from None
-    stretch = birge_squared(found)
-    covariance = found.covariance * stretch[..., None, None]
     return {
-        "coefficients": coefficient_rows(lot.units, found, covariance, lot.out_unit),
-        "covariance": covariance_rows(lot.units, covariance),
-        "residuals": _residual_rows(lot, found, stretch),
+        "coefficients": coefficient_rows(
+            lot.units, found.fit, found.fit.covariance, lot.out_unit, found.nonlinear_error
+        ),
+        "covariance": covariance_rows(lot.units, found.fit.covariance),
+        "residuals": _residual_rows(lot, found),
+        "predictions": _prediction_rows(lot, found),
+        "wander": _wander_rows(lot, found),
     }
 
 
-def birge_squared(found: LotFit) -> NDArray[np.float64]:
+def _fitted(lot: LotArrays, effects: Sequence[str]) -> _Noisy:
+    used = lot.of_kind("dwell")
+    lot = replace(lot, state=replace(lot.state, felt=_felt(lot, used), memory={}))
+    values = profiled(lot, effects, used)
+    error = np.where(used[:, None], lot.standard_error, np.inf)
+    plain = fit_lot(effects, lot.state, lot.output, error, nonlinear=values)
+    known = lot.standard_error[:, used]
+    spare = int(plain.dof.sum()) - plain.shared.size
+    if spare < FEWEST_TO_SPARE or np.any(plain.dof < 1) or not np.all(np.isfinite(known) & (known > 0.0)):
+        return _by_birge(lot, plain, used)
+    found = fit_lot_with_wander(effects, lot.state, lot.output, lot.standard_error, nonlinear=values, used=used)
+    return _by_wander(lot, found, used)
+
+
+def _felt(lot: LotArrays, used: NDArray[np.bool_]) -> Array:
+    """Force along the sensors' own axes at every dwell, (units, n, 3), g; misalignment from the dwells of the fit alone."""
+    force, own = lot.state.force, lot.state.force[:, used]
+    turn = np.linalg.pinv(own, rcond=1e-9) @ felt_force(own, lot.output[:, used])
+    return force @ turn
+
+
+def _by_wander(lot: LotArrays, found: WanderFit, used: NDArray[np.bool_]) -> _Noisy:
+    level = np.sqrt(np.mean(lot.standard_error[:, used] ** 2, axis=1)) * np.sqrt(found.lack_of_fit)
+    return _Noisy(
+        method="wander",
+        fit=found.fit,
+        noise=found.noise,
+        expected=found.expected,
+        predicted=found.predicted,
+        white=level * found.white,
+        flicker=level * found.flicker,
+        walk=level * found.walk,
+        lack_of_fit=found.lack_of_fit,
+        nonlinear_error=found.nonlinear_error,
+    )
+
+
+def _by_birge(lot: LotArrays, plain: LotFit, used: NDArray[np.bool_]) -> _Noisy:
+    """The plain fit with its covariance scaled; all its noise is taken to be white."""
+    stretch = birge_squared(plain)
+    noise = lot.standard_error * np.sqrt(stretch)[:, None, :]
+    columns = design.local_columns(design.split(plain.effects)[0], lot.state, plain.nonlinear)
+    covariance = plain.covariance * stretch[..., None, None]
+    unseen = columns[..., ~used, :]
+    model = np.einsum("...np,...pq,...mq->...nm", unseen, covariance, unseen)
+    own = np.swapaxes(noise[:, ~used] ** 2, -1, -2)
+    return _Noisy(
+        method="birge",
+        fit=replace(plain, covariance=covariance),
+        noise=noise,
+        expected=noise,
+        predicted=model + own[..., None] * np.eye(own.shape[-1]),
+        white=np.sqrt(np.mean(noise**2, axis=1)),
+        flicker=np.zeros_like(stretch),
+        walk=np.zeros_like(stretch),
+        lack_of_fit=stretch,
+        nonlinear_error={},
+    )
+
+
+def birge_squared(found: LotFit) -> Array:
     """χ²/ν of every unit and axis, never below one, (units, 3)."""
     return np.maximum(1.0, found.chi2 / np.maximum(found.dof, 1))
 
 
-def _residual_rows(lot: LotArrays, found: LotFit, stretch: NDArray[np.float64]) -> pd.DataFrame:
-    scale = np.abs(np.diagonal(found.response(), axis1=-2, axis2=-1))[:, None, :]
-    shape = lot.output.shape
-    u, n, a = np.meshgrid(*(np.arange(size) for size in shape), indexing="ij")
-    u, n, a = u.ravel(), n.ravel(), a.ravel()
-    error = lot.standard_error * np.sqrt(stretch)[:, None, :]
+def _residual_rows(lot: LotArrays, found: _Noisy) -> pd.DataFrame:
+    used = lot.of_kind("dwell")
+    scale = np.abs(np.diagonal(found.fit.response(), axis1=-2, axis2=-1))[:, None, :]
+    force = np.broadcast_to(lot.state.force, lot.output.shape)[:, used]
+    u, n, a = (index.ravel() for index in np.meshgrid(*(np.arange(size) for size in force.shape), indexing="ij"))
     temperature = lot.state.temperature
     return pd.DataFrame(
         {
             "unit": np.asarray(lot.units, dtype=object)[u],
-            "dwell": lot.dwells[n],
+            "dwell": lot.dwells[used][n],
             "axis": np.asarray(AXES, dtype=object)[a],
-            "pose": np.asarray(lot.poses, dtype=object)[n],
-            "force_g": np.broadcast_to(lot.state.force, shape)[u, n, a],
-            "residual_ug": (MICRO * found.residuals / scale).ravel(),
-            "standard_error_ug": (MICRO * error / scale).ravel(),
-            "unit_C": np.full(u.size, np.nan) if temperature is None else temperature[u, n],
+            "pose": np.asarray(lot.poses, dtype=object)[used][n],
+            "force_g": force.ravel(),
+            "residual_ug": (MICRO * found.fit.residuals / scale)[:, used].ravel(),
+            "standard_error_ug": (MICRO * found.noise / scale)[:, used].ravel(),
+            "expected_ug": (MICRO * found.expected / scale)[:, used].ravel(),
+            "unit_C": np.full(u.size, np.nan) if temperature is None else temperature[:, used][u, n],
+        }
+    )
+
+
+def _prediction_rows(lot: LotArrays, found: _Noisy) -> pd.DataFrame:
+    """Covariance of what should be left at the dwells for verification, as a long table of lower triangles."""
+    scale = np.abs(np.diagonal(found.fit.response(), axis1=-2, axis2=-1))
+    dwells = lot.dwells[~lot.of_kind("dwell")]
+    row, column = np.tril_indices(dwells.size)
+    u, a, k = (
+        i.ravel() for i in np.meshgrid(np.arange(len(lot.units)), np.arange(3), np.arange(row.size), indexing="ij")
+    )
+    values = found.predicted * (MICRO / scale[..., None, None]) ** 2
+    return pd.DataFrame(
+        {
+            "unit": np.asarray(lot.units, dtype=object)[u],
+            "axis": np.asarray(AXES, dtype=object)[a],
+            "dwell": dwells[row][k],
+            "other": dwells[column][k],
+            "covariance_ug2": values[..., row, column].ravel(),
+        }
+    )
+
+
+def _wander_rows(lot: LotArrays, found: _Noisy) -> pd.DataFrame:
+    """How the noise of the dwells was found, and its parts, by unit and axis."""
+    scale = np.abs(np.diagonal(found.fit.response(), axis1=-2, axis2=-1))
+    u, a = (index.ravel() for index in np.meshgrid(np.arange(len(lot.units)), np.arange(3), indexing="ij"))
+    parts = {"white_ug": found.white, "flicker_ug": found.flicker, "walk_ug": found.walk}
+    return pd.DataFrame(
+        {
+            "unit": np.asarray(lot.units, dtype=object)[u],
+            "axis": np.asarray(AXES, dtype=object)[a],
+            "method": found.method,
+            **{name: (MICRO * values / scale).ravel() for name, values in parts.items()},
+            "lack_of_fit": found.lack_of_fit.ravel(),
+            "dof": found.fit.dof.ravel(),
         }
     )
 
@@ -79,6 +209,8 @@ def _nothing() -> dict[str, pd.DataFrame]:
         "coefficients": empty_table(texts="unit axis effect name unit_text", numbers="value standard_error"),
         "covariance": empty_table(texts="unit axis", numbers="value", whole="row column"),
         "residuals": empty_table(
-            texts="unit axis pose", numbers="force_g residual_ug standard_error_ug unit_C", whole="dwell"
+            texts="unit axis pose", numbers="force_g residual_ug standard_error_ug expected_ug unit_C", whole="dwell"
         ),
+        "predictions": empty_table(texts="unit axis", numbers="covariance_ug2", whole="dwell other"),
+        "wander": empty_table(texts="unit axis method", numbers="white_ug flicker_ug walk_ug lack_of_fit", whole="dof"),
     }

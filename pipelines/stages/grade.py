@@ -10,7 +10,7 @@ import pandas as pd
 
 from pipelines.stages.calibration import read_calibration
 from pipelines.stages.empty import empty_table
-from pipelines.stages.figures import NEEDS_EFFECT, NEEDS_STATIC, NEEDS_VERIFICATION, Figure, figures_of
+from pipelines.stages.figures import NEEDS_EFFECT, NEEDS_STATIC, NEEDS_VERIFICATION, Figure, UnitTables, figures_of
 from schemas.errors import RecipeInvalid
 from schemas.limits import FIGURES, GRADE_FIGURE, GRADES, Decision, Limits, decide, describe_rule, grade_of
 
@@ -29,6 +29,7 @@ class Evidence:
     covariance: pd.DataFrame
     residuals: pd.DataFrame
     verification: pd.DataFrame
+    verification_poses: pd.DataFrame
     noise: pd.DataFrame
 
 
@@ -65,8 +66,9 @@ def grade(evidence: Evidence, limits: Limits, zero_g: float = 0.0) -> dict[str, 
         if verdict["refused"] or calibration is None:
             grade_rows.append(_grade_row(verdict, "refused", NO_GRADE, str(verdict["reason"])))
             continue
-        own = [_of(table, unit) for table in (evidence.residuals, evidence.verification, evidence.noise)]
-        figures = list(figures_of(unit, calibration, own[0], own[1], own[2], zero_g))
+        shown = (evidence.residuals, evidence.verification, evidence.verification_poses, evidence.noise)
+        own = UnitTables(*(_of(table, unit) for table in shown))
+        figures = list(figures_of(unit, calibration, own, zero_g))
         decisions = [decide(limits, f.name, f.value, f.uncertainty) for f in figures if f.name in limits.figures]
         figure_rows += [_figure_row(unit, figure, decisions) for figure in figures]
         grade_rows.append(_decided(verdict, figures, decisions, limits))

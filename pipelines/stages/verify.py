@@ -1,78 +1,107 @@
-"""Verification on poses that the fit has not seen: | |a_corr| − g | for every unit and dwell, with its uncertainty."""
+"""Verification on poses that the fit has not seen: | |a_corr| − g | of every unit, by dwell and by pose, and its uncertainty."""
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 import pandas as pd
 
-from inertial import design
 from inertial.correction import correct, station_change
 from pipelines.stages.arrays import AXES, LotArrays, lot_arrays
-from pipelines.stages.calibration import Calibration, read_calibration
+from pipelines.stages.calibration import read_calibration
 from pipelines.stages.empty import empty_table
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    Array = NDArray[np.float64]
+
 MICRO = 1e6
 
 
 def verify(
-    dwells: pd.DataFrame, coefficients: pd.DataFrame, covariance: pd.DataFrame, residuals: pd.DataFrame
-) -> pd.DataFrame:
-    """The error that is left in every verification dwell, in µg.
+    dwells: pd.DataFrame,
+    history: pd.DataFrame,
+    coefficients: pd.DataFrame,
+    covariance: pd.DataFrame,
+    predictions: pd.DataFrame,
+) -> dict[str, pd.DataFrame]:
+    """The error that is left in every verification dwell, and in every verification pose over its dwells, in µg.
 
     ``error_ug`` is |a_corr| − g, which needs no angle; ``error_x_ug`` … compare with the table's angles too.
-    ``uncertainty_ug`` (k = 1) is what may be expected there: the coefficients' covariance and the wander of a single
-    dwell, both from the fit. ``reading_ug`` (k = 1) is the white noise of the reading alone.
+    ``uncertainty_ug`` (k = 1) is what may be expected there of a model that is right: white noise, wander since the fit's
+    own dwells, and what both have done to the coefficients. ``reading_ug`` (k = 1) is the white noise of the dwell alone.
+
+    In ``verification_poses`` the error is the mean over the dwells of one pose: what the calibration leaves, while wander, which
+    no calibration removes, averages out as far as it does. Its uncertainty is that of this mean, with the correlation of
+    its dwells.
     """
-    unseen = dwells[dwells["kind"] == "verification"]
-    if unseen.empty or coefficients.empty:
-        numbers = "norm_g error_ug uncertainty_ug reading_ug error_x_ug error_y_ug error_z_ug unit_C"
-        return empty_table(texts="unit pose", whole="dwell", numbers=numbers)
-    lot, calibration = lot_arrays(unseen), read_calibration(coefficients, covariance)
-    model = calibration.effects
+    if not np.any(dwells["kind"] == "verification") or coefficients.empty:
+        return _nothing()
+    # all dwells, so that what an effect remembers of the pose before is there
+    lot, calibration = lot_arrays(dwells, history), read_calibration(coefficients, covariance)
+    model, unseen = calibration.effects, lot.of_kind("verification")
     corrected = correct(model, lot.state, lot.output, calibration.coefficients, calibration.nonlinear)
     truth = lot.state.force + station_change(model, lot.state, calibration.shared, calibration.nonlinear)
     norm = np.linalg.norm(corrected, axis=-1)
-    axis_error = _axis_uncertainty(lot, calibration, residuals)
-    toward = corrected / norm[..., None]
+    toward = (corrected / norm[..., None])[:, unseen]
     scale = np.abs(np.diagonal(calibration.response, axis1=-2, axis2=-1))[:, None, :]
+    reading = (lot.standard_error / scale)[:, unseen]
+    expected = np.einsum("uja,uajk,uka->ujk", toward, _expected(predictions, lot.units), toward)
     columns = {
-        "norm_g": norm,
-        "error_ug": MICRO * (norm - np.linalg.norm(lot.state.force, axis=-1)),
-        "uncertainty_ug": MICRO * np.sqrt(np.sum((toward * axis_error) ** 2, axis=-1)),
-        "reading_ug": MICRO * np.sqrt(np.sum((toward * lot.standard_error / scale) ** 2, axis=-1)),
+        "norm_g": norm[:, unseen],
+        "error_ug": MICRO * (norm - np.linalg.norm(lot.state.force, axis=-1))[:, unseen],
+        "uncertainty_ug": np.sqrt(np.diagonal(expected, axis1=-2, axis2=-1)),
+        "reading_ug": MICRO * np.sqrt(np.sum((toward * reading) ** 2, axis=-1)),
     }
-    return _rows(lot, columns, MICRO * (corrected - truth))
+    return {
+        "verification": _rows(lot, unseen, columns, MICRO * (corrected - truth)[:, unseen]),
+        "verification_poses": _pose_rows(lot, unseen, columns["error_ug"], expected),
+    }
 
 
-def _axis_uncertainty(lot: LotArrays, calibration: Calibration, residuals: pd.DataFrame) -> NDArray[np.float64]:
-    """Standard uncertainty of each corrected axis, (units, n, 3), g."""
-    sensor, _ = design.split(calibration.effects)
-    scale = np.abs(np.diagonal(calibration.response, axis1=-2, axis2=-1))
-    columns = design.local_columns(sensor, replace(lot.state, memory={}), calibration.nonlinear)
-    model = np.einsum("uanp,uapq,uanq->una", np.broadcast_to(columns, (len(lot.units), *columns.shape[-3:])),
-                      calibration.covariance, columns)  # fmt: skip
-    squares = residuals.assign(square=residuals["standard_error_ug"] ** 2)
-    table = squares.pivot_table(index="unit", columns="axis", values="square", aggfunc="mean")
-    single = table.loc[list(lot.units), list(AXES)].to_numpy() / MICRO**2
-    return np.sqrt(model / scale[:, None, :] ** 2 + single[:, None, :])
+def _expected(predictions: pd.DataFrame, units: tuple[str, ...]) -> Array:
+    """Covariance of the errors of the dwells that a right model leaves, (units, 3, m, m), µg²."""
+    ordered = predictions.sort_values(["unit", "axis", "dwell", "other"])
+    m = ordered["dwell"].nunique()
+    row, column = np.tril_indices(m)
+    out = np.zeros((len(units), 3, m, m))
+    values = ordered["covariance_ug2"].to_numpy().reshape(len(units), 3, -1)
+    out[..., row, column] = values
+    out[..., column, row] = values
+    return out
 
 
-def _rows(lot: LotArrays, columns: dict[str, NDArray[np.float64]], by_axis: NDArray[np.float64]) -> pd.DataFrame:
+def _pose_rows(lot: LotArrays, unseen: NDArray[np.bool_], error: Array, expected: Array) -> pd.DataFrame:
+    poses = np.asarray(lot.poses, dtype=object)[unseen]
+    rows = []
+    for pose in dict.fromkeys(poses.tolist()):
+        own = np.flatnonzero(poses == pose)
+        spread = np.sqrt(expected[:, own][:, :, own].mean(axis=(1, 2)))
+        for unit, value, uncertainty in zip(lot.units, error[:, own].mean(axis=1), spread, strict=True):
+            rows.append((unit, pose, own.size, value, uncertainty))
+    return pd.DataFrame(rows, columns=["unit", "pose", "dwells", "error_ug", "uncertainty_ug"])
+
+
+def _rows(lot: LotArrays, unseen: NDArray[np.bool_], columns: dict[str, Array], by_axis: Array) -> pd.DataFrame:
     u, n = (index.ravel() for index in np.meshgrid(*(np.arange(s) for s in by_axis.shape[:2]), indexing="ij"))
     temperature = lot.state.temperature
     return pd.DataFrame(
         {
             "unit": np.asarray(lot.units, dtype=object)[u],
-            "dwell": lot.dwells[n],
-            "pose": np.asarray(lot.poses, dtype=object)[n],
+            "dwell": lot.dwells[unseen][n],
+            "pose": np.asarray(lot.poses, dtype=object)[unseen][n],
             **{name: values.ravel() for name, values in columns.items()},
             **{f"error_{letter}_ug": by_axis[..., axis].ravel() for axis, letter in enumerate(AXES)},
-            "unit_C": np.full(u.size, np.nan) if temperature is None else temperature[u, n],
+            "unit_C": np.full(u.size, np.nan) if temperature is None else temperature[:, unseen][u, n],
         }
     )
+
+
+def _nothing() -> dict[str, pd.DataFrame]:
+    numbers = "norm_g error_ug uncertainty_ug reading_ug error_x_ug error_y_ug error_z_ug unit_C"
+    return {
+        "verification": empty_table(texts="unit pose", whole="dwell", numbers=numbers),
+        "verification_poses": empty_table(texts="unit pose", whole="dwells", numbers="error_ug uncertainty_ug"),
+    }

@@ -29,7 +29,8 @@ def test_every_built_in_recipe_makes_a_job(name: str) -> None:
 def test_the_main_job_is_the_one_of_the_figures() -> None:
     recipe = load_recipe()
     assert len(recipe.units) == 8
-    assert (len(recipe.poses), len(recipe.verification), len(recipe.temperatures_C)) == (24, 6, 3)
+    assert (len(recipe.poses), len({p.name for p in recipe.verification}), len(recipe.temperatures_C)) == (24, 6, 3)
+    assert [p.name for p in recipe.verification] == [f"v{k}" for k in range(1, 7)] * 3
     assert recipe.static_record_s == 1200.0
 
 

@@ -16,6 +16,8 @@ from pipelines.stages.reduce import reduce
 from pipelines.stages.validate import validate
 from schemas.errors import DataRejected
 
+NO_HISTORY = pd.DataFrame({"time_s": [], "chamber_C": [], "slot": [], "unit": [], "unit_C": []})
+
 
 @pytest.fixture(scope="module")
 def run(tmp_path_factory: pytest.TempPathFactory) -> Run:
@@ -64,7 +66,9 @@ def test_fit_without_noise_is_exact() -> None:
             **{f"sd_{a}": 1e-3 for a in "xyz"}, "n": 100,
         }
     )  # fmt: skip
-    table = fit(dwells, ["bias", "scale", "misalignment"])["coefficients"].set_index(["axis", "effect"])["value"]
+    table = fit(dwells, NO_HISTORY, ["bias", "scale", "misalignment"])["coefficients"].set_index(["axis", "effect"])[
+        "value"
+    ]
     np.testing.assert_allclose(table["x", "scale"], 2.0, rtol=1e-12)
     np.testing.assert_allclose(table["z", "bias"], 0.3, rtol=1e-12)
 
@@ -85,7 +89,8 @@ def test_lack_of_fit_widens_the_uncertainty(run: Run) -> None:
     bent = dwells.assign(out_x=dwells["out_x"] + 3000.0 * dwells["force_x"] ** 2)
     effects = ["bias", "scale", "misalignment", "bias_temperature", "scale_temperature"]
     straight, wider = (
-        fit(table, effects)["coefficients"].set_index(["unit", "axis", "effect"]) for table in (dwells, bent)
+        fit(table, NO_HISTORY, effects)["coefficients"].set_index(["unit", "axis", "effect"])
+        for table in (dwells, bent)
     )
     ratio = (wider["standard_error"] / straight["standard_error"]).loc[("A1", "x", "bias")]
     assert ratio > 3.0

@@ -74,9 +74,49 @@ def test_refuses_a_reading_without_error(plan: State, rng: np.random.Generator) 
         fit_lot_with_wander(EFFECTS, plan, outputs(rng, plan, 0.0, 0.0), error)
 
 
-def test_refuses_effects_of_the_station(plan: State, rng: np.random.Generator) -> None:
+def turned(plan: State) -> State:
     angles = np.radians(np.tile(poses.plan("fibonacci24"), (2, 1)))
-    turned = State(force=plan.force, time=plan.time, outer=angles[:, 0], inner=angles[:, 1])
+    return State(force=plan.force, time=plan.time, outer=angles[:, 0], inner=angles[:, 1])
+
+
+def test_parameters_of_the_station_are_found_within_their_errors(plan: State, rng: np.random.Generator) -> None:
+    state, tilt = turned(plan), 1e-3
+    lean = force_from_angles(state.outer, state.inner, up=(tilt, 0.0, np.sqrt(1.0 - tilt**2)))
+    out = outputs(rng, plan, 1e-4, 0.0) + (lean - plan.force)
+    error = np.full(out.shape, WHITE)
+    found = fit_lot_with_wander((*EFFECTS, "level_error"), state, out, error).fit
+    plain = fit_lot((*EFFECTS, "level_error"), state, out, error)
+    ours, theirs = np.sqrt(np.diag(found.shared_covariance)), np.sqrt(np.diag(plain.shared_covariance))
+    assert np.all(np.abs(np.abs(found.shared[np.argmax(np.abs(found.shared))]) - tilt) < 5.0 * ours.max())
+    assert np.all(ours > 1.5 * theirs)
+
+
+def test_dwells_left_out_are_predicted_within_their_errors(plan: State, rng: np.random.Generator) -> None:
+    out, used = outputs(rng, plan, 1e-4, 0.0), np.arange(DWELLS) % 4 != 3
+    error = np.full(out.shape, WHITE)
+    found = fit_lot_with_wander(EFFECTS, plan, out, error, used=used)
+    spread = np.sqrt(np.diagonal(found.predicted, axis1=-2, axis2=-1))
+    assert 0.9 < np.std(np.swapaxes(found.fit.residuals, -1, -2)[..., ~used] / spread) < 1.1
+    assert 0.9 < np.std((found.fit.residuals / found.expected)[:, used]) < 1.1
+    mean = np.swapaxes(found.fit.residuals, -1, -2)[..., ~used].mean(axis=-1)
+    assert 0.85 < np.std(mean / np.sqrt(found.predicted.mean(axis=(-1, -2)))) < 1.15
+    alone = fit_lot_with_wander(EFFECTS, plan, np.where(used[:, None], out, 7.0), error, used=used).fit
+    np.testing.assert_allclose(alone.coefficients, found.fit.coefficients, rtol=1e-9, atol=1e-12)
+
+
+def test_a_unit_that_the_model_does_not_fit_leaves_the_others_alone(plan: State, rng: np.random.Generator) -> None:
+    out = outputs(rng, plan, 1e-4, 0.0)
+    error = np.full(out.shape, WHITE)
+    before = fit_lot_with_wander(EFFECTS, plan, out, error)
+    out[3, :, 0] += 0.02 * plan.force[:, 0] ** 3
+    after = fit_lot_with_wander(EFFECTS, plan, out, error)
+    ratio = after.fit.standard_errors / before.fit.standard_errors
+    assert np.all(ratio[3, 0] > 3.0)
+    np.testing.assert_allclose(np.delete(ratio.reshape(-1, 4), 9, axis=0), 1.0, rtol=0.1)
+    assert after.lack_of_fit[3, 0] > 10.0
+
+
+def test_refuses_a_plan_without_a_dwell_to_spare(plan: State, rng: np.random.Generator) -> None:
     out = outputs(rng, plan, 0.0, 0.0)
-    with pytest.raises(NotIdentified, match="belongs to the station"):
-        fit_lot_with_wander((*EFFECTS, "level_error"), turned, out, np.full(out.shape, WHITE))
+    with pytest.raises(NotIdentified, match="leave nothing to judge the noise by"):
+        fit_lot_with_wander(EFFECTS, plan, out, np.full(out.shape, WHITE), used=np.arange(DWELLS) < 4)

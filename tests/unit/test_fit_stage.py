@@ -1,0 +1,133 @@
+"""The fit stage: noise between dwells, nonlinear parameters, and what it says where it cannot find the noise."""
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from inertial import poses
+from inertial.frames import force_from_angles
+from inertial.noise import generate
+from pipelines.stages.calibration import read_calibration
+from pipelines.stages.fit import fit
+from pipelines.stages.verify import verify
+from schemas.tables import check
+
+LINEAR = ["bias", "scale", "misalignment", "bias_temperature"]
+LAG = [*LINEAR, "thermal_lag"]
+TAU, LAGGING, WHITE = 240.0, 8e-5, 2e-5
+NO_HISTORY = pd.DataFrame({name: pd.Series(dtype=float) for name in ("time_s", "chamber_C", "slot", "unit", "unit_C")})
+
+
+def chamber(time: np.ndarray) -> np.ndarray:
+    """Four levels in turn, approached within minutes."""
+    out = np.full(time.shape, 25.0)
+    for start, level in ((0.0, 40.0), (900.0, 10.0), (1800.0, 55.0), (2700.0, 25.0)):
+        out = np.where(time >= start, level + (out - level) * np.exp(-np.maximum(time - start, 0.0) / 60.0), out)
+    return out
+
+
+def late(time: np.ndarray, temperature: np.ndarray, tau: float) -> np.ndarray:
+    """Temperature of a body that follows through a thermal resistance, step by step."""
+    out = temperature.copy()
+    for k in range(1, time.size):
+        out[k] = out[k - 1] + (temperature[k - 1] - out[k - 1]) * (time[k] - time[k - 1]) / tau
+    return out
+
+
+def lot(
+    rng: np.random.Generator, units: int = 6, wander: float = 0.0, lagging: float = LAGGING
+) -> tuple[pd.DataFrame, pd.DataFrame]:
+    """Dwells and history of a lot in a chamber that never rests."""
+    angles = np.tile(np.concatenate([poses.plan("fibonacci24"), [[35.0, 15.0], [105.0, -100.0]]]), (4, 1))
+    force = force_from_angles(*np.radians(angles).T)
+    n = len(angles)
+    time, fine = 20.0 + 34.0 * np.arange(n), np.arange(0.0, 3600.0, 1.0)
+    heat = chamber(fine)
+    behind = np.interp(time, fine, late(fine, heat, TAU) - heat)
+    own = np.interp(time, fine, heat)
+    dwells, history = [], []
+    for u in range(units):
+        slow = generate.flicker(rng, (3, 20 * n), wander)[:, -n:].T if wander else 0.0
+        gain = np.eye(3) + 0.01 * rng.normal(size=(3, 3))
+        out = force @ gain.T + 0.02 * rng.normal(size=3) + (own - 25.0)[:, None] * 1e-4 * rng.normal(size=3)
+        out = out + lagging * behind[:, None] + slow + WHITE * rng.normal(size=(n, 3))
+        dwells.append(
+            pd.DataFrame(
+                {
+                    "unit": f"U{u}", "dwell": range(n), "time_s": time, "pose": [f"p{k % 26}" for k in range(n)],
+                    "kind": np.where(np.arange(n) % 26 < 24, "dwell", "verification"), "out_unit": "g", "unit_C": own, "n": 100,
+                    **{f"force_{a}": force[:, i] for i, a in enumerate("xyz")},
+                    **{f"out_{a}": out[:, i] for i, a in enumerate("xyz")}, **{f"sd_{a}": 10.0 * WHITE for a in "xyz"},
+                }
+            )
+        )  # fmt: skip
+        history.append(
+            pd.DataFrame(
+                {"time_s": fine[::10], "chamber_C": heat[::10], "slot": u, "unit": f"U{u}", "unit_C": heat[::10]}
+            )
+        )
+    return pd.concat(dwells, ignore_index=True), pd.concat(history, ignore_index=True)
+
+
+def test_finds_the_time_constant_of_a_lag_with_its_error(rng: np.random.Generator) -> None:
+    dwells, history = lot(rng)
+    rows = fit(dwells, history, LAG)["coefficients"]
+    tau = rows[(rows["effect"] == "thermal_lag") & (rows["name"] == "tau")].iloc[0]
+    assert tau["value"] == pytest.approx(TAU, rel=0.03)
+    assert 0.0 < tau["standard_error"] < 0.05 * TAU
+    assert abs(tau["value"] - TAU) < 5.0 * tau["standard_error"] + 2.0
+    size = rows[rows["name"] == "kL"]["value"]
+    np.testing.assert_allclose(size, LAGGING, rtol=0.1)
+
+
+def test_verification_with_a_lag_uses_what_came_before_each_dwell(rng: np.random.Generator) -> None:
+    dwells, history = lot(rng)
+    found = fit(dwells, history, LAG)
+    tables = [found[name] for name in ("coefficients", "covariance", "predictions")]
+    rows = verify(dwells, history, *tables)["verification"]
+    ratio = rows["error_ug"] / rows["uncertainty_ug"]
+    assert 0.8 < np.std(ratio) < 1.25
+    assert rows["error_ug"].abs().max() < 5.0 * 1e6 * WHITE
+
+
+def test_calibration_with_a_time_constant_for_each_axis_is_read_as_it_was_written(rng: np.random.Generator) -> None:
+    dwells, history = lot(rng)
+    found = fit(dwells, history, LAG)
+    table = found["coefficients"]
+    one = table[table["name"] == "tau"]
+    split = pd.concat(
+        [
+            table[table["name"] != "tau"],
+            *(one.assign(axis=a, value=v) for a, v in zip("xyz", (1.0, 2.0, 3.0), strict=True)),
+        ]
+    )
+    ordered = split.sort_values(["unit"], kind="stable")
+    assert read_calibration(ordered, found["covariance"]).nonlinear["thermal_lag"]["tau"] == (1.0, 2.0, 3.0)
+
+
+def test_the_tables_keep_their_contract(rng: np.random.Generator) -> None:
+    dwells, history = lot(rng, units=2)
+    for name, table in fit(dwells, history, LINEAR).items():
+        check(name, table)
+
+
+def test_wander_between_dwells_is_found_and_told(rng: np.random.Generator) -> None:
+    dwells, _ = lot(rng, wander=1e-4, lagging=0.0)
+    table = fit(dwells, NO_HISTORY, LINEAR)["wander"]
+    assert set(table["method"]) == {"wander"}
+    assert (table["flicker_ug"] > 3.0 * 1e6 * WHITE).all()
+
+
+def test_coefficients_lie_within_their_errors_for_a_device_that_wanders(rng: np.random.Generator) -> None:
+    dwells, _ = lot(rng, units=24, wander=1e-4, lagging=0.0)
+    found = fit(dwells, NO_HISTORY, [*LINEAR, "third_order"])["coefficients"]
+    rows = found[found["effect"] == "third_order"]  # which no unit has
+    assert 0.85 < np.std(rows["value"] / rows["standard_error"]) < 1.15
+
+
+def test_says_so_where_there_are_too_few_dwells_for_the_noise(rng: np.random.Generator) -> None:
+    dwells, _ = lot(rng, units=1)
+    few = dwells[dwells["dwell"] < 6]
+    found = fit(few, NO_HISTORY, ["bias", "scale", "misalignment"])
+    assert set(found["wander"]["method"]) == {"birge"}
+    assert np.isfinite(found["coefficients"]["standard_error"]).all()
