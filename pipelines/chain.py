@@ -72,8 +72,9 @@ def _verify(job: Job, run: Run) -> Tables:
 
 def _noise(job: Job, run: Run) -> Tables:
     del job
-    tables = (run.table(name) for name in ("readings", "coefficients", "covariance"))
-    return noise(_records(run).samples(), *tables)
+    readings, *tables = (run.table(name) for name in ("readings", "coefficients", "covariance"))
+    static = set(readings.loc[readings["kind"] == "allan", "record"])
+    return noise(_records(run).samples(static), readings, *tables)
 
 
 _EVIDENCE = ("verdicts", "coefficients", "covariance", "residuals", "verification", "verification_poses", "noise")

@@ -81,15 +81,15 @@ class Problem:
     """(t, 5)"""
     target: Array
     """(t,) log-variance less the mean of the logarithm of chi-square."""
-    root: Array
-    """(t, t) lower Cholesky factor of the covariance of the log-variances."""
+    whiten: Array
+    """(t, t) inverse of the lower Cholesky factor of the covariance of the log-variances."""
 
     def cost(self, strengths: Array) -> float:
         """Chi-square of the curve."""
         expected = self.model @ strengths
         if not np.all(expected > 0.0):
             return np.inf
-        residual = solve_triangular(self.root, self.target - np.log(expected), lower=True)
+        residual = self.whiten @ (self.target - np.log(expected))
         return float(residual @ residual)
 
     def solve(self, free: NDArray[np.bool_], start: Array) -> tuple[Array, float]:
@@ -114,8 +114,8 @@ class Problem:
     def _gauss_newton(self, free: NDArray[np.bool_], strengths: Array) -> Array:
         expected = self.model @ strengths
         expected = np.where(expected > 0.0, expected, np.exp(self.target))
-        rows = solve_triangular(self.root, self.model / expected[:, None], lower=True)
-        wanted = solve_triangular(self.root, self.target - np.log(expected) + 1.0, lower=True)
+        rows = self.whiten @ (self.model / expected[:, None])
+        wanted = self.whiten @ (self.target - np.log(expected) + 1.0)
         wanted = wanted - rows[:, ~free] @ strengths[~free]
         size = np.linalg.norm(rows[:, free], axis=0)
         trial = strengths.copy()
@@ -137,7 +137,7 @@ def problem(variance: Array, moments: Sums, strengths: Array) -> Problem:
     return Problem(
         model=basis(moments.m),
         target=np.log(variance) - (digamma(half) - np.log(half)),
-        root=_root(correlation * np.outer(spread, spread)),
+        whiten=solve_triangular(_root(correlation * np.outer(spread, spread)), np.eye(len(half)), lower=True),
     )
 
 

@@ -12,7 +12,7 @@ from pipelines.archive.keys import digest
 from schemas import tables
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Collection, Iterator
     from pathlib import Path
 
 PARTS = ("samples", "readings", "history")
@@ -79,10 +79,16 @@ class Records:
         """Hash of everything captured, in order of record."""
         return digest({f.name: files.read_json(f / "record.json")["content"] for f in self._folders()})
 
-    def samples(self) -> Iterator[pd.DataFrame]:
-        """The samples, one table per record in order of record: a lot's samples never lie in memory together."""
+    def samples(self, records: Collection[int] | None = None) -> Iterator[pd.DataFrame]:
+        """The samples, one table per record in order of record: a lot's samples never lie in memory together.
+
+        Parameters
+        ----------
+        records : numbers of those that are wanted; all where None
+        """
         for folder in self._folders():
-            yield files.read_table(folder / "samples.parquet", "samples")
+            if records is None or int(folder.name) in records:
+                yield files.read_table(folder / "samples.parquet", "samples")
 
     def gathered(self, part: str) -> pd.DataFrame:
         """Readings, history or samples of all records in one table."""

@@ -121,10 +121,10 @@ def _sample_faults(samples: pd.DataFrame, readings: pd.DataFrame, zero: float) -
     faults: list[Fault] = []
     here = readings[readings["record"].isin(samples["record"].unique()) & (readings["status"] == "ok")]
     groups = samples.groupby(["unit", "record"], sort=False).indices
+    output = samples[list(AXES)].to_numpy(dtype=float)
     for row in here.itertuples():
         place = f"in record {row.record} (pose {row.pose})"
-        index = groups.get((row.unit, row.record), np.array([], dtype=np.int64))
-        values = samples.iloc[index][list(AXES)].to_numpy(dtype=float)
+        values = output[groups.get((row.unit, row.record), np.array([], dtype=np.int64))]
         scale = Scale(zero, float(row.full_scale), str(row.out_unit))  # pyright: ignore[reportArgumentType]
         found = _fault_of(values, scale, int(row.n))  # pyright: ignore[reportArgumentType]
         if found:

@@ -17,7 +17,19 @@ from pipelines.report import render
 from pipelines.runner import Runner
 from schemas.errors import DataRejected, WrongUse
 
-TABLES_OF_RESULTS = ("dwells", "coefficients", "covariance", "residuals", "verification", "allan", "noise", "figures")
+TABLES_OF_RESULTS = (
+    "dwells",
+    "coefficients",
+    "covariance",
+    "residuals",
+    "predictions",
+    "wander",
+    "verification",
+    "verification_poses",
+    "allan",
+    "noise",
+    "figures",
+)
 
 
 @pytest.fixture(scope="module")
@@ -40,7 +52,11 @@ def test_a_unit_that_falls_silent_is_reported_and_the_others_go_on(spoilt: Run) 
 
 def test_the_others_get_what_they_would_have_got(spoilt: Run, sound: Run) -> None:
     wanted = sound.table("coefficients").query("unit != 'A2'").reset_index(drop=True)
-    pd.testing.assert_frame_equal(spoilt.table("coefficients"), wanted, rtol=1e-9)
+    found = spoilt.table("coefficients")
+    pd.testing.assert_frame_equal(found[["unit", "axis", "effect"]], wanted[["unit", "axis", "effect"]])
+    # the noise is judged by the whole lot, so that weights and errors move a little; the result does not
+    assert ((found["value"] - wanted["value"]).abs() < 0.1 * wanted["standard_error"]).all()
+    assert (found["standard_error"] / wanted["standard_error"]).between(0.9, 1.1).all()
 
 
 @pytest.mark.parametrize("table", TABLES_OF_RESULTS)

@@ -90,7 +90,7 @@ def test_the_hash_of_a_package_covers_its_modules() -> None:
 
 def test_a_manifest_says_from_what_by_whom_and_with_what(run: Run) -> None:
     manifest = run.manifest("coefficients")
-    assert manifest["inputs"] == {"dwells": run.manifest("dwells")["sha256"]}
+    assert manifest["inputs"] == {name: run.manifest(name)["sha256"] for name in ("dwells", "history")}
     assert manifest["parameters"]["effects"][0] == "bias"
     assert {"who", "where", "when", "libraries", "code", "schema"} <= manifest.keys()
 
