@@ -51,7 +51,7 @@ def class_of(field: Field, model: Model, term: Term) -> EffectClass:
     rest = model.without(term.effect.id)
     space = rest.at(model.share)
     variance = model.space.variance
-    scored = _scores(field, rest, space, variance)
+    scored = [(s, t) for s, t in _scores(field, rest, space, variance) if term.effect.id not in t.effect.after]
     own = _score(field, space, variance, term)
     scored.append((own, term))
     best = min(s for s, _ in scored)

@@ -127,8 +127,16 @@ def _unseen(field: Field, base: Model, candidates: Sequence[AnyEffect]) -> tuple
 def _classes(field: Field, base: Model, final: Model) -> list[EffectClass]:
     """A class for every effect that was found, the largest first."""
     held = {t.effect.id for t in base.terms}
-    added = [t for t in final.terms if t.effect.id not in held]
-    found = [class_of(field, final, t) for t in added]
+    model, found = final, []
+    for term in [t for t in final.terms if t.effect.id not in held]:
+        group = class_of(field, model, term)
+        best = group.members[0].term
+        if (
+            best is not term
+        ):  # a rival that is better beside the others takes the place, so that no other class has it too
+            others = [t for t in model.terms if t is not term]
+            model = Model(base.problem, [*others, best], near=model.share)
+        found.append(group)
     return sorted(found, key=lambda c: -c.size)
 
 

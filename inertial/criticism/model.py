@@ -96,7 +96,7 @@ class Model:
         shares = _SHARES
         if self._near is not None:
             around = self._near * np.array([0.03, 0.1, 0.3, 0.6, 1.0, 1.6, 3.0]) if self._near > 0.0 else _SHARES[1:6]
-            shares = np.concatenate([[0.0], around])
+            shares = np.concatenate([[0.0], np.minimum(around, _SHARES[-1] * np.linspace(1.0, 1.1, around.size))])
         found = np.array([self._deviance(s) for s in shares])
         best = int(np.argmin(found))
         if 0 < best < shares.size - 1 and shares[best - 1] > 0.0:
@@ -118,15 +118,8 @@ class Model:
         there = np.isfinite(basis.error)
         white = float(np.mean(basis.error[there] ** 2))
         # the constant part of the wander goes into the bias of the run and is no error of the dwells against each other
-        slow = space.share * self._wander_about_mean()
+        slow = space.share * basis.wander_about_mean
         return float(np.sqrt(space.variance * white * (1.0 + slow)))
-
-    def _wander_about_mean(self) -> float:
-        basis = self.problem.basis
-        turn, wander = basis.turn[0], basis.wander[0]
-        kernel = (turn.T * wander) @ turn
-        n = kernel.shape[0]
-        return float(np.trace(kernel) / n - kernel.sum() / n**2)
 
     def _variant(
         self, terms: Sequence[Term], curves: Array | None = None, shared_curves: Array | None = None

@@ -6,11 +6,15 @@ a·(I + ρ·F) is diagonal, so that trying many values of ρ costs nothing.
 """
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
+
+LONGEST = 1500
+"""Dwells beyond which the wander is left out: its covariance would not fit. Long runs are averaged before they are judged."""
 
 _EVEN = 1.3
 """White standard errors of a block that differ by less than this factor are taken as equal: one basis then serves a whole lot."""
@@ -36,13 +40,13 @@ def flicker_kernel(time: Array, *, slowest: float = 4.0) -> Array:
 class Basis:
     """Rotation in which white noise is the identity and the wander is diagonal.
 
-    turn : (1 or blocks, n, n), applied from the left to values already divided by ``error``
+    turn : (1 or blocks, n, n), applied from the left to values already divided by ``error``; None leaves them (long records)
     error : (blocks, n), white standard error of each dwell, g; infinite for a dwell that is not there
     wander : (1 or blocks, n), variance of the wander along each rotated coordinate, for share ρ = 1
     count : number of dwells that are there
     """
 
-    turn: Array
+    turn: Array | None
     error: Array
     wander: Array
     count: int
@@ -50,7 +54,16 @@ class Basis:
     def rotate(self, columns: Array) -> Array:
         """Columns (blocks, n, m) divided by the white standard error and rotated."""
         weighted = columns / self.error[..., None]
-        return np.matmul(self.turn, weighted)
+        return weighted if self.turn is None else np.matmul(self.turn, weighted)
+
+    @cached_property
+    def wander_about_mean(self) -> float:
+        """Mean variance of the wander about the record's own mean, for share ρ = 1."""
+        if self.turn is None:
+            return 0.0
+        kernel = (self.turn[0].T * self.wander[0]) @ self.turn[0]
+        n = kernel.shape[0]
+        return float(np.trace(kernel) / n - kernel.sum() / n**2)
 
     def spread(self, share: float) -> Array:
         """Standard deviations (1 or blocks, n) of the rotated coordinates at a share ρ of wander, for white noise of 1."""
@@ -66,6 +79,8 @@ def basis(time: Array, error: Array) -> Basis:
     error : (blocks, n), white standard error of each dwell, infinite where a dwell is missing
     """
     there = np.isfinite(error)
+    if time.shape[-1] > LONGEST:
+        return Basis(None, error, np.zeros((1, time.shape[-1])), int(there.sum()))
     even = _evened(error, there)
     same_time = np.all(np.abs(time - time[:1]) < 1.0)
     flat = np.all(there) and np.all(even == even[:, :1])

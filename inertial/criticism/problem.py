@@ -69,6 +69,7 @@ class Problem:
         self.error = self._error()
         self.series = self._series()
         self._kept: dict[tuple[object, ...], Candidate] = {}
+        self._terms: dict[tuple[object, ...], Array] = {}
         self._room = _CACHE
 
     @cached_property
@@ -144,7 +145,14 @@ class Problem:
 
     def rotated(self, effect: AnyEffect, values: Values) -> Array:
         """Rotated columns (blocks, n, p) of an effect."""
-        return self.basis.rotate(self.columns(effect, values))
+        key = (effect.id, *values.items())
+        kept = self._terms.get(key)
+        if kept is None:
+            kept = self.basis.rotate(self.columns(effect, values))
+            if kept.size < self._room:
+                self._room -= kept.size
+                self._terms[key] = kept
+        return kept
 
     def candidate(self, effect: AnyEffect, grid: Sequence[Values], *, first: int | None = None) -> Candidate:
         """Rotated columns of an effect over values of its nonlinear parameters; ``first`` keeps only so many columns an axis."""

@@ -26,6 +26,7 @@ MATERIAL = 0.2
 """Share of the floor below which a significant effect is not named: remainders of imperfect drivers are of that size."""
 
 _FINALISTS = 6
+_AGAIN = 3
 _MOST = 6
 _SHARES_TRIED = (1.0, 0.15, 0.01)
 
@@ -119,12 +120,25 @@ def search(field: Field, base: Model, stop: Callable[[Sequence[Term]], bool]) ->
         best = next((r for r in rivals if convincing(field, model, r)), None)
         if best is None or (len(chosen) >= 2 and stop(chosen)):
             break
-        chosen.append(best.term)
-        model = model.with_term(best.term)
+        best = _parent_first(field, model, best)
+        term = refine(model, best.term, model.with_term(best.term).share)
+        chosen.append(term)
+        model = model.with_term(term)
         if len(chosen) > 1:
             model, chosen = _reexamine(field, base, model, chosen)
     model, chosen = _taken_apart(field, base, model, chosen)
     return Found(model, tuple(chosen), ladder)
+
+
+def _parent_first(field: Field, model: Model, rival: Rival) -> Rival:
+    """The lower-order effect that a rival is built on, where it is missing and called for by itself; else the rival."""
+    held = {t.effect.id for t in model.terms}
+    for effect in field.effects:
+        if effect.id in rival.term.effect.after and effect.id not in held:
+            parent = judge(field, model, Term(effect, tuple(field.grids[effect.id][0].items())), model.share)
+            if convincing(field, model, parent):
+                return parent
+    return rival
 
 
 def anything(field: Field, model: Model) -> bool:
@@ -149,7 +163,7 @@ def size_of(model: Model, term: Term) -> float:
     return float(np.sqrt(max(float(gain.drop[0]) * white - noise, 0.0) / model.problem.count))
 
 
-def _contest(field: Field, model: Model, barred: str = "") -> list[Rival]:
+def _contest(field: Field, model: Model, barred: str = "", finalists: int = _FINALISTS) -> list[Rival]:
     """Rivals by their penalised likelihood, the finalists with the noise estimated anew beside them."""
     leave = {*(t.effect.id for t in model.terms), barred}
     count = field.problem.count
@@ -163,9 +177,9 @@ def _contest(field: Field, model: Model, barred: str = "") -> list[Rival]:
                 if gain.rank[place] and (name not in tried or score < tried[name][0]):
                     effect = next(e for e in field.effects if e.id == name)
                     tried[name] = (score, place, effect.primary if primary else None)
-    ranked = sorted(tried, key=lambda k: tried[k][0])[:_FINALISTS]
-    finalists = [_exact(field, model, name, tried[name][1], tried[name][2]) for name in ranked]
-    return sorted(finalists, key=lambda r: r.cost)
+    ranked = sorted(tried, key=lambda k: tried[k][0])[:finalists]
+    found = [_exact(field, model, name, tried[name][1], tried[name][2]) for name in ranked]
+    return sorted(found, key=lambda r: r.cost)
 
 
 def _best_of(field: Field, space: Space, name: str, gain: Gain, logdet: float, count: int) -> tuple[int, float]:
@@ -182,7 +196,7 @@ def _exact(field: Field, model: Model, name: str, place: int, first: int | None)
     """A finalist with its nonlinear parameters refined and the share of wander estimated with it inside."""
     effect = next(e for e in field.effects if e.id == name)
     term = Term(effect, tuple(field.grids[name][place].items()), first)
-    term = refine(model, term, model.with_term(term).share)
+    term = refine(model, term, model.with_term(term).share, axes=False)
     richer = model.with_term(term)
     return judge(field, model, term, richer.share)
 
@@ -205,7 +219,7 @@ def freedom(term: Term) -> int:
     return sum(len(v) if isinstance(v, tuple) else 1 for v in term.keywords.values()) if term.effect.nonlinear else 0
 
 
-def refine(model: Model, term: Term, share: float) -> Term:
+def refine(model: Model, term: Term, share: float, *, axes: bool = True) -> Term:
     """A term with its continuous nonlinear parameters moved to the best fit near their grid values.
 
     One value serves all units and axes, unless one per axis takes off far more than noise could.
@@ -215,7 +229,7 @@ def refine(model: Model, term: Term, share: float) -> Term:
     continuous = [p for p in term.effect.parameters(state) if not p.choices]
     for parameter in continuous:
         term = _refine_one(space, model.problem, term, parameter)
-    if term.effect.scope == "station" or model.problem.lot.radial:
+    if not axes or term.effect.scope == "station" or model.problem.lot.radial:
         return term
     for parameter in continuous:
         term = _per_axis(space, model.problem, term, parameter)
@@ -297,13 +311,14 @@ def _reexamine(field: Field, base: Model, model: Model, chosen: list[Term]) -> t
         if len(chosen) < 2:
             break
         rest = model.without(term.effect.id)
-        rivals = _contest(field, rest)
+        rivals = _contest(field, rest, finalists=_AGAIN)
         best = next((r for r in rivals if convincing(field, rest, r)), None)
+        best = None if best is None else _parent_first(field, rest, best)
         others = [t for t in chosen if t is not term]
         if best is None:
             chosen, model = others, rest
             continue
-        chosen = [*others, best.term]
+        chosen = [*others, term if best.term.effect.id == term.effect.id else best.term]
         model = Model(field.problem, [*base.terms, *chosen], near=model.share)
     return model, chosen
 

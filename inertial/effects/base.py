@@ -58,6 +58,7 @@ class Effect(ABC):
     breaker : what to measure so that it shows
     simplicity : rank among effects that the data cannot tell apart; the lowest is recommended
     sharp : whether it answers to the force along the sensor's own axis so sharply that misalignment matters
+    after : effects of lower order that are named first where they are called for as well
     vanishing : RMS of a column below which a plan does not excite it: products that only the angles' jitter keeps from zero
     primary : number of leading columns that stand for a simpler form of the effect; None where there is none
     """
@@ -71,6 +72,7 @@ class Effect(ABC):
     hides_behind: ClassVar[tuple[str, ...]] = ()
     breaker: ClassVar[str]
     simplicity: ClassVar[int] = 50
+    after: ClassVar[tuple[str, ...]] = ()
     primary: ClassVar[int | None] = None
     sharp: ClassVar[bool] = False
     vanishing: ClassVar[float] = 0.0

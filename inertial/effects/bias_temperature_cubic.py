@@ -17,6 +17,7 @@ class BiasTemperatureCubic(SensorEffect):
     hides_behind: ClassVar[tuple[str, ...]] = ("thermal_kink",)
     breaker: ClassVar[str] = "at least five temperatures"
     simplicity: ClassVar[int] = 7
+    after: ClassVar[tuple[str, ...]] = ("bias_temperature",)
 
     def columns(self, state: State, axis: int, **nonlinear: float) -> Array:
         del axis, nonlinear

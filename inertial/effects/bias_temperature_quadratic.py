@@ -17,6 +17,7 @@ class BiasTemperatureQuadratic(SensorEffect):
     hides_behind: ClassVar[tuple[str, ...]] = ("thermal_hysteresis", "thermal_kink")
     breaker: ClassVar[str] = "at least four temperatures, on the way up and back"
     simplicity: ClassVar[int] = 5
+    after: ClassVar[tuple[str, ...]] = ("bias_temperature",)
 
     def columns(self, state: State, axis: int, **nonlinear: float) -> Array:
         del axis, nonlinear

@@ -17,6 +17,7 @@ class ScaleTemperatureQuadratic(SensorEffect):
     hides_behind: ClassVar[tuple[str, ...]] = ()
     breaker: ClassVar[str] = "opposed poses at four temperatures or more"
     simplicity: ClassVar[int] = 6
+    after: ClassVar[tuple[str, ...]] = ("scale_temperature",)
 
     def columns(self, state: State, axis: int, **nonlinear: float) -> Array:
         del nonlinear

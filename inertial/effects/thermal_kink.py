@@ -20,6 +20,7 @@ class ThermalKink(SensorEffect):
     hides_behind: ClassVar[tuple[str, ...]] = ("bias_temperature_cubic", "bias_temperature_quadratic")
     breaker: ClassVar[str] = "steps of 5 K about the kink"
     simplicity: ClassVar[int] = 25
+    after: ClassVar[tuple[str, ...]] = ("bias_temperature",)
     nonlinear: ClassVar[tuple[Nonlinear, ...]] = (
         Nonlinear("centre", "degC", -40.0, 85.0, "linear", 12),
         Nonlinear("width", "K", 0.5, 8.0, "log", 3),

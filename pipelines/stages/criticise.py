@@ -13,6 +13,7 @@ from inertial.criticism.faults import Fault, find_faults
 from inertial.criticism.proposals import proposals
 from inertial.errors import InertialError
 from pipelines.stages.compare import compare
+from pipelines.stages.condense import condense
 from pipelines.stages.measured import Measured, lot_of, measured
 from schemas.errors import DataRejected
 
@@ -64,7 +65,7 @@ def examined(
     """Readings, data faults and the diagnosis of the units without a fault; None where every unit has one."""
     model = list(effects) if effects else default_model(dwells)
     catalogue.get_all(model)
-    found = measured(dwells, history)
+    found = measured(condense(dwells), history)
     faults = find_faults(found.readings) if found.reference != "norm" else []
     blocked = {f.unit for f in faults}
     sound = [u for u in range(len(found.units)) if u not in blocked]

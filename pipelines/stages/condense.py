@@ -1,0 +1,62 @@
+"""Long runs made shorter: consecutive dwells of one pose averaged, or every so many-th dwell kept."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pandas as pd
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+MOST = 1000
+"""Dwells of a unit whose full covariance is still handled: it grows with their square, the work with their cube."""
+
+_REFERENCE = ("force_x", "force_y", "force_z", "outer_deg", "inner_deg")
+_SUMS = ("n", "duration_s")
+
+
+def condense(dwells: pd.DataFrame, most: int = MOST) -> pd.DataFrame:
+    """Dwells of which no unit has more than about ``most``: neighbours in one pose averaged, else thinned out evenly.
+
+    What is averaged keeps its scatter ``sd_*`` and adds up its samples ``n``; texts are those of the first dwell.
+    """
+    numbers = np.unique(dwells["dwell"].to_numpy())
+    if len(numbers) <= most:
+        return dwells
+    size = int(np.ceil(len(numbers) / most))
+    group = _groups(dwells, numbers, size)
+    if group is None:
+        return dwells[dwells["dwell"].isin(numbers[::size])]
+    place = pd.Series(group, index=numbers)
+    numeric = [c for c in dwells.columns if pd.api.types.is_numeric_dtype(dwells[c]) and c != "dwell"]
+    how = {
+        c: "sum" if c in _SUMS else "mean" if c in numeric else "first"
+        for c in dwells.columns
+        if c not in ("unit", "dwell")
+    }
+    grouped = dwells.assign(dwell=dwells["dwell"].map(place)).groupby(["unit", "dwell"], as_index=False, sort=True)
+    joined = grouped.agg(how)
+    for axis in "xyz":
+        # single samples have no scatter of their own: that of the group takes its place
+        own = joined[f"sd_{axis}"] if f"sd_{axis}" in joined.columns else pd.Series(np.nan, index=joined.index)
+        joined[f"sd_{axis}"] = own.where(own > 0.0, grouped[f"out_{axis}"].std()[f"out_{axis}"])
+    if "n" not in joined.columns:
+        joined["n"] = grouped.size()["size"]
+    return joined.dropna(subset=["sd_x", "sd_y", "sd_z"])
+
+
+def _groups(dwells: pd.DataFrame, numbers: NDArray[np.int64], size: int) -> NDArray[np.int64] | None:
+    """Number of the group of each dwell; None where poses change too often, or are not known, to average neighbours."""
+    columns = [c for c in _REFERENCE if c in dwells.columns]
+    if not columns:
+        return None
+    first = dwells.drop_duplicates("dwell").sort_values("dwell")
+    pose = np.round(first[columns].to_numpy(dtype=float), 4)
+    moved = np.concatenate([[True], np.any(np.diff(pose, axis=0) != 0.0, axis=1)])
+    if np.count_nonzero(moved) > len(numbers) / (2 * size):
+        return None
+    start = np.maximum.accumulate(np.where(moved, np.arange(len(numbers)), 0))
+    new = moved | ((np.arange(len(numbers)) - start) % size == 0)
+    return np.cumsum(new).astype(np.int64) - 1
