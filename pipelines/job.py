@@ -89,6 +89,7 @@ class Request:
         lot = lot_of(recipe, self.units, seed=self.seed, repeat=self.repeat)
         job = Job(recipe, limits, lot, load_station(self.station))
         _refuse_more_units_than_slots(job)
+        _refuse_unknown_device(job)
         _refuse_beyond_station(job)
         _refuse_inconsistent(job)
         return job
@@ -134,6 +135,14 @@ def _refuse_more_units_than_slots(job: Job) -> None:
     if len(job.lot.units) > SLOTS:
         message = f"lot: {len(job.lot.units)} units, the fixture has {SLOTS} slots; measure them as several lots"
         raise WrongUse(message)
+
+
+def _refuse_unknown_device(job: Job) -> None:
+    """Refuse a kind of device that a simulated station has no figures of; on hardware the slots tell what they hold."""
+    if job.station.simulation is not None:
+        from stations.plant.preset import load_preset  # a station of hardware has no plant
+
+        load_preset(job.lot.device, job.station.simulation.preset_overrides)
 
 
 def _refuse_beyond_station(job: Job) -> None:

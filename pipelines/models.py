@@ -103,6 +103,9 @@ def chosen_effects(listed: str, model: Path | None, where: str) -> list[str] | N
     if model is not None:
         return list(read_model(model).model.effects)
     names = list(dict.fromkeys(part.strip() for part in listed.split(",") if part.strip()))
+    if listed and not names:
+        message = f"{where}: --effects '{listed}' names no effect; list some (bias,scale,misalignment), or leave it out"
+        raise WrongUse(message)
     refuse_unknown_effects(names, where)
     return names or None
 
@@ -182,7 +185,7 @@ def extended(text: str, step: Step, source: str) -> tuple[str, ModelFile]:
 
 def publish_model(path: Path, text: str) -> None:
     """Write a model file so that it is there whole or as it was before."""
-    files.publish(path, text.encode())
+    files.publish(path, text.encode(), "model", files.ELSEWHERE)
 
 
 def model_text(path: Path) -> str:

@@ -76,9 +76,11 @@ class StationRefused(StationError):
 
 def close_matches(found: str, known: Iterable[str]) -> tuple[str, ...]:
     """Up to three of the known names that look like the one found, best first."""
-    names = sorted(set(known))
-    exact_but_case = [name for name in names if name.lower() == found.lower()]
-    return tuple(dict.fromkeys([*exact_but_case, *get_close_matches(found, names, n=3, cutoff=0.55)]))
+    by_lower: dict[str, list[str]] = {}
+    for name in sorted(set(known)):
+        by_lower.setdefault(name.lower(), []).append(name)
+    near = get_close_matches(found.lower(), list(by_lower), n=3, cutoff=0.55)
+    return tuple(name for lower in near for name in by_lower[lower])[:3]
 
 
 def did_you_mean(found: str, known: Iterable[str]) -> str:

@@ -30,15 +30,25 @@ SCHEMA_MARK = b"tumbleline.schema"
 TEMPORARY = ".tmp-"
 
 
+IN_ARCHIVE = "give another with --archive DIR or TUMBLELINE_ARCHIVE"
+ELSEWHERE = "name another place"
+
+
 @contextmanager
-def writing(path: Path) -> Generator[None, None, None]:
-    """A block that writes under ``path``; what the system refuses becomes one message."""
+def writing(path: Path, what: str = "archive", remedy: str = IN_ARCHIVE) -> Generator[None, None, None]:
+    """A block that writes under ``path``; what the system refuses becomes one message.
+
+    Parameters
+    ----------
+    what : is written, as the message begins.
+    remedy : what the reader can do, as it ends.
+    """
     try:
         yield
     except OSError as problem:
         message = (
-            f"archive: {path} cannot be written ({problem.strerror}), a folder with write permission and free space is "
-            "needed; give another with --archive DIR or TUMBLELINE_ARCHIVE"
+            f"{what}: {path} cannot be written ({problem.strerror}), a folder with write permission and free space is "
+            f"needed; {remedy}"
         )
         raise ArchiveUnusable(message) from None
 
@@ -67,7 +77,10 @@ def read_table(path: Path, name: str, expected: str | None = None) -> pd.DataFra
     """
     remedy = "restore it from a copy, or remove the run's folder and run it again"
     if not path.is_file():
-        message = f"archive: {path} is not there, table '{name}' is needed; run the stage again"
+        message = (
+            f"archive: {path} is not there, table '{name}' is needed; if the run was stopped, give its command again "
+            "and it goes on"
+        )
         raise ArchiveUnusable(message)
     try:
         table = pq.read_table(path)
@@ -100,9 +113,14 @@ def json_bytes(content: dict[str, Any]) -> bytes:
     return (json.dumps(content, sort_keys=True, indent=1, ensure_ascii=False) + "\n").encode()
 
 
-def publish(path: Path, data: bytes) -> None:
-    """Write a file so that it is there whole or not at all, and stays there after a power cut."""
-    with writing(path.parent):
+def publish(path: Path, data: bytes, what: str = "archive", remedy: str = IN_ARCHIVE) -> None:
+    """Write a file so that it is there whole or not at all, and stays there after a power cut.
+
+    Parameters
+    ----------
+    what, remedy : beginning and end of the message where it cannot be written.
+    """
+    with writing(path.parent, what, remedy):
         path.parent.mkdir(parents=True, exist_ok=True)
         aside = path.parent / f"{TEMPORARY}{uuid.uuid4().hex}"
         try:

@@ -10,10 +10,12 @@ import typer
 from typer.core import TyperCommand, TyperGroup
 
 from inertial.errors import InertialError
-from schemas.errors import UNUSABLE, TumblelineError
+from schemas.errors import UNUSABLE, TumblelineError, WrongUse, did_you_mean
 
 if TYPE_CHECKING:
     from typer._click import Command, Context
+
+INTERRUPTED = 130  # as shells tell of Ctrl-C
 
 COMMANDS: dict[str, tuple[str, str]] = {
     "run": ("run", "Measure and calibrate a lot, from recipe to report: the main job."),
@@ -61,6 +63,13 @@ class _Commands(TyperGroup):
         del ctx
         return [*COMMANDS]  # the module cli.list hides the built-in of that name here once it is imported
 
+    def resolve_command(self, ctx: Context, args: list[str]) -> tuple[str | None, Command | None, list[str]]:
+        """The command that the arguments begin with; one that is not there is told with close matches."""
+        if args and args[0] not in COMMANDS and not args[0].startswith("-"):
+            message = f"no command is called '{args[0]}'; {did_you_mean(args[0], COMMANDS)}"
+            raise WrongUse(message)
+        return super().resolve_command(ctx, args)
+
     def get_command(self, ctx: Context, cmd_name: str) -> Command | None:
         """The command of this name."""
         del ctx
@@ -89,6 +98,10 @@ def main() -> None:
         _leave(str(problem), problem.exit_status)
     except InertialError as problem:
         _leave(str(problem), UNUSABLE)
+    except SystemExit as left:
+        if left.code == INTERRUPTED:
+            _leave("stopped; a run goes on where it was when its command is given again", INTERRUPTED)
+        raise
 
 
 def _leave(message: str, status: int) -> None:

@@ -38,13 +38,13 @@ def command(
 
     The same lot is measured twice; the second run is fresh data that no fit sees.
     """
-    from pipelines.archive.files import writing
+    from pipelines.archive.files import ELSEWHERE, writing
     from pipelines.demo.measure import measure
     from pipelines.demo.scenes import scene
 
     drawn = _seed() if seed is None else seed
     hidden = scene(effect, drawn)
-    with writing(folder):
+    with writing(folder, "demo", ELSEWHERE):
         folder.mkdir(parents=True, exist_ok=True)
         (folder / "model.toml").unlink(missing_ok=True)
     with _bar() as progress:

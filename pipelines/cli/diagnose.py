@@ -101,5 +101,5 @@ def write_report(path: Path, text: str) -> None:
     """Write a report so that it is there whole or not at all, and say where."""
     from pipelines.archive import files
 
-    files.publish(path, text.encode())
+    files.publish(path, text.encode(), "report", files.ELSEWHERE)
     error_console().print(f"report: {path}", markup=False, soft_wrap=True)

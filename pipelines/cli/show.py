@@ -48,8 +48,16 @@ def _show_run(run: Run, *, as_json: bool) -> None:
     if document["units"]:
         print_summary(document)
     else:
-        console().print(f"run {run.id} has no grades", markup=False)
+        console().print(_unfinished(run), markup=False, soft_wrap=True)
     console().print(f"tables  {', '.join(tables)}", markup=False)
+
+
+def _unfinished(run: Run) -> str:
+    """Why a run has no grades: it was imported, or it was stopped."""
+    if run.records is None:
+        return f"run {run.id} was imported: it has no grades"
+    done = len(run.records.finished())
+    return f"run {run.id} is not finished ({done} records are stored); give its 'tumbleline run' again and it goes on"
 
 
 def _show_table(run: Run, name: str, *, as_json: bool) -> None:

@@ -193,6 +193,30 @@ def _plausible(frame: pd.DataFrame, where: str) -> None:
         if values[row] < 0.0:
             message = f"{where}: row {row}, column {column}: found {values[row]}, 0 or more is needed; correct it"
             raise DataRejected(message)
+    _countable(frame, where)
+
+
+def _countable(frame: pd.DataFrame, where: str) -> None:
+    """Refuse means of no samples, outputs in a unit that nobody knows, and dwells that were all measured at one instant."""
+    if "n" in frame.columns:
+        values = np.asarray(frame["n"], dtype=np.float64)
+        row = int(np.argmax(values < 1.0))
+        if values[row] < 1.0:
+            message = f"{where}: row {row}, column n: found {values[row]:g}, a mean of 1 or more samples is needed; correct it"
+            raise DataRejected(message)
+    if "out_unit" in frame.columns:
+        for name in sorted({str(value) for value in frame["out_unit"].dropna()}):
+            if name not in tables.OUTPUT_UNITS:
+                known = ", ".join(tables.OUTPUT_UNITS)
+                message = f"{where}: column out_unit: found '{name}', one of {known} is needed; correct it"
+                raise DataRejected(message)
+    for unit, rows in frame.groupby("unit", sort=False):
+        if len(rows) > 1 and float(np.ptp(rows["time_s"])) == 0.0:
+            message = (
+                f"{where}: column time_s: all {len(rows)} dwells of unit {unit} at {rows['time_s'].iloc[0]:g} s, the time of "
+                "each is needed, in s; record it"
+            )
+            raise DataRejected(message)
 
 
 def _checked_history(frame: pd.DataFrame, where: str) -> pd.DataFrame:

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 from pipelines.archive import code_hash, stage_key
 from pipelines.report.page import render
+from schemas.errors import WrongUse
 
 if TYPE_CHECKING:
     from pipelines.archive import Run
@@ -18,9 +19,20 @@ MODULES = ("schemas.limits", "schemas.tables", "pipelines.report")
 
 def make_report(run: Run) -> bool:
     """Whether the run's report was there already, made from its tables as they are; it is now."""
+    _refuse_unfinished(run)
     inputs, code = {name: run.manifest(name)["sha256"] for name in INPUTS}, code_hash(MODULES)
     key = stage_key("report", inputs, {}, code)
     if run.has_report(key):
         return True
     run.save_report(key, render(run), {"inputs": inputs, "parameters": {}, "code": code})
     return False
+
+
+def _refuse_unfinished(run: Run) -> None:
+    """Refuse a report on a run without decisions."""
+    missing = [name for name in INPUTS if name not in run.tables()]
+    if missing:
+        message = f"report: run {run.id} has no {', '.join(missing)}; "
+        if run.records is None:
+            raise WrongUse(message + "it was imported, and a report needs a captured run")
+        raise WrongUse(message + "it is not finished: give its 'tumbleline run' again and it goes on")
