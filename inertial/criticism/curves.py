@@ -46,13 +46,17 @@ def fit_curve(model: Model, driver: str, candidate: Candidate) -> CurveFit:
 def _curve(space: Space, candidate: Candidate) -> tuple[Array, int]:
     """Rotated column (blocks, n, 1) of the common curve that takes off most, and the coefficients it spends."""
     whole = candidate.columns[:, :, 0, :]
-    free = space._project(whole / space.spread[..., None])  # noqa: SLF001  # the package's own projection
-    target = space.residual
+    white = whole / space.spread[..., None]
+    free = space.project(white)
+    even = _evened(np.einsum("bnp,bnr->pr", free, free), np.sqrt(np.einsum("bnp,bnp->p", white, white)))
+    whole, free = whole @ even, free @ even
     gram = np.swapaxes(free, -1, -2) @ free
-    right = np.einsum("bnp,bn->bp", free, target)
-    ridge = 1e-8 * np.trace(gram.sum(axis=0)) / gram.shape[-1] * np.eye(gram.shape[-1])
-    size = np.ones(len(right))
-    shape = _principal(gram, right, ridge)
+    right = np.einsum("bnp,bn->bp", free, space.residual)
+    ridge = 1e-9 * np.eye(gram.shape[-1])
+    own = np.linalg.solve(gram + 1e-6 * np.eye(gram.shape[-1]), right[..., None])[..., 0]
+    shape = np.linalg.svd(own, full_matrices=False)[2][0].astype(
+        np.float64
+    )  # the leading direction of the blocks' own curves
     for _ in range(_TURNS):
         inner = np.einsum("p,bpr,r->b", shape, gram, shape)
         size = np.where(inner > 1e-12, np.einsum("bp,p->b", right, shape) / np.where(inner > 1e-12, inner, 1.0), 0.0)
@@ -61,11 +65,9 @@ def _curve(space: Space, candidate: Candidate) -> tuple[Array, int]:
     return (whole @ shape)[..., None], len(right) + shape.size - 1
 
 
-def _principal(gram: Array, right: Array, ridge: Array) -> Array:
-    """A start: the leading direction of the blocks' own curves."""
-    own = np.linalg.solve(gram + ridge, right[..., None])[..., 0]
-    mean = gram.mean(axis=0) + ridge
-    root = np.linalg.cholesky(mean)
-    _, _, directions = np.linalg.svd(own @ root, full_matrices=False)
-    shape = np.linalg.solve(root.T, directions[0])
-    return shape / max(float(np.linalg.norm(shape)), 1e-300)
+def _evened(gram: Array, size: Array) -> Array:
+    """Transformation (p, r) to columns of equal size and no correlation over the lot, without what the model absorbs."""
+    scale = np.maximum(size, 1e-300)
+    values, vectors = np.linalg.eigh(gram / np.outer(scale, scale))
+    keep = values > 1e-6 * values[-1]
+    return (vectors[:, keep] / np.sqrt(values[keep])) / scale[:, None]

@@ -13,10 +13,23 @@ from inertial.criticism.drivers import Driver, Place, drivers_of, places
 from inertial.criticism.heldout import fit_rms, heldout_rms
 from inertial.criticism.model import Model, Term
 from inertial.criticism.problem import Lot, Problem
-from inertial.criticism.search import NAMED_BELOW, Field, Found, Rival, anything, log_p_value, search, terms_of
+from inertial.criticism.search import (
+    NAMED_BELOW,
+    Field,
+    Found,
+    Rival,
+    anything,
+    cost_of_model,
+    log_p_value,
+    search,
+    terms_of,
+)
 from inertial.criticism.unknown import Suspect, better_curve, suspects
 from inertial.effects.base import AnyEffect
 from inertial.effects.covariate import COVARIATE_PREFIX, Covariate
+
+DECISIVE = 0.2
+"""Share of what a curve brings by which it must beat the effects chosen so far to end the search for more."""
 
 UNEXPLAINED = 0.5
 """Share of the floor below which a smooth dependence is left alone."""
@@ -111,9 +124,14 @@ def diagnose(lot: Lot, effects: Sequence[str], rng: Generator) -> Diagnosis:
 
 
 def _imitates(field: Field, base: Model, chosen: Sequence[Term], suspected: list[Suspect]) -> bool:
-    """Whether a curve of one driver does better than the effects chosen so far, and leaves nothing else to be found."""
+    """Whether a curve of one driver does better than the effects chosen so far: by far, or leaving nothing else to be found."""
     instead = better_curve(base, chosen, suspected)
-    return instead is not None and not anything(field, instead[0].model)
+    if instead is None:
+        return False
+    fit = instead[0]
+    effects = cost_of_model(Model(base.problem, [*base.terms, *chosen], near=fit.model.share))
+    by_far = effects - fit.cost > DECISIVE * (cost_of_model(base) - fit.cost)
+    return by_far or not anything(field, fit.model)
 
 
 def _unseen(field: Field, base: Model, candidates: Sequence[AnyEffect]) -> tuple[str, ...]:

@@ -61,7 +61,7 @@ class Space:
         self.spread = basis.spread(share)
         self.q = _orthonormal(local / self.spread[..., None])
         targets = np.concatenate([y[..., None], shared], axis=-1) / self.spread[..., None]
-        self.targets = self._project(targets)
+        self.targets = self.project(targets)
         self.gram = np.einsum("bnt,bns->ts", self.targets, self.targets)
         self.local_rank = self.q[1]
         self.shared_rank = int(np.linalg.matrix_rank(self.gram[1:, 1:], tol=None)) if shared.shape[-1] else 0
@@ -94,7 +94,7 @@ class Space:
         logdet = float(np.sum(np.log(self.spread**2))) * (self.targets.shape[0] / self.spread.shape[0])
         return self.dof * np.log(self.rss / max(self.dof, 1)) + logdet + float(np.sum(information))
 
-    def _project(self, columns: Array) -> Array:
+    def project(self, columns: Array) -> Array:
         """Columns (blocks, n, m) less what the local columns explain."""
         q = self.q[0]
         return columns - q @ (np.swapaxes(q, -1, -2) @ columns)
@@ -104,7 +104,7 @@ class Space:
         blocks, n, grid, p = candidate.columns.shape
         flat = (candidate.columns / self.spread[..., None, None]).reshape(blocks, n, grid * p)
         size = np.sqrt(np.einsum("bnm,bnm->bm", flat, flat))
-        left = self._project(flat)
+        left = self.project(flat)
         if candidate.shared:
             return self._gain_shared(left.reshape(blocks, n, grid, p), size.reshape(blocks, grid, p))
         safe = np.where(size > 0.0, size, 1.0)
@@ -161,7 +161,7 @@ def left_over(basis: Basis, space: Space, candidate: Candidate) -> Array:
     blocks, n, grid, p = candidate.columns.shape
     flat = (candidate.columns / space.spread[..., None, None]).reshape(blocks, n, grid * p)
     before = np.einsum("bnm,bnm->m", flat, flat)
-    after = space._project(flat)  # noqa: SLF001  # the same module's projection
+    after = space.project(flat)
     v = np.sqrt(np.einsum("bnm,bnm->m", after, after) / np.where(before > 0.0, before, 1.0))
     return v.reshape(grid, p).max(axis=1)
 

@@ -56,10 +56,13 @@ def suspects(problem: Problem) -> list[Suspect]:
     state = problem.lot.state
     found: list[Suspect] = []
     for name, values, _ in quantities(state):
-        if varies(values):
+        if varies(values) and not (name == "chamber_C" and _alike_to(values, state.temperature)):
             knots = _TIME_KNOTS if name in {"time_s", "since_power_s"} else _KNOTS
             each = _unit_range(values if problem.lot.radial else np.repeat(values, 3, axis=0))
-            found.append(Suspect(name, _alike(problem, _flexible(values, knots)), each))
+            found.append(Suspect(name, _alike(problem, curve(values, knots)), each))
+            steps = _levels(values)
+            if steps is not None:
+                found.append(Suspect(name, _alike(problem, steps)))
     if not problem.lot.radial:
         own = np.stack([state.along(axis) for axis in range(3)], axis=1).reshape(problem.blocks, problem.n)
         found.append(Suspect("pose", _rotated(problem, curve(own, _KNOTS)), _unit_range(own)))
@@ -121,7 +124,7 @@ def _function_of(base: Model, term: Term, suspect: Suspect) -> bool:
     before = base.at(0.0)
     whole = np.concatenate([base.local, suspect.candidate.columns[:, :, 0, :]], axis=-1)
     after = type(before)(base.problem.basis, 0.0, base.problem.y, whole, base.shared)
-    left = [float(np.sum(s._project(columns / s.spread[..., None]) ** 2)) for s in (before, after)]  # noqa: SLF001
+    left = [float(np.sum(s.project(columns / s.spread[..., None]) ** 2)) for s in (before, after)]
     return left[1] < 0.1 * left[0]
 
 
@@ -138,8 +141,26 @@ def _sharp(model: Model, suspect: Suspect) -> CurveFit | None:
     if not gain.rank[best]:
         return None
     column = rotated[..., best : best + 1]
+    if best < len(_WIDTHS) * len(_CENTRES):
+        column = _narrowed(model, z, _CENTRES[best % len(_CENTRES)], _WIDTHS[best // len(_CENTRES)])
     fitted = model.with_curves(column)
     return CurveFit(suspect.driver, fitted, int(gain.rank[best]) + 2, cost_of_model(fitted) + 2.0 * PER_COEFFICIENT)
+
+
+def _narrowed(model: Model, z: Array, centre: float, width: float) -> Array:
+    """Column of a bump whose place and width are found between those of the grid."""
+    space = model.space
+    column = np.zeros(0)
+    for reach in (0.5, 0.2):
+        pairs = [
+            (centre + reach * dc * 0.05, width * (1.0 + reach) ** dw)
+            for dc in (-1, -0.5, 0, 0.5, 1)
+            for dw in (-1, 0, 1)
+        ]
+        rotated = model.problem.basis.rotate(np.stack([np.exp(-0.5 * ((z - c) / w) ** 2) for c, w in pairs], axis=-1))
+        best = int(np.argmax(space.gain(Candidate(rotated[..., None], shared=False)).drop))
+        (centre, width), column = pairs[best], rotated[..., best : best + 1]
+    return column
 
 
 def _unit_range(values: Array) -> Array:
@@ -147,14 +168,19 @@ def _unit_range(values: Array) -> Array:
     return (values - values.min()) / max(float(np.ptp(values)), 1e-12)
 
 
-def _flexible(values: Array, knots: int) -> Array:
-    """A level for each group of values where they come in a few groups (soaks), else a spline: (units, n, d)."""
+def _alike_to(values: Array, other: Array | None) -> bool:
+    """Whether one quantity is as good as another: the chamber's temperature is the sensor's once it has soaked."""
+    return other is not None and float(np.corrcoef(values.ravel(), other.ravel())[0, 1]) > 0.98
+
+
+def _levels(values: Array) -> Array | None:
+    """A step between neighbouring groups of values where they come in a few groups (soaks), (units, n, d); else None."""
     order = np.sort(values, axis=None)
     gaps = np.diff(order)
     edges = order[:-1][gaps > 0.03 * np.ptp(order)] + 0.5 * gaps[gaps > 0.03 * np.ptp(order)]
-    if 2 <= edges.size < _LEVELS:
-        return np.stack([(values > e).astype(float) for e in edges], axis=-1)
-    return curve(values, knots)
+    if not 2 <= edges.size < _LEVELS:
+        return None
+    return np.stack([(values > e).astype(float) for e in edges], axis=-1)
 
 
 def _alike(problem: Problem, columns: Array) -> Candidate:

@@ -6,29 +6,34 @@ from inertial import operators
 from inertial.effects.base import Array, Nonlinear, SensorEffect, stack
 from inertial.state import State
 
+_NARROW = 0.35
+"""Half width of the second play over that of the first: together they follow a spread of widths (Preisach) closely."""
+
 
 class ThermalHysteresis(SensorEffect):
-    """Bias that remembers from which side a temperature was reached."""
+    """Bias that remembers from which side a temperature was reached: one play, or two of different width."""
 
     id: ClassVar[str] = "thermal_hysteresis"
     symbol: ClassVar[str] = "kH"
-    equation: ClassVar[str] = "kH·h(T), h the play operator of half width w"
+    equation: ClassVar[str] = "kH·h(T; w) + kH2·h(T; 0.35·w), h the play operator of half width w"
     source: ClassVar[str] = "Visintin, Differential Models of Hysteresis; mechanism: friction in the die attach"
     typical_ug: ClassVar[tuple[float, float]] = (100.0, 10000.0)
     hides_behind: ClassVar[tuple[str, ...]] = ("aging_linear", "bias_temperature_quadratic")
     breaker: ClassVar[str] = "a closed loop of temperature, and minor loops; a one-way soak holds no information"
     simplicity: ClassVar[int] = 24
+    primary: ClassVar[int | None] = 1
     nonlinear: ClassVar[tuple[Nonlinear, ...]] = (Nonlinear("half_width", "K", 1.0, 60.0, "log", 10),)
 
     def columns(self, state: State, axis: int, *, half_width: float, **nonlinear: float) -> Array:
         del axis, nonlinear
+        return stack(state, [self._inside(state, half_width), self._inside(state, _NARROW * half_width)])
 
+    def _inside(self, state: State, half_width: float) -> Array:
         def hysteresis(time: Array, temperature: Array) -> Array:
             del time
             return operators.play(temperature, half_width)
 
-        inside = state.temperature_operator((self.id, half_width), hysteresis)
-        return stack(state, [inside])
+        return state.temperature_operator((self.id, half_width), hysteresis)
 
     def start_columns(self, state: State, axis: int, *, half_width: float, **nonlinear: float) -> Array:
         del axis, nonlinear
@@ -41,4 +46,4 @@ class ThermalHysteresis(SensorEffect):
 
     def names(self, axis: int) -> tuple[str, ...]:
         del axis
-        return ("kH",)
+        return "kH", "kH2"
