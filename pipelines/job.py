@@ -132,8 +132,15 @@ def _refuse_inconsistent(job: Job) -> None:
 
 
 def _refuse_more_units_than_slots(job: Job) -> None:
-    if len(job.lot.units) > SLOTS:
-        message = f"lot: {len(job.lot.units)} units, the fixture has {SLOTS} slots; measure them as several lots"
+    """Refuse a lot that does not fit the fixture: between two fillings somebody must seat units, so each is a lot of its own."""
+    serials = [unit.serial for unit in job.lot.units]
+    if len(serials) > SLOTS:
+        fillings = [serials[start : start + SLOTS] for start in range(0, len(serials), SLOTS)]
+        commands = ", then ".join(f"--units {','.join(own)}" for own in fillings)
+        message = (
+            f"lot: {len(serials)} units, the fixture has {SLOTS} slots; measure {len(fillings)} lots, one after the other: "
+            f"{commands}"
+        )
         raise WrongUse(message)
 
 

@@ -115,9 +115,10 @@ class Decision:
         """The decision for people: figure, value, uncertainty, limit and margin."""
         unit = "" if self.unit == "1" else f" {self.unit}"
         spread = f" ± {self.uncertainty:.2g}" if self.uncertainty > 0.0 else ""
+        within = ", less than U: measure longer, or again" if self.outcome.startswith("conditional") else ""
         return (
             f"{self.figure} {self.outcome}: {self.value:.4g}{spread}{unit}, "
-            f"limit {self.limit:.4g}{unit}, margin {self.margin:.3g}{unit}"
+            f"limit {self.limit:.4g}{unit}, margin {self.margin:.3g}{unit}{within}"
         )
 
 

@@ -22,7 +22,8 @@ SHOWN = (
 )
 
 LEGEND = (
-    "fit: rms residual · verify: largest | |a| − g | on poses not used · error: rms of the worst axis on those poses\n"
+    "fit: rms residual · verify: largest | |a| − g | of a pose not used, mean of its dwells · error: rms of the worst axis "
+    "there\n"
     "N, B: noise of the worst axis, an upper limit where a term is not identified"
 )
 

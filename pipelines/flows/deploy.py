@@ -1,6 +1,7 @@
 """Registers the deployments of a ``prefect.yaml``: what ``prefect deploy --all`` does, without asking who listens.
 
-Prefect 3.8's own command ends in an error on the FastAPI that it needs here: it sends null for an optional number.
+Prefect 3.8's own command ends in an error 422 from FastAPI 0.151 on: after each deployment it asks for the pool's workers with
+null for two numbers, and since then FastAPI takes null for a value and no longer for one that is missing.
 """
 
 from __future__ import annotations

@@ -38,6 +38,8 @@ def test_decides_by_the_agreed_rule(value: float, guarded: str, simple: str) -> 
 def test_names_value_uncertainty_limit_margin_and_rule() -> None:
     decision = decide(limits(), "bias_error_ug", 130.0, 5.0)
     assert decision.sentence == "bias_error_ug fail: 130 ± 10 µg, limit 100 µg, margin -30 µg"
+    undecided = decide(limits(), "bias_error_ug", 95.0, 5.0)
+    assert undecided.sentence.endswith("margin 5 µg, less than U: measure longer, or again")
     assert decision.rule == "ILAC-G8:09/2019 guarded acceptance, w = U with k = 2"
 
 

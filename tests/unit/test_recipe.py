@@ -142,8 +142,9 @@ def test_refuses_an_empty_serial(tmp_path: Path) -> None:
 
 
 def test_refuses_more_units_than_slots(tmp_path: Path) -> None:
-    with pytest.raises(WrongUse, match="9 units, the fixture has 8 slots"):
+    with pytest.raises(WrongUse, match=r"9 units, the fixture has 8 slots; measure 2 lots") as refused:
         small_job(tmp_path, units=tuple(f"S{n}" for n in range(9)))
+    assert str(refused.value).endswith("--units S0,S1,S2,S3,S4,S5,S6,S7, then --units S8")
 
 
 def test_says_where_toml_breaks(tmp_path: Path) -> None:
