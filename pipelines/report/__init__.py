@@ -13,7 +13,10 @@ if TYPE_CHECKING:
 
 __all__ = ["INPUTS", "make_report", "render"]
 
-INPUTS = ("verdicts", "dwells", "coefficients", "residuals", "verification", "allan", "noise", "figures", "grades")
+INPUTS = (
+    *("verdicts", "dwells", "coefficients", "residuals", "verification", "verification_poses"),
+    *("allan", "noise", "figures", "grades"),
+)
 MODULES = ("schemas.limits", "schemas.tables", "pipelines.report")
 
 

@@ -36,10 +36,10 @@ TITLES = {
 def render(run: Run) -> str:
     """The report of a run as one HTML text that needs no other file."""
     tables = {name: run.table(name) for name in ("verdicts", "dwells", "coefficients", "residuals", "verification")}
-    tables |= {name: run.table(name) for name in ("allan", "noise", "figures", "grades")}
+    tables |= {name: run.table(name) for name in ("verification_poses", "allan", "noise", "figures", "grades")}
     grades = tables["grades"].sort_values("slot")
     limit = _limit(run, "verification_norm_ug")
-    units = [_unit(row, tables, limit) for row in rows_of(grades)]
+    units = [_unit(row, tables) for row in rows_of(grades)]
     calibrated = [unit["unit"] for unit in units if unit["outcome"] != "refused"]
     return template("page.html").render(
         run=run.id,
@@ -48,16 +48,23 @@ def render(run: Run) -> str:
         rule=str(grades["rule"].iloc[0]),
         units=units,
         passed=sum(unit["outcome"] == "pass" for unit in units),
-        lot_svg=lot_plot(tables["verification"], calibrated, limit) if len(tables["verification"]) else "",
+        lot_svg=_lot_svg(tables, calibrated, limit),
+        verification_poses=len({pose["name"] for pose in run.about["recipe"]["verification"]}),
         provenance=_provenance(run),
     )
+
+
+def _lot_svg(tables: dict[str, pd.DataFrame], units: list[str], limit: float) -> str:
+    if not len(tables["verification"]):
+        return ""
+    return lot_plot(tables["verification"], tables["verification_poses"], units, limit)
 
 
 def _limit(run: Run, figure: str) -> float:
     return float(run.about["limits"]["figures"].get(figure, {}).get("max", np.nan))
 
 
-def _unit(row: dict[str, Any], tables: dict[str, pd.DataFrame], limit: float) -> dict[str, Any]:
+def _unit(row: dict[str, Any], tables: dict[str, pd.DataFrame]) -> dict[str, Any]:
     """What the page says of one unit; a refused one has its reasons and nothing else."""
     unit = str(row["unit"])
     own = {name: table[table["unit"] == unit] for name, table in tables.items()}
@@ -73,7 +80,7 @@ def _unit(row: dict[str, Any], tables: dict[str, pd.DataFrame], limit: float) ->
         "noise": _noise(own["noise"]),
         "plots": [
             model_plots(fitted, own["residuals"]),
-            check_plots(own["residuals"], own["verification"], own["allan"], limit),
+            check_plots(own["residuals"], own["verification"], own["allan"]),
         ],
     }
 

@@ -58,7 +58,7 @@ def model_plots(dwells: pd.DataFrame, residuals: pd.DataFrame) -> str:
         return svg(figure)
 
 
-def check_plots(residuals: pd.DataFrame, verification: pd.DataFrame, allan: pd.DataFrame, limit_ug: float) -> str:
+def check_plots(residuals: pd.DataFrame, verification: pd.DataFrame, allan: pd.DataFrame) -> str:
     """Residuals by pose, the error on poses not used, and the Allan deviation."""
     shown = 1 + (len(verification) > 0) + (len(allan) > 0)
     with mpl.rc_context(STYLE):
@@ -69,24 +69,27 @@ def check_plots(residuals: pd.DataFrame, verification: pd.DataFrame, allan: pd.D
         figure.subplots_adjust(left=edge, right=1.0 - 0.01, bottom=0.14, top=0.91, wspace=0.3)
         _by_pose(places.pop(0), residuals)
         if len(verification):
-            _verification(places.pop(0), verification, limit_ug)
+            _verification(places.pop(0), verification)
         if len(allan):
             _allan(places.pop(0), allan)
         return svg(figure)
 
 
-def lot_plot(verification: pd.DataFrame, units: list[str], limit_ug: float) -> str:
-    """Error on the poses not used, unit by unit, against the limit."""
+def lot_plot(verification: pd.DataFrame, poses: pd.DataFrame, units: list[str], limit_ug: float) -> str:
+    """Error on the poses not used, unit by unit: single dwells in grey, the means of the poses against the limit."""
     with mpl.rc_context(STYLE):
         figure = Figure(figsize=(WIDTH_IN, 2.9))
         place = figure.subplots()
         _few_ticks(place)
         figure.subplots_adjust(left=0.075, right=0.995, bottom=0.11, top=0.97)
         for position, unit in enumerate(units):
-            errors = verification.loc[verification["unit"] == unit, "error_ug"].to_numpy()
-            spread = np.linspace(-0.22, 0.22, errors.size) if errors.size > 1 else np.zeros(errors.size)
-            colour = np.where(np.abs(errors) > limit_ug, "#c62828", "#1565c0")
-            place.scatter(position + spread, errors, s=22, c=colour, alpha=0.8, linewidths=0)
+            names = poses.loc[poses["unit"] == unit, "pose"].tolist()
+            spread = dict(zip(names, np.linspace(-0.25, 0.25, len(names)) if len(names) > 1 else [0.0], strict=True))
+            single = verification[verification["unit"] == unit]
+            place.scatter(position + single["pose"].map(spread), single["error_ug"], s=9, c="#b4b4b4", linewidths=0)
+            means = poses.loc[poses["unit"] == unit, "error_ug"].to_numpy()
+            colour = np.where(np.abs(means) > limit_ug, "#c62828", "#1565c0")
+            place.scatter(position + np.array([*spread.values()]), means, s=30, c=colour, linewidths=0)
         _limit_lines(place, limit_ug)
         place.set_xticks(range(len(units)), units)
         place.set(ylabel="|a| − g / µg", xlim=(-0.6, len(units) - 0.4))
@@ -140,12 +143,12 @@ def _by_pose(place: Axes, residuals: pd.DataFrame) -> None:
     place.set_ylim(low, high + 0.18 * (high - low))
 
 
-def _verification(place: Axes, rows: pd.DataFrame, limit_ug: float) -> None:
+def _verification(place: Axes, rows: pd.DataFrame) -> None:
+    """Single dwells against what noise and wander let expect; limits are for the means of their poses."""
     numbers = np.arange(len(rows)) + 1
     expanded = 2.0 * rows["uncertainty_ug"].to_numpy()
     place.fill_between(numbers, -expanded, expanded, color="#d9d9d9", linewidth=0, label="expected, k = 2")
     place.scatter(numbers, rows["error_ug"], s=22, c="#1565c0", linewidths=0, label="|a| − g")
-    _limit_lines(place, limit_ug)
     place.set(title="poses not used by the fit", xlabel="verification dwell", ylabel="|a| − g / µg")
     place.legend(loc="upper right", ncols=2, frameon=False, handletextpad=0.4, columnspacing=0.8)
     low, high = place.get_ylim()

@@ -2,6 +2,7 @@
 
 import re
 
+import pandas as pd
 import pytest
 from capture_double import small_run
 from hypothesis import given
@@ -10,6 +11,7 @@ from hypothesis import strategies as st
 from pipelines.archive import Run
 from pipelines.report import make_report, render
 from pipelines.report.numbers import plain, with_uncertainty
+from pipelines.report.plots import lot_plot
 
 
 @pytest.fixture(scope="module")
@@ -47,6 +49,17 @@ def test_has_no_number_longer_than_its_uncertainty_supports(page: str) -> None:
         max(len(re.findall(r"\d", re.sub(r"<[^>]*>", " ", cell).split("±")[0])) for cell in cells if "…" not in cell)
         <= 10
     )
+
+
+@pytest.mark.parametrize(("mean", "red"), [(300.0, False), (1300.0, True)])
+def test_the_limit_is_for_the_mean_of_a_pose_not_for_a_dwell_that_wandered(mean: float, *, red: bool) -> None:
+    dwells = pd.DataFrame(
+        {"unit": "A1", "pose": ["v01", "v01", "v02"], "error_ug": [1400.0, 2.0 * mean - 1400.0, 10.0]}
+    )
+    poses = pd.DataFrame({"unit": "A1", "pose": ["v01", "v02"], "error_ug": [mean, 10.0]})
+    drawn = lot_plot(dwells, poses, ["A1"], 1000.0)
+    assert ("fill: #c62828" in drawn) is red
+    assert "fill: #b4b4b4" in drawn
 
 
 def test_is_made_once(run: Run) -> None:
