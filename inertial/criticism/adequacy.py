@@ -1,5 +1,7 @@
 """Is the model good enough for the noise that is there: the largest of many tests, against its own distribution."""
 
+from collections.abc import Iterable, Iterator
+
 import numpy as np
 from numpy.random import Generator
 from numpy.typing import NDArray
@@ -12,6 +14,10 @@ from inertial.criticism.space import SEEN, Candidate, Space
 Array = NDArray[np.float64]
 
 _DRAWS = 400
+_FEWEST = 60
+_NUMBERS = 10_000_000
+"""Random numbers drawn at the most: large lots get fewer draws."""
+
 _CLEAR = np.log(1e-4)
 
 
@@ -21,10 +27,8 @@ def adequacy(field: Field, drivers: list[Driver], space: Space, rng: Generator) 
     The look that fails most is compared with the most failing look of noise drawn from the fitted covariance; a failure far
     beyond what draws can show is charged with the number of looks instead.
     """
-    candidates = [field.problem.candidate(e, field.grids[e.id]) for e in field.effects]
-    candidates += [d.candidate for d in drivers]
     worst, looks = 0.0, 0
-    for candidate in candidates:
+    for candidate in _everything(field, drivers):
         gain = space.gain(candidate)
         looks += gain.drop.size
         tested = [log_p_value(space, float(d), int(r)) for d, r in zip(gain.drop, gain.rank, strict=True)]
@@ -32,18 +36,24 @@ def adequacy(field: Field, drivers: list[Driver], space: Space, rng: Generator) 
     charged = worst + np.log(max(looks, 1))
     if charged < _CLEAR:
         return float(charged)
-    drawn = _worst_of_noise(candidates, space, rng)
+    drawn = _worst_of_noise(_everything(field, drivers), space, rng)
     beyond = float(np.mean(drawn <= worst))
-    return float(np.log(max(beyond, 0.5 / _DRAWS)))
+    return float(np.log(max(beyond, 0.5 / drawn.size)))
 
 
-def _worst_of_noise(candidates: list[Candidate], space: Space, rng: Generator) -> Array:
+def _everything(field: Field, drivers: list[Driver]) -> Iterator[Candidate]:
+    yield from field.pieces()
+    yield from (d.candidate for d in drivers)
+
+
+def _worst_of_noise(candidates: Iterable[Candidate], space: Space, rng: Generator) -> Array:
     """Smallest log p over all looks for each draw of noise, (draws,)."""
     blocks, n = space.targets.shape[:2]
-    noise = rng.standard_normal((blocks, n, _DRAWS))
+    draws = int(np.clip(_NUMBERS // (blocks * n), _FEWEST, _DRAWS))
+    noise = rng.standard_normal((blocks, n, draws))
     noise = noise - space.q[0] @ (np.swapaxes(space.q[0], -1, -2) @ noise)
     total = np.einsum("bnd,bnd->d", noise, noise)
-    worst = np.zeros(_DRAWS)
+    worst = np.zeros(draws)
     for candidate in candidates:
         for drop, rank in _drops(candidate, space, noise):
             after = space.dof - rank

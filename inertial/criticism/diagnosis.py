@@ -1,7 +1,8 @@
 """The diagnosis of a lot: adequacy, where the model fails, classes of missing effects, what is left unexplained."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.random import Generator
@@ -27,6 +28,9 @@ from inertial.criticism.search import (
 from inertial.criticism.unknown import Suspect, better_curve, suspects
 from inertial.effects.base import AnyEffect
 from inertial.effects.covariate import COVARIATE_PREFIX, Covariate
+
+_MANY = 32
+_ENOUGH = 24
 
 DECISIVE = 0.2
 """Share of what a curve brings by which it must beat the effects chosen so far to end the search for more."""
@@ -96,10 +100,12 @@ def diagnose(lot: Lot, effects: Sequence[str], rng: Generator) -> Diagnosis:
     drivers = drivers_of(problem)
     unseen = _unseen(field, base, candidates)
     log_p = adequacy(field, drivers, base.space, rng)
-    suspected = suspects(problem)
-    found = search(field, base, stop=lambda chosen: _imitates(field, base, chosen, suspected))
+    part = _part(field, base)
+    found = search(part.field, part.base, stop=part.imitates)
+    if part.field is not field:
+        found = replace(search(field, base, stop=part.imitates, start=found.added), ladder=found.ladder)
     adequate = log_p >= np.log(ADEQUATE_ABOVE) and not found.added
-    final, unexplained = (found.model, None) if adequate else _beyond(base, found, drivers, suspected)
+    final, unexplained = (found.model, None) if adequate else _beyond(part, base, found, drivers)
     classes = _classes(field, base, final)
     named = _named(problem, base, classes)
     if unexplained is None:
@@ -123,15 +129,37 @@ def diagnose(lot: Lot, effects: Sequence[str], rng: Generator) -> Diagnosis:
     )
 
 
-def _imitates(field: Field, base: Model, chosen: Sequence[Term], suspected: list[Suspect]) -> bool:
-    """Whether a curve of one driver does better than the effects chosen so far: by far, or leaving nothing else to be found."""
-    instead = better_curve(base, chosen, suspected)
-    if instead is None:
-        return False
-    fit = instead[0]
-    effects = cost_of_model(Model(base.problem, [*base.terms, *chosen], near=fit.model.share))
-    by_far = effects - fit.cost > DECISIVE * (cost_of_model(base) - fit.cost)
-    return by_far or not anything(field, fit.model)
+@dataclass(frozen=True)
+class _Part:
+    """As much of a lot as the search for effects needs: what all units of a large lot share shows in two dozen of them."""
+
+    field: Field
+    base: Model
+
+    @cached_property
+    def suspected(self) -> list[Suspect]:
+        """Curves of every driver."""
+        return suspects(self.field.problem)
+
+    def imitates(self, chosen: Sequence[Term]) -> bool:
+        """Whether a curve of one driver does better than the effects chosen: by far, or leaving nothing else to find."""
+        instead = better_curve(self.base, chosen, self.suspected)
+        if instead is None:
+            return False
+        fit = instead[0]
+        problem = self.field.problem
+        effects = cost_of_model(Model(problem, [*self.base.terms, *chosen], near=fit.model.share))
+        by_far = effects - fit.cost > DECISIVE * (cost_of_model(self.base) - fit.cost)
+        return by_far or not anything(self.field, fit.model)
+
+
+def _part(field: Field, base: Model) -> _Part:
+    lot = field.problem.lot
+    if lot.state.time.shape[0] <= _MANY:
+        return _Part(field, base)
+    pick = np.linspace(0, lot.state.time.shape[0] - 1, _ENOUGH).round().astype(int)
+    problem = Problem(lot.units(pick.tolist()))
+    return _Part(Field(problem, field.effects), Model(problem, base.terms))
 
 
 def _unseen(field: Field, base: Model, candidates: Sequence[AnyEffect]) -> tuple[str, ...]:
@@ -176,16 +204,14 @@ def _covariate(classes: Sequence[EffectClass]) -> Unexplained | None:
     return None
 
 
-def _beyond(
-    base: Model, found: Found, drivers: list[Driver], suspected: list[Suspect]
-) -> tuple[Model, Unexplained | None]:
+def _beyond(part: "_Part", base: Model, found: Found, drivers: list[Driver]) -> tuple[Model, Unexplained | None]:
     """The effects that stand, and the driver that is left: effects that only imitate a curve of one driver are taken back."""
-    instead = better_curve(base, found.added, suspected) if found.added else None
+    instead = better_curve(part.base, found.added, part.suspected) if found.added else None
     if instead is not None:
         fit, kept = instead
-        space = fit.model.space
-        drop = max(base.at(fit.model.share).rss - space.rss, 0.0)
-        log_p = log_p_value(base.at(fit.model.share), drop, fit.rank) + float(np.log(len(suspected)))
+        before = part.base.at(fit.model.share)
+        drop = max(before.rss - fit.model.space.rss, 0.0)
+        log_p = log_p_value(before, drop, fit.rank) + float(np.log(len(part.suspected)))
         return Model(base.problem, [*base.terms, *kept]), Unexplained(fit.driver, "curve", log_p)
     final = found.model
     convincing = [d for d in drivers if _convincing(final, d, len(drivers))]

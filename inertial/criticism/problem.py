@@ -1,6 +1,6 @@
 """A lot's dwells as series in g: one block per unit and axis, or one per unit where only the norm of gravity is known."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import product
@@ -16,7 +16,13 @@ from inertial.state import State
 
 Array = NDArray[np.float64]
 
-_CACHE = 30_000_000
+_PIECE = 4_000_000
+"""Numbers of rotated columns worked on at a time."""
+
+_WIDEST = 3
+"""Columns an axis that an effect usually has at the most."""
+
+_CACHE = 15_000_000
 """Numbers of rotated columns kept between passes; beyond, they are made again: memory stays bounded for large lots."""
 
 
@@ -159,7 +165,7 @@ class Problem:
         key = (effect.id, len(grid), tuple(grid[0].items()), tuple(grid[-1].items()))
         kept = self._kept.get(key)
         if kept is None:
-            stacked = np.stack([self.rotated(effect, values) for values in grid], axis=2)
+            stacked = np.stack([self.basis.rotate(self.columns(effect, values)) for values in grid], axis=2)
             kept = Candidate(stacked, shared=effect.scope == "station")
             if stacked.size < self._room:
                 self._room -= stacked.size
@@ -167,6 +173,13 @@ class Problem:
         if first is None:
             return kept
         return Candidate(kept.columns[..., :first], kept.shared)
+
+    def pieces(self, effect: AnyEffect, grid: Sequence[Values], *, first: int | None = None) -> Iterator[Candidate]:
+        """The candidate of an effect in pieces of its grid, so small that large lots are worked on in bounded memory."""
+        width = 1 + self.blocks * self.n * _WIDEST
+        size = max(1, _PIECE // width)
+        for start in range(0, len(grid), size):
+            yield self.candidate(effect, grid[start : start + size], first=first)
 
 
 def grid_of(effect: AnyEffect, state: State) -> list[dict[str, float]]:

@@ -1,6 +1,6 @@
 """The search for missing effects: forward with the noise estimated anew, and back again over what was chosen."""
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -62,7 +62,7 @@ class Field:
         for effect in effects:
             try:
                 grid = grid_of(effect, problem.lot.state)
-                problem.candidate(effect, grid)
+                problem.columns(effect, grid[0])
             except MissingInput as reason:
                 self.lacking[effect.id] = reason.quantity
                 continue
@@ -79,8 +79,17 @@ class Field:
         found: dict[str, Gain] = {}
         for effect in self.effects:
             if effect.id not in leave:
-                found[effect.id] = space.gain(self.problem.candidate(effect, self.grids[effect.id]))
+                found[effect.id] = self._gain(space, effect, None)
         return found
+
+    def _gain(self, space: Space, effect: AnyEffect, first: int | None) -> Gain:
+        pieces = self.problem.pieces(effect, self.grids[effect.id], first=first)
+        return Gain.joined([space.gain(piece) for piece in pieces])
+
+    def pieces(self) -> Iterator[Candidate]:
+        """Every candidate at every value of its nonlinear parameters, in pieces."""
+        for effect in self.effects:
+            yield from self.problem.pieces(effect, self.grids[effect.id])
 
     def primary_gains(self, space: Space, leave: set[str]) -> dict[str, Gain]:
         """Gain of the leading column alone, for effects of several columns whose first is an effect of its own."""
@@ -88,7 +97,7 @@ class Field:
         for effect in self.effects:
             first = effect.primary
             if effect.id not in leave and first is not None:
-                found[effect.id] = space.gain(self.problem.candidate(effect, self.grids[effect.id], first=first))
+                found[effect.id] = self._gain(space, effect, first)
         return found
 
 
@@ -106,15 +115,17 @@ def log_p_value(space: Space, drop: float, rank: int) -> float:
     return float(stats.f.logsf((drop / rank) / (left / after), rank, after))
 
 
-def search(field: Field, base: Model, stop: Callable[[Sequence[Term]], bool]) -> Found:
+def search(field: Field, base: Model, stop: Callable[[Sequence[Term]], bool], start: Sequence[Term] = ()) -> Found:
     """The effects that the measurements call for beyond a base model.
 
     Parameters
     ----------
     stop : asked before a third and every further effect: whether those chosen only imitate something else
+    start : effects that a part of the lot called for already
     """
-    model, chosen, ladder = base, [], ()
-    for _ in range(_MOST):
+    chosen: list[Term] = list(start)
+    model, ladder = Model(field.problem, [*base.terms, *chosen], near=base.share) if chosen else base, ()
+    for _ in range(_MOST - len(chosen)):
         rivals = _contest(field, model)
         ladder = ladder or tuple(rivals)
         best = next((r for r in rivals if convincing(field, model, r)), None)
@@ -126,7 +137,8 @@ def search(field: Field, base: Model, stop: Callable[[Sequence[Term]], bool]) ->
         model = model.with_term(term)
         if len(chosen) > 1:
             model, chosen = _reexamine(field, base, model, chosen)
-    model, chosen = _taken_apart(field, base, model, chosen)
+    if len(chosen) > len(start):
+        model, chosen = _taken_apart(field, base, model, chosen)
     return Found(model, tuple(chosen), ladder)
 
 

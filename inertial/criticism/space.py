@@ -4,6 +4,7 @@ Blocks are the series that have coefficients of their own: one per unit and axis
 effects) are targets beside the measurements, so that adding a block's own column only updates a small Gram matrix.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -42,6 +43,17 @@ class Gain:
     drop: Array
     rank: NDArray[np.intp]
     by_block: Array
+
+    @staticmethod
+    def joined(parts: Sequence["Gain"]) -> "Gain":
+        """The gain over a grid that was worked on in parts."""
+        if len(parts) == 1:
+            return parts[0]
+        return Gain(
+            np.concatenate([p.drop for p in parts]),
+            np.concatenate([p.rank for p in parts]),
+            np.concatenate([p.by_block for p in parts], axis=1),
+        )
 
 
 class Space:
