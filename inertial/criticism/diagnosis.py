@@ -94,6 +94,7 @@ def diagnose(lot: Lot, effects: Sequence[str], rng: Generator) -> Diagnosis:
     problem = Problem(lot)
     held = catalogue.get_all(effects)
     base = Model(problem, terms_of(held, problem))
+    refuse_without_freedom(base)
     candidates = [e for e in catalogue.catalogue().values() if e.id not in set(effects)]
     covariates = [Covariate(name) for name in lot.state.covariates if f"{COVARIATE_PREFIX}{name}" not in set(effects)]
     field = Field(problem, [*candidates, *covariates])

@@ -43,6 +43,23 @@ def truncated(readings: Readings) -> Iterator[Fault]:
         at_end = missing[missing > last]
         name = "truncated_file" if at_end.size >= 0.5 * missing.size else "dropped_samples"
         yield Fault(name, unit, _places(missing), f"{missing.size} of {row.size} dwells of the lot are missing")
+    if there.all() and _cut_off(readings):
+        for unit in range(len(there)):
+            yield Fault(
+                "truncated_file",
+                unit,
+                (),
+                "the record of temperature goes on, and the last round of poses is not complete",
+            )
+
+
+def _cut_off(readings: Readings) -> bool:
+    """Whether the temperature's history runs on far behind the last dwell, which ends in the middle of a round of poses."""
+    time = readings.time[0]
+    if readings.history_end is None or readings.history_end - time[-1] < 0.15 * float(np.ptp(time)):
+        return False
+    _, counts = np.unique(np.round(readings.force[0], 3), axis=0, return_counts=True)
+    return bool(counts.max() == counts.min() + 1 and counts.min() >= 2)
 
 
 def clock(readings: Readings) -> Iterator[Fault]:
@@ -88,21 +105,28 @@ def stuck(readings: Readings) -> Iterator[Fault]:
 
 
 def stale(readings: Readings) -> Iterator[Fault]:
-    """A thermometer that repeats itself to the last digit while the temperature moves."""
+    """A thermometer that repeats itself to the last digit while the temperature moves, or while it had noise before."""
     if readings.temperature is None:
         return
     for unit, row in enumerate(readings.temperature):
         start, length = _longest_repeat(row)
         if length < 6:
             continue
-        stretch = slice(start, start + length)
-        moved = _moved_elsewhere(readings, unit, stretch)
-        steps = np.abs(np.diff(row[np.isfinite(row)]))
-        fine = steps[steps > 0.0]
+        moved = _moved_elsewhere(readings, unit, slice(start, start + length))
+        outside: Array = np.delete(row, np.arange(start, start + length)).astype(np.float64)
+        steps = np.diff(outside)
+        fine = np.abs(steps[steps != 0.0])
         resolution = float(np.min(fine)) if fine.size else np.inf
-        if moved > max(1.0, 3.0 * min(resolution, 1e9)) or (length > 0.25 * row.size and resolution < 0.01):
+        if moved > max(1.0, 3.0 * min(resolution, 1e9)) or (length > 0.15 * row.size and _noisy_steps(steps)):
             evidence = f"temperature stays at {row[start]:.3f} °C for {length} dwells"
             yield Fault("stale_temperature", unit, _places(np.arange(start, start + length)), evidence)
+
+
+def _noisy_steps(steps: Array) -> bool:
+    """Whether readings go up and down at random: steps of noise turn round two times in three, those of a drift seldom."""
+    if steps.size < 6 or np.mean(steps == 0.0) > 0.1:
+        return False
+    return bool(np.mean(np.sign(steps[1:]) != np.sign(steps[:-1])) > 0.45)
 
 
 def _moved_elsewhere(readings: Readings, unit: int, stretch: slice) -> float:

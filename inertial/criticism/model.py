@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from inertial.criticism.problem import Problem
 from inertial.criticism.space import Space, information
 from inertial.effects.base import AnyEffect
+from inertial.errors import NotIdentified
 
 Array = NDArray[np.float64]
 
@@ -148,6 +149,22 @@ class Model:
     def without(self, effect_id: str) -> "Model":
         """The model less one effect."""
         return self._variant([t for t in self.terms if t.effect.id != effect_id])
+
+
+def refuse_without_freedom(model: Model) -> None:
+    """Refuse to judge a model that has as many coefficients as there are measurements: it fits anything, and tells nothing.
+
+    Raises
+    ------
+    NotIdentified
+        No degree of freedom is left.
+    """
+    if model.at(0.0).dof < 1:
+        count, series = model.problem.count, model.problem.blocks
+        raise NotIdentified(
+            f"model: {count // series} dwells a unit leave nothing to judge the model by, more dwells than its coefficients on "
+            "an axis are needed; measure more poses or repeats, or judge a smaller model"
+        )
 
 
 def _vertex(x: Array, y: Array) -> float:

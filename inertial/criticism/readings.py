@@ -24,6 +24,7 @@ class Readings:
     time : (units, n), s
     temperature, chamber, vibration : (units, n), °C, °C, g; None where not recorded
     unit_name : the output's unit where it is stated ("g", "V", "LSB")
+    history_end : s, last instant of the temperature's history, where there is one
     """
 
     force: Array
@@ -36,6 +37,7 @@ class Readings:
     chamber: Array | None = None
     vibration: Array | None = None
     unit_name: str | None = None
+    history_end: float | None = None
 
     @property
     def there(self) -> NDArray[np.bool_]:

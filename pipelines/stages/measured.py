@@ -84,6 +84,7 @@ def measured(dwells: pd.DataFrame, history: pd.DataFrame | None = None) -> Measu
         chamber=table.one("chamber_C", filled=False),
         vibration=table.one("vibration_g", filled=False),
         unit_name=_stated_unit(dwells),
+        history_end=None if history is None or history.empty else float(history["time_s"].max()),
     )
     return Measured(units, numbers, readings, _state(table, force, units, history), reference)
 
