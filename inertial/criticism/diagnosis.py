@@ -12,7 +12,7 @@ from inertial.criticism.adequacy import adequacy
 from inertial.criticism.classes import EffectClass, class_of
 from inertial.criticism.drivers import Driver, Place, drivers_of, places
 from inertial.criticism.heldout import fit_rms, heldout_rms
-from inertial.criticism.model import Model, Term
+from inertial.criticism.model import Model, Term, refuse_without_freedom
 from inertial.criticism.problem import Lot, Problem
 from inertial.criticism.search import (
     NAMED_BELOW,
