@@ -9,7 +9,7 @@ import numpy as np
 from inertial import effects as catalogue
 from inertial.criticism.comparison import estimate, residuals_of, rms
 from inertial.criticism.heldout import heldout_rms
-from inertial.criticism.model import Model
+from inertial.criticism.model import Model, refuse_without_freedom
 from inertial.criticism.problem import Problem
 from inertial.criticism.search import terms_of
 from inertial.effects import StationEffect
@@ -56,8 +56,10 @@ def compare(
 
 
 def _compared(found: Measured, effects: Sequence[str], fresh: Measured | None) -> dict[str, Any]:
-    problem = Problem(lot_of(found))
+    square = "misalignment" not in effects
+    problem = Problem(lot_of(found, square=square))
     model = Model(problem, terms_of(catalogue.get_all(effects), problem))
+    refuse_without_freedom(model)
     fitted = estimate(model)
     left = residuals_of(problem, fitted)
     units = _by_unit(found, left)
@@ -77,7 +79,7 @@ def _compared(found: Measured, effects: Sequence[str], fresh: Measured | None) -
     }
     if fresh is not None:
         again = _same_units(found, fresh)
-        on_fresh = residuals_of(Problem(lot_of(again, like=found)), fitted)
+        on_fresh = residuals_of(Problem(lot_of(again, like=found, square=square)), fitted)
         answer["fresh_rms_ug"] = MICRO * rms(on_fresh)
         for unit, values in zip(again.units, _by_unit(again, on_fresh), strict=True):
             answer["by_unit"][unit]["fresh_rms_ug"] = MICRO * rms(values)
