@@ -11,6 +11,7 @@ import numpy as np
 import pandas as pd
 import pytest
 from capture_double import CaptureDouble, PulledPlug, recipe_file, small_job
+from lots import lot
 
 from pipelines.archive import Archive, files
 from pipelines.cli import main
@@ -61,6 +62,22 @@ def test_dwells_that_cannot_be_are_refused(change, words: str) -> None:
 
 def test_one_dwell_of_a_unit_needs_no_second_time() -> None:
     assert len(exchange.checked(dwells(1), where="f.csv")) == 1
+
+
+@pytest.mark.parametrize("command", ["diagnose", "compare"])
+def test_a_model_with_as_many_coefficients_as_dwells_is_not_called_adequate(
+    tmp_path: Path,
+    rng: np.random.Generator,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+    command: str,
+) -> None:
+    table = lot(rng, units=2, temperatures=(25.0,)).query("dwell < 4")
+    table.to_csv(tmp_path / "few.csv", index=False)
+    model = ("--effects", "bias,scale,misalignment")
+    status, out, message = told(monkeypatch, capsys, command, str(tmp_path / "few.csv"), *model)
+    assert (status, out) == (2, "")
+    assert "4 dwells a unit leave nothing to judge the model by" in message
 
 
 def test_a_kind_of_device_with_a_slip_is_refused_before_anything_moves(tmp_path: Path) -> None:
