@@ -72,7 +72,7 @@ def examined(
     if not sound:
         return found, faults, None
     try:
-        lot = lot_of(found.pick(sound) if blocked else found)
+        lot = lot_of(found.pick(sound) if blocked else found, square="misalignment" not in model)
         return found, faults, diagnose_lot(lot, model, np.random.default_rng(_SEED))
     except InertialError as problem:
         raise DataRejected(str(problem)) from None

@@ -178,18 +178,19 @@ def _history(history: pd.DataFrame, units: tuple[str, ...], time: Array) -> Hist
     return History(grid, np.stack(series))
 
 
-def lot_of(found: Measured, like: Measured | None = None) -> Lot:
+def lot_of(found: Measured, like: Measured | None = None, *, square: bool = False) -> Lot:
     """The lot in g: outputs over a nominal scale, white standard errors, normalised response.
 
     Where only the norm of gravity is known, a nine-parameter fit gives the directions, and the lot is radial.
 
     Parameters
     ----------
+    square : whether the model takes the axes as square, so that six parameters, not nine, give the directions
     like : the run whose nominal scale and response are used: coefficients of one run apply to another only so
     """
     readings = found.readings
     if found.reference == "norm":
-        return _radial(found, like or found)
+        return _radial(found, like or found, square=square)
     coefficients = (like or found).readings.fits
     scale = np.abs(np.diagonal(coefficients[:, :, 1:], axis1=1, axis2=2))
     scale = np.where(scale > 0.0, scale, 1.0)
@@ -215,14 +216,15 @@ def _white_error(readings: Readings, scale: Array, output: Array) -> Array:
     return np.broadcast_to(np.maximum(pooled, 1e-12), readings.output.shape)
 
 
-def _radial(found: Measured, like: Measured) -> Lot:
+def _radial(found: Measured, like: Measured, *, square: bool) -> Lot:
     from inertial.fits.ellipsoid import fit_ellipsoid
 
     readings = found.readings
     forces, outputs, errors = [], [], []
     for unit in range(len(found.units)):
         there = readings.there[unit]
-        fit = fit_ellipsoid(like.readings.output[unit, like.readings.there[unit]])
+        shape = "six" if square else "nine"
+        fit = fit_ellipsoid(like.readings.output[unit, like.readings.there[unit]], shape=shape)
         corrected = np.zeros((there.size, 3))
         corrected[there] = fit.apply(readings.output[unit, there])
         size = np.linalg.norm(corrected, axis=1, keepdims=True)
