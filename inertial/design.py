@@ -47,11 +47,14 @@ def starting_values(effects: Sequence[AnyEffect], state: State) -> dict[str, dic
 
 def local_columns(effects: Sequence[SensorEffect], state: State, values: Values) -> Array:
     """Columns of the sensor's effects, (..., 3, n, p), g per unit of the coefficient; p counts the same on every axis."""
-    axes = [
-        np.concatenate([e.columns(state, axis, **on_axis(values, e.id, axis)) for e in effects], axis=-1)
-        for axis in range(3)
-    ]
+    axes = [_joined([e.columns(state, axis, **on_axis(values, e.id, axis)) for e in effects]) for axis in range(3)]
     return np.stack(np.broadcast_arrays(*axes), axis=-3)
+
+
+def _joined(columns: Sequence[Array]) -> Array:
+    """Columns (..., n, p) side by side, those that all units share repeated where others differ from unit to unit."""
+    shape = np.broadcast_shapes(*(c.shape[:-1] for c in columns))
+    return np.concatenate([np.broadcast_to(c, (*shape, c.shape[-1])) for c in columns], axis=-1)
 
 
 def shared_columns(effects: Sequence[StationEffect], state: State, values: Values, response: Array) -> Array:

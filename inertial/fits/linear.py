@@ -21,8 +21,11 @@ Array = NDArray[np.float64]
 _SINGULAR = 1e-11
 """Smallest eigenvalue of the scaled normal matrix: below, a coefficient is not determined."""
 
-_DELICATE = 1e-3
-"""Smallest eigenvalue of the scaled normal matrix below which the solution is refined once."""
+_DELICATE = 1e3
+"""Variance inflation of a coefficient above which the solution is refined once."""
+
+_SUSPICIOUS = 1e9
+"""Variance inflation above which the eigenvalues are looked at."""
 
 
 @dataclass(frozen=True)
@@ -106,10 +109,8 @@ def fit_lot(
     values = design.starting_values([*sensor, *station], state)
     for name, given in (nonlinear or {}).items():
         values[name] = {**values.get(name, {}), **given}
+    z = np.swapaxes(output, -1, -2)
     names = tuple(design.local_names(sensor, axis) for axis in range(3))
-    z = np.moveaxis(
-        np.ascontiguousarray(np.moveaxis(output, -1, 0)), 0, -2
-    )  # axis by axis in memory, as it is worked on
     weight = None if standard_error is None else 1.0 / np.swapaxes(standard_error, -1, -2)
     local = _Local(design.local_columns(sensor, state, values), weight, names)
     theta = local.solve(z)
@@ -118,7 +119,8 @@ def fit_lot(
         columns = design.shared_columns(station, state, values, response_matrix(theta, names))
         shared, shared_covariance, z = _solve_shared(local, columns, z, design.shared_names(station))
         theta = local.solve(z)
-    residual = z - local.apply(theta)
+    residual = local.apply(theta)
+    np.subtract(z, residual, out=residual)
     chi2, dof = local.chi2(residual)
     covariance = local.inverse
     if weight is None:
@@ -159,8 +161,9 @@ class _Local:
         self._refuse_empty(names)
         self.scaled = weighted / self.scale[..., None, :]
         gram = np.swapaxes(self.scaled, -1, -2) @ self.scaled
-        self.delicate = self._refuse_singular(gram, names)
-        self.gram_inverse = np.linalg.inv(gram)
+        self.gram_inverse = self._inverted(gram, names)
+        # the largest variance inflation: 1/v² of the column that the others leave least of
+        self.delicate = float(np.max(np.diagonal(self.gram_inverse, axis1=-2, axis2=-1))) > _DELICATE
         self.inverse = self.gram_inverse / (self.scale[..., :, None] * self.scale[..., None, :])
 
     def _refuse_empty(self, names: Sequence[Sequence[tuple[str, str]]]) -> None:
@@ -173,12 +176,24 @@ class _Local:
                 f"the plan must excite it; add poses or conditions that do, or leave it out of the model"
             )
 
-    def _refuse_singular(self, gram: Array, names: Sequence[Sequence[tuple[str, str]]]) -> bool:
-        """Whether the system is so ill-conditioned that rounding asks for a step of refinement; refuses a singular one."""
+    def _inverted(self, gram: Array, names: Sequence[Sequence[tuple[str, str]]]) -> Array:
+        """Inverse of the scaled normal matrices; a singular one is refused with the coefficients it confuses."""
+        inverse: Array
+        try:
+            inverse = np.linalg.inv(gram).astype(np.float64)
+        except np.linalg.LinAlgError:
+            inverse = np.full(gram.shape, np.inf)
+        inflation = np.diagonal(inverse, axis1=-2, axis2=-1)
+        if np.all(inflation < _SUSPICIOUS) and np.all(inflation > 0.0):
+            return inverse
+        self._refuse_singular(gram, names)
+        return inverse
+
+    def _refuse_singular(self, gram: Array, names: Sequence[Sequence[tuple[str, str]]]) -> None:
         values, vectors = np.linalg.eigh(gram)
         bad = np.argwhere(values[..., 0] < _SINGULAR)
         if not bad.size:
-            return bool(np.min(values) < _DELICATE)
+            return
         where = tuple(int(i) for i in bad[0])
         axis = where[-1]
         share = np.abs(vectors[(*where, slice(None), 0)])
@@ -221,11 +236,18 @@ class _Local:
 
 
 def _apply(matrices: Array, vectors: Array) -> Array:
-    """Matrices (..., 3, m, k) times vectors (..., 3, k); where all units share the matrices, as one product per axis."""
-    if matrices.ndim == 3 and vectors.ndim == 3:
-        product = np.matmul(np.swapaxes(vectors, 0, 1), np.swapaxes(matrices, -1, -2))
-        return np.swapaxes(product, 0, 1)
-    return np.matmul(matrices, vectors[..., None])[..., 0]
+    """Matrices (..., 3, m, k) times vectors (..., 3, k), (..., 3, m).
+
+    Matrices that all units share are put side by side in one (3k, 3m), so that the whole lot is a single product without a copy.
+    """
+    if matrices.ndim > 3 or vectors.ndim != 3:
+        return np.matmul(matrices, vectors[..., None])[..., 0]
+    _, m, k = matrices.shape
+    together = np.zeros((k, 3, m, 3))
+    for axis in range(3):
+        together[:, axis, :, axis] = matrices[axis].T
+    flat = np.swapaxes(vectors, -1, -2).reshape(-1, 3 * k)
+    return np.swapaxes((flat @ together.reshape(3 * k, 3 * m)).reshape(-1, m, 3), -1, -2)
 
 
 def _solve_shared(

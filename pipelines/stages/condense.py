@@ -44,7 +44,8 @@ def condense(dwells: pd.DataFrame, most: int = MOST) -> pd.DataFrame:
         joined[f"sd_{axis}"] = own.where(own > 0.0, grouped[f"out_{axis}"].std()[f"out_{axis}"])
     if "n" not in joined.columns:
         joined["n"] = grouped.size()["size"]
-    return joined.dropna(subset=["sd_x", "sd_y", "sd_z"])
+    whole = grouped.size()["size"] >= 0.5 * size  # the rest of a stretch holds too little to stand beside the others
+    return joined[whole].dropna(subset=["sd_x", "sd_y", "sd_z"])
 
 
 def _groups(dwells: pd.DataFrame, numbers: NDArray[np.int64], size: int) -> NDArray[np.int64] | None:
