@@ -164,7 +164,7 @@ def _slope(time: Array, values: Array) -> Array:
     return (after - before) / np.maximum(t_after - t_before, 1e-9)
 
 
-_RATE_WINDOW = 60.0
+_RATE_WINDOW = 30.0
 """Half width in s over which a history's slope is taken: the noise of a thermometer read every few seconds is no rate."""
 
 

@@ -8,8 +8,10 @@ from inertial.criticism.model import Model, Term
 from inertial.criticism.search import Field, cost_of, freedom, log_p_value, refine, size_of
 from inertial.criticism.space import Candidate, Space
 
-TOLD_APART = 10.0
-"""Difference of penalised chi-square that parts two effects: the wrong one leads by so much with probability Φ(−√10) = 8e‑4."""
+TOLD_APART = 15.0
+"""Difference of penalised chi-square that parts two effects.
+
+The wrong one leads by ten with probability Φ(−√10) = 8e-4; the rest is room for readings of the drivers that are not exact."""
 
 _NEAR = 80.0
 """Rivals further off on the grid of their nonlinear parameters are not refined."""

@@ -29,6 +29,9 @@ from inertial.criticism.unknown import Suspect, better_curve, suspects
 from inertial.effects.base import AnyEffect
 from inertial.effects.covariate import COVARIATE_PREFIX, Covariate
 
+STEEPER = 0.0
+"""Penalised chi-square by which a random walk beside the 1/f wander must beat the effects found without it."""
+
 _MANY = 32
 _ENOUGH = 24
 
@@ -91,7 +94,20 @@ def diagnose(lot: Lot, effects: Sequence[str], rng: Generator) -> Diagnosis:
     effects : ids of the model to judge
     rng : draws the noise that adequacy is measured against
     """
-    problem = Problem(lot)
+    found = _examined(Problem(lot), effects, rng)
+    if found.adequate or (found.unexplained is not None and _covariate([n.effects for n in found.named]) is None):
+        return found
+    # what looks like drift, ageing and steps may be a wander steeper than 1/f: it is believed where it does better without them
+    steep = Problem(lot, steep=True)
+    bare = min(cost_of_model(Model(steep, m.terms)) for m in (found.base, found.final))
+    if bare > cost_of_model(found.final) - STEEPER:
+        return found
+    return _examined(steep, effects, rng)
+
+
+def _examined(problem: Problem, effects: Sequence[str], rng: Generator) -> Diagnosis:
+    """The diagnosis under one kind of wander."""
+    lot = problem.lot
     held = catalogue.get_all(effects)
     base = Model(problem, terms_of(held, problem))
     refuse_without_freedom(base)
@@ -159,7 +175,7 @@ def _part(field: Field, base: Model) -> _Part:
     if lot.state.time.shape[0] <= _MANY:
         return _Part(field, base)
     pick = np.linspace(0, lot.state.time.shape[0] - 1, _ENOUGH).round().astype(int)
-    problem = Problem(lot.units(pick.tolist()))
+    problem = Problem(lot.units(pick.tolist()), steep=field.problem.steep)
     return _Part(Field(problem, field.effects), Model(problem, base.terms))
 
 

@@ -61,20 +61,36 @@ class Basis:
         """Mean variance of the wander about the record's own mean, for share ρ = 1."""
         if self.turn is None:
             return 0.0
-        kernel = (self.turn[0].T * self.wander[0]) @ self.turn[0]
-        n = kernel.shape[0]
-        return float(np.trace(kernel) / n - kernel.sum() / n**2)
+        return float(_about_mean((self.turn[0].T * self.wander[0]) @ self.turn[0]))
 
     def spread(self, share: float) -> Array:
         """Standard deviations (1 or blocks, n) of the rotated coordinates at a share ρ of wander, for white noise of 1."""
         return np.sqrt(1.0 + share * self.wander)
 
 
-def basis(time: Array, error: Array) -> Basis:
+def steep_kernel(time: Array) -> Array:
+    """Covariance of 1/f wander and a random walk of the same variance about the record's mean, (..., n, n)."""
+    start = time.min(axis=-1, keepdims=True)
+    since = (time - start) / max(float(np.ptp(time)), 1.0)
+    walk = np.minimum(since[..., :, None], since[..., None, :])
+    return (
+        flicker_kernel(time)
+        + walk * (_about_mean(flicker_kernel(time)) / np.maximum(_about_mean(walk), 1e-12))[..., None, None]
+    )
+
+
+def _about_mean(kernel: Array) -> Array:
+    """Mean variance about the record's mean, (...,)."""
+    n = kernel.shape[-1]
+    return np.trace(kernel, axis1=-2, axis2=-1) / n - kernel.sum(axis=(-2, -1)) / n**2
+
+
+def basis(time: Array, error: Array, *, steep: bool = False) -> Basis:
     """The rotation for blocks of dwells.
 
     Parameters
     ----------
+    steep : whether the wander has a random walk in it
     time : (blocks, n), s
     error : (blocks, n), white standard error of each dwell, infinite where a dwell is missing
     """
@@ -82,15 +98,16 @@ def basis(time: Array, error: Array) -> Basis:
     if time.shape[-1] > LONGEST:
         return Basis(None, error, np.zeros((1, time.shape[-1])), int(there.sum()))
     even = _evened(error, there)
+    kernel = steep_kernel if steep else flicker_kernel
     same_time = np.all(np.abs(time - time[:1]) < 1.0)
     flat = np.all(there) and np.all(even == even[:, :1])
     if same_time and flat:
-        values, vectors = np.linalg.eigh(flicker_kernel(time[0]))
+        values, vectors = np.linalg.eigh(kernel(time[0]))
         turn, wander = vectors.T[None], np.maximum(values, 0.0)[None]
     else:
         typical = np.array([np.mean(e[t] ** 2) if t.any() else 1.0 for e, t in zip(even, there, strict=True)])
         weight = np.where(there, np.sqrt(typical)[:, None] / even, 0.0)
-        values, vectors = np.linalg.eigh(flicker_kernel(time) * weight[:, :, None] * weight[:, None, :])
+        values, vectors = np.linalg.eigh(kernel(time) * weight[:, :, None] * weight[:, None, :])
         turn, wander = np.swapaxes(vectors, -1, -2), np.maximum(values, 0.0)
     return Basis(turn, even, wander, int(there.sum()))
 

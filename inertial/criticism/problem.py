@@ -65,10 +65,10 @@ class Lot:
 
 
 class Problem:
-    """Series and columns of a lot in the blocks' rotated coordinates."""
+    """Series and columns of a lot in the blocks' rotated coordinates; ``steep`` wander has a random walk in it."""
 
-    def __init__(self, lot: Lot) -> None:
-        self.lot = lot
+    def __init__(self, lot: Lot, *, steep: bool = False) -> None:
+        self.lot, self.steep = lot, steep
         units, n = lot.state.time.shape
         self.blocks = units if lot.radial else 3 * units
         self.n = n
@@ -82,7 +82,7 @@ class Problem:
     def basis(self) -> Basis:
         """The rotation in which the noise of the dwells is diagonal."""
         time = self.lot.state.time if self.lot.radial else np.repeat(self.lot.state.time, 3, axis=0)
-        return basis(time, self.error)
+        return basis(time, self.error, steep=self.steep)
 
     @cached_property
     def y(self) -> Array:
