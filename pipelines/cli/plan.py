@@ -52,8 +52,8 @@ def _print(document: dict[str, Any]) -> None:
     error = document["dwell_error_ug"]["together"]
     console().print(
         f"[bold]{document['recipe']}[/bold]: {document['poses']} poses × {len(document['temperatures_C'])} temperatures, "
-        f"{minutes['total']:.0f} min of station time ({minutes['soaks']:.0f} soaks, {minutes['moves']:.0f} moves, "
-        f"{minutes['dwells']:.0f} dwells, {minutes['static_record']:.0f} static record); "
+        f"{minutes['total']:.0f} min of station time (soaks {minutes['soaks']:.0f} min, moves {minutes['moves']:.0f} min, "
+        f"dwells {minutes['dwells']:.0f} min, static record {minutes['static_record']:.0f} min); "
         f"error of a dwell {short(error)} µg"
     )
     seen = [row for row in document["effects"] if row["seen"]]
