@@ -105,7 +105,7 @@ def test_a_lock_has_a_version_and_hashes_for_everything_and_no_address(path: Pat
     assert "://" not in text
     entries = re.split(r"\n(?=\S)", text.strip())
     assert len(entries) > 20
-    assert [e.splitlines()[0] for e in entries if not re.match(r"[\w.-]+(\[[\w,-]+\])?==\S+", e)] == []
+    assert [e.splitlines()[0] for e in entries if not re.match(r"[\w.-]+(\[[\w, -]+\])?==\S+", e)] == []
     assert [e.splitlines()[0] for e in entries if "--hash=sha256:" not in e] == []
 
 
