@@ -22,6 +22,7 @@ _TIME_KNOTS = 12
 _HARMONICS = 5
 _CYCLES = np.arange(1.0, 14.1, 0.5)
 _LEVELS = 14
+_VISITS = 1.5
 _CENTRES = np.linspace(0.0, 1.0, 21)
 _WIDTHS = (0.02, 0.05, 0.1)
 _SHARPEST = 3
@@ -60,7 +61,8 @@ def suspects(problem: Problem) -> list[Suspect]:
             knots = _TIME_KNOTS if name in {"time_s", "since_power_s"} else _KNOTS
             each = _unit_range(values if problem.lot.radial else np.repeat(values, 3, axis=0))
             found.append(Suspect(name, _alike(problem, curve(values, knots)), each))
-            steps = _levels(values)
+            # levels in time, one for each soak, would follow any memory of temperature: a dependence on time is smooth
+            steps = None if name in {"time_s", "since_power_s"} else _levels(values)
             if steps is not None:
                 found.append(Suspect(name, _alike(problem, steps)))
     if not problem.lot.radial:
@@ -180,6 +182,10 @@ def _levels(values: Array) -> Array | None:
     edges = order[:-1][gaps > 0.03 * np.ptp(order)] + 0.5 * gaps[gaps > 0.03 * np.ptp(order)]
     if not 2 <= edges.size < _LEVELS:
         return None
+    level = np.searchsorted(edges, values[0])
+    visits = 1 + int(np.count_nonzero(np.diff(level)))
+    if visits < _VISITS * (edges.size + 1):
+        return None  # levels that are met once each are as many free offsets: they would follow any memory
     return np.stack([(values > e).astype(float) for e in edges], axis=-1)
 
 
