@@ -167,17 +167,6 @@ class Space:
         return Gain(drop, rank, np.zeros((left.shape[0], grid)))
 
 
-def left_over(basis: Basis, space: Space, candidate: Candidate) -> Array:
-    """The part v of a candidate that is left, (grid,): RMS of its columns after the model over their RMS."""
-    del basis
-    blocks, n, grid, p = candidate.columns.shape
-    flat = (candidate.columns / space.spread[..., None, None]).reshape(blocks, n, grid * p)
-    before = np.einsum("bnm,bnm->m", flat, flat)
-    after = space.project(flat)
-    v = np.sqrt(np.einsum("bnm,bnm->m", after, after) / np.where(before > 0.0, before, 1.0))
-    return v.reshape(grid, p).max(axis=1)
-
-
 def information(local: Array, spread: Array) -> float:
     """log|XᵀV⁻¹X| summed over the blocks, for rotated columns (blocks, n, p)."""
     if local.shape[-1] == 0:
