@@ -36,6 +36,9 @@ OTHERS_SHARE = 0.1
 DOUBT = {0: 0.0, 1: 40.0, 2: 20.0}
 """Penalised chi-square by which a curve must beat so many effects: physics that is known is believed first."""
 
+DOUBT_MEMORY = 0.5
+"""The same for an effect with memory: a curve over time follows any memory of one run, and the catalogue's form is simple."""
+
 DOUBT_SHARE = 0.15
 """Share of what a curve explains that one effect must leave over before the curve is believed instead."""
 
@@ -90,7 +93,8 @@ def better_curve(base: Model, chosen: Sequence[Term], field: Sequence[Suspect]) 
     replaced = len(chosen) - len(kept)
     doubt = DOUBT.get(replaced, 0.0)
     if replaced == 1:
-        doubt = max(doubt, DOUBT_SHARE * (bare - best.cost))
+        share = DOUBT_MEMORY if any(t.effect.memory for t in chosen if t not in kept) else DOUBT_SHARE
+        doubt = max(doubt, share * (bare - best.cost))
     return (best, kept) if replaced and best.cost + doubt < whole else None
 
 

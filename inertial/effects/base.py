@@ -59,6 +59,7 @@ class Effect(ABC):
     simplicity : rank among effects that the data cannot tell apart; the lowest is recommended
     sharp : whether it answers to the force along the sensor's own axis so sharply that misalignment matters
     after : effects of lower order that are named first where they are called for as well
+    memory : whether it depends on all that went before: its form is then the simplest of many
     vanishing : RMS of a column below which a plan does not excite it: products that only the angles' jitter keeps from zero
     primary : number of leading columns that stand for a simpler form of the effect; None where there is none
     """
@@ -76,6 +77,7 @@ class Effect(ABC):
     primary: ClassVar[int | None] = None
     sharp: ClassVar[bool] = False
     vanishing: ClassVar[float] = 0.0
+    memory: ClassVar[bool] = False
     nonlinear: ClassVar[tuple[Nonlinear, ...]] = ()
 
     def parameters(self, state: State) -> tuple[Nonlinear, ...]:

@@ -20,6 +20,7 @@ class CreepAfterMove(SensorEffect):
     hides_behind: ClassVar[tuple[str, ...]] = ("pose_hysteresis",)
     breaker: ClassVar[str] = "waits of different length after a move"
     simplicity: ClassVar[int] = 32
+    memory: ClassVar[bool] = True
     nonlinear: ClassVar[tuple[Nonlinear, ...]] = (Nonlinear("tau", "s", 2.0, 2000.0, "log", 12),)
 
     def columns(self, state: State, axis: int, *, tau: float, **nonlinear: float) -> Array:

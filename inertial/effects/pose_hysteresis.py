@@ -24,6 +24,7 @@ class PoseHysteresis(SensorEffect):
     hides_behind: ClassVar[tuple[str, ...]] = ("backlash", "bias_asymmetry")
     breaker: ClassVar[str] = "the same poses from both sides"
     simplicity: ClassVar[int] = 33
+    memory: ClassVar[bool] = True
     nonlinear: ClassVar[tuple[Nonlinear, ...]] = (
         Nonlinear("half_width", "g", 0.02, 1.0, "log", 6),
         Nonlinear("kept", "1", 0.0, 1.0, choices=(0.0, 1.0)),

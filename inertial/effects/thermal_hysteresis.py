@@ -21,6 +21,7 @@ class ThermalHysteresis(SensorEffect):
     hides_behind: ClassVar[tuple[str, ...]] = ("aging_linear", "bias_temperature_quadratic")
     breaker: ClassVar[str] = "a closed loop of temperature, and minor loops; a one-way soak holds no information"
     simplicity: ClassVar[int] = 24
+    memory: ClassVar[bool] = True
     primary: ClassVar[int | None] = 1
     nonlinear: ClassVar[tuple[Nonlinear, ...]] = (Nonlinear("half_width", "K", 1.0, 60.0, "log", 10),)
 

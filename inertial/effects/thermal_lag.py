@@ -20,6 +20,7 @@ class ThermalLag(SensorEffect):
     hides_behind: ClassVar[tuple[str, ...]] = ("thermal_rate", "bias_temperature")
     breaker: ClassVar[str] = "a fast step of temperature, read while it settles"
     simplicity: ClassVar[int] = 21
+    memory: ClassVar[bool] = True
     primary: ClassVar[int | None] = 1
     nonlinear: ClassVar[tuple[Nonlinear, ...]] = (Nonlinear("tau", "s", 5.0, 3000.0, "log", 14),)
 
