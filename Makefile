@@ -2,6 +2,7 @@
 PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
+CRATE := $(VENV)/crate-validator
 export OMP_NUM_THREADS ?= 1
 export OPENBLAS_NUM_THREADS ?= 1
 export PREFECT_SERVER_ANALYTICS_ENABLED = false
@@ -26,10 +27,10 @@ types: $(VENV)/.dev
 layers: $(VENV)/.dev
 	$(BIN)/lint-imports
 
-pytest: $(VENV)/.dev debian
+pytest: $(VENV)/.dev $(CRATE)/.done debian
 	$(BIN)/python -m pytest -m "not slow"
 
-test-slow: $(VENV)/.dev debian  ## suites that take minutes
+test-slow: $(VENV)/.dev $(CRATE)/.done debian  ## suites that take minutes
 	$(BIN)/python -m pytest -m slow
 
 bench: $(VENV)/.bench  ## figures of the README
@@ -60,10 +61,17 @@ $(VENV)/.bench: requirements-bench.lock pyproject.toml | $(VENV)/bin/python
 	$(call install,requirements-bench.lock)
 	@touch $(VENV)/.run $(VENV)/.dev
 
+# a validator of another maker, in an environment of its own: it asks for older libraries than the product has
+$(CRATE)/.done: requirements-crate.lock | $(VENV)/bin/python
+	$(PYTHON) -m venv $(CRATE)
+	$(CRATE)/bin/pip install --quiet --disable-pip-version-check --no-deps --require-hashes -r requirements-crate.lock
+	@touch $@
+
 locks:  ## resolve the locks anew (needs uv)
 	uv pip compile pyproject.toml --extra build --python-version 3.11 --generate-hashes --no-strip-extras --no-emit-index-url --no-annotate --no-header -o requirements-run.lock
 	uv pip compile pyproject.toml --extra build --extra dev --python-version 3.11 --generate-hashes --no-strip-extras --no-emit-index-url --no-annotate --no-header -o requirements-dev.lock
 	uv pip compile pyproject.toml --extra build --extra dev --extra bench --python-version 3.11 --generate-hashes --no-strip-extras --no-emit-index-url --no-annotate --no-header -o requirements-bench.lock
+	echo 'roc-validator>=0.13' | uv pip compile - --python-version 3.11 --generate-hashes --no-strip-extras --no-emit-index-url --no-annotate --no-header -o requirements-crate.lock
 
 clean:
 	rm -rf $(VENV) archive build dist *.egg-info
