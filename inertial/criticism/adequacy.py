@@ -8,7 +8,8 @@ from numpy.typing import NDArray
 from scipy import stats
 
 from inertial.criticism.drivers import Driver
-from inertial.criticism.search import Field, log_p_value
+from inertial.criticism.penalty import log_p_value
+from inertial.criticism.search import Field
 from inertial.criticism.space import SEEN, Candidate, Space
 
 Array = NDArray[np.float64]

@@ -5,7 +5,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from inertial.criticism.model import Model, Term
-from inertial.criticism.search import Field, cost_of, freedom, log_p_value, refine, size_of
+from inertial.criticism.penalty import cost_of, freedom, log_p_value
+from inertial.criticism.refinement import refine
+from inertial.criticism.search import Field, size_of
 from inertial.criticism.space import Candidate, Space
 
 TOLD_APART = 15.0

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inertial.criticism.model import Model
-from inertial.criticism.search import PER_COEFFICIENT, cost_of_model
+from inertial.criticism.penalty import PER_COEFFICIENT, cost_of_model
 from inertial.criticism.space import Candidate, Space
 
 Array = NDArray[np.float64]

@@ -13,17 +13,16 @@ from inertial.criticism.classes import EffectClass, class_of
 from inertial.criticism.drivers import Driver, Place, drivers_of, places
 from inertial.criticism.heldout import fit_rms, heldout_rms
 from inertial.criticism.model import Model, Term, refuse_without_freedom
+from inertial.criticism.penalty import cost_of_model, log_p_value
 from inertial.criticism.problem import Lot, Problem
+from inertial.criticism.refinement import terms_of
 from inertial.criticism.search import (
     NAMED_BELOW,
     Field,
     Found,
     Rival,
     anything,
-    cost_of_model,
-    log_p_value,
     search,
-    terms_of,
 )
 from inertial.criticism.unknown import Suspect, better_curve, suspects
 from inertial.effects.base import AnyEffect

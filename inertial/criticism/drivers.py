@@ -7,8 +7,8 @@ from itertools import combinations_with_replacement
 import numpy as np
 from numpy.typing import NDArray
 
+from inertial.criticism.penalty import log_p_value
 from inertial.criticism.problem import Problem
-from inertial.criticism.search import log_p_value
 from inertial.criticism.space import Candidate, Space
 from inertial.state import State
 

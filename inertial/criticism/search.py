@@ -5,19 +5,16 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import stats
 
 from inertial.criticism.model import Model, Term
+from inertial.criticism.penalty import cost_of, cost_of_model, deviance, freedom, log_p_value
 from inertial.criticism.problem import Problem, grid_of
+from inertial.criticism.refinement import refine
 from inertial.criticism.space import Candidate, Gain, Space
-from inertial.effects.base import AnyEffect, Nonlinear
+from inertial.effects.base import AnyEffect
 from inertial.errors import MissingInput
 
 Array = NDArray[np.float64]
-
-PER_COEFFICIENT = 2.5
-PER_COLUMN = 6.0
-"""Penalty, in chi-square, for each coefficient and each column: a larger effect must earn its size."""
 
 NAMED_BELOW = 1e-4
 """Probability, over all looks together, below which an effect is named."""
@@ -101,20 +98,6 @@ class Field:
         return found
 
 
-def cost_of(rank: int, columns: int, nonlinear: int) -> float:
-    """Penalty of an effect, in chi-square."""
-    return PER_COEFFICIENT * (rank + nonlinear) + PER_COLUMN * columns
-
-
-def log_p_value(space: Space, drop: float, rank: int) -> float:
-    """Natural logarithm of the probability that noise alone takes off so much with so many coefficients."""
-    after = space.dof - rank
-    if rank == 0 or after <= 0:
-        return 0.0
-    left = max(space.rss - drop, 1e-300)
-    return float(stats.f.logsf((drop / rank) / (left / after), rank, after))
-
-
 def search(field: Field, base: Model, stop: Callable[[Sequence[Term]], bool], start: Sequence[Term] = ()) -> Found:
     """The effects that the measurements call for beyond a base model.
 
@@ -178,14 +161,12 @@ def size_of(model: Model, term: Term) -> float:
 def _contest(field: Field, model: Model, barred: str = "", finalists: int = _FINALISTS) -> list[Rival]:
     """Rivals by their penalised likelihood, the finalists with the noise estimated anew beside them."""
     leave = {*(t.effect.id for t in model.terms), barred}
-    count = field.problem.count
     tried: dict[str, tuple[float, int, int | None]] = {}
     for factor in _SHARES_TRIED:
         space = model.at(model.share * factor)
-        logdet = float(np.sum(np.log(space.spread**2))) * (field.problem.blocks / space.spread.shape[0])
         for primary, gains in ((False, field.gains(space, leave)), (True, field.primary_gains(space, leave))):
             for name, gain in gains.items():
-                place, score = _best_of(field, space, name, gain, logdet, count)
+                place, score = _best_of(field, space, name, gain)
                 if gain.rank[place] and (name not in tried or score < tried[name][0]):
                     effect = next(e for e in field.effects if e.id == name)
                     tried[name] = (score, place, effect.primary if primary else None)
@@ -194,14 +175,12 @@ def _contest(field: Field, model: Model, barred: str = "", finalists: int = _FIN
     return sorted(found, key=lambda r: r.cost)
 
 
-def _best_of(field: Field, space: Space, name: str, gain: Gain, logdet: float, count: int) -> tuple[int, float]:
+def _best_of(field: Field, space: Space, name: str, gain: Gain) -> tuple[int, float]:
     """Best grid value of a candidate, and its penalised deviance there."""
-    left = np.maximum(space.rss - gain.drop, 1e-300)
-    place = int(np.argmin(left))
+    place = int(np.argmax(gain.drop))
     columns = max(1, round(gain.rank[place] / field.problem.blocks))
     nonlinear = len(field.grids[name][0]) if len(field.grids[name]) > 1 else 0
-    deviance = count * np.log(left[place] / count) + logdet
-    return place, float(deviance + cost_of(int(gain.rank[place]), columns, nonlinear))
+    return place, deviance(space, float(gain.drop[place])) + cost_of(int(gain.rank[place]), columns, nonlinear)
 
 
 def _exact(field: Field, model: Model, name: str, place: int, first: int | None) -> Rival:
@@ -220,101 +199,8 @@ def judge(field: Field, model: Model, term: Term, share: float) -> Rival:
     drop, rank = float(gain.drop[0]), int(gain.rank[0])
     columns = max(1, round(rank / field.problem.blocks))
     nonlinear = freedom(term)
-    count = field.problem.count
-    logdet = float(np.sum(np.log(space.spread**2))) * (field.problem.blocks / space.spread.shape[0])
-    deviance = count * np.log(max(space.rss - drop, 1e-300) / count) + logdet
-    return Rival(term, drop, rank, float(deviance + cost_of(rank, columns, nonlinear)), log_p_value(space, drop, rank))
-
-
-def freedom(term: Term) -> int:
-    """Number of nonlinear parameters that were found from the data: one, or three where the axes have their own."""
-    return sum(len(v) if isinstance(v, tuple) else 1 for v in term.keywords.values()) if term.effect.nonlinear else 0
-
-
-def refine(model: Model, term: Term, share: float, *, axes: bool = True) -> Term:
-    """A term with its continuous nonlinear parameters moved to the best fit near their grid values.
-
-    One value serves all units and axes, unless one per axis takes off far more than noise could.
-    """
-    space = model.at(share)
-    state = model.problem.lot.state
-    continuous = [p for p in term.effect.parameters(state) if not p.choices]
-    for parameter in continuous:
-        term = _refine_one(space, model.problem, term, parameter)
-    if not axes or term.effect.scope == "station" or model.problem.lot.radial:
-        return term
-    for parameter in continuous:
-        term = _per_axis(space, model.problem, term, parameter)
-    return term
-
-
-AXES_DIFFER = 30.0
-"""Chi-square that one value per axis must take off beyond one value for all."""
-
-
-def _refine_one(space: Space, problem: Problem, term: Term, parameter: Nonlinear) -> Term:
-    """Three rounds of five values, each round narrower, about the value that all axes share."""
-    centre, width = _on_scale(parameter, float(np.mean(term.keywords[parameter.name]))), _cell(parameter)
-    for _ in range(3):
-        values = _around(parameter, centre, width)
-        gain = space.gain(_varied(problem, term, parameter, values))
-        centre, width = _on_scale(parameter, float(values[int(np.argmax(gain.drop))])), 0.4 * width
-    return _with_value(term, parameter, float(_off_scale(parameter, centre)))
-
-
-def _per_axis(space: Space, problem: Problem, term: Term, parameter: Nonlinear) -> Term:
-    """The same for every axis by itself, where the axes differ by more than noise."""
-    common = float(space.gain(problem.candidate(term.effect, [term.keywords], first=term.first)).drop[0])
-    best: list[float] = []
-    total = 0.0
-    for axis in range(3):
-        values = parameter.grid()
-        width, taken = _cell(parameter), 0.0
-        found = float(values[0])
-        for _ in range(4):
-            by_axis = space.gain(_varied(problem, term, parameter, values)).by_block[axis::3].sum(axis=0)
-            found = float(values[int(np.argmax(by_axis))])
-            taken = float(by_axis.max())
-            values, width = _around(parameter, _on_scale(parameter, found), width), 0.4 * width
-        best.append(found)
-        total += taken
-    if total - common < AXES_DIFFER * space.variance:
-        return term
-    return _with_value(term, parameter, tuple(best))
-
-
-def _on_scale(parameter: Nonlinear, value: float) -> float:
-    """A value on the scale on which it is varied."""
-    return {"log": np.log, "inverse": lambda v: 1.0 / v, "linear": lambda v: v}[parameter.scale](value)
-
-
-def _off_scale(parameter: Nonlinear, value: float) -> float:
-    return {"log": np.exp, "inverse": lambda v: 1.0 / v, "linear": lambda v: v}[parameter.scale](value)
-
-
-def _cell(parameter: Nonlinear) -> float:
-    """Width of a cell of the starting grid, on its scale."""
-    return abs(_on_scale(parameter, parameter.high) - _on_scale(parameter, parameter.low)) / max(
-        parameter.grid().size - 1, 1
-    )
-
-
-def _around(parameter: Nonlinear, centre: float, width: float) -> Array:
-    """Five values about a centre on the parameter's scale, within its bounds."""
-    low, high = sorted((_on_scale(parameter, parameter.low), _on_scale(parameter, parameter.high)))
-    points = np.clip(centre + width * np.array([-0.9, -0.45, 0.0, 0.45, 0.9]), low, high)
-    return np.array([_off_scale(parameter, float(p)) for p in points])
-
-
-def _varied(problem: Problem, term: Term, parameter: Nonlinear, values: Array) -> Candidate:
-    """A term's columns at several values of one parameter."""
-    sets = [{**term.keywords, parameter.name: float(v)} for v in values]
-    columns = np.stack([problem.rotated(term.effect, s) for s in sets], axis=2)
-    return Candidate(columns[..., : term.first], term.effect.scope == "station")
-
-
-def _with_value(term: Term, parameter: Nonlinear, value: float | tuple[float, ...]) -> Term:
-    return Term(term.effect, tuple({**term.keywords, parameter.name: value}.items()), term.first)
+    cost = deviance(space, drop) + cost_of(rank, columns, nonlinear)
+    return Rival(term, drop, rank, cost, log_p_value(space, drop, rank))
 
 
 def _reexamine(field: Field, base: Model, model: Model, chosen: list[Term]) -> tuple[Model, list[Term]]:
@@ -353,27 +239,3 @@ def _taken_apart(field: Field, base: Model, model: Model, chosen: list[Term]) ->
         if len(pair) == 2 and cost_of_model(rest) < cost_of_model(model):
             model, chosen = rest, [*others, *pair]
     return model, chosen
-
-
-def cost_of_model(model: Model) -> float:
-    """Penalised deviance of a whole model: the fewer coefficients and columns, the better."""
-    space, problem = model.space, model.problem
-    logdet = float(np.sum(np.log(space.spread**2))) * (problem.blocks / space.spread.shape[0])
-    deviance = problem.count * np.log(max(space.rss, 1e-300) / problem.count) + logdet
-    nonlinear = sum(freedom(t) for t in model.terms)
-    columns = model.local.shape[-1] + model.shared.shape[-1]
-    return float(deviance + cost_of(space.local_rank + space.shared_rank, columns, nonlinear))
-
-
-def terms_of(effects: Sequence[AnyEffect], problem: Problem) -> list[Term]:
-    """Terms of a given model, nonlinear parameters found one after the other beside the rest."""
-    terms = [Term(e, tuple(grid_of(e, problem.lot.state)[0].items())) for e in effects]
-    for place, effect in enumerate(effects):
-        grid = grid_of(effect, problem.lot.state)
-        if len(grid) < 2:
-            continue
-        rest = Model(problem, [t for i, t in enumerate(terms) if i != place])
-        gain = rest.space.gain(problem.candidate(effect, grid))
-        best = Term(effect, tuple(grid[int(np.argmax(gain.drop))].items()))
-        terms[place] = refine(rest, best, rest.share)
-    return terms

@@ -94,6 +94,11 @@ class Space:
         return self.rss / max(self.dof, 1)
 
     @cached_property
+    def logdet(self) -> float:
+        """Log-determinant of the covariance of all blocks, without the common factor a."""
+        return float(np.sum(np.log(self.spread**2))) * (self.targets.shape[0] / self.spread.shape[0])
+
+    @cached_property
     def residual(self) -> Array:
         """Whitened residuals, (blocks, n)."""
         if self.targets.shape[-1] == 1:
@@ -103,8 +108,7 @@ class Space:
 
     def restricted(self, information: Array) -> float:
         """−2 log restricted likelihood, up to a constant, given log|XᵀV⁻¹X| of the model."""
-        logdet = float(np.sum(np.log(self.spread**2))) * (self.targets.shape[0] / self.spread.shape[0])
-        return self.dof * np.log(self.rss / max(self.dof, 1)) + logdet + float(np.sum(information))
+        return self.dof * np.log(self.rss / max(self.dof, 1)) + self.logdet + float(np.sum(information))
 
     def project(self, columns: Array) -> Array:
         """Columns (blocks, n, m) less what the local columns explain."""

@@ -10,8 +10,8 @@ from inertial import frames
 from inertial.criticism.curves import CurveFit, fit_curve
 from inertial.criticism.drivers import curve, quantities, varies
 from inertial.criticism.model import Model, Term
+from inertial.criticism.penalty import PER_COEFFICIENT, cost_of_model
 from inertial.criticism.problem import Problem
-from inertial.criticism.search import PER_COEFFICIENT, cost_of_model
 from inertial.criticism.space import Candidate
 from inertial.effects.covariate import COVARIATE_PREFIX
 

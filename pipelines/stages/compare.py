@@ -11,7 +11,7 @@ from inertial.criticism.comparison import estimate, residuals_of, rms
 from inertial.criticism.heldout import heldout_rms
 from inertial.criticism.model import Model, refuse_without_freedom
 from inertial.criticism.problem import Problem
-from inertial.criticism.search import terms_of
+from inertial.criticism.refinement import terms_of
 from inertial.effects import StationEffect
 from inertial.errors import InertialError
 from pipelines.stages.measured import Measured, lot_of, measured

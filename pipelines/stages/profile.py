@@ -8,7 +8,7 @@ import numpy as np
 
 from inertial import effects as catalogue
 from inertial.criticism.problem import Lot, Problem
-from inertial.criticism.search import terms_of
+from inertial.criticism.refinement import terms_of
 from inertial.fits.linear import fit_lot
 
 if TYPE_CHECKING:

@@ -1,0 +1,112 @@
+"""Nonlinear parameters of a term moved from the grid to where the measurements fit best."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from inertial.criticism.model import Model, Term
+from inertial.criticism.problem import Problem, grid_of
+from inertial.criticism.space import Candidate, Space
+from inertial.effects.base import AnyEffect, Nonlinear
+
+Array = NDArray[np.float64]
+
+AXES_DIFFER = 30.0
+"""Chi-square that one value per axis must take off beyond one value for all."""
+
+
+def refine(model: Model, term: Term, share: float, *, axes: bool = True) -> Term:
+    """A term with its continuous nonlinear parameters moved to the best fit near their grid values.
+
+    One value serves all units and axes, unless one per axis takes off far more than noise could.
+    """
+    space = model.at(share)
+    state = model.problem.lot.state
+    continuous = [p for p in term.effect.parameters(state) if not p.choices]
+    for parameter in continuous:
+        term = _refine_one(space, model.problem, term, parameter)
+    if not axes or term.effect.scope == "station" or model.problem.lot.radial:
+        return term
+    for parameter in continuous:
+        term = _per_axis(space, model.problem, term, parameter)
+    return term
+
+
+def _refine_one(space: Space, problem: Problem, term: Term, parameter: Nonlinear) -> Term:
+    """Three rounds of five values, each round narrower, about the value that all axes share."""
+    centre, width = _on_scale(parameter, float(np.mean(term.keywords[parameter.name]))), _cell(parameter)
+    for _ in range(3):
+        values = _around(parameter, centre, width)
+        gain = space.gain(_varied(problem, term, parameter, values))
+        centre, width = _on_scale(parameter, float(values[int(np.argmax(gain.drop))])), 0.4 * width
+    return _with_value(term, parameter, float(_off_scale(parameter, centre)))
+
+
+def _per_axis(space: Space, problem: Problem, term: Term, parameter: Nonlinear) -> Term:
+    """The same for every axis by itself, where the axes differ by more than noise."""
+    common = float(space.gain(problem.candidate(term.effect, [term.keywords], first=term.first)).drop[0])
+    best: list[float] = []
+    total = 0.0
+    for axis in range(3):
+        values = parameter.grid()
+        width, taken = _cell(parameter), 0.0
+        found = float(values[0])
+        for _ in range(4):
+            by_axis = space.gain(_varied(problem, term, parameter, values)).by_block[axis::3].sum(axis=0)
+            found = float(values[int(np.argmax(by_axis))])
+            taken = float(by_axis.max())
+            values, width = _around(parameter, _on_scale(parameter, found), width), 0.4 * width
+        best.append(found)
+        total += taken
+    if total - common < AXES_DIFFER * space.variance:
+        return term
+    return _with_value(term, parameter, tuple(best))
+
+
+def _on_scale(parameter: Nonlinear, value: float) -> float:
+    """A value on the scale on which it is varied."""
+    return {"log": np.log, "inverse": lambda v: 1.0 / v, "linear": lambda v: v}[parameter.scale](value)
+
+
+def _off_scale(parameter: Nonlinear, value: float) -> float:
+    return {"log": np.exp, "inverse": lambda v: 1.0 / v, "linear": lambda v: v}[parameter.scale](value)
+
+
+def _cell(parameter: Nonlinear) -> float:
+    """Width of a cell of the starting grid, on its scale."""
+    return abs(_on_scale(parameter, parameter.high) - _on_scale(parameter, parameter.low)) / max(
+        parameter.grid().size - 1, 1
+    )
+
+
+def _around(parameter: Nonlinear, centre: float, width: float) -> Array:
+    """Five values about a centre on the parameter's scale, within its bounds."""
+    low, high = sorted((_on_scale(parameter, parameter.low), _on_scale(parameter, parameter.high)))
+    points = np.clip(centre + width * np.array([-0.9, -0.45, 0.0, 0.45, 0.9]), low, high)
+    return np.array([_off_scale(parameter, float(p)) for p in points])
+
+
+def _varied(problem: Problem, term: Term, parameter: Nonlinear, values: Array) -> Candidate:
+    """A term's columns at several values of one parameter."""
+    sets = [{**term.keywords, parameter.name: float(v)} for v in values]
+    columns = np.stack([problem.rotated(term.effect, s) for s in sets], axis=2)
+    return Candidate(columns[..., : term.first], term.effect.scope == "station")
+
+
+def _with_value(term: Term, parameter: Nonlinear, value: float | tuple[float, ...]) -> Term:
+    return Term(term.effect, tuple({**term.keywords, parameter.name: value}.items()), term.first)
+
+
+def terms_of(effects: Sequence[AnyEffect], problem: Problem) -> list[Term]:
+    """Terms of a given model, nonlinear parameters found one after the other beside the rest."""
+    terms = [Term(e, tuple(grid_of(e, problem.lot.state)[0].items())) for e in effects]
+    for place, effect in enumerate(effects):
+        grid = grid_of(effect, problem.lot.state)
+        if len(grid) < 2:
+            continue
+        rest = Model(problem, [t for i, t in enumerate(terms) if i != place])
+        gain = rest.space.gain(problem.candidate(effect, grid))
+        best = Term(effect, tuple(grid[int(np.argmax(gain.drop))].items()))
+        terms[place] = refine(rest, best, rest.share)
+    return terms
