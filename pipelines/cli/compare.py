@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated, Any
-
-import typer
+from typing import TYPE_CHECKING, Any
 
 from pipelines.cli.options import (
     ArchiveOption,
     DwellsArgument,
     EffectFileOption,
     EffectsOption,
+    FreshHistoryOption,
+    FreshOption,
     HistoryOption,
     JsonOption,
     ModelOption,
@@ -32,14 +32,9 @@ def command(
     dwells: DwellsArgument,
     effects: EffectsOption = "",
     model: ModelOption = None,
-    fresh: Annotated[
-        str,
-        typer.Option("--fresh", metavar="DWELLS2", help="The same units measured again: never fitted, only predicted."),
-    ] = "",
+    fresh: FreshOption = "",
     history: HistoryOption = "",
-    fresh_history: Annotated[
-        str, typer.Option("--fresh-history", metavar="FILE", help="Temperatures against time of the fresh run.")
-    ] = "",
+    fresh_history: FreshHistoryOption = "",
     effect_file: EffectFileOption = None,
     archive: ArchiveOption = None,
     *,

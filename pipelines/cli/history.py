@@ -10,6 +10,8 @@ import typer
 from pipelines.cli.options import (
     ArchiveOption,
     EffectFileOption,
+    FreshHistoryOption,
+    FreshOption,
     HistoryOption,
     JsonOption,
     console,
@@ -25,14 +27,9 @@ def command(
     dwells: Annotated[
         str, typer.Option("--dwells", metavar="DWELLS", help="A file in the exchange format, or a run of the archive.")
     ] = "",
-    fresh: Annotated[
-        str,
-        typer.Option("--fresh", metavar="DWELLS2", help="The same units measured again: never fitted, only predicted."),
-    ] = "",
+    fresh: FreshOption = "",
     history: HistoryOption = "",
-    fresh_history: Annotated[
-        str, typer.Option("--fresh-history", metavar="FILE", help="Temperatures against time of the fresh run.")
-    ] = "",
+    fresh_history: FreshHistoryOption = "",
     picture: Annotated[
         Path | None, typer.Option("--picture", metavar="FILE.png", help="Draw it, as PNG, SVG or PDF.")
     ] = None,

@@ -35,6 +35,12 @@ ModelOption = Annotated[Path | None, typer.Option("--model", metavar="FILE", hel
 HistoryOption = Annotated[
     str, typer.Option("--history", metavar="FILE", help="Temperatures against time; a run of the archive has its own.")
 ]
+FreshOption = Annotated[
+    str, typer.Option("--fresh", metavar="DWELLS2", help="The same units measured again: never fitted, only predicted.")
+]
+FreshHistoryOption = Annotated[
+    str, typer.Option("--fresh-history", metavar="FILE", help="Temperatures against time of the fresh run.")
+]
 EffectFileOption = Annotated[
     list[Path] | None,
     typer.Option("--effect-file", metavar="FILE.py", help="A Python file with effects of your own; may be repeated."),
