@@ -86,6 +86,20 @@ class Soak(Strict):
     poll_s: Positive = 10.0
 
 
+class Pace(Strict):
+    """How long a station needs, for the planning of its time: nothing is driven by these figures.
+
+    ``lag_s`` is that of the slowest device behind the chamber's air; a simulated station has its own in its simulation.
+    ``in_position_s`` goes by between the end of a move and the drive's word that it stands.
+    """
+
+    ramp_K_per_min: Positive = 3.0
+    lag_s: Positive = 200.0
+    in_position_s: NotNegative = 1.5
+    record_s: NotNegative = 0.0
+    room_C: FiniteFloat = 23.0
+
+
 class Link(Strict):
     """Patience of the links."""
 
@@ -150,6 +164,7 @@ class StationConfig(Strict):
     devices: Devices
     limits: Limits = Limits()
     soak: Soak = Soak()
+    pace: Pace = Pace()
     link: Link = Link()
     simulation: Simulation | None = None
 

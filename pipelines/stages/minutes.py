@@ -1,0 +1,168 @@
+"""Station time of a recipe, or of any steps: moves, soaks, dwells and the static record, before any of it is spent."""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from dataclasses import dataclass, replace
+from functools import lru_cache
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from pipelines.stages.capture import Step
+    from schemas.recipe import Pose, Recipe
+    from schemas.station import StationConfig
+
+_POLL_S = 0.25
+"""How often the table is asked whether it stands."""
+
+_FIRST_SOAK = -1
+
+
+@dataclass(frozen=True)
+class Minutes:
+    """Station time in minutes, by what it goes into."""
+
+    moves: float
+    soaks: float
+    dwells: float
+    static_record: float
+
+    @property
+    def total(self) -> float:
+        """All of it."""
+        return self.moves + self.soaks + self.dwells + self.static_record
+
+    def document(self) -> dict[str, float]:
+        """The parts and their sum, rounded, by name."""
+        parts = {"soaks": self.soaks, "moves": self.moves, "dwells": self.dwells, "static_record": self.static_record}
+        return {**{k: round(v, 2) for k, v in parts.items()}, "total": round(self.total, 2)}
+
+
+@dataclass(frozen=True)
+class Standing:
+    """Where a station stands: table in degrees, air and slowest device in °C, and the soak that it has reached."""
+
+    outer: float = 0.0
+    inner: float = 0.0
+    air: float = 23.0
+    device: float = 23.0
+    soak: int = _FIRST_SOAK
+
+
+def minutes(steps: Sequence[Step], station: StationConfig, recipe: Recipe, start: Standing | None = None) -> Minutes:
+    """Station time of steps in order; a change of their ``soak`` is a soak, as capture does it.
+
+    Parameters
+    ----------
+    steps : records to take, of a recipe (:func:`pipelines.stages.capture.steps`) or any others
+    station : its speeds, its rule for soaks and its pace
+    recipe : for the shortest soak, the settling after a move and the durations
+    start : where the station stands; in the room, level and not soaked where None
+    """
+    room = station.simulation.room_C if station.simulation else station.pace.room_C
+    now = start or Standing(air=room, device=room)
+    moves = soaks = dwells = static = 0.0
+    for step in steps:
+        if step.soak != now.soak:
+            waited, now = soaked(now, step.temperature, station, recipe.soak_min_s)
+            now = replace(now, soak=step.soak)
+            soaks += waited
+        going = move_seconds(now, step.pose, station) + recipe.settle_s + station.pace.record_s
+        lasting = recipe.static_record_s if step.kind == "allan" else recipe.dwell_s
+        static, dwells = (static + lasting, dwells) if step.kind == "allan" else (static, dwells + lasting)
+        moves += going
+        now = _later(replace(now, outer=step.pose.outer_deg, inner=step.pose.inner_deg), going + lasting, station)
+    return Minutes(moves / 60.0, soaks / 60.0, dwells / 60.0, static / 60.0)
+
+
+def move_seconds(now: Standing, pose: Pose, station: StationConfig) -> float:
+    """Seconds from the command to a pose until both axes say that they stand there."""
+    limits = station.limits
+    way = max(abs(pose.outer_deg - now.outer), abs(pose.inner_deg - now.inner))
+    going = axis_seconds(way, limits.speed_deg_s, limits.acceleration_deg_s2) + station.pace.in_position_s
+    return math.ceil(going / _POLL_S) * _POLL_S
+
+
+def axis_seconds(way: float, speed: float, acceleration: float) -> float:
+    """Seconds of a trapezoidal move over ``way`` degrees."""
+    ramp = min(speed / acceleration, math.sqrt(way / acceleration))
+    return 0.0 if ramp == 0.0 else ramp + way / (acceleration * ramp)
+
+
+def soaked(now: Standing, target: float, station: StationConfig, shortest: float) -> tuple[float, Standing]:
+    """Seconds until the slowest device has settled at ``target`` °C by the station's rule, and how it stands then."""
+    waited, device = _soak(now.air, now.device, target, shortest, _thermal(station))
+    return waited, replace(now, air=target, device=device)
+
+
+@dataclass(frozen=True)
+class _Thermal:
+    """Pace of chamber and devices, and the rule by which a soak counts as reached."""
+
+    lag: float
+    ramp: float
+    band: float
+    rate: float
+    window: float
+    limit: float
+    poll: float
+
+
+def _thermal(station: StationConfig) -> _Thermal:
+    rule, ramp = station.soak, station.pace.ramp_K_per_min / 60.0
+    return _Thermal(
+        lag_of(station), ramp, rule.band_K, rule.rate_K_per_min / 60.0, rule.window_s, rule.limit_s, rule.poll_s
+    )
+
+
+def lag_of(station: StationConfig) -> float:
+    """Seconds by which the slowest device follows the chamber's air."""
+    return station.simulation.slot_lag_s[1] if station.simulation else station.pace.lag_s
+
+
+@lru_cache(maxsize=4096)
+def _soak(air: float, device: float, target: float, shortest: float, thermal: _Thermal) -> tuple[float, float]:
+    """Seconds, and the device's temperature at the end: air ramps to the target, the device follows with its lag.
+
+    The rule is :meth:`stations.station.Station.soak`'s: all of the window inside the band, and its halves apart by less than
+    the rate allows. A soak that never settles is given up as the station would.
+    """
+    past: deque[float] = deque([device], maxlen=round(thermal.window / thermal.poll) + 1)
+    waited = 0.0
+    while waited < shortest or not _settled(past, target, thermal):
+        if waited > shortest + thermal.limit:
+            break
+        air, device = _followed(air, device, target, thermal)
+        past.append(device)
+        waited += thermal.poll
+    return waited, device
+
+
+def _settled(past: deque[float], target: float, thermal: _Thermal) -> bool:
+    span = (len(past) - 1) * thermal.poll
+    if span < thermal.window - 1.5 * thermal.poll:
+        return False
+    rows = list(past)
+    half = len(rows) // 2
+    drift = abs(sum(rows[half:]) / (len(rows) - half) - sum(rows[:half]) / half)
+    return max(abs(t - target) for t in rows) <= thermal.band and drift / (span / 2.0) <= thermal.rate
+
+
+def _followed(air: float, device: float, target: float, thermal: _Thermal) -> tuple[float, float]:
+    """Air and device one poll later: exact for a ramp that ends at the target, and a lag of first order behind it."""
+    ramping = min(thermal.poll, abs(target - air) / thermal.ramp)
+    slope = math.copysign(thermal.ramp, target - air)
+    far = slope * thermal.lag  # how far the device is behind a ramp that never ends
+    behind = far + (air - device - far) * math.exp(-ramping / thermal.lag)
+    behind *= math.exp(-(thermal.poll - ramping) / thermal.lag)
+    air = target if ramping < thermal.poll else air + slope * ramping
+    return air, air - behind
+
+
+def _later(now: Standing, seconds: float, station: StationConfig) -> Standing:
+    """How the station stands after some seconds at the temperature of its air."""
+    keep = math.exp(-seconds / lag_of(station))
+    return replace(now, device=now.air + (now.device - now.air) * keep)
