@@ -30,7 +30,7 @@ class Stage:
 
     inputs : tables it reads; ``records`` are the captured samples
     parameters : what it is called with besides tables, JSON-able: part of its key
-    modules : import names whose source is part of its key
+    modules : import names whose source, with all that it imports from the product, is part of its key
     """
 
     name: str
@@ -89,7 +89,7 @@ def _none(job: Job) -> dict[str, Any]:
     return {}
 
 
-_SHARED = ("inertial", "pipelines.stages.arrays", "pipelines.stages.calibration", "schemas.tables")
+_TABLES = "schemas.tables"
 
 STAGES: tuple[Stage, ...] = (
     Stage(
@@ -98,7 +98,7 @@ STAGES: tuple[Stage, ...] = (
         outputs=("verdicts",),
         parameters=lambda job: {"lot": job.lot.model_dump(mode="json"), "zero_output": job.recipe.zero_output},
         call=_validate,
-        modules=("inertial", "schemas.tables", "pipelines.stages.validate"),
+        modules=("pipelines.stages.validate", _TABLES),
     ),
     Stage(
         name="reduce",
@@ -106,7 +106,7 @@ STAGES: tuple[Stage, ...] = (
         outputs=("dwells",),
         parameters=lambda job: {"local_gravity_m_s2": job.recipe.local_gravity_m_s2},
         call=_reduce,
-        modules=("inertial", "schemas.tables", "pipelines.stages.reduce"),
+        modules=("pipelines.stages.reduce", _TABLES),
     ),
     Stage(
         name="fit",
@@ -117,7 +117,7 @@ STAGES: tuple[Stage, ...] = (
             "formulas": [f.model_dump(mode="json") for f in job.recipe.formulas],
         },
         call=_fit,
-        modules=(*_SHARED, "pipelines.stages.fit", "pipelines.stages.profile"),
+        modules=("pipelines.stages.fit", _TABLES),
     ),
     Stage(
         name="verify",
@@ -125,7 +125,7 @@ STAGES: tuple[Stage, ...] = (
         outputs=("verification", "verification_poses"),
         parameters=_none,
         call=_verify,
-        modules=(*_SHARED, "pipelines.stages.verify"),
+        modules=("pipelines.stages.verify", _TABLES),
     ),
     Stage(
         name="noise",
@@ -133,7 +133,7 @@ STAGES: tuple[Stage, ...] = (
         outputs=("allan", "noise"),
         parameters=_none,
         call=_noise,
-        modules=(*_SHARED, "pipelines.stages.noise"),
+        modules=("pipelines.stages.noise", _TABLES),
     ),
     Stage(
         name="grade",
@@ -144,7 +144,7 @@ STAGES: tuple[Stage, ...] = (
             "zero_output": job.recipe.zero_output,
         },
         call=_grade,
-        modules=(*_SHARED, "schemas.limits", "pipelines.stages.figures", "pipelines.stages.grade"),
+        modules=("pipelines.stages.grade", _TABLES),
     ),
 )
 ORDER = ("capture", *(stage.name for stage in STAGES), "report")

@@ -5,10 +5,10 @@ from __future__ import annotations
 import hashlib
 import json
 from functools import cache
-from importlib import import_module
 from importlib.metadata import version
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
+
+from pipelines.archive.sources import sources
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -43,24 +43,16 @@ def stage_key(stage: str, inputs: Mapping[str, str], parameters: Mapping[str, An
 
 @cache
 def code_hash(modules: Sequence[str]) -> str:
-    """Hash of the sources of modules and, for packages, of everything below them.
+    """Hash of the sources that modules run: their own, those of everything below packages, and what they import.
 
     Parameters
     ----------
     modules : import names, as a tuple.
     """
     total = hashlib.sha256()
-    for path in sorted({source for module in modules for source in _sources(module)}):
-        total.update(path.name.encode() + b"\0" + path.read_bytes() + b"\0")
+    for name, path in sources(modules).items():
+        total.update(name.encode() + b"\0" + path.read_bytes() + b"\0")
     return total.hexdigest()
-
-
-def _sources(module: str) -> list[Path]:
-    file = import_module(module).__file__
-    if file is None:
-        return []
-    path = Path(file)
-    return sorted(path.parent.rglob("*.py")) if path.name == "__init__.py" else [path]
 
 
 @cache
