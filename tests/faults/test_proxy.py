@@ -1,0 +1,119 @@
+"""The bad network does to frames what it is told, and nothing else."""
+
+import socket
+import threading
+from contextlib import contextmanager, suppress
+
+import pytest
+
+from stations.plant.faults.proxy import ChaosProxy, Meddling, split
+
+REPLY = b"\x00\x2a\x00\x00\x00\x07\x01\x03\x04\x11\x11\x22\x22"
+
+
+def frame(number: int, body: bytes = b"\x01\x03\x04\x11\x11\x22\x22") -> bytes:
+    return number.to_bytes(2, "big") + b"\x00\x00" + len(body).to_bytes(2, "big") + body
+
+
+@contextmanager
+def echo():
+    """A server that answers every frame with itself."""
+    listener = socket.create_server(("127.0.0.1", 0))
+
+    def serve(connection):
+        with connection, suppress(OSError):
+            while data := connection.recv(4096):
+                connection.sendall(data)
+
+    def accept():
+        with suppress(OSError):
+            while True:
+                threading.Thread(target=serve, args=(listener.accept()[0],), daemon=True).start()
+
+    thread = threading.Thread(target=accept, daemon=True)
+    thread.start()
+    yield listener.getsockname()
+    listener.shutdown(socket.SHUT_RDWR)
+    listener.close()
+    thread.join(5.0)
+
+
+@contextmanager
+def through(*meddlings: Meddling):
+    with echo() as address, ChaosProxy(*address) as proxy:
+        proxy.once(*meddlings)
+        with socket.create_connection((proxy.host, proxy.port), timeout=0.3) as client:
+            yield proxy, client
+
+
+def received(client: socket.socket, size: int) -> bytes:
+    """What arrives, up to ``size`` bytes, until nothing comes for a while."""
+    data = b""
+    with suppress(TimeoutError):
+        while len(data) < size and (more := client.recv(4096)):
+            data += more
+    return data
+
+
+def test_frames_pass_as_they_are():
+    with through() as (proxy, client):
+        client.sendall(frame(1) + frame(2))
+        assert received(client, 26) == frame(1) + frame(2)
+    assert proxy.frames == {"request": 2, "reply": 2}
+
+
+@pytest.mark.parametrize(
+    ("meddling", "arrives"),
+    [
+        (Meddling("drop"), b""),
+        (Meddling("drop", "request"), b""),
+        (Meddling("delay", delay_s=0.05), frame(1)),
+        (Meddling("duplicate"), frame(1) * 2),
+        (Meddling("truncate", size=3), frame(1)[:-3]),
+        (Meddling("half_open"), b""),
+        (Meddling("late"), b""),
+        (Meddling("retag"), frame(2)),
+        (Meddling("swap"), frame(1, b"\x01\x03\x04\x22\x22\x11\x11")),
+    ],
+)
+def test_the_next_frame_is_spoilt_as_asked(meddling, arrives):
+    with through(meddling) as (proxy, client):
+        client.sendall(frame(1))
+        assert received(client, 26) == arrives
+    assert proxy.spoilt == [meddling]
+
+
+def test_garbled_frames_differ_in_as_many_bytes_as_asked_at_most():
+    with through(Meddling("garble", size=2)) as (_, client):
+        client.sendall(frame(1))
+        found = received(client, 13)
+    assert 1 <= sum(a != b for a, b in zip(found, frame(1), strict=True)) <= 2
+
+
+def test_a_late_reply_comes_in_front_of_the_next_one_on_a_new_connection():
+    with through(Meddling("late")) as (proxy, client):
+        client.sendall(frame(1))
+        assert received(client, 13) == b""
+        with socket.create_connection((proxy.host, proxy.port), timeout=2.0) as again:
+            again.sendall(frame(2))
+            assert received(again, 26) == frame(1) + frame(2)
+
+
+def test_a_reset_breaks_the_connection_off():
+    with through(Meddling("reset")) as (_, client):
+        client.sendall(frame(1))
+        with pytest.raises(ConnectionResetError):
+            client.recv(64)
+
+
+def test_half_open_connections_stay_silent_and_new_ones_work():
+    with through(Meddling("half_open")) as (proxy, client):
+        client.sendall(frame(1) + frame(2))
+        assert received(client, 26) == b""
+        with socket.create_connection((proxy.host, proxy.port), timeout=2.0) as again:
+            again.sendall(frame(3))
+            assert received(again, 13) == frame(3)
+
+
+def test_streams_are_cut_at_frames():
+    assert split(REPLY + REPLY[:5]) == ([REPLY], REPLY[:5])
