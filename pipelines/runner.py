@@ -5,23 +5,20 @@ That is going on after a crash and running an archive again, by one mechanism.
 
 from __future__ import annotations
 
-import fcntl
 import time
 from collections.abc import Callable
-from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from threadpoolctl import threadpool_limits
 
 from pipelines.archive import Archive, Records, Run, code_hash, files, stage_key
+from pipelines.archive.locks import alone
 from pipelines.chain import BY_NAME, ORDER, RECORDS, Stage
 from pipelines.progress import silent
-from schemas.errors import OperatorNeeded
 
 if TYPE_CHECKING:
-    from collections.abc import Generator, Iterator
-    from pathlib import Path
+    from collections.abc import Iterator
 
     from pipelines.job import Job
     from pipelines.progress import Progress
@@ -69,7 +66,7 @@ class Runner:
             if name == "capture":
                 reused = self._capture()
             else:
-                with _alone(self.run.path, wait=True):
+                with alone(self.run.path, wait=True):
                     files.sweep(self.run.path)
                     reused = self._report() if name == "report" else self._compute(BY_NAME[name])
         return Done(name, reused, time.perf_counter() - start)
@@ -84,7 +81,7 @@ class Runner:
         records = self.archive.capture(self.job.capture_id)
         was_there = records.is_complete()
         if not was_there:
-            with _alone(records.path):
+            with alone(records.path):
                 records.begin()
                 self.measure(self.job, records, self.progress)
                 records.complete()
@@ -118,21 +115,3 @@ class Runner:
         if name == RECORDS:
             return self.archive.capture(self.job.capture_id).hash()
         return self.run.manifest(name)["sha256"]
-
-
-@contextmanager
-def _alone(folder: Path, *, wait: bool = False) -> Generator[None, None, None]:
-    """A block in which no other process writes into the folder; the system frees it when a process dies.
-
-    A capture lasts hours, so a second one is refused; a stage lasts seconds, so a second one waits.
-    """
-    with files.writing(folder):
-        folder.mkdir(parents=True, exist_ok=True)
-        lock = (folder / "lock").open("w")
-    with lock:
-        try:
-            fcntl.flock(lock, fcntl.LOCK_EX | (0 if wait else fcntl.LOCK_NB))
-        except BlockingIOError:
-            message = f"capture: another process is measuring this lot into {folder}; wait for it, or stop it"
-            raise OperatorNeeded(message) from None
-        yield

@@ -12,13 +12,13 @@ import os
 import platform
 from dataclasses import dataclass
 from datetime import UTC, datetime
-from pathlib import Path
+from hashlib import sha256
 from typing import TYPE_CHECKING, Any
 
 from pipelines.archive import files
 from pipelines.archive.keys import digest, libraries
 from pipelines.archive.records import PARTS, Records
-from schemas import tables
+from pipelines.archive.store import address_of, place_of
 from schemas.errors import ArchiveUnusable, WrongUse, did_you_mean
 
 if TYPE_CHECKING:
@@ -26,12 +26,14 @@ if TYPE_CHECKING:
 
     import pandas as pd
 
+    from pipelines.archive.store import Place
+
 FORMAT = 1
 
 
-def default_root() -> Path:
-    """The archive's folder where none is given: the environment's TUMBLELINE_ARCHIVE, else ./archive."""
-    return Path(os.environ.get("TUMBLELINE_ARCHIVE") or "archive")
+def default_root() -> Place:
+    """The archive's place where none is given: the environment's TUMBLELINE_ARCHIVE, else ./archive."""
+    return place_of(os.environ.get("TUMBLELINE_ARCHIVE") or "archive")
 
 
 @dataclass(frozen=True)
@@ -66,7 +68,7 @@ class Run:
         return Records(self.archive.root / "captures" / capture) if capture else None
 
     @property
-    def report(self) -> Path:
+    def report(self) -> Place:
         """Where the report for people lies."""
         return self.path / "report.html"
 
@@ -87,18 +89,19 @@ class Run:
         ----------
         about : the stage's inputs, parameters and code, as they went into the key.
         """
+        from schemas import tables  # slow to import, and only writers of tables need it
+
         for name, frame in outputs.items():
             data = files.table_bytes(
                 name,
                 tables.check(name, frame, where=f"{stage} → {name}"),
                 tables.VERSION,
             )
-            path = self.path / f"{name}.parquet"
-            files.publish(path, data)
+            files.publish(self.path / f"{name}.parquet", data)
             content = {
                 "stage": stage,
                 "key": key,
-                "sha256": files.sha256(path),
+                "sha256": sha256(data).hexdigest(),
                 "rows": len(frame),
             }
             manifest = {**provenance(), **content, **about, "schema": tables.VERSION}
@@ -106,8 +109,9 @@ class Run:
 
     def save_report(self, key: str, html: str, about: Mapping[str, Any]) -> None:
         """Publish the report for people with its manifest."""
-        files.publish(self.report, html.encode())
-        content = {"stage": "report", "key": key, "sha256": files.sha256(self.report)}
+        data = html.encode()
+        files.publish(self.report, data)
+        content = {"stage": "report", "key": key, "sha256": sha256(data).hexdigest()}
         files.publish(
             self.path / "report.json",
             files.json_bytes({**provenance(), **content, **about}),
@@ -122,6 +126,8 @@ class Run:
         path = self.path / f"{name}.parquet"
         if name in PARTS and not path.is_file() and self.records is not None:
             return self.records.gathered(name)
+        from schemas import tables
+
         if name not in tables.TABLES:
             message = f"archive: no table is called '{name}'; {did_you_mean(name, tables.TABLES)}"
             raise WrongUse(message)
@@ -153,10 +159,15 @@ class Run:
 
 
 class Archive:
-    """A folder of captures and runs."""
+    """A folder of captures and runs, or a place in an object store that is used as one."""
 
-    def __init__(self, root: Path | str | None = None) -> None:
-        self.root = Path(root) if root is not None else default_root()
+    def __init__(self, root: Place | str | None = None) -> None:
+        self.root: Place = place_of(root) if root is not None else default_root()
+
+    @property
+    def address(self) -> str:
+        """By what another process opens the same archive."""
+        return address_of(self.root)
 
     def prepare(self) -> None:
         """Make sure that the folder is an archive that can be written; refuse a folder of something else."""
@@ -165,7 +176,7 @@ class Archive:
             self._refuse_other_format(files.read_json(mark))
             with files.writing(self.root):
                 probe = self.root / f"{files.TEMPORARY}probe-{os.getpid()}"
-                probe.touch()
+                probe.write_bytes(b"")
                 probe.unlink()
             return
         if self.root.is_dir() and any(self.root.iterdir()):

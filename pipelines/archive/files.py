@@ -1,7 +1,7 @@
 """Single files of the archive: durable, atomic writing; reading that trusts nothing.
 
-Everything is written under a temporary name in the folder where it will live, fsynced, then renamed: a reader sees the
-whole file or none. Equal tables give equal bytes, whatever the host and the hour.
+In a folder everything is written under a temporary name where it will live, fsynced, then renamed; in an object store putting
+is atomic by itself. A reader sees the whole file or none. Equal tables give equal bytes, whatever the host and the hour.
 """
 
 from __future__ import annotations
@@ -12,18 +12,18 @@ import os
 import shutil
 import uuid
 from contextlib import contextmanager
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import pyarrow as pa
-import pyarrow.parquet as pq
-
+from pipelines.archive.store import ObjectPath, first_line
 from schemas.errors import ArchiveUnusable
 
 if TYPE_CHECKING:
-    from collections.abc import Generator
+    from collections.abc import Generator, Mapping
+    from pathlib import Path
 
     import pandas as pd
+
+    from pipelines.archive.store import Place
 
 TABLE_MARK = b"tumbleline.table"
 SCHEMA_MARK = b"tumbleline.schema"
@@ -35,7 +35,7 @@ ELSEWHERE = "name another place"
 
 
 @contextmanager
-def writing(path: Path, what: str = "archive", remedy: str = IN_ARCHIVE) -> Generator[None, None, None]:
+def writing(path: Place, what: str = "archive", remedy: str = IN_ARCHIVE) -> Generator[None, None, None]:
     """A block that writes under ``path``; what the system refuses becomes one message.
 
     Parameters
@@ -47,20 +47,23 @@ def writing(path: Path, what: str = "archive", remedy: str = IN_ARCHIVE) -> Gene
         yield
     except OSError as problem:
         message = (
-            f"{what}: {path} cannot be written ({problem.strerror}), a folder with write permission and free space is "
+            f"{what}: {path} cannot be written ({first_line(problem)}), a folder with write permission and free space is "
             f"needed; {remedy}"
         )
         raise ArchiveUnusable(message) from None
 
 
-def sha256(path: Path) -> str:
+def sha256(path: Place) -> str:
     """Hash of a file's bytes, hexadecimal."""
     with path.open("rb") as file:
-        return hashlib.file_digest(file, "sha256").hexdigest()
+        return hashlib.file_digest(file, "sha256").hexdigest()  # pyright: ignore[reportArgumentType]  # bytes in memory, too
 
 
 def table_bytes(name: str, frame: pd.DataFrame, version: int) -> bytes:
     """A table as Parquet: zstd, no index, no library notes, the table's name and schema version in the metadata."""
+    import pyarrow as pa  # a quarter of a second, which commands without a table need not spend
+    import pyarrow.parquet as pq
+
     table = pa.Table.from_pandas(frame, preserve_index=False)
     table = table.replace_schema_metadata({TABLE_MARK: name.encode(), SCHEMA_MARK: str(version).encode()})
     sink = pa.BufferOutputStream()
@@ -68,52 +71,56 @@ def table_bytes(name: str, frame: pd.DataFrame, version: int) -> bytes:
     return sink.getvalue().to_pybytes()
 
 
-def read_table(path: Path, name: str, expected: str | None = None) -> pd.DataFrame:
+def read_table(path: Place, name: str, expected: str | None = None) -> pd.DataFrame:
     """A table of the archive, checked to be whole, ours and unchanged since it was written.
 
     Parameters
     ----------
     expected : hash that the manifest gives; None where there is no manifest to compare with.
     """
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
     remedy = "restore it from a copy, or remove the run's folder and run it again"
-    if not path.is_file():
+    try:
+        data = path.read_bytes()
+    except (FileNotFoundError, IsADirectoryError):
         message = (
             f"archive: {path} is not there, table '{name}' is needed; if the run was stopped, give its command again "
             "and it goes on"
         )
-        raise ArchiveUnusable(message)
+        raise ArchiveUnusable(message) from None
     try:
-        table = pq.read_table(path)
+        table = pq.read_table(pa.BufferReader(data))
     except (pa.ArrowInvalid, OSError) as problem:
-        reason = str(problem).splitlines()[0]
-        message = f"archive: {path} ({path.stat().st_size} bytes) is not a whole Parquet file ({reason}); {remedy}"
+        message = f"archive: {path} ({len(data)} bytes) is not a whole Parquet file ({first_line(problem)}); {remedy}"
         raise ArchiveUnusable(message) from None
     mark = (table.schema.metadata or {}).get(TABLE_MARK, b"").decode()
     if mark != name:
         found = f"holds table '{mark}'" if mark else "was not written by this archive"
         message = f"archive: {path} {found}, table '{name}' is needed; import foreign files with 'tumbleline import'"
         raise ArchiveUnusable(message)
-    if expected is not None and sha256(path) != expected:
+    if expected is not None and hashlib.sha256(data).hexdigest() != expected:
         message = f"archive: {path} has changed since it was written (its hash is not its manifest's); {remedy}"
         raise ArchiveUnusable(message)
     return table.to_pandas()
 
 
-def read_json(path: Path) -> dict[str, Any]:
+def read_json(path: Place) -> dict[str, Any]:
     """A manifest's content."""
     try:
-        return json.loads(path.read_text(encoding="utf-8"))
+        return json.loads(path.read_bytes())
     except (OSError, ValueError):
         message = f"archive: {path} is not a manifest that can be read; restore it from a copy"
         raise ArchiveUnusable(message) from None
 
 
-def json_bytes(content: dict[str, Any]) -> bytes:
+def json_bytes(content: Mapping[str, Any]) -> bytes:
     """Canonical JSON: keys sorted, UTF-8, one newline at the end."""
     return (json.dumps(content, sort_keys=True, indent=1, ensure_ascii=False) + "\n").encode()
 
 
-def publish(path: Path, data: bytes, what: str = "archive", remedy: str = IN_ARCHIVE) -> None:
+def publish(path: Place, data: bytes, what: str = "archive", remedy: str = IN_ARCHIVE) -> None:
     """Write a file so that it is there whole or not at all, and stays there after a power cut.
 
     Parameters
@@ -121,39 +128,76 @@ def publish(path: Path, data: bytes, what: str = "archive", remedy: str = IN_ARC
     what, remedy : beginning and end of the message where it cannot be written.
     """
     with writing(path.parent, what, remedy):
-        path.parent.mkdir(parents=True, exist_ok=True)
-        aside = path.parent / f"{TEMPORARY}{uuid.uuid4().hex}"
-        try:
+        if isinstance(path, ObjectPath):
+            path.write_bytes(data)
+            return
+        with _aside(path.parent) as aside:
             _write_durably(aside, data)
             aside.replace(path)
             _sync_folder(path.parent)
-        finally:
-            aside.unlink(missing_ok=True)
 
 
-def publish_folder(path: Path, files: dict[str, bytes]) -> None:
-    """Write several files so that they are there together or not at all; a folder that is there already stays."""
+def publish_first(path: Place, data: bytes) -> bool:
+    """Write a file that nobody has written yet; whether it was this call that wrote it.
+
+    Of several processes in a folder exactly one is told so. An object store has no such operation: its callers hold a claim.
+    """
     with writing(path.parent):
-        path.parent.mkdir(parents=True, exist_ok=True)
-        aside = path.parent / f"{TEMPORARY}{uuid.uuid4().hex}"
-        aside.mkdir()
-        try:
+        if isinstance(path, ObjectPath):
+            if path.is_file():
+                return False
+            path.write_bytes(data)
+            return True
+        with _aside(path.parent) as aside:
+            _write_durably(aside, data)
+            try:
+                os.link(aside, path)
+            except FileExistsError:
+                return False
+            _sync_folder(path.parent)
+            return True
+
+
+def publish_folder(path: Place, files: Mapping[str, bytes]) -> None:
+    """Write several files so that they are there together or not at all; a folder that is there already stays.
+
+    In an object store the last file of the mapping is put last and must be the one by which readers know that all are there.
+    """
+    with writing(path.parent):
+        if isinstance(path, ObjectPath):
+            for name, data in files.items():
+                (path / name).write_bytes(data)
+            return
+        with _aside(path.parent) as aside:
+            aside.mkdir()
             for name, data in files.items():
                 _write_durably(aside / name, data)
             _sync_folder(aside)
             if not path.exists():
                 aside.rename(path)
             _sync_folder(path.parent)
-        finally:
-            shutil.rmtree(aside, ignore_errors=True)
 
 
-def sweep(folder: Path) -> None:
+def sweep(folder: Place) -> None:
     """Remove what a killed writer left under temporary names; only for folders with one writer."""
-    if folder.is_dir():
+    if not isinstance(folder, ObjectPath) and folder.is_dir():  # an object store has no temporary names
         with writing(folder):
             for left in folder.glob(f"{TEMPORARY}*"):
                 shutil.rmtree(left) if left.is_dir() else left.unlink()
+
+
+@contextmanager
+def _aside(folder: Path) -> Generator[Path, None, None]:
+    """A name in a folder under which something is written before it is published; nothing is left of it."""
+    folder.mkdir(parents=True, exist_ok=True)
+    aside = folder / f"{TEMPORARY}{uuid.uuid4().hex}"
+    try:
+        yield aside
+    finally:
+        if aside.is_dir():
+            shutil.rmtree(aside, ignore_errors=True)
+        else:
+            aside.unlink(missing_ok=True)
 
 
 def _write_durably(path: Path, data: bytes) -> None:

@@ -5,15 +5,16 @@ from __future__ import annotations
 from hashlib import sha256
 from typing import TYPE_CHECKING
 
-import pandas as pd
-
 from pipelines.archive import files
 from pipelines.archive.keys import digest
-from schemas import tables
+from pipelines.archive.store import ObjectPath
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterator
-    from pathlib import Path
+
+    import pandas as pd
+
+    from pipelines.archive.store import Place
 
 PARTS = ("samples", "readings", "history")
 
@@ -21,7 +22,7 @@ PARTS = ("samples", "readings", "history")
 class Records:
     """The records of one capture, as the sink that capture writes to and as the source that stages read from."""
 
-    def __init__(self, path: Path) -> None:
+    def __init__(self, path: Place) -> None:
         self.path = path
 
     def begin(self) -> None:
@@ -50,6 +51,8 @@ class Records:
         station_state: bytes,
     ) -> None:
         """Store one record, durably and all at once, with the station's state after it."""
+        from schemas import tables
+
         content = {
             "samples.parquet": self._encoded("samples", samples),
             "readings.parquet": self._encoded("readings", readings),
@@ -88,22 +91,34 @@ class Records:
         """
         for folder in self._folders():
             if records is None or int(folder.name) in records:
-                yield files.read_table(folder / "samples.parquet", "samples")
+                yield self._part(folder, "samples")
 
     def gathered(self, part: str) -> pd.DataFrame:
         """Readings, history or samples of all records in one table."""
-        parts = [files.read_table(folder / f"{part}.parquet", part) for folder in self._folders()]
+        import pandas as pd
+
+        parts = [self._part(folder, part) for folder in self._folders()]
         kept = [frame for frame in parts if len(frame)] or parts[:1]
         return pd.concat(kept, ignore_index=True)
 
-    def _folders(self) -> list[Path]:
-        if not self.path.is_dir():
-            return []
-        return sorted(folder for folder in self.path.iterdir() if folder.name.isdigit())
+    def _folders(self) -> list[Place]:
+        """Folders of the records that are stored whole, in order of record."""
+        if isinstance(self.path, ObjectPath):  # record.json is put last
+            whole = [one.parent for one in self.path.walk() if one.name == "record.json"]
+        else:
+            whole = list(self.path.iterdir()) if self.path.is_dir() else []
+        return sorted((folder for folder in whole if folder.name.isdigit()), key=lambda folder: folder.name)
 
-    def _state_path(self, record: int) -> Path:
+    def _state_path(self, record: int) -> Place:
         return self.path / "state" / f"{record:05d}.bin"
 
     @staticmethod
+    def _part(folder: Place, part: str) -> pd.DataFrame:
+        name = f"{part}.parquet"
+        return files.read_table(folder / name, part, files.read_json(folder / "record.json")["content"][name])
+
+    @staticmethod
     def _encoded(name: str, frame: pd.DataFrame) -> bytes:
+        from schemas import tables  # slow to import, and only writers of tables need it
+
         return files.table_bytes(name, tables.check(name, frame), tables.VERSION)

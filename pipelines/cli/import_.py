@@ -86,7 +86,7 @@ def _refuse_unknown_fit(fit: str) -> None:
         raise WrongUse(message)
 
 
-def _import_one(path: Path, how: Mapping, fit: str, archive: Path | None) -> dict[str, Any]:
+def _import_one(path: Path, how: Mapping, fit: str, archive: str | None) -> dict[str, Any]:
     """Read, judge and keep one file; the document for JSON."""
     from pipelines.importers import files, judge, keep, record
 

@@ -11,7 +11,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
 
-def dwells_and_history(source: str, history: str, archive: Path | None) -> tuple[pd.DataFrame, pd.DataFrame | None]:
+def dwells_and_history(source: str, history: str, archive: str | None) -> tuple[pd.DataFrame, pd.DataFrame | None]:
     """The dwells of a file or run, and their temperatures against time where there are any.
 
     Parameters
@@ -28,7 +28,7 @@ def dwells_and_history(source: str, history: str, archive: Path | None) -> tuple
     return dwells, read_history(source, archive=archive)
 
 
-def _has_history(run: str, archive: Path | None) -> bool:
+def _has_history(run: str, archive: str | None) -> bool:
     from pipelines.archive import Archive
 
     return "history" in Archive(archive).run(run).tables()
@@ -43,7 +43,7 @@ def add_effect_files(paths: Sequence[Path] | None) -> None:
 
 
 def both_runs(
-    dwells: str, history: str, fresh: str, fresh_history: str, archive: Path | None
+    dwells: str, history: str, fresh: str, fresh_history: str, archive: str | None
 ) -> tuple[pd.DataFrame, pd.DataFrame | None, pd.DataFrame | None, pd.DataFrame | None]:
     """Dwells and history of a run, then those of the fresh one where it is named."""
     first, temperatures = dwells_and_history(dwells, history, archive)

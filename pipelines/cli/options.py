@@ -17,8 +17,12 @@ if TYPE_CHECKING:
     from rich.console import Console
 
 ArchiveOption = Annotated[
-    Path | None,
-    typer.Option("--archive", metavar="DIR", help="Folder of the archive; TUMBLELINE_ARCHIVE or ./archive by default."),
+    str | None,
+    typer.Option(
+        "--archive",
+        metavar="DIR",
+        help="Folder or address (s3://…) of the archive; TUMBLELINE_ARCHIVE or ./archive by default.",
+    ),
 ]
 JsonOption = Annotated[bool, typer.Option("--json", help="Print one JSON document and nothing else.")]
 RunArgument = Annotated[str, typer.Argument(metavar="RUN", help="A run's name, its beginning, or 'latest'.")]

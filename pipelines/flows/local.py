@@ -13,6 +13,7 @@ import urllib.error
 import urllib.request
 import uuid
 from contextlib import contextmanager
+from hashlib import sha256
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -40,9 +41,17 @@ def run_locally(request: Request, job: Job, archive: Archive, progress: Progress
     progress(0, job.recipe.wanted_records, "starting the orchestrator")
     if os.environ.get("PREFECT_API_URL"):
         return _run(request, job, archive, progress, told)
-    with local_server(archive.root.resolve() / "orchestrator") as environment:
+    with local_server(_home(archive)) as environment:
         os.environ.update(environment)
         return _run(request, job, archive, progress, told)
+
+
+def _home(archive: Archive) -> Path:
+    """Where the server of an archive keeps what it needs: in its folder, or with the user where that is an object store."""
+    if isinstance(archive.root, Path):
+        return archive.root.resolve() / "orchestrator"
+    cache = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
+    return cache / "tumbleline" / f"orchestrator-{sha256(archive.address.encode()).hexdigest()[:16]}"
 
 
 def _run(request: Request, job: Job, archive: Archive, progress: Progress, told: Callable[[Done], None]) -> Run:
@@ -52,7 +61,7 @@ def _run(request: Request, job: Job, archive: Archive, progress: Progress, told:
     close_dead_runs(name)
     with listening(progress, told):
         named = calibrate_lot.with_options(flow_run_name=name)
-        run_id = str(named(**request.parameters(), archive=str(archive.root.resolve())))
+        run_id = str(named(**request.parameters(), archive=archive.address))
     settle_history(name, len(ORDER))
     return archive.run(run_id)
 

@@ -9,8 +9,6 @@ import pandas as pd
 from pipelines.archive import Archive, code_hash, stage_key
 
 if TYPE_CHECKING:
-    from pathlib import Path
-
     from pipelines.archive import Run
     from pipelines.importers.files import Source
     from pipelines.importers.judge import Judged
@@ -18,7 +16,7 @@ if TYPE_CHECKING:
     from pipelines.importers.record import Imported
 
 
-def keep(data: Imported, source: Source, how: Mapping, judged: Judged | None, archive: Path | None) -> Run:
+def keep(data: Imported, source: Source, how: Mapping, judged: Judged | None, archive: str | None) -> Run:
     """The run that holds the import: samples, dwells and coefficients, each with a manifest that names the source."""
     inputs = {"source": source.sha256}
     parameters = {"mapping": how.model_dump(mode="json"), "fit": None if judged is None else judged.method}

@@ -1,0 +1,109 @@
+"""Working alone: a block in which no other process writes into a place of the archive.
+
+In a folder the system's file lock does it, and frees it when a process dies. An object store has no lock, but it shows what
+was put to everybody at once; so whoever wants a place puts a claim there, then looks: with another live claim beside its own
+it takes its own away and asks again later. Of two that come together at least one sees the other, so never both go on.
+A claim is put anew from time to time; one that was not is a dead process's. Only the store's own clock is compared.
+"""
+
+from __future__ import annotations
+
+import fcntl
+import os
+import platform
+import random
+import threading
+import time
+import uuid
+from contextlib import contextmanager, suppress
+from typing import TYPE_CHECKING
+
+from pipelines.archive import files
+from pipelines.archive.store import ObjectPath
+from schemas.errors import OperatorNeeded
+
+if TYPE_CHECKING:
+    from collections.abc import Generator
+
+    from pipelines.archive.store import Place
+
+LEASE_S = 120.0
+RENEWAL_S = 30.0
+FIRST_PAUSE_S, LONGEST_PAUSE_S = 0.02, 2.0
+CLAIM = "claim-"
+
+
+@contextmanager
+def alone(folder: Place, *, wait: bool = False) -> Generator[None, None, None]:
+    """A block in which no other process writes into the folder.
+
+    A capture lasts hours, so a second one is refused; a stage lasts seconds, so a second one waits.
+    """
+    with _claimed(folder, wait=wait) if isinstance(folder, ObjectPath) else _locked(folder, wait=wait):
+        yield
+
+
+@contextmanager
+def _locked(folder: Place, *, wait: bool) -> Generator[None, None, None]:
+    with files.writing(folder):
+        folder.mkdir(parents=True, exist_ok=True)
+        lock = open(str(folder / "lock"), "w", encoding="utf-8")  # noqa: PTH123, SIM115 - held for the block below
+    with lock:
+        try:
+            fcntl.flock(lock, fcntl.LOCK_EX | (0 if wait else fcntl.LOCK_NB))
+        except BlockingIOError:
+            raise OperatorNeeded(_busy(folder)) from None
+        yield
+
+
+@contextmanager
+def _claimed(folder: ObjectPath, *, wait: bool) -> Generator[None, None, None]:
+    claim = folder / f"{CLAIM}{platform.node()}-{os.getpid()}-{uuid.uuid4().hex[:8]}"
+    pause, randomly = FIRST_PAUSE_S, random.SystemRandom()
+    while True:
+        with files.writing(folder):
+            claim.write_bytes(b"")
+        if not _others(folder, claim):
+            break
+        claim.unlink(missing_ok=True)
+        if not wait and pause > 20.0 * FIRST_PAUSE_S:  # two that came together both step back: ask a few times
+            raise OperatorNeeded(_busy(folder))
+        time.sleep(pause * randomly.uniform(0.5, 1.5))
+        pause = min(2.0 * pause, LONGEST_PAUSE_S)
+    over = threading.Event()
+    keeper = threading.Thread(target=_renew, args=(claim, over), daemon=True)
+    keeper.start()
+    try:
+        yield
+    finally:
+        over.set()
+        keeper.join()
+        claim.unlink(missing_ok=True)
+
+
+def _others(folder: ObjectPath, claim: ObjectPath) -> list[ObjectPath]:
+    """Live claims of others; dead ones are taken away."""
+    now = claim.stat().st_mtime
+    found: list[ObjectPath] = []
+    for other in folder.iterdir():
+        if not other.name.startswith(CLAIM) or other == claim:
+            continue
+        try:
+            age = now - other.stat().st_mtime
+        except FileNotFoundError:  # given back in the meantime
+            continue
+        if age > LEASE_S:
+            other.unlink(missing_ok=True)
+        else:
+            found.append(other)
+    return found
+
+
+def _renew(claim: ObjectPath, over: threading.Event) -> None:
+    while not over.wait(RENEWAL_S):
+        with suppress(OSError):  # the store may be away for a moment; the next renewal is early enough
+            claim.write_bytes(b"")
+
+
+def _busy(folder: Place) -> str:
+    return f"capture: another process is measuring this lot into {folder}; wait for it, or stop it"
