@@ -1,0 +1,76 @@
+"""The flow ``map_partitions``: a task per partition, on the workers of a Dask cluster."""
+
+from __future__ import annotations
+
+from tempfile import TemporaryDirectory
+from typing import TYPE_CHECKING, Any
+
+from prefect import flow, task
+from prefect.cache_policies import NO_CACHE
+from prefect_dask.task_runners import DaskTaskRunner
+
+from pipelines.flows.partitions import LOCAL, in_one_thread, one_thread_each
+from schemas.errors import LinkLost
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+
+CONNECT_S = 10
+
+
+@task(task_run_name="{label}", cache_policy=NO_CACHE, persist_result=False)
+def partition(label: str, function: Callable[[Any], Any], part: Any) -> Any:
+    """What the function makes of one partition, wherever this runs."""
+    del label
+    return in_one_thread(function, part)
+
+
+@flow(name="map_partitions", persist_result=False, log_prints=False, validate_parameters=False)
+def mapped(function: Callable[[Any], Any], partitions: Sequence[Any]) -> list[Any]:
+    """What the function makes of every partition, in order."""
+    width = len(str(len(partitions)))
+    futures = [
+        partition.submit(f"{number:0{width}d} of {len(partitions)}", function, part)
+        for number, part in enumerate(partitions, start=1)
+    ]
+    return [future.result() for future in futures]
+
+
+def run_on_dask(
+    function: Callable[[Any], Any], partitions: Sequence[Any], address: str, workers: int, name: str
+) -> list[Any]:
+    """Results of all partitions, in order, from a cluster at an address, or from one of processes on this machine."""
+    if address != LOCAL:
+        _refuse_silent(address)
+        return _flow(DaskTaskRunner(address=address), name)(function, partitions)
+    with one_thread_each(), TemporaryDirectory(prefix="tumbleline-dask-", ignore_cleanup_errors=True) as scratch:
+        cluster = {
+            "n_workers": min(workers, len(partitions)),
+            "threads_per_worker": 1,
+            "processes": True,
+            "dashboard_address": None,
+            "local_directory": scratch,
+        }
+        return _flow(DaskTaskRunner(cluster_kwargs=cluster), name)(function, partitions)
+
+
+def _flow(runner: Any, name: str) -> Callable[[Callable[[Any], Any], Sequence[Any]], list[Any]]:
+    return mapped.with_options(flow_run_name=name, task_runner=runner)
+
+
+def _refuse_silent(address: str) -> None:
+    """Refuse an address where no scheduler answers, or one without workers, before the flow waits for ever."""
+    from distributed import Client
+
+    try:
+        with Client(address, timeout=CONNECT_S, set_as_default=False) as client:
+            found = len(client.scheduler_info()["workers"])
+    except (OSError, TimeoutError, ValueError) as problem:
+        message = (
+            f"--dask {address}: no Dask scheduler answers within {CONNECT_S} s ({type(problem).__name__}); start it with "
+            "'dask scheduler', or correct the address"
+        )
+        raise LinkLost(message) from None
+    if not found:
+        message = f"--dask {address}: the scheduler has no worker, one at least is needed; start it with 'dask worker {address}'"
+        raise LinkLost(message)
