@@ -15,24 +15,34 @@ from pydantic import Field, FiniteFloat, ValidationError, model_validator
 from schemas.errors import RecipeInvalid, did_you_mean
 from schemas.recipe import Strict, explain
 
-WordOrder = Literal["high_first", "low_first"]
-RegisterType = Literal["uint16", "int16", "uint32", "int32", "float32", "string"]
+WordOrder = Literal["high_first", "low_first", "high_first_swapped", "low_first_swapped"]
+RegisterType = Literal["uint16", "int16", "uint32", "int32", "float32", "string", "bit"]
+Space = Literal["holding", "input", "coil", "discrete"]
 Kind = Literal["axis", "chamber", "reader", "slot"]
+Carrier = Literal["tcp", "rtu", "tls", "ascii"]
+Adapter = Literal[
+    "oriental_az", "smc_lec", "iai_numeric",
+    "watlow_f4t", "watlow_f4", "binder", "eurotherm_3200", "espec_p300",
+    "tumbleline_reader", "tumbleline_slot",
+]  # fmt: skip
 
-WORDS: dict[str, int] = {"uint16": 1, "int16": 1, "uint32": 2, "int32": 2, "float32": 2, "string": 1}
+WORDS: dict[str, int] = {"uint16": 1, "int16": 1, "uint32": 2, "int32": 2, "float32": 2, "string": 1, "bit": 1}
+BITS: frozenset[str] = frozenset({"coil", "discrete"})
+READ_ONLY: frozenset[str] = frozenset({"input", "discrete"})
 ADDRESSES = 65536
 LONGEST_WRITE = 123  # registers in one FC16 request (Modbus Application Protocol 1.1b3, 6.12)
 
 
 class Register(Strict):
-    """One value, or ``count`` of the same kind in a row, at a wire address.
+    """One value, or ``count`` of the same kind in a row, at a wire address of one of Modbus' four spaces.
 
     ``value = raw · scale``; ``minimum`` and ``maximum`` bound the value, in ``unit``. A string has ``count`` words of two
-    characters.
+    characters. ``disputed`` says what sources disagree about. ``source`` is the profile's where none is named.
     """
 
     name: Annotated[str, Field(pattern=r"^[a-z][a-z0-9_]*$")]
     address: Annotated[int, Field(ge=0, lt=ADDRESSES)]
+    space: Space = "holding"
     manual: str = ""
     type: RegisterType
     count: Annotated[int, Field(ge=1)] = 1
@@ -45,10 +55,16 @@ class Register(Strict):
     enumeration: dict[str, int] = Field(default_factory=dict[str, int])
     bits: dict[str, int] = Field(default_factory=dict[str, int])
     source: str = ""
+    disputed: str = ""
+
+    @property
+    def writable(self) -> bool:
+        """Whether it may be written at all."""
+        return self.access != "read"
 
     @property
     def words(self) -> int:
-        """Registers taken on the wire."""
+        """Registers, or bits, taken on the wire."""
         return WORDS[self.type] * self.count
 
     @property
@@ -61,10 +77,44 @@ class Register(Strict):
         if self.end > ADDRESSES:
             message = f"{self.name}: ends at address {self.end}, the last one is {ADDRESSES - 1}; move or shorten it"
             raise ValueError(message)
+        if (self.space in BITS) != (self.type == "bit"):
+            message = (
+                f"{self.name}: type {self.type} in space {self.space}; coils and discrete inputs hold bits, others none"
+            )
+            raise ValueError(message)
+        if self.space in READ_ONLY and self.writable:
+            message = f"{self.name}: access {self.access} in space {self.space}, which can only be read; correct one"
+            raise ValueError(message)
         if (self.enumeration or self.bits) and self.type in {"float32", "string"}:
             message = f"{self.name}: {self.type} cannot hold an enumeration or bits; use an integer type"
             raise ValueError(message)
         return self
+
+
+class Command(Strict):
+    """One value of a device that is spoken to in lines of text.
+
+    ``ask`` is the question whose answer's comma-separated part ``field`` is the value; ``tell`` is the line that sets it, with
+    the value in braces. What has no ``tell`` is never written.
+    """
+
+    name: Annotated[str, Field(pattern=r"^[a-z][a-z0-9_]*$")]
+    ask: str
+    field: Annotated[int, Field(ge=0)] = 0
+    tell: str = ""
+    manual: str = ""
+    type: Literal["number", "text"] = "number"
+    unit: str = ""
+    minimum: FiniteFloat | None = None
+    maximum: FiniteFloat | None = None
+    values: list[str] = Field(default_factory=list[str])
+    source: str = ""
+    disputed: str = ""
+
+    @property
+    def writable(self) -> bool:
+        """Whether it may be set."""
+        return bool(self.tell)
 
 
 class Fifo(Strict):
@@ -75,21 +125,32 @@ class Fifo(Strict):
 
 
 class Profile(Strict):
-    """A device's register map."""
+    """A device's register map, or its lines of text.
+
+    ``adapter`` names what its commands mean; ``links`` what carries them, the device's own way first.
+    """
 
     name: str
     kind: Kind
+    adapter: Adapter
     maker: str
     model: str
     verified: bool
     source: str
+    links: Annotated[list[Carrier], Field(min_length=1)] = Field(default_factory=lambda: list[Carrier](["tcp"]))
     word_order: WordOrder = "high_first"
-    registers: Annotated[list[Register], Field(min_length=1)]
+    registers: list[Register] = Field(default_factory=list[Register])
+    commands: list[Command] = Field(default_factory=list[Command])
     groups: dict[str, list[str]] = Field(default_factory=dict[str, list[str]])
     fifo: Fifo | None = None
 
     @model_validator(mode="after")
     def _consistent(self) -> Profile:
+        spoken = self.links == ["ascii"]
+        if not (self.commands if spoken else self.registers) or (self.registers if spoken else self.commands):
+            carriers = ", ".join(self.links)
+            message = f"links {carriers}: a device on ascii has commands alone, any other registers alone; correct it"
+            raise ValueError(message)
         _refuse_overlaps(self)
         for group, names in self.groups.items():
             _refuse_gaps(group, [self.register(name) for name in names])
@@ -103,25 +164,41 @@ class Profile(Strict):
         message = f"profile {self.name}: no register '{name}'; {did_you_mean(name, (r.name for r in self.registers))}"
         raise RecipeInvalid(message, key=name)
 
+    def command(self, name: str) -> Command:
+        """The command of that name; an unknown one is refused with what looks like it."""
+        for command in self.commands:
+            if command.name == name:
+                return command
+        message = f"profile {self.name}: no command '{name}'; {did_you_mean(name, (c.name for c in self.commands))}"
+        raise RecipeInvalid(message, key=name)
+
     def has(self, name: str) -> bool:
-        """Whether there is a register of that name."""
-        return any(register.name == name for register in self.registers)
+        """Whether there is a register, command or group of that name."""
+        return name in self.groups or any(entry.name == name for entry in (*self.registers, *self.commands))
 
     def order(self, register: Register) -> WordOrder:
         """The word order that holds for a register."""
         return register.word_order or self.word_order
 
+    def may_write(self, space: Space, address: int, count: int) -> bool:
+        """Whether ``count`` registers or bits from an address on are whole registers that may be written, and nothing else."""
+        end, at = address + count, address
+        for register in sorted(self.registers, key=lambda r: r.address):
+            if register.space == space and register.address == at and register.end <= end and register.writable:
+                at = register.end
+        return at == end > address
+
 
 def _refuse_overlaps(profile: Profile) -> None:
-    spans = [(r.address, r.end, r.name) for r in profile.registers]
+    spans = [(r.space, r.address, r.end, r.name) for r in profile.registers]
     if profile.fifo is not None:
-        spans.append((profile.fifo.address, profile.fifo.address + profile.fifo.registers, "fifo"))
+        spans.append(("holding", profile.fifo.address, profile.fifo.address + profile.fifo.registers, "fifo"))
     spans.sort()
-    for (_, end, name), (start, _, following) in pairwise(spans):
-        if start < end:
+    for (space, _, end, name), (next_space, start, _, following) in pairwise(spans):
+        if space == next_space and start < end:
             message = f"registers {name} and {following} overlap at address {start}; each needs its own; correct one"
             raise ValueError(message)
-    names = [r.name for r in profile.registers]
+    names = [entry.name for entry in (*profile.registers, *profile.commands)]
     twice = sorted({name for name in names if names.count(name) > 1})
     if twice:
         message = f"register {', '.join(twice)} is there twice, each name may be there once; rename one"
@@ -131,7 +208,7 @@ def _refuse_overlaps(profile: Profile) -> None:
 def _refuse_gaps(group: str, registers: list[Register]) -> None:
     """A group is written in one request, so its registers follow each other without a gap."""
     for left, right in pairwise(registers):
-        if left.end != right.address:
+        if left.end != right.address or left.space != right.space:
             message = f"group {group}: {right.name} does not follow {left.name} ({left.end} is needed); order them"
             raise ValueError(message)
     if sum(r.words for r in registers) > LONGEST_WRITE:

@@ -24,6 +24,7 @@ _RANGE = {
     "int16": (-(2**15), 2**15 - 1),
     "uint32": (0, 2**32 - 1),
     "int32": (-(2**31), 2**31 - 1),
+    "bit": (0, 1),
 }
 WORDS_PER_SAMPLE: dict[Packing, int] = {"int20x3": 4, "int24x3": 5}
 SEQUENCE: dict[Packing, int] = {"int20x3": 16, "int24x3": 256}
@@ -35,7 +36,7 @@ class NotEncodable(ValueError):
 
 
 def encode(register: Register, order: WordOrder, value: Value) -> list[int]:
-    """The words that hold a value; a number outside the register's type or limits is refused."""
+    """The words, or bits, that hold a value; a number outside the register's type or limits is refused."""
     if register.type == "string":
         return _encode_text(register, value)
     values = value if isinstance(value, list) else [value]
@@ -73,9 +74,17 @@ def _encode_number(register: Register, order: WordOrder, value: float | str) -> 
         if not low <= raw <= high:
             message = f"{register.name}: {value} {register.unit} does not fit {register.type}; give a smaller value"
             raise NotEncodable(message)
+        if register.type == "bit":
+            return (int(raw),)
     packed = struct.pack(_FORMAT[register.type], raw)
-    words = struct.unpack(f">{len(packed) // 2}H", packed)
-    return words if order == "high_first" else words[::-1]
+    return _arranged(struct.unpack(f">{len(packed) // 2}H", packed), order)
+
+
+def _arranged(words: tuple[int, ...], order: WordOrder) -> tuple[int, ...]:
+    """Words as they stand on the wire; every order is its own reverse."""
+    if order.startswith("low_first"):
+        words = words[::-1]
+    return tuple((w & 0xFF) << 8 | w >> 8 for w in words) if order.endswith("swapped") else words
 
 
 def _number(register: Register, value: float | str) -> float:
@@ -93,7 +102,9 @@ def _number(register: Register, value: float | str) -> float:
 
 
 def _decode_number(register: Register, order: WordOrder, words: Sequence[int]) -> float:
-    ordered = words if order == "high_first" else words[::-1]
+    if register.type == "bit":
+        return words[0]
+    ordered = _arranged(tuple(words), order)
     raw = struct.unpack(_FORMAT[register.type], struct.pack(f">{len(ordered)}H", *ordered))[0]
     return raw * register.scale if register.scale != 1.0 else raw
 

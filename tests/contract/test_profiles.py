@@ -137,6 +137,7 @@ def test_chambers_of_every_profile_take_a_set_point_and_tell_it_back():
 PROFILE = """
 name = "p"
 kind = "axis"
+adapter = "oriental_az"
 maker = "m"
 model = "m"
 verified = false
