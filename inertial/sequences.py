@@ -1,0 +1,241 @@
+"""Dwells that could be measured next: steps of a station, and the state of a lot with them appended."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from inertial import frames
+from inertial.state import T_REFERENCE, History, State
+
+Array = NDArray[np.float64]
+
+_GRAIN_S = 15.0
+"""Steps in which air and devices are followed between dwells."""
+
+
+@dataclass(frozen=True)
+class Step:
+    """One dwell to take.
+
+    outer, inner : rad
+    temperature : °C, of the chamber
+    wait : s, from the end of the move to the begin of the dwell
+    soaked : whether the devices settle at the temperature first; else the dwell is taken while they still follow the air
+    off : s without power before it, so that the devices warm up anew
+    """
+
+    outer: float
+    inner: float
+    temperature: float
+    wait: float = 2.0
+    soaked: bool = True
+    off: float = 0.0
+
+
+@dataclass(frozen=True)
+class Pace:
+    """How long a station takes.
+
+    move_s : s of a move of 90°; dwell_s : s of a dwell; overhead_s : s beside each, for commands
+    ramp : K/s of the air; lag : s by which the devices follow it
+    soak_s : s of the shortest soak; settled : K within which a device counts as settled
+    """
+
+    move_s: float = 5.0
+    dwell_s: float = 10.0
+    overhead_s: float = 0.5
+    ramp: float = 0.05
+    lag: float = 150.0
+    soak_s: float = 900.0
+    settled: float = 0.05
+
+
+@dataclass(frozen=True)
+class Timeline:
+    """When steps are taken, and what the devices are at then; times from the end of the dwells before.
+
+    time : (k,), s, middle of each dwell; since_move : (k,), s, likewise
+    device, air : (k,), °C
+    grid, grid_device : (m,), s and °C, all the way through
+    end : s
+    """
+
+    time: Array
+    since_move: Array
+    device: Array
+    air: Array
+    grid: Array
+    grid_device: Array
+    end: float
+
+
+def timeline(steps: Sequence[Step], pace: Pace, start: Step | None, device: float) -> Timeline:
+    """When each of some steps is taken.
+
+    Parameters
+    ----------
+    start : where table and chamber stand before the first; at its pose and settled where None
+    device : temperature of the devices before the first, °C
+    """
+    there = start or replace(steps[0], temperature=device)
+    follow = _Follow(there.temperature, device)
+    rows: list[tuple[float, float, float, float]] = []
+    for step in steps:
+        turn = max(_turn(step.outer - there.outer), _turn(step.inner - there.inner))
+        if step.temperature != there.temperature and step.soaked:
+            follow.soak(step.temperature, pace)
+        elif not step.soaked:
+            follow.target = step.temperature
+        follow.go_on(step.off, pace)
+        follow.go_on(pace.overhead_s + pace.move_s * np.sqrt(turn / (0.5 * np.pi)), pace)
+        follow.go_on(step.wait + 0.5 * pace.dwell_s, pace)
+        rows.append((follow.now, step.wait + 0.5 * pace.dwell_s, follow.device, follow.air))
+        follow.go_on(0.5 * pace.dwell_s, pace)
+        there = step
+    time, since, devices, air = np.array(rows).T
+    return Timeline(time, since, devices, air, np.array(follow.times), np.array(follow.devices), follow.now)
+
+
+def _turn(angle: float) -> float:
+    return abs(angle)
+
+
+class _Follow:
+    """Air that ramps to its target, and devices a first-order lag behind it."""
+
+    def __init__(self, air: float, device: float) -> None:
+        self.air, self.device, self.target, self.now = air, device, air, 0.0
+        self.times, self.devices = [0.0], [device]
+
+    def go_on(self, seconds: float, pace: Pace) -> None:
+        """Lets some seconds pass."""
+        end = self.now + max(seconds, 0.0)
+        while self.now < end - 1e-9:
+            grain = min(_GRAIN_S, end - self.now)
+            reach = pace.ramp * grain
+            self.air += float(np.clip(self.target - self.air, -reach, reach))
+            self.device += (self.air - self.device) * (1.0 - float(np.exp(-grain / pace.lag)))
+            self.now += grain
+            self.times.append(self.now)
+            self.devices.append(self.device)
+
+    def soak(self, target: float, pace: Pace) -> None:
+        """Goes to a temperature and stays until the devices have settled, the shortest soak at least."""
+        self.target, start = target, self.now
+        far = abs(target - self.device)
+        ramping = abs(target - self.air) / pace.ramp
+        settling = ramping + pace.lag * float(np.log(max(min(far, pace.ramp * pace.lag) / pace.settled, 1.0)))
+        self.go_on(max(pace.soak_s, settling) - (self.now - start), pace)
+
+
+def extended(
+    state: State, steps: Sequence[Step], pace: Pace | None = None, *, response: Array | None = None, rest: float = 0.0
+) -> State:
+    """A state with steps taken after its last dwell.
+
+    What the steps do not set (supply, vibration, other columns) is as it was, dwell for dwell from the beginning.
+
+    Parameters
+    ----------
+    state : of one unit or a lot, (..., n)
+    response : (..., 3, 3), how the force shows on each axis; for states that carry the force felt
+    rest : s that pass before the first step
+    """
+    pace = pace or Pace()
+    count = len(steps)
+    batch = np.broadcast_shapes(state.force.shape[:-2], state.time.shape[:-1])
+    wide = (*batch, count)
+    last = None if state.temperature is None else np.broadcast_to(state.temperature, (*batch, n_of(state)))[..., -1]
+    middle = T_REFERENCE if last is None else float(np.mean(last))
+    ran = timeline(steps, pace, standing(state), middle)
+    apart = np.zeros(batch) if last is None else last - middle
+    outer, inner = np.array([s.outer for s in steps]), np.array([s.inner for s in steps])
+    scale = float(np.mean(np.linalg.norm(state.force, axis=-1)))
+    force = np.broadcast_to(scale * frames.force_from_angles(outer, inner), (*wide, 3))
+    whole = np.concatenate([np.broadcast_to(state.force, (*batch, n_of(state), 3)), force], axis=-2)
+    begin = np.max(state.time) + rest + 0.5 * pace.dwell_s
+    powered = None if state.since_power is None else _since_power(state.since_power, steps, rest + ran.time)
+    return replace(
+        state,
+        force=whole,
+        felt=_felt(state, whole, response),
+        time=_joined(state.time, np.broadcast_to(begin + ran.time, wide)),
+        temperature=_joined_if(state.temperature, apart[..., None] + ran.device),
+        chamber=_joined_if(state.chamber, np.broadcast_to(ran.air, wide)),
+        since_power=_joined_if(state.since_power, powered),
+        since_move=_joined_if(state.since_move, np.broadcast_to(ran.since_move, wide)),
+        supply=_again(state.supply, count),
+        vibration=_again(state.vibration, count),
+        outer=_joined_if(state.outer, np.broadcast_to(outer, wide)),
+        inner=_joined_if(state.inner, np.broadcast_to(inner, wide)),
+        covariates={name: _joined(values, _next(values, count)) for name, values in state.covariates.items()},
+        history=_history(state.history, begin + ran.grid, ran.grid_device + apart[..., None]),
+        memory={},
+    )
+
+
+def standing(state: State) -> Step | None:
+    """Where table and chamber stand after the last dwell of a state; None where its angles are not known."""
+    if state.outer is None or state.inner is None:
+        return None
+    air = state.chamber if state.chamber is not None else state.temperature
+    last = T_REFERENCE if air is None else float(np.mean(air[..., -1]))
+    return Step(float(np.mean(state.outer[..., -1])), float(np.mean(state.inner[..., -1])), last)
+
+
+def n_of(state: State) -> int:
+    """Number of dwells of a state."""
+    return int(state.force.shape[-2])
+
+
+def _felt(state: State, force: Array, response: Array | None) -> Array | None:
+    if state.felt is None:
+        return None
+    if response is None:
+        return np.concatenate([state.felt, force[..., n_of(state) :, :]], axis=-2)
+    return np.einsum("...ij,...nj->...ni", response, force)
+
+
+def _since_power(since: Array, steps: Sequence[Step], time: Array) -> Array:
+    """Seconds since power-on at each step, (..., k); a step with the power off before it begins anew."""
+    last = since[..., -1:]
+    found: list[Array] = []
+    on_again: float | None = None
+    for step, now in zip(steps, time, strict=True):
+        if step.off > 0.0:
+            on_again = float(now) - step.wait - 10.0
+        found.append(last + now if on_again is None else np.full_like(last, max(float(now) - on_again, 0.0)))
+    return np.concatenate(found, axis=-1)
+
+
+def _history(history: History | None, time: Array, temperature: Array) -> History | None:
+    if history is None:
+        return None
+    lead = history.temperature.shape[:-1]
+    more = np.broadcast_to(temperature, (*lead, time.size))
+    later = time > history.time[-1]
+    return History(
+        np.concatenate([history.time, time[later]]),
+        np.concatenate([history.temperature, more[..., later]], axis=-1),
+    )
+
+
+def _joined(values: Array, more: Array) -> Array:
+    lead = np.broadcast_shapes(values.shape[:-1], more.shape[:-1])
+    whole = [np.broadcast_to(v, (*lead, v.shape[-1])) for v in (values, more)]
+    return np.concatenate(whole, axis=-1)
+
+
+def _joined_if(values: Array | None, more: Array | None) -> Array | None:
+    return None if values is None or more is None else _joined(values, more)
+
+
+def _again(values: Array | None, count: int) -> Array | None:
+    return None if values is None else _joined(values, _next(values, count))
+
+
+def _next(values: Array, count: int) -> Array:
+    """The first values of a series once more, (..., count): what nobody sets goes on as it did."""
+    return np.take(values, np.arange(count) % values.shape[-1], axis=-1)
