@@ -46,6 +46,28 @@ class ThermalChamber:
             )
             raise StationRefused(message)
 
+    def off(self) -> None:
+        """Switches heating and cooling off."""
+        self._switch("off")
+
+    def on(self) -> None:
+        """Switches heating and cooling on again, for a station whose safe state is a chamber that is off."""
+        self._switch(AUTOMATIC)
+
+    def _switch(self, mode: str) -> None:
+        registers = self._registers
+        if not registers.profile.has("mode"):
+            message = (
+                f"{registers.name}: profile {registers.profile.name} has no register for the mode, one is needed to make it "
+                f"{mode}; set safety.chamber to set_point or hold"
+            )
+            raise StationRefused(message)
+        registers.write("mode", mode)
+        found = registers.text("actual_mode") if registers.profile.has("actual_mode") else registers.text("mode")
+        if found != mode:
+            message = f"{registers.name}: in mode {found}, {mode} is needed; check the controller's panel"
+            raise StationRefused(message)
+
     def temperature(self) -> float:
         """The air's temperature, °C; what no chamber can have is refused."""
         value = self._registers.number("temperature")

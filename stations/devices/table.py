@@ -62,6 +62,12 @@ class TableAxis:
             raise OperatorNeeded(message)
         return flags["in_position"] and not flags["move"]
 
+    def stop(self) -> None:
+        """Stops the axis where it is; it holds, and what was left of its move is dropped."""
+        bit = self._registers.profile.register("command").bits["stop"]
+        self._registers.write("command", 1 << bit)
+        self._registers.write("command", 0)
+
     def position(self) -> float:
         """The encoder's reading, degrees."""
         return self._registers.number("feedback_position")
@@ -82,6 +88,7 @@ class TiltTable:
 
     def __init__(self, outer: TableAxis, inner: TableAxis, clock: Clock) -> None:
         self._outer, self._inner = outer, inner
+        self.axes = {"outer": outer, "inner": inner}
         self._clock = clock
         self.still_since = clock.now()
 
