@@ -1,4 +1,4 @@
-"""What a device needs of a link; who it is connected to is the link's business."""
+"""What a device needs of a link; who it is connected to, and by what, is the link's business."""
 
 from __future__ import annotations
 
@@ -7,20 +7,38 @@ from typing import TYPE_CHECKING, Protocol
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from schemas.profile import Space
+
 
 class Link(Protocol):
-    """Registers of the devices behind one address.
+    """Registers and bits of the devices behind one address.
 
     Reading and writing raise :class:`StationTimeout`, :class:`LinkLost` or :class:`StationRefused`, naming device, address and
     what was asked.
     """
 
-    def read(self, device_id: int, address: int, count: int, what: str) -> list[int]:
-        """Words of ``count`` holding registers; ``what`` names them in messages."""
+    def read(self, device_id: int, address: int, count: int, what: str, space: Space = "holding") -> list[int]:
+        """Words, or bits, of ``count`` registers; ``what`` names them in messages."""
         ...
 
-    def write(self, device_id: int, address: int, words: Sequence[int], what: str) -> None:
-        """Writes holding registers in one request, sent once."""
+    def write(self, device_id: int, address: int, words: Sequence[int], what: str, space: Space = "holding") -> None:
+        """Writes registers or bits in one request, sent once."""
+        ...
+
+    def close(self) -> None:
+        """Ends the connection."""
+        ...
+
+
+class TextLink(Protocol):
+    """Lines to and from one device; raises as :class:`Link` does."""
+
+    def ask(self, question: str, what: str) -> str:
+        """The answer to a question that changes nothing; it may be put twice."""
+        ...
+
+    def tell(self, order: str, what: str) -> str:
+        """The answer to an order, sent once."""
         ...
 
     def close(self) -> None:

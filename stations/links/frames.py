@@ -1,0 +1,114 @@
+"""Modbus requests and the answers that fit them: everything else is no answer.
+
+Source: Modbus Application Protocol 1.1b3, 6.1–6.12 and 7; Modbus over serial line 1.02, 6.2.2 (CRC).
+"""
+
+from __future__ import annotations
+
+import struct
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from schemas.profile import Space
+
+READ = {"coil": 1, "discrete": 2, "holding": 3, "input": 4}
+WRITE_COIL, WRITE_COILS, WRITE_REGISTERS = 5, 15, 16
+ON, OFF = 0xFF00, 0x0000
+EXCEPTION = 0x80
+LONGEST_READ = 125  # registers in one request (6.3)
+BYTE = 8
+
+
+class Malformed(Exception):
+    """What came back is no answer to what was asked."""
+
+
+class Refused(Exception):
+    """The device answered with an exception code."""
+
+    def __init__(self, code: int) -> None:
+        self.code = code
+        super().__init__(f"exception {code}")
+
+
+def read_request(space: Space, address: int, count: int) -> bytes:
+    """The request that reads ``count`` registers or bits."""
+    return struct.pack(">BHH", READ[space], address, count)
+
+
+def write_request(space: Space, address: int, values: Sequence[int]) -> bytes:
+    """The request that writes registers, or bits given as 0 and 1."""
+    if space == "holding":
+        n = len(values)
+        return struct.pack(f">BHHB{n}H", WRITE_REGISTERS, address, n, 2 * n, *values)
+    if len(values) == 1:
+        return struct.pack(">BHH", WRITE_COIL, address, ON if values[0] else OFF)
+    packed = pack_bits(values)
+    return struct.pack(">BHHB", WRITE_COILS, address, len(values), len(packed)) + packed
+
+
+def reply_size(request: bytes) -> int:
+    """Bytes in the answer to a request that is not an exception."""
+    function, count = request[0], int.from_bytes(request[3:5], "big")
+    if function in {READ["holding"], READ["input"]}:
+        return 2 + 2 * count
+    if function in {READ["coil"], READ["discrete"]}:
+        return 2 + (count + BYTE - 1) // BYTE
+    return 5
+
+
+def values_in(request: bytes, reply: bytes) -> list[int]:
+    """The words or bits that answer a read, nothing for a write; :class:`Refused` or :class:`Malformed` otherwise."""
+    function = request[0]
+    if len(reply) == 2 and reply[0] == function | EXCEPTION and reply[1]:
+        raise Refused(reply[1])
+    size = reply_size(request)
+    if len(reply) != size or reply[0] != function:
+        shown = f"function {reply[0]}, {len(reply)} bytes" if reply else "nothing"
+        message = f"{shown}; function {function}, {size} bytes are needed"
+        raise Malformed(message)
+    if function in {WRITE_COIL, WRITE_COILS, WRITE_REGISTERS}:
+        if reply != request[:5]:
+            message = f"it confirms {reply[1:].hex()}; {request[1:5].hex()} is needed"
+            raise Malformed(message)
+        return []
+    if reply[1] != size - 2:
+        message = f"it counts {reply[1]} bytes; {size - 2} are needed"
+        raise Malformed(message)
+    if function in {READ["holding"], READ["input"]}:
+        return list(struct.unpack(f">{(size - 2) // 2}H", reply[2:]))
+    return unpack_bits(reply[2:], int.from_bytes(request[3:5], "big"))
+
+
+def pack_bits(values: Sequence[int]) -> bytes:
+    """Bits as bytes, the first in the lowest place."""
+    return sum(1 << i for i, value in enumerate(values) if value).to_bytes((len(values) + BYTE - 1) // BYTE, "little")
+
+
+def unpack_bits(data: bytes, count: int) -> list[int]:
+    """The first ``count`` bits of bytes."""
+    number = int.from_bytes(data, "little")
+    return [number >> i & 1 for i in range(count)]
+
+
+def _crc_table() -> tuple[int, ...]:
+    table: list[int] = []
+    for byte in range(256):
+        crc = byte
+        for _ in range(BYTE):
+            crc = crc >> 1 ^ 0xA001 if crc & 1 else crc >> 1
+        table.append(crc)
+    return tuple(table)
+
+
+_CRC = _crc_table()
+
+
+def crc16(data: bytes) -> bytes:
+    """The check of a serial frame, low byte first, as it goes onto the line."""
+    crc = 0xFFFF
+    for byte in data:
+        crc = crc >> 8 ^ _CRC[(crc ^ byte) & 0xFF]
+    return crc.to_bytes(2, "little")

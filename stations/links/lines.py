@@ -1,0 +1,87 @@
+"""Lines of text over TCP: a question or an order, one line back."""
+
+from __future__ import annotations
+
+import socket
+import time
+
+from schemas.errors import LinkLost, StationRefused, StationTimeout
+
+END = b"\r\n"
+REFUSED = "NA:"
+LONGEST = 1024
+CHUNK = 256
+
+
+class LineLink:
+    """One device that is spoken to in lines; connected when it is first needed and again after it broke."""
+
+    def __init__(self, host: str, port: int, *, timeout_s: float, read_attempts: int) -> None:
+        self._where = f"{host}:{port}"
+        self._address = (host, port)
+        self._timeout = timeout_s
+        self._attempts = read_attempts
+        self._socket: socket.socket | None = None
+
+    def ask(self, question: str, what: str) -> str:
+        """The answer to a question; after a time-out or a loss it is put again on a fresh connection."""
+        for attempt in range(1, self._attempts + 1):
+            try:
+                return self._exchange(question, what)
+            except (StationTimeout, LinkLost):
+                if attempt == self._attempts:
+                    raise
+        message = f"{self._where}: no attempt to ask '{question}' was allowed; set read_attempts to 1 or more"
+        raise StationTimeout(message)
+
+    def tell(self, order: str, what: str) -> str:
+        """The answer to an order, sent once: after a failure nobody knows whether it acted."""
+        return self._exchange(order, what)
+
+    def close(self) -> None:
+        """Ends the connection."""
+        if self._socket is not None:
+            self._socket.close()
+        self._socket = None
+
+    def _exchange(self, line: str, what: str) -> str:
+        """The line that comes back. A line has no number, so a connection whose answer is late or strange is not used again."""
+        asked = f"{what} '{line}'"
+        try:
+            answer = self._spoken(line)
+        except TimeoutError:
+            self.close()
+            message = f"{self._where}: no answer to {asked} in {self._timeout:g} s; check device and cable"
+            raise StationTimeout(message) from None
+        except OSError as problem:
+            self.close()
+            message = (
+                f"{self._where}: connection lost at {asked} ({problem}), a listening device is needed; check power"
+            )
+            raise LinkLost(message) from None
+        if answer.startswith(REFUSED):
+            message = f"{self._where}: {asked} was answered with '{answer}'; check the device and its profile"
+            raise StationRefused(message)
+        return answer
+
+    def _spoken(self, line: str) -> str:
+        deadline = time.monotonic() + self._timeout
+        if self._socket is None:
+            self._socket = socket.create_connection(self._address, self._timeout)
+        self._socket.sendall(line.encode("ascii") + END)
+        data = b""
+        while not data.endswith(END):
+            left = deadline - time.monotonic()
+            if left <= 0.0:
+                raise TimeoutError
+            self._socket.settimeout(left)
+            more = self._socket.recv(CHUNK)
+            if not more or len(data) > LONGEST:
+                message = "closed by the device" if not more else "a line without an end"
+                raise ConnectionError(message)
+            data += more
+        text = data[: -len(END)]
+        if END in text or not text.isascii():
+            message = f"{text!r} is not one line"
+            raise ConnectionError(message)
+        return text.decode("ascii")

@@ -1,0 +1,239 @@
+"""What carries Modbus: TCP, TCP with TLS, a serial line. A wire sends a request once and gives the answer, or says why not.
+
+Whatever goes wrong, the connection is closed: an answer that comes late must not meet the next question. On TCP the transaction's
+number tells too, and it goes on counting over connections, because a gateway may answer the next one with the last one's answer.
+"""
+
+from __future__ import annotations
+
+import os
+import socket
+import ssl
+import struct
+import time
+from typing import TYPE_CHECKING, Protocol
+
+import serial
+from serial import PARITY_EVEN, PARITY_NONE, PARITY_ODD, Serial
+
+from stations.links.frames import EXCEPTION, Malformed, crc16, reply_size
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+HEADER = 7  # transaction, protocol, length, unit (Modbus Messaging on TCP/IP 1.0b, 3.1.3)
+LONGEST = 254  # unit and PDU
+CHUNK = 4096
+PARITIES = {"none": PARITY_NONE, "even": PARITY_EVEN, "odd": PARITY_ODD}
+EXCEPTION_FRAME = 5  # device, function, code, check
+QUIET_CHARACTERS = 3.5  # Modbus over serial line 1.02, 2.5.1.1
+QUIET_S = 0.00175  # above 19200 baud
+
+
+class Silence(Exception):
+    """Nothing came back in time."""
+
+
+class Broken(Exception):
+    """The connection could not be made, or ended."""
+
+
+class Wire(Protocol):
+    """A way to devices; ``where`` names it in messages, ``timeout_s`` is its patience."""
+
+    where: str
+    timeout_s: float
+
+    def exchange(self, device_id: int, request: bytes) -> bytes:
+        """The answer to a request, without its envelope; :class:`Silence`, :class:`Broken` or :class:`Malformed`."""
+        ...
+
+    def close(self) -> None:
+        """Ends the connection; the next request makes a new one."""
+        ...
+
+
+class TcpWire:
+    """Modbus TCP, over TLS when a context is given; connected when it is first needed and again after it broke."""
+
+    def __init__(
+        self, host: str, port: int, timeout_s: float, *, tls: ssl.SSLContext | None = None, server_name: str = ""
+    ) -> None:
+        self.where = f"{host}:{port}"
+        self.timeout_s = timeout_s
+        self._address = (host, port)
+        self._tls = tls
+        self._server_name = server_name or host
+        self._socket: socket.socket | None = None
+        self._buffer = b""
+        self._number = int.from_bytes(os.urandom(2), "big")  # a gateway may still hold what an earlier process asked
+
+    def exchange(self, device_id: int, request: bytes) -> bytes:
+        """The answer under this request's number; answers under other numbers are dropped."""
+        deadline = time.monotonic() + self.timeout_s
+        self._number = self._number % 0xFFFF + 1
+        frame = struct.pack(">HHHB", self._number, 0, len(request) + 1, device_id) + request
+        try:
+            connection = self._connected()
+            connection.settimeout(self.timeout_s)
+            connection.sendall(frame)
+            return self._answer(connection, device_id, deadline)
+        except TimeoutError:
+            self.close()
+            raise Silence from None
+        except OSError as problem:
+            self.close()
+            raise Broken(_reason(problem)) from None
+        except Malformed:
+            self.close()
+            raise
+
+    def close(self) -> None:
+        """Ends the connection."""
+        if self._socket is not None:
+            self._socket.close()
+        self._socket, self._buffer = None, b""
+
+    def _connected(self) -> socket.socket:
+        if self._socket is None:
+            plain = socket.create_connection(self._address, self.timeout_s)
+            plain.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+            self._socket = plain
+            if self._tls is not None:
+                self._socket = self._tls.wrap_socket(plain, server_hostname=self._server_name)
+        return self._socket
+
+    def _answer(self, connection: socket.socket, device_id: int, deadline: float) -> bytes:
+        while True:
+            while (frame := self._frame()) is None:
+                left = deadline - time.monotonic()
+                if left <= 0.0:
+                    raise TimeoutError
+                connection.settimeout(left)
+                data = connection.recv(CHUNK)
+                if not data:
+                    message = "closed by the device"
+                    raise ConnectionError(message)
+                self._buffer += data
+            if int.from_bytes(frame[:2], "big") != self._number:
+                continue
+            if frame[6] != device_id:
+                message = f"device {frame[6]}; device {device_id} is needed"
+                raise Malformed(message)
+            return frame[HEADER:]
+
+    def _frame(self) -> bytes | None:
+        """The next whole frame of the stream; a stream that cannot be one is refused."""
+        if len(self._buffer) < HEADER:
+            return None
+        protocol, length = struct.unpack(">HH", self._buffer[2:6])
+        if protocol or not 2 < length <= LONGEST:
+            message = f"protocol {protocol}, length {length}; protocol 0, length 3 to {LONGEST} are needed"
+            raise Malformed(message)
+        end = 6 + length
+        if len(self._buffer) < end:
+            return None
+        frame, self._buffer = self._buffer[:end], self._buffer[end:]
+        return frame
+
+
+class SerialWire:
+    """Modbus RTU over a serial line.
+
+    A serial frame has no number. After a failure the line is therefore heard out for as long as an answer may take, before
+    anything else is asked.
+    """
+
+    def __init__(self, device: str, timeout_s: float, *, baud: int, parity: str, stop_bits: int) -> None:
+        self.where = device
+        self.timeout_s = timeout_s
+        self._baud, self._parity, self._stop_bits = baud, PARITIES[parity], stop_bits
+        self._port: Serial | None = None
+        self._late_until = 0.0
+        character = (10 if parity == "none" else 11) / baud
+        self._quiet = max(QUIET_S, QUIET_CHARACTERS * character)
+        self._heard = 0.0
+
+    def exchange(self, device_id: int, request: bytes) -> bytes:
+        """The answer to a request; its check must be right."""
+        frame = bytes([device_id]) + request
+        try:
+            port = self._opened()
+            self._hear_out(port)
+            port.write(frame + crc16(frame))
+            return self._answer(port, device_id, request)
+        except (Silence, Malformed):
+            self.close()
+            self._late_until = time.monotonic() + self.timeout_s
+            raise
+        except (serial.SerialException, OSError) as problem:
+            self.close()
+            raise Broken(_reason(problem)) from None
+
+    def close(self) -> None:
+        """Leaves the line."""
+        if self._port is not None:
+            self._port.close()
+        self._port = None
+
+    def _opened(self) -> Serial:
+        if self._port is None:
+            self._port = Serial(
+                self.where,
+                self._baud,
+                parity=self._parity,
+                stopbits=self._stop_bits,
+                timeout=self.timeout_s,
+                write_timeout=self.timeout_s,
+                exclusive=True,
+            )
+        return self._port
+
+    def _hear_out(self, port: Serial) -> None:
+        """Drops what comes late, and keeps the silence that ends a frame."""
+        while (left := self._late_until - time.monotonic()) > 0.0:
+            port.timeout = left
+            port.read(CHUNK)
+        time.sleep(max(0.0, self._heard + self._quiet - time.monotonic()))
+        port.reset_input_buffer()
+
+    def _answer(self, port: Serial, device_id: int, request: bytes) -> bytes:
+        deadline = time.monotonic() + self.timeout_s
+        data = _read(port, EXCEPTION_FRAME, deadline)
+        if data[0] != device_id or data[1] & ~EXCEPTION != request[0]:
+            message = f"device {data[0]}, function {data[1]}; device {device_id}, function {request[0]} are needed"
+            raise Malformed(message)
+        if not data[1] & EXCEPTION:
+            data += _read(port, 1 + reply_size(request) + 2 - EXCEPTION_FRAME, deadline)
+        self._heard = time.monotonic()
+        if crc16(data[:-2]) != data[-2:]:
+            message = f"check {data[-2:].hex()}; {crc16(data[:-2]).hex()} is needed"
+            raise Malformed(message)
+        return data[1:-2]
+
+
+def _read(port: Serial, count: int, deadline: float) -> bytes:
+    """``count`` bytes, or :class:`Silence` at the deadline."""
+    port.timeout = max(0.0, deadline - time.monotonic())
+    data = port.read(count) if count else b""
+    if len(data) < count:
+        raise Silence
+    return data
+
+
+def tls_context(ca: Path, certificate: Path | None = None, key: Path | None = None) -> ssl.SSLContext:
+    """A context that trusts this authority alone, checks the name, and shows a certificate where one is given."""
+    context = ssl.SSLContext(ssl.PROTOCOL_TLS_CLIENT)
+    context.minimum_version = ssl.TLSVersion.TLSv1_2
+    context.load_verify_locations(ca)
+    if certificate is not None:
+        context.load_cert_chain(certificate, key)
+    return context
+
+
+def _reason(problem: Exception) -> str:
+    if isinstance(problem, ssl.SSLCertVerificationError):
+        return f"its certificate does not hold: {problem.verify_message}"
+    if isinstance(problem, OSError) and problem.strerror:
+        return problem.strerror
+    return str(problem)
