@@ -107,6 +107,21 @@ class Run:
             manifest = {**provenance(), **content, **about, "schema": tables.VERSION}
             files.publish(self.path / f"{name}.json", files.json_bytes(manifest))
 
+    def adopt(self, other: Run, names: tuple[str, ...]) -> None:
+        """Take tables over from another run of the same archive, byte for byte, with who made them, when and with what."""
+        for name in names:
+            path, manifest = other.path / f"{name}.parquet", other.manifest(name)
+            data = path.read_bytes()
+            if sha256(data).hexdigest() != manifest["sha256"]:
+                message = (
+                    f"archive: {path} has changed since it was written (its hash is not its manifest's); restore it from a "
+                    "copy before the run is run again"
+                )
+                raise ArchiveUnusable(message)
+            files.publish(self.path / f"{name}.parquet", data)
+            content = {**manifest, "taken_from": manifest.get("taken_from", other.id)}
+            files.publish(self.path / f"{name}.json", files.json_bytes(content))
+
     def save_report(self, key: str, html: str, about: Mapping[str, Any]) -> None:
         """Publish the report for people with its manifest."""
         data = html.encode()
