@@ -109,10 +109,25 @@ def read_table(path: Place, name: str, expected: str | None = None) -> pd.DataFr
 def read_json(path: Place) -> dict[str, Any]:
     """A manifest's content."""
     try:
-        return json.loads(path.read_bytes())
-    except (OSError, ValueError):
-        message = f"archive: {path} is not a manifest that can be read; restore it from a copy"
-        raise ArchiveUnusable(message) from None
+        data = path.read_bytes()
+    except OSError:
+        raise ArchiveUnusable(_no_manifest(path)) from None
+    return parsed(data, path)
+
+
+def parsed(data: bytes, path: Place) -> dict[str, Any]:
+    """The content of a manifest whose bytes were read."""
+    try:
+        content = json.loads(data)
+    except ValueError:
+        raise ArchiveUnusable(_no_manifest(path)) from None
+    if not isinstance(content, dict):
+        raise ArchiveUnusable(_no_manifest(path))
+    return content
+
+
+def _no_manifest(path: Place) -> str:
+    return f"archive: {path} is not a manifest that can be read; restore it from a copy"
 
 
 def json_bytes(content: Mapping[str, Any]) -> bytes:

@@ -6,7 +6,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from pipelines.cli.options import ArchiveOption, JsonOption, RunArgument, console, print_json, print_table, rows, short
+from pipelines.cli.options import ArchiveOption, JsonOption, console, print_json, print_table, rows, short
+from schemas.errors import DONE, PART_FAILED
 
 if TYPE_CHECKING:
     from pipelines.archive import Run
@@ -15,17 +16,30 @@ MANY = 40
 
 
 def command(
-    run: RunArgument = "latest",
+    run: Annotated[
+        str, typer.Argument(metavar="RUN|UNIT", help="A run's name, its beginning, 'latest'; or a serial number.")
+    ] = "latest",
     table: Annotated[
         str, typer.Argument(metavar="[TABLE]", help="A table of the run, for instance coefficients.")
+    ] = "",
+    at: Annotated[str, typer.Option("--at", metavar="DATE", help="Which calibration of UNIT holds on this day.")] = "",
+    known: Annotated[
+        str, typer.Option("--known", metavar="DATE", help="With --at: by what had been written up to this day.")
     ] = "",
     archive: ArchiveOption = None,
     *,
     as_json: JsonOption = False,
 ) -> None:
-    """Show what a run came to, or one of its tables."""
+    """Show what a run came to, one of its tables, or which calibration of a unit holds on a date.
+
+    Exit status 1: no calibration of the unit holds on that date.
+    """
     from pipelines.archive import Archive
 
+    if at or known:
+        from pipelines.cli.validity import show_validity
+
+        raise typer.Exit(DONE if show_validity(Archive(archive), run, at, known, as_json=as_json) else PART_FAILED)
     found = Archive(archive).run(run)
     if table:
         _show_table(found, table, as_json=as_json)

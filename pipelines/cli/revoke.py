@@ -1,0 +1,42 @@
+"""``tumbleline revoke``: a unit's calibration does not hold any more, and why."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import typer
+
+from pipelines.cli.options import ArchiveOption, JsonOption, console, print_json
+
+
+def command(
+    serial: Annotated[str, typer.Argument(metavar="SERIAL", help="The unit.")],
+    reason: Annotated[str, typer.Option("--reason", help="Why; those who relied on it will read it.")] = "",
+    day: Annotated[
+        str,
+        typer.Option(
+            "--from", metavar="DATE", help="First day on which it does not hold; none of its days holds by default."
+        ),
+    ] = "",
+    certificate: Annotated[
+        int,
+        typer.Option("--certificate", min=0, help="Number after the serial; by default all that hold today or later."),
+    ] = 0,
+    archive: ArchiveOption = None,
+    *,
+    as_json: JsonOption = False,
+) -> None:
+    """Revoke a unit's calibration, with the reason. Nothing is erased: the event is added to the unit's."""
+    from pipelines.archive import Archive
+    from pipelines.trace import Ledger
+    from pipelines.trace.days import day_of
+
+    ledger = Ledger(Archive(archive))
+    event = ledger.revoke(serial, reason, day=day_of(day, "--from") if day else "", certificate=certificate)
+    ended = [f"{serial}/{number}" for number in event.ends]
+    if as_json:
+        print_json({"unit": serial, "revoked": ended, **event.document()})
+    else:
+        console().print(
+            f"revoked {', '.join(ended)} from {event.start} on: {event.reason}", markup=False, soft_wrap=True
+        )

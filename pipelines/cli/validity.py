@@ -1,0 +1,82 @@
+"""Which calibration of a unit holds on a date, for people and as JSON; reads a few small files and no table library."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from pipelines.cli.options import console, print_json, print_table
+
+if TYPE_CHECKING:
+    from pipelines.archive import Archive
+    from pipelines.trace import Calibration
+
+MADE = ("stage", "code", "key", "libraries", "schema", "inputs", "parameters", "who", "where", "when")
+
+
+def show_validity(archive: Archive, serial: str, at: str, known: str, *, as_json: bool) -> bool:
+    """Print it; whether a calibration holds."""
+    from pipelines.trace import Ledger
+    from pipelines.trace.days import day_of, today
+    from schemas.errors import WrongUse
+
+    day = day_of(at, "--at") if at else today()
+    history = Ledger(archive).calibrations(serial, day_of(known, "--known") if known else "")
+    if not history:
+        message = (
+            f"show: unit {serial!r} has no calibration in archive {archive.root}; certify one with 'tumbleline certify'"
+        )
+        raise WrongUse(message)
+    valid = next((one for one in history if one.holds(day)), None)
+    if as_json:
+        shown = None if valid is None else {**valid.document(), **_made(archive, valid)}
+        print_json(
+            {"unit": serial, "at": day, "valid": valid is not None, "calibration": shown,
+             "history": [one.document() for one in history]}
+        )  # fmt: skip
+    else:
+        _print(serial, day, valid, history, {} if valid is None else _made(archive, valid))
+    return valid is not None
+
+
+def _made(archive: Archive, valid: Calibration) -> dict[str, Any]:
+    """The coefficients of a calibration, and from which code, libraries and data they were made."""
+    from pipelines.archive import Run
+    from pipelines.trace.coefficients import coefficients_of
+
+    run = Run(archive, valid.run)
+    if not (run.path / "run.json").is_file():
+        return {"coefficients": None, "made": None}
+    manifest = run.manifest("coefficients")
+    return {
+        "coefficients": coefficients_of(run, valid),
+        "made": {key: manifest.get(key) for key in MADE} | {"capture": run.about.get("capture")},
+    }
+
+
+def _print(serial: str, day: str, valid: Calibration | None, history: list[Calibration], made: dict[str, Any]) -> None:
+    out = console()
+    if valid is None:
+        out.print(f"{serial}: no calibration holds on {day}", style="bold red", markup=False)
+    else:
+        event = valid.event
+        out.print(f"{serial}: certificate {valid.certificate} holds on {day}", style="bold green", markup=False)
+        out.print(f"  valid    {valid.start} until {valid.until}, grade {event.grade}", markup=False)
+        out.print(f"  from     run {valid.run}, recipe {event.recipe}, station {event.station}", markup=False)
+        out.print(f"  by       {event.who} on {event.where}, {event.when}", markup=False)
+        out.print(f"  tables   coefficients {event.coefficients[:16]}…", markup=False)
+        if made.get("made"):
+            libraries = ", ".join(f"{name} {number}" for name, number in made["made"]["libraries"].items())
+            out.print(f"  code     {made['made']['code'][:16]}… with {libraries}", markup=False, soft_wrap=True)
+    lines = [[one.certificate, one.start, one.until, one.state, one.run, _why(one)] for one in history]
+    print_table(["certificate", "from", "until", "state", "run", "why"], lines)
+    rows = made.get("coefficients") or []
+    if rows:
+        cells = [
+            [r["effect"], r["axis"], r["name"], f"{r['value']:.8g}", f"{r['standard_error']:.2g}", r["unit_text"]]
+            for r in rows
+        ]
+        print_table(["effect", "axis", "name", "value", "standard error", "unit"], cells)
+
+
+def _why(one: Calibration) -> str:
+    return one.ended_by.reason or f"by {one.ended_by.certificate}" if one.ended_by else one.event.reason

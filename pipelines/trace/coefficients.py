@@ -1,0 +1,35 @@
+"""The coefficients of one calibration, read without a table library: an auditor waits for them."""
+
+from __future__ import annotations
+
+import hashlib
+from typing import TYPE_CHECKING, Any
+
+from pipelines.archive.store import first_line
+from schemas.errors import ArchiveUnusable
+
+if TYPE_CHECKING:
+    from pipelines.archive import Run
+    from pipelines.trace.validity import Calibration
+
+
+def coefficients_of(run: Run, calibration: Calibration) -> list[dict[str, Any]]:
+    """Rows of the unit in the run's table of coefficients, which is the one that was certified."""
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    place = run.path / "coefficients.parquet"
+    try:
+        data = place.read_bytes()
+        if hashlib.sha256(data).hexdigest() != calibration.event.coefficients:
+            message = (
+                f"calibrations: {place} is not the table that certificate {calibration.certificate} was given for (its hash is "
+                "another); restore it from a copy"
+            )
+            raise ArchiveUnusable(message)
+        table = pq.read_table(pa.BufferReader(data))
+    except (OSError, pa.ArrowInvalid) as problem:
+        message = f"calibrations: {place} cannot be read ({first_line(problem)}); restore it from a copy"
+        raise ArchiveUnusable(message) from None
+    units = table.column("unit").to_pylist()
+    return table.take([row for row, unit in enumerate(units) if unit == calibration.serial]).to_pylist()

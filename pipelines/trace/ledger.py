@@ -1,0 +1,266 @@
+"""The ledger of calibrations: by unit, the events that began and ended their validity.
+
+``calibrations/<aa>/<hash of the serial>/<sequence>.json``: a unit is found by one look into one folder, however many there are,
+and no serial can name a place outside. Each event is a file that is created once. Of two processes that write a unit's next
+event one is told that it is there, reads it and decides anew; so an event was always decided knowing all before it.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import re
+from contextlib import nullcontext
+from dataclasses import replace
+from datetime import datetime, timedelta
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from pipelines.archive import Archive, files
+from pipelines.archive.archive import provenance
+from pipelines.archive.locks import alone
+from pipelines.archive.store import ObjectPath, place_of
+from pipelines.trace.days import LAST, today
+from pipelines.trace.events import Event, event_of
+from pipelines.trace.validity import Calibration, calibrations_of, overlapped
+from schemas.errors import ArchiveUnusable, WrongUse
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterable, Iterator, Sequence
+
+    from pipelines.archive import Run
+    from pipelines.archive.store import Place
+    from pipelines.trace.certifying import Certified
+
+SERIAL = re.compile(r"[A-Za-z0-9][A-Za-z0-9._+-]{0,63}")
+FOLDER = "calibrations"
+CLOCK_SLACK = timedelta(minutes=5)  # clocks of hosts that write into one archive differ by less
+
+
+class Ledger:
+    """The calibrations of an archive.
+
+    Parameters
+    ----------
+    archive : the archive, or its place or address.
+    """
+
+    def __init__(self, archive: Archive | Place | str) -> None:
+        self.root = archive.root if isinstance(archive, Archive) else place_of(archive)
+
+    def events(self, serial: str) -> list[Event]:
+        """What happened to a unit's calibrations, in order; empty for a unit that is not known."""
+        return [event for event, _ in self._read(serial)]
+
+    def calibrations(self, serial: str, known: str = "") -> list[Calibration]:
+        """The unit's calibrations in the order in which they were certified.
+
+        Parameters
+        ----------
+        known : only what was written up to this day; all of it where empty.
+        """
+        return calibrations_of(e for e in self.events(serial) if not known or e.when[:10] <= known)
+
+    def valid_at(self, serial: str, day: str, known: str = "") -> Calibration | None:
+        """The calibration that holds for a unit on a day; None where none does."""
+        return next((one for one in self.calibrations(serial, known) if one.holds(day)), None)
+
+    def all(self) -> Iterator[Calibration]:
+        """Every calibration of every unit."""
+        for events in self.histories():
+            yield from calibrations_of(events)
+
+    def histories(self) -> Iterator[list[Event]]:
+        """The events of every unit, unit by unit, in no order that means anything."""
+        top = self.root / FOLDER
+        for shard in sorted(top.iterdir(), key=lambda place: place.name) if top.is_dir() else ():
+            for folder in sorted(shard.iterdir(), key=lambda place: place.name) if shard.is_dir() else ():
+                events = [event for event, _ in _events(folder)]
+                if events:
+                    yield events
+
+    def certify(
+        self,
+        run: Run,
+        units: Sequence[str] = (),
+        start: str = "",
+        until: str = "",
+        *,
+        months: int = 12,
+        reason: str = "",
+        supersede: bool = False,
+    ) -> Certified:
+        """What became of certifying a run's units; see :func:`pipelines.trace.certifying.certify`."""
+        from pipelines.trace.certifying import certify  # reads tables, which looking up does not
+
+        return certify(self, run, units, start, until, months=months, reason=reason, supersede=supersede)
+
+    def add(self, event: Event, *, supersede: bool = False) -> tuple[Event, bool]:
+        """The event that certifies a calibration, as it was written, and whether it was there already.
+
+        Parameters
+        ----------
+        event : with serial, run, validity and what it rests on; the ledger fills in the rest.
+        supersede : end calibrations that begin later and overlap, too.
+        """
+        refuse_serial(event.serial, "certify")
+
+        def decided(events: Sequence[Event]) -> Event | None:
+            known = calibrations_of(events)
+            if any(_same(one, event) for one in known):
+                return None
+            _refuse_other_device(events, event)
+            ends = overlapped(known, event.start, event.until, supersede=supersede)
+            return replace(event, action="supersede" if ends else "certify", ends=ends)
+
+        written = self._append(event.serial, decided)
+        if written is not None:
+            return written, False
+        return next(one.event for one in self.calibrations(event.serial) if _same(one, event)), True
+
+    def revoke(self, serial: str, reason: str, *, day: str = "", certificate: int = 0) -> Event:
+        """The event that ends a unit's calibrations.
+
+        Parameters
+        ----------
+        day : from when they do not hold; empty: from their first day, as if they had never been.
+        certificate : sequence of the one that is meant; 0 for all that hold today or later.
+        """
+        if not reason.strip():
+            message = "revoke: no reason is given, one is needed for those who relied on it; add --reason"
+            raise WrongUse(message)
+
+        def decided(events: Sequence[Event]) -> Event:
+            known = [one for one in calibrations_of(events) if one.start < one.until]
+            chosen = [one for one in known if certificate in {0, one.event.sequence}]
+            meant = [one for one in chosen if one.until > (day or ("" if certificate else today()))]
+            if not meant:
+                raise WrongUse(_nothing_to_revoke(serial, known, certificate, day))
+            start = day or min(one.start for one in meant)
+            ends = tuple(one.event.sequence for one in meant)
+            last = meant[-1].event
+            return replace(
+                last, action="revoke", start=start, until=LAST, ends=ends, reason=reason.strip(), evidence=()
+            )
+
+        written = self._append(serial, decided)
+        if written is None:  # revoking always has something to write, or raises
+            raise WrongUse(_nothing_to_revoke(serial, [], certificate, day))
+        return written
+
+    def write_bulk(self, events: Iterable[Event]) -> int:
+        """Write events of a new archive at once, without a look at what is there nor a sync per file; how many there were.
+
+        Parameters
+        ----------
+        events : of a unit in order, numbered from 1; ``previous`` is filled in.
+        """
+        count, last = 0, dict[str, str]()
+        for event in events:
+            data = files.json_bytes(replace(event, previous=last.get(event.serial, "")).document())
+            place = self._folder(event.serial) / f"{event.sequence:06d}.json"
+            place.parent.mkdir(parents=True, exist_ok=True)
+            place.write_bytes(data)
+            last[event.serial] = hashlib.sha256(data).hexdigest()
+            count += 1
+        return count
+
+    def _append(self, serial: str, decide: Callable[[Sequence[Event]], Event | None]) -> Event | None:
+        """Write what is decided on a unit's events as its next one; None where nothing is to be written."""
+        folder = self._folder(serial)
+        with alone(folder, wait=True) if isinstance(folder, ObjectPath) else nullcontext():
+            while True:
+                known = self._read(serial)
+                event = decide([one for one, _ in known])
+                if event is None:
+                    return None
+                event = _stamped(event, known)
+                data = files.json_bytes(event.document())
+                if files.publish_first(folder / f"{event.sequence:06d}.json", data):
+                    return event
+
+    def _folder(self, serial: str) -> Place:
+        name = hashlib.sha256(serial.encode("utf-8", "surrogateescape")).hexdigest()
+        return self.root / FOLDER / name[:2] / name[:16]
+
+    def _read(self, serial: str) -> list[tuple[Event, str]]:
+        found = _events(self._folder(serial))
+        for event, _ in found:
+            if event.serial != serial:
+                where = self._folder(serial)
+                message = (
+                    f"calibrations: {where} holds unit {event.serial!r}, {serial!r} is needed; restore it from a copy"
+                )
+                raise ArchiveUnusable(message)
+        return found
+
+
+def refuse_serial(serial: str, where: str) -> None:
+    """Refuse what cannot be printed on a device: line ends, separators of paths and the like."""
+    if not SERIAL.fullmatch(serial):
+        message = (
+            f"{where}: serial {serial!r}, one of letters, digits and . _ + - is needed (1 to 64, the first a letter or digit); "
+            "correct the serial where it was entered"
+        )
+        raise WrongUse(message)
+
+
+def _events(folder: Place) -> list[tuple[Event, str]]:
+    """Events of a unit's folder with the hashes of their files; refused where one is missing among them."""
+    if isinstance(folder, Path):
+        names = sorted(path.name for path in folder.iterdir()) if folder.is_dir() else []
+    else:
+        names = sorted(path.name for path in folder.iterdir())
+    names = [name for name in names if name.endswith(".json") and not name.startswith(files.TEMPORARY)]
+    found: list[tuple[Event, str]] = []
+    for count, name in enumerate(names, 1):
+        place = folder / name
+        data = place.read_bytes()
+        event = event_of(files.parsed(data, place), str(place))
+        if event.sequence != count or name != f"{count:06d}.json":
+            message = f"calibrations: {folder} has event {name} where number {count} is due; restore what is missing from a copy"
+            raise ArchiveUnusable(message)
+        found.append((event, hashlib.sha256(data).hexdigest()))
+    return found
+
+
+def _stamped(event: Event, known: Sequence[tuple[Event, str]]) -> Event:
+    """The event with its number, what it follows, and who writes it where and when."""
+    by = provenance()
+    if known:
+        last = known[-1][0]
+        if datetime.fromisoformat(by["when"]) < datetime.fromisoformat(last.when) - CLOCK_SLACK:
+            message = (
+                f"calibrations: the clock says {by['when']}, the last event of unit {event.serial} was written at {last.when}; "
+                "set this host's clock, then give the command again (nothing was written)"
+            )
+            raise ArchiveUnusable(message)
+    stamp = {key: by[key] for key in ("who", "where", "when")}
+    return replace(event, sequence=len(known) + 1, previous=known[-1][1] if known else "", **stamp)
+
+
+def _same(one: Calibration, event: Event) -> bool:
+    """Whether a calibration that holds is what an event would certify again."""
+    old = (one.run, one.event.coefficients, one.start, one.until)
+    return old == (event.run, event.coefficients, event.start, event.until)
+
+
+def _refuse_other_device(events: Sequence[Event], event: Event) -> None:
+    devices = {one.device for one in events} - {event.device}
+    if devices:
+        message = (
+            f"certify: unit {event.serial} of run {event.run} is a device {event.device}, the ledger knows this serial as "
+            f"{', '.join(sorted(devices))}: two units have one serial; find out which is which, and give one another"
+        )
+        raise WrongUse(message)
+
+
+def _nothing_to_revoke(serial: str, known: Sequence[Calibration], certificate: int, day: str) -> str:
+    if not known:
+        return f"revoke: unit {serial!r} has no calibration that holds, one is needed; see 'tumbleline show' with --at"
+    there = ", ".join(f"{one.certificate} ({one.start} to {one.until})" for one in known)
+    what = (
+        f"certificate {serial}/{certificate}"
+        if certificate
+        else f"a calibration of unit {serial} after {day or today()}"
+    )
+    return f"revoke: there is no {what} that still holds; there are {there}"
