@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 from pydantic import Field, FiniteFloat, ValidationError, model_validator
 
+from schemas.carrier import Carried
 from schemas.errors import RecipeInvalid
 from schemas.recipe import Strict, explain, read_text
 
@@ -21,21 +22,15 @@ SIMULATED = "simulated.toml"
 SLOTS = 8
 
 
-class Device(Strict):
-    """A device at an address; a simulated station leaves host and port empty and gets its own."""
+class Device(Carried):
+    """A device at an address."""
 
-    profile: str
-    host: str = ""
-    port: Annotated[int, Field(ge=0, le=65535)] = 502
     device_id: Annotated[int, Field(ge=1, le=247)]
 
 
-class Slots(Strict):
+class Slots(Carried):
     """The reader's slots: slot n answers at ``device_id`` + n."""
 
-    profile: str
-    host: str = ""
-    port: Annotated[int, Field(ge=0, le=65535)] = 502
     device_id: Annotated[int, Field(ge=1, le=240)]
 
 
@@ -175,8 +170,8 @@ class StationConfig(Strict):
             raise ValueError(message)
         if self.kind == "modbus":
             for name in Devices.model_fields:
-                if not getattr(self.devices, name).host:
-                    message = f"devices.{name}.host: empty, a station of kind modbus needs one; add the address"
+                if missing := getattr(self.devices, name).missing():
+                    message = f"devices.{name}.{missing}: empty, a station of kind modbus needs one; add it"
                     raise ValueError(message)
         return self
 
