@@ -13,9 +13,10 @@ from pipelines.planned import refuse_unidentified
 from pipelines.recipes import MAIN_JOB, load_limits, load_recipe, lot_of
 from pipelines.stages.grade import refuse_limits_without_figures
 from schemas.errors import RecipeInvalid, WrongUse
+from schemas.fault import parse_fault
 from schemas.limits import Limits
 from schemas.recipe import Lot, Recipe
-from schemas.station import SLOTS, StationConfig, load_station
+from schemas.station import StationConfig, load_station, with_faults
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -33,6 +34,7 @@ ANALYSIS_KEYS = {
     "zero_output",
     "model_name",
     "model_version",
+    "faults",  # they are the station's, which is in the capture's name
 }
 
 
@@ -53,7 +55,10 @@ class Job:
     def capture_id(self) -> str:
         """Name of the capture: the same for recipes that differ only in what is made of the data."""
         measured = self.recipe.model_dump(mode="json", exclude=ANALYSIS_KEYS)
-        content = {"recipe": measured, "lot": self.lot.model_dump(), "station": self.station.model_dump(mode="json")}
+        if not measured["soaks"]:  # recipes without them keep the names that their captures had before there were any
+            del measured["soaks"]
+        station = self.station.model_dump(mode="json", exclude={"pace"})  # pace plans time, and drives nothing
+        content = {"recipe": measured, "lot": self.lot.model_dump(), "station": station}
         return digest(content)[:16]
 
     @property
@@ -70,24 +75,32 @@ class Job:
 
 @dataclass(frozen=True)
 class Request:
-    """What a command or a schedule asks for: plain values that a job is made from."""
+    """What a command or a schedule asks for: plain values that a job is made from.
+
+    ``slots`` say where each of the ``units`` sits; slot by slot from 0 where there are none. ``faults`` are trouble for a
+    simulated station, written as on the command line.
+    """
 
     recipe: str = MAIN_JOB
     station: Path | None = None
     units: tuple[str, ...] = ()
+    slots: tuple[int, ...] = ()
     seed: int | None = None
     repeat: int = 0
+    faults: tuple[str, ...] = ()
 
     def parameters(self) -> dict[str, Any]:
         """The request as JSON-able values."""
-        return {**asdict(self), "station": str(self.station) if self.station else None, "units": list(self.units)}
+        lists = {name: list(getattr(self, name)) for name in ("units", "slots", "faults")}
+        return {**asdict(self), "station": str(self.station) if self.station else None, **lists}
 
     def job(self) -> Job:
         """The job that is asked for, with everything refused that cannot work, before anything moves."""
         recipe = load_recipe(self.recipe)
         limits = load_limits(recipe, Path(self.recipe).parent)
-        lot = lot_of(recipe, self.units, seed=self.seed, repeat=self.repeat)
-        job = Job(recipe, limits, lot, load_station(self.station))
+        lot = lot_of(recipe, self.units, self.slots, seed=self.seed, repeat=self.repeat)
+        station = with_faults(load_station(self.station), [*recipe.faults, *map(parse_fault, self.faults)])
+        job = Job(recipe, limits, lot, station)
         _refuse_more_units_than_slots(job)
         _refuse_unknown_device(job)
         _refuse_beyond_station(job)
@@ -133,23 +146,38 @@ def _refuse_inconsistent(job: Job) -> None:
 
 def _refuse_more_units_than_slots(job: Job) -> None:
     """Refuse a lot that does not fit the fixture: between two fillings somebody must seat units, so each is a lot of its own."""
-    serials = [unit.serial for unit in job.lot.units]
-    if len(serials) > SLOTS:
-        fillings = [serials[start : start + SLOTS] for start in range(0, len(serials), SLOTS)]
-        commands = ", then ".join(f"--units {','.join(own)}" for own in fillings)
+    serials, slots = [unit.serial for unit in job.lot.units], job.station.devices.slots.count
+    if len(serials) > slots:
+        found = fillings(serials, slots)
+        commands = ", then ".join(f"--units {','.join(own)}" for own in found)
         message = (
-            f"lot: {len(serials)} units, the fixture has {SLOTS} slots; measure {len(fillings)} lots, one after the other: "
+            f"lot: {len(serials)} units, the fixture has {slots} slots; measure {len(found)} lots, one after the other: "
             f"{commands}"
         )
         raise WrongUse(message)
+    for unit in job.lot.units:
+        if unit.slot >= slots:
+            message = (
+                f"lot: unit {unit.serial} in slot {unit.slot}, the fixture of station {job.station.name} has slots 0 to "
+                f"{slots - 1}; correct the slot map"
+            )
+            raise WrongUse(message)
+
+
+def fillings(serials: Sequence[str], slots: int) -> list[tuple[str, ...]]:
+    """Serial numbers in portions that fit a fixture of so many slots."""
+    return [tuple(serials[start : start + slots]) for start in range(0, len(serials), slots)]
 
 
 def _refuse_unknown_device(job: Job) -> None:
-    """Refuse a kind of device that a simulated station has no figures of; on hardware the slots tell what they hold."""
+    """Refuse devices and faults that a simulated station does not know; on hardware the slots tell what they hold."""
     if job.station.simulation is not None:
+        from stations.plant.faults.catalogue import trouble_of
         from stations.plant.preset import load_preset  # a station of hardware has no plant
 
         load_preset(job.lot.device, job.station.simulation.preset_overrides)
+        for fault in job.station.simulation.faults:
+            trouble_of(fault, [unit.serial for unit in job.lot.units])
 
 
 def _refuse_beyond_station(job: Job) -> None:

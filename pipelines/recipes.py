@@ -10,13 +10,14 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from pydantic import ValidationError
 
 from inertial import poses
 from inertial.frames import force_from_angles
 from pipelines.models import read_model, refuse_unknown_effects
 from schemas.errors import RecipeInvalid, WrongUse, close_matches, did_you_mean
 from schemas.limits import Limits, parse_limits, unknown_limits
-from schemas.recipe import Lot, Pose, Recipe, RecipeFile, Unit, parse_recipe, read_text
+from schemas.recipe import Lot, Pose, Recipe, RecipeFile, Unit, explain, parse_recipe, read_text
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -41,13 +42,16 @@ def load_recipe(name: str = MAIN_JOB) -> Recipe:
         exclude={"poses", "verification", "verification_repeats", "static_pose", "model", "effects"}
     )
     outer, inner = file.static_pose
-    return Recipe(
-        **shared,
-        **model,
-        poses=fit_poses,
-        verification=verification * file.verification_repeats,
-        static_pose=Pose(name="static", outer_deg=outer, inner_deg=inner),
-    )
+    try:
+        return Recipe(
+            **shared,
+            **model,
+            poses=fit_poses,
+            verification=verification * file.verification_repeats,
+            static_pose=Pose(name="static", outer_deg=outer, inner_deg=inner),
+        )
+    except ValidationError as problem:
+        raise explain(problem, source, RecipeFile) from None
 
 
 def load_limits(recipe: Recipe, folder: Path | None = None) -> Limits:
@@ -61,8 +65,10 @@ def load_limits(recipe: Recipe, folder: Path | None = None) -> Limits:
     return parse_limits(built_in.read_text(encoding="utf-8"), f"limits {recipe.limits}")
 
 
-def lot_of(recipe: Recipe, serials: Sequence[str], *, seed: int | None = None, repeat: int = 0) -> Lot:
-    """The lot to measure: the serials given, or else the recipe's, one slot after the other."""
+def lot_of(
+    recipe: Recipe, serials: Sequence[str], slots: Sequence[int] = (), *, seed: int | None = None, repeat: int = 0
+) -> Lot:
+    """The lot to measure: the serials given, or else the recipe's, each in its slot or one slot after the other."""
     named = list(serials) or recipe.units
     if not named:
         message = "lot: no unit is named, at least one is needed; give serial numbers with --units, or in the recipe"
@@ -75,7 +81,7 @@ def lot_of(recipe: Recipe, serials: Sequence[str], *, seed: int | None = None, r
     if twice:
         message = f"lot: serial {', '.join(twice)} is there twice, each may be there once; correct the list of units"
         raise WrongUse(message)
-    units = [Unit(serial=serial, slot=slot) for slot, serial in enumerate(named)]
+    units = [Unit(serial=serial, slot=slot) for serial, slot in zip(named, slots or range(len(named)), strict=True)]
     return Lot(
         units=units,
         device=recipe.device,

@@ -7,6 +7,7 @@ same thing with every name resolved, and is what stages and stations are given.
 from __future__ import annotations
 
 import tomllib
+from itertools import pairwise
 from typing import TYPE_CHECKING, Annotated, Any
 
 from pydantic import (
@@ -20,6 +21,7 @@ from pydantic import (
 )
 
 from schemas.errors import RecipeInvalid, close_matches, did_you_mean
+from schemas.fault import Fault
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -60,6 +62,18 @@ class Unit(Strict):
     slot: Annotated[int, Field(ge=0)]
 
 
+class SoakPart(Strict):
+    """What is measured at one soak, where not every pose is measured at every temperature.
+
+    ``poses`` and ``verification`` are numbers in the recipe's lists, from 1, in order of measurement; a pose may come again.
+    Left out, all of the list are meant.
+    """
+
+    temperature_C: FiniteFloat
+    poses: list[Annotated[int, Field(ge=1)]] | None = None
+    verification: list[Annotated[int, Field(ge=1)]] | None = None
+
+
 class Lot(Strict):
     """The units measured together, the kind of device they are, and the seed of a simulated station.
 
@@ -89,7 +103,9 @@ class _Measurement(Strict):
     """The keys that a recipe file and a resolved recipe share.
 
     ``zero_output`` is the nominal output at 0 g, in the output's unit; the zero-g offset is counted from it.
-    ``span_min_g`` is how far the poses must reach on every axis, largest minus smallest.
+    ``soaks`` say soak by soak which poses are measured; ``temperatures_C`` are theirs then and may be left out.
+    ``span_min_g`` is how far the poses must reach on every axis, largest minus smallest. ``faults`` are trouble for a
+    simulated station, to try what a recipe does then.
     """
 
     name: Annotated[str, Field(min_length=1, pattern=r"^[a-z0-9][a-z0-9._-]*$")]
@@ -97,6 +113,7 @@ class _Measurement(Strict):
     device: str
     local_gravity_m_s2: Gravity
     temperatures_C: Annotated[list[FiniteFloat], Field(min_length=1)]
+    soaks: list[SoakPart] = []
     soak_min_s: Positive = SHORTEST_SOAK_S
     allow_short_soak: bool = False
     settle_s: NotNegative = 2.0
@@ -110,6 +127,15 @@ class _Measurement(Strict):
     limits: str = "consumer"
     units: list[str] = []
     seed: int = 0
+    faults: list[Fault] = []
+
+    @model_validator(mode="before")
+    @classmethod
+    def _temperatures_of_the_soaks(cls, given: Any) -> Any:
+        if not isinstance(given, dict) or not given.get("soaks") or "temperatures_C" in given:
+            return given
+        own = [s.get("temperature_C") if isinstance(s, dict) else s.temperature_C for s in given["soaks"]]
+        return {**given, "temperatures_C": own}
 
     @model_validator(mode="after")
     def _usable(self) -> _Measurement:
@@ -119,13 +145,27 @@ class _Measurement(Strict):
                 "allow_short_soak = true and answer for the temperature gradients"
             )
             raise ValueError(message)
+        if self.soaks and [s.temperature_C for s in self.soaks] != self.temperatures_C:
+            message = "soaks, temperatures_C: they say different temperatures, one of the two is enough; remove temperatures_C"
+            raise ValueError(message)
         samples = int(self.dwell_s * self.rate_hz)
         if samples < FEWEST_SAMPLES:
             message = f"dwell_s: {samples} samples per pose, a mean needs {FEWEST_SAMPLES}; raise dwell_s or rate_hz"
             raise ValueError(message)
         return self
 
-    @field_validator("effects", "units", "temperatures_C")
+    @field_validator("temperatures_C")
+    @classmethod
+    def _no_soak_twice_in_a_row(cls, values: list[float]) -> list[float]:
+        again = sorted({f"{a:g}" for a, b in pairwise(values) if a == b})
+        if again:
+            message = (
+                f"{', '.join(again)} °C is there twice in a row, a soak goes to another temperature; remove the second"
+            )
+            raise ValueError(message)
+        return values
+
+    @field_validator("effects", "units")
     @classmethod
     def _no_repeats(cls, values: list[Any]) -> list[Any]:
         twice = sorted({str(v) for v in values if values.count(v) > 1})
@@ -176,11 +216,37 @@ class Recipe(_Measurement):
     model_version: int = 0
     formulas: list[FormulaSpec] = []
 
+    @model_validator(mode="after")
+    def _soaks_name_poses_that_are_there(self) -> Recipe:
+        for number, part in enumerate(self.soaks, start=1):
+            for key, listed in (("poses", self.poses), ("verification", self.verification)):
+                beyond = [k for k in getattr(part, key) or [] if k > len(listed)]
+                if beyond:
+                    message = (
+                        f"soaks: soak {number} names {key} {beyond[0]}, there are {len(listed)}; correct the number"
+                    )
+                    raise ValueError(message)
+        return self
+
+    def poses_at(self, soak: int) -> list[Pose]:
+        """The poses of the fit that are measured at a soak, from 0, in order."""
+        return _picked(self.poses, self.soaks[soak].poses if self.soaks else None)
+
+    def verification_at(self, soak: int) -> list[Pose]:
+        """The poses for verification that are measured at a soak, from 0, in order."""
+        return _picked(self.verification, self.soaks[soak].verification if self.soaks else None)
+
     @property
     def wanted_records(self) -> int:
-        """The number of records that capture makes: every pose at every temperature, and the static one."""
-        per_soak = len(self.poses) + len(self.verification)
-        return per_soak * len(self.temperatures_C) + (1 if self.static_record_s > 0.0 else 0)
+        """The number of records that capture makes: the poses of every soak, and the static one."""
+        soaks = range(len(self.temperatures_C))
+        dwells = sum(len(self.poses_at(k)) + len(self.verification_at(k)) for k in soaks)
+        return dwells + (1 if self.static_record_s > 0.0 else 0)
+
+
+def _picked(poses: list[Pose], numbers: list[int] | None) -> list[Pose]:
+    """The poses of these numbers, from 1; all where none are given."""
+    return poses if numbers is None else [poses[k - 1] for k in numbers]
 
 
 def parse_recipe(text: str, source: str) -> RecipeFile:

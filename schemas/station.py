@@ -9,17 +9,21 @@ from typing import TYPE_CHECKING, Annotated, Literal
 from pydantic import Field, FiniteFloat, ValidationError, model_validator
 
 from schemas.carrier import Carried
-from schemas.errors import RecipeInvalid
+from schemas.errors import RecipeInvalid, WrongUse
+from schemas.fault import Fault
 from schemas.recipe import Strict, explain, read_text
+from schemas.safety import Safety, SelfTest, Suspenders
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
     from pathlib import Path
 
 Positive = Annotated[FiniteFloat, Field(gt=0.0)]
 NotNegative = Annotated[FiniteFloat, Field(ge=0.0)]
 Bounds = tuple[FiniteFloat, FiniteFloat]
 SIMULATED = "simulated.toml"
-SLOTS = 8
+MOST_SLOTS = 32  # the reader's registers name that many
+LAST_DEVICE_ID = 247  # Modbus over serial line 1.02, 2.2
 
 
 class Device(Carried):
@@ -29,9 +33,21 @@ class Device(Carried):
 
 
 class Slots(Carried):
-    """The reader's slots: slot n answers at ``device_id`` + n."""
+    """The fixture's slots, ``count`` of them: slot n answers at ``device_id`` + n."""
 
     device_id: Annotated[int, Field(ge=1, le=240)]
+    count: Annotated[int, Field(ge=1, le=MOST_SLOTS)] = 8
+
+    @model_validator(mode="after")
+    def _addressable(self) -> Slots:
+        last = self.device_id + self.count - 1
+        if last > LAST_DEVICE_ID:
+            message = (
+                f"count: {self.count} slots from device_id {self.device_id} end at {last}, {LAST_DEVICE_ID} is the last id "
+                "that Modbus has; begin lower"
+            )
+            raise ValueError(message)
+        return self
 
 
 class Devices(Strict):
@@ -109,32 +125,6 @@ class Hidden(Strict):
     figures: dict[str, FiniteFloat] = Field(default_factory=dict[str, float])
 
 
-class Fault(Strict):
-    """Something that goes wrong at ``at_s`` on the simulated station's clock.
-
-    ``silent``: the reader's gateway says that the device does not answer. ``mute``: nothing at all comes back.
-    ``dead``: the outputs stay as they are. ``door``: the chamber's door opens. ``serial`` names the unit that is meant,
-    ``device`` one of the station's own.
-    """
-
-    kind: Literal["silent", "mute", "dead", "door"]
-    at_s: NotNegative = 0.0
-    serial: str = ""
-    device: Literal["", "outer", "inner", "chamber", "reader"] = ""
-
-    @model_validator(mode="after")
-    def _names_what_is_meant(self) -> Fault:
-        wanted = {"door": (False, False), "dead": (True, False)}.get(self.kind)
-        named = (bool(self.serial), bool(self.device))
-        if named != wanted and (wanted is not None or sum(named) != 1):
-            message = (
-                f"fault {self.kind}: serial '{self.serial}', device '{self.device}'; dead needs a serial, silent and mute "
-                "a serial or a device, door neither; correct the fault"
-            )
-            raise ValueError(message)
-        return self
-
-
 class Simulation(Strict):
     """How the simulated station is made."""
 
@@ -161,7 +151,21 @@ class StationConfig(Strict):
     soak: Soak = Soak()
     pace: Pace = Pace()
     link: Link = Link()
+    suspenders: Suspenders = Suspenders()
+    safety: Safety = Safety()
+    self_test: SelfTest = SelfTest()
     simulation: Simulation | None = None
+
+    @model_validator(mode="after")
+    def _can_be_safe(self) -> StationConfig:
+        low, high = self.limits.temperature_C
+        if self.safety.chamber == "set_point" and not low <= self.safety.temperature_C <= high:
+            message = (
+                f"safety.temperature_C: {self.safety.temperature_C:g} °C, {low:g} to {high:g} °C is allowed by [limits]; "
+                "choose one inside, or another safety.chamber"
+            )
+            raise ValueError(message)
+        return self
 
     @model_validator(mode="after")
     def _complete(self) -> StationConfig:
@@ -174,6 +178,19 @@ class StationConfig(Strict):
                     message = f"devices.{name}.{missing}: empty, a station of kind modbus needs one; add it"
                     raise ValueError(message)
         return self
+
+
+def with_faults(config: StationConfig, faults: Sequence[Fault]) -> StationConfig:
+    """The station with faults beyond its file's; a station of hardware has trouble enough of its own."""
+    if not faults:
+        return config
+    if config.kind != "simulated" or config.simulation is None:
+        message = (
+            f"station {config.name}: fault {faults[0].kind} on kind {config.kind}, a simulated station is needed; leave it out"
+        )
+        raise WrongUse(message)
+    simulation = config.simulation.model_copy(update={"faults": [*config.simulation.faults, *faults]})
+    return config.model_copy(update={"simulation": simulation})
 
 
 def load_station(path: Path | None = None) -> StationConfig:

@@ -91,10 +91,11 @@ def make_plant(
 def serve_plant(config: StationConfig, lot: Lot, plant: Plant) -> Generator[Station]:
     """A station whose devices are the plant's, over Modbus TCP on loopback."""
     from stations.plant.clock import PlantClock  # noqa: PLC0415 - hardware needs no plant
+    from stations.plant.faults.wire import on_the_wire  # noqa: PLC0415
     from stations.plant.server import PlantServer  # noqa: PLC0415
 
-    with PlantServer(plant) as server:
-        links = _Links(config, (server.host, server.port))
+    with PlantServer(plant) as server, on_the_wire(plant, server.host, server.port) as address:
+        links = _Links(config, address)
         try:
             yield _assemble(config, lot, links, PlantClock(plant), lambda: plant.journal.state(plant.now_us))
         finally:

@@ -118,7 +118,7 @@ def _look(config: StationConfig, address: tuple[str, int] | None) -> Iterator[Re
             for reading in _registers(link, device):
                 if device.name == "reader" and reading.register == OCCUPIED and not reading.fault:
                     mask = int(float(reading.value))
-                    slots = [i for i in range(16) if mask >> i & 1]
+                    slots = [i for i in range(mask.bit_length()) if mask >> i & 1]
                 yield reading
         finally:
             link.close()

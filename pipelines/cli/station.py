@@ -25,7 +25,9 @@ StationOption = Annotated[
     typer.Option("--station", metavar="FILE", help="The station; the built-in simulated one by default."),
 ]
 DeviceOption = Annotated[str, typer.Option("--device", help="Preset of the simulated devices under test.")]
-UnitsOption = Annotated[int, typer.Option("--units", min=1, max=8, help="How many simulated devices sit in the slots.")]
+UnitsOption = Annotated[
+    int, typer.Option("--units", min=1, max=32, help="How many simulated devices sit in the slots.")
+]
 
 
 @app.command()

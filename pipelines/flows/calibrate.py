@@ -75,9 +75,11 @@ def calibrate_lot(
     recipe: str = "production",
     station: str | None = None,
     units: list[str] | None = None,
+    slots: list[int] | None = None,
     archive: str | None = None,
     seed: int | None = None,
     repeat: int | None = None,
+    faults: list[str] | None = None,
 ) -> str:
     """Measure and calibrate a lot; the id of its run in the archive.
 
@@ -86,7 +88,8 @@ def calibrate_lot(
     anew = int(str(flow_run.id).replace("-", "")[:7], 16) if repeat is None else repeat
     progress, told = _listeners[-1] if _listeners else (silent, lambda _done: None)
     where = Path(station) if station else None
-    job = Request(recipe=recipe, station=where, units=tuple(units or ()), seed=seed, repeat=anew).job()
+    lot = {"units": tuple(units or ()), "slots": tuple(slots or ())}
+    job = Request(recipe=recipe, station=where, **lot, seed=seed, repeat=anew, faults=tuple(faults or ())).job()
     runner = Runner(job, Archive(archive), progress)
     for name in ORDER:
         told(stage(name, runner))

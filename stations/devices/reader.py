@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from schemas.errors import OperatorNeeded, StationRefused
+from stations.codec import named
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -15,14 +16,28 @@ if TYPE_CHECKING:
     from stations.devices.slot import Slot
 
 RATE_HZ = 1e-3  # how well a rate is read back
+POSSIBLE_C = (-100.0, 250.0)
+POSSIBLE_V = (0.5, 60.0)  # no device in the catalogue works below; words in the wrong order read as next to nothing
+STRONGEST_G = 50.0
 
 
 @dataclass(frozen=True)
 class Instruments:
-    """The fixture's instruments at one instant: by slot °C and V, for all g rms."""
+    """The fixture's instruments at one instant: by slot °C and V, for all g rms; and whether somebody is at the station."""
 
     temperature_C: list[float]
     supply_V: list[float]
+    vibration_g: float
+    door_open: bool = False
+    stop_pressed: bool = False
+
+
+@dataclass(frozen=True)
+class Guarded:
+    """What the reader watches for people and fixture, of one instant."""
+
+    door_open: bool
+    stop_pressed: bool
     vibration_g: float
 
 
@@ -63,16 +78,35 @@ class Reader:
         self._registers.write("sampling", "stopped")
 
     def instruments(self) -> Instruments:
-        """Temperatures, supplies and vibration now; impossible ones are refused."""
-        values = self._registers.read_group("instruments")
-        temperature, supply = values["temperature"], values["supply"]
-        vibration = self._registers.number("vibration")
-        if not isinstance(temperature, list) or not isinstance(supply, list) or not math.isfinite(vibration):
+        """Temperatures, supplies and vibration now.
+
+        A slot in use that tells the impossible has NaN for its temperature: its unit is lost, not the others. Where all do, the
+        reader itself is read wrongly, and that is refused.
+        """
+        temperature, supply = self._registers.numbers("temperature"), self._registers.numbers("supply")
+        guarded = self.guarded()
+        vibration = guarded.vibration_g
+        wrong = [slot for slot in self.slots if not _possible(temperature[slot], supply[slot])]
+        if (wrong and len(wrong) == len(self.slots)) or not 0.0 <= vibration < STRONGEST_G:
+            first = min(self.slots, default=0)
             message = (
-                f"{self._registers.name}: instruments do not read as the profile says; check word order and counts"
+                f"{self._registers.name}: slot {first} at {temperature[first]:g} °C and {supply[first]:g} V, vibration "
+                f"{vibration:g} g rms, possible values are needed; check supply, sensors, word order and counts"
             )
             raise StationRefused(message)
-        return Instruments(temperature, supply, vibration)
+        told = [math.nan if slot in wrong else value for slot, value in enumerate(temperature)]
+        return Instruments(told, supply, vibration, guarded.door_open, guarded.stop_pressed)
+
+    def guarded(self) -> Guarded:
+        """Door, emergency stop and vibration now, in one request."""
+        values, profile = self._registers.read_group("guard"), self._registers.profile
+        door, stop, vibration = values["door"], values["emergency_stop"], values["vibration"]
+        if not isinstance(door, int) or not isinstance(stop, int) or not isinstance(vibration, int | float):
+            message = f"{self._registers.name}: door {door!r}, emergency stop {stop!r}, vibration {vibration!r}: numbers are needed"
+            raise StationRefused(f"{message}; check the profile")
+        closed = named(profile.register("door"), door) == "closed"
+        released = named(profile.register("emergency_stop"), stop) == "released"
+        return Guarded(not closed, not released, float(vibration))
 
     def since_power(self) -> float:
         """Seconds since the devices were powered."""
@@ -83,3 +117,10 @@ class Reader:
         if self._registers.text("door") != "closed":
             message = f"{self._registers.name}: the chamber's door is open, closed is needed; close it and start again"
             raise OperatorNeeded(message)
+
+
+def _possible(celsius: float, volts: float) -> bool:
+    """Whether a slot with a device in it can say so; a comparison with NaN is false."""
+    low, high = POSSIBLE_C
+    least, most = POSSIBLE_V
+    return low < celsius < high and least < volts < most

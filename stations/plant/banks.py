@@ -23,7 +23,7 @@ def build_banks(plant: Plant, devices: Devices) -> dict[int, Bank]:
         devices.outer.device_id: _axis(plant, plant.outer, devices.outer.profile),
         devices.inner.device_id: _axis(plant, plant.inner, devices.inner.profile),
         devices.chamber.device_id: _chamber(plant, devices.chamber.profile),
-        devices.reader.device_id: _reader(plant, devices.reader.profile),
+        devices.reader.device_id: _reader(plant, devices.reader.profile, devices.slots.count),
     }
     for unit, slot in enumerate(plant.slots):
         banks[devices.slots.device_id + slot] = _slot(plant, unit, devices.slots.profile)
@@ -45,7 +45,7 @@ def _axis(plant: Plant, axis: Axis, name: str) -> Bank:
     def status() -> Value:
         now = plant.now
         moving = axis.moving(now)
-        flags = {"home_end": True, "ready": not moving, "busy": moving, "move": moving}
+        flags = {"home_end": axis.homed, "ready": not moving, "busy": moving, "move": moving}
         flags["in_position"] = axis.in_position(now)
         return sum(1 << bits[flag] for flag, up in flags.items() if up)
 
@@ -108,7 +108,7 @@ def _chamber(plant: Plant, name: str) -> Bank:
     return Bank(profile, sources, command)
 
 
-def _reader(plant: Plant, name: str) -> Bank:
+def _reader(plant: Plant, name: str, slots: int) -> Bank:
     profile, sampler = load_profile(name), plant.sampler
 
     def command(values: dict[str, Value]) -> None:
@@ -123,11 +123,12 @@ def _reader(plant: Plant, name: str) -> Bank:
                 sampler.stop()
 
     sources = {
-        "slots": lambda: len(profile.register("occupied").bits),
+        "slots": lambda: slots,
         "sampling": lambda: int(sampler.running),
         "rate": lambda: sampler.rate,
         "since_power": lambda: plant.now,
         "door": lambda: int(plant.fixture.chamber.door_open),
+        "emergency_stop": lambda: int(plant.emergency_stop),
         "vibration": plant.vibration_reading,
         "occupied": lambda: sum(1 << slot for slot in plant.slots),
         "temperature": plant.temperature_reading,

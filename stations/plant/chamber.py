@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -34,15 +35,22 @@ class Chamber:
     integral: float = 0.0
     running: bool = True
     door_open: bool = False
+    powered: bool = True
+    winds_up: bool = False
+    hunting: tuple[float, float] = (0.0, 1.0)  # K, s
+    shaken_g: float = 0.0
+    seconds: float = 0.0
 
     def step(self) -> None:
         """Goes on by one second."""
         reach = self.ramp_K_min / 60.0 * STEP_S
         self.working += float(np.clip(self.set_point - self.working, -reach, reach))
-        error = self.working - self.air
+        self.seconds += STEP_S
+        swing, period = self.hunting
+        error = self.working + swing * math.sin(2.0 * math.pi * self.seconds / period) - self.air
         wanted = GAIN_PER_K * error + self.integral
-        demand = float(np.clip(wanted, -1.0, 1.0)) if self.running else 0.0
-        if wanted == demand:  # the integral waits while the actuator is at its end
+        demand = float(np.clip(wanted, -1.0, 1.0)) if self.running and self.powered else 0.0
+        if wanted == demand or self.winds_up:  # the integral waits while the actuator is at its end
             self.integral += GAIN_PER_K * error * STEP_S / INTEGRAL_S
         self.power += (demand - self.power) * STEP_S / ACTUATOR_S
         leak = DOOR_S if self.door_open else LEAK_S
@@ -52,9 +60,10 @@ class Chamber:
 
     def vibration(self) -> float:
         """Vibration of the fixture, g rms: the building, and the compressor by how hard it cools."""
-        if not self.running:
-            return QUIET_G
+        quiet = math.hypot(QUIET_G, self.shaken_g)
+        if not self.running or not self.powered:
+            return quiet
         duty = max(0.0, -self.power)
         if self.working < self.room:
             duty = max(duty, COOLING_FLOOR)
-        return float(np.hypot(QUIET_G, COMPRESSOR_G * np.sqrt(duty)))
+        return float(np.hypot(quiet, COMPRESSOR_G * np.sqrt(duty)))

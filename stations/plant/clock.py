@@ -16,7 +16,7 @@ class PlantClock:
 
     def now(self) -> float:
         """Seconds since the plant's power-on."""
-        return self._plant.now
+        return self._plant.now + self._plant.clock_off_s
 
     def sleep(self, seconds: float) -> None:
         """Lets the plant's time go on."""

@@ -18,6 +18,7 @@ Array = NDArray[np.float64]
 Counts = NDArray[np.int64]
 
 REFERENCE_C = 25.0
+SUPPLY_SHIFT_G = 0.05  # bias of a device that is not ratiometric, for a supply that is gone
 QUADRATIC_PER_K = 0.003  # quadratic over linear temperature coefficient, one sigma
 
 
@@ -96,7 +97,9 @@ class Devices:
         self._scale_t = np.stack([t.scale_tempco for t in truths])
         self._scale_t2 = np.stack([t.scale_tempco_quadratic for t in truths])
         self._cubic = np.stack([t.cubic for t in truths])
-        self._gain = np.array([t.supply_ratio for t in truths])[:, None]
+        self._ratio = np.array([t.supply_ratio for t in truths])[:, None]
+        self._gain = self._ratio
+        self._shift = np.zeros((len(truths), 1))
 
     def output(self, force: Array, temperature: Array) -> Array:
         """Output without noise, (n, s, 3) in g, under force (n, s, 3) in g at ``temperature`` (n, s) in °C."""
@@ -107,10 +110,17 @@ class Devices:
         scale = self._scale * (1.0 + theta * (self._scale_t + theta * self._scale_t2))
         return bias + scale * along
 
+    def supply(self, part: Array) -> None:
+        """Supplies at ``part`` (s,) of what they were: ratiometric outputs follow, the bias of others moves."""
+        if self._preset.ratiometric:
+            self._gain = self._ratio * part[:, None]
+        else:
+            self._shift = SUPPLY_SHIFT_G * (part[:, None] - 1.0)
+
     def counts(self, output: Array) -> Counts:
         """What the converter says of outputs (n, s, 3) in g: supply, clipping at range and codes, rounding."""
         preset = self._preset
-        inside = np.clip(output, -preset.range_g, preset.range_g)
+        inside = np.clip(output + self._shift, -preset.range_g, preset.range_g)
         raw = np.rint(self._gain * (preset.zero_level + preset.scale * inside) / self._lsb)
         return np.clip(raw, -preset.largest_count - 1, preset.largest_count).astype(np.int64)
 

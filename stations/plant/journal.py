@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from schemas.errors import ArchiveUnusable, DataRejected
-from schemas.station import Fault
+from schemas.fault import Fault
 
 if TYPE_CHECKING:
     from schemas.recipe import Lot

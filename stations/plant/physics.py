@@ -46,7 +46,7 @@ class Physics:
         self._outer, self._inner = axes
         self._fixture = fixture
         self._rotations = rotations
-        self._devices = devices
+        self.devices = devices
         self._dynamics = dynamics
         self._noise = noise
         self._hidden = list(hidden)
@@ -59,7 +59,7 @@ class Physics:
 
     def force(self, time: Array) -> Array:
         """True specific force on every unit, (n, s, 3) in g, without vibration."""
-        outer, inner = np.deg2rad(self._outer.angle(time)), np.deg2rad(self._inner.angle(time))
+        outer, inner = np.deg2rad(self._outer.shaft(time)), np.deg2rad(self._inner.shaft(time))
         for effect in self._hidden:
             outer, inner = effect.table(outer, inner)
         force = rotate(self._rotations, turn(self._up, outer, inner)[:, None, :])
@@ -83,10 +83,10 @@ class Physics:
         swing = math.sqrt(2.0) * shaking * np.sin(2.0 * math.pi * VIBRATION_HZ * time)
         felt = self._dynamics.respond(self.force(time) + swing[:, None, None] * VIBRATION_ALONG)
         temperature = self._fixture.temperature.at(time)
-        out = self._devices.output(felt, temperature)
+        out = self.devices.output(felt, temperature)
         for effect, memory in zip(self._hidden, self._fixture.memory, strict=True):
             out = out + effect.output(felt, Block(time, time, shaking, temperature, memory.at(time)))
-        counts = self._devices.counts(out + self._noise.sample(len(time), rate))
+        counts = self.devices.counts(out + self._noise.sample(len(time), rate))
         self._sampled_until = float(time[-1])
         return self._with_the_dead(counts, time)
 

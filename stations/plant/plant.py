@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
+import heapq
 import threading
+from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from schemas.errors import WrongUse, did_you_mean
-from schemas.station import SLOTS, Fault, Simulation, StationConfig
+from schemas.errors import WrongUse
+from schemas.station import MOST_SLOTS, Simulation, StationConfig
 from stations.plant.banks import build_banks
 from stations.plant.device import Devices, Truth, draw_truth, rotation, stream
 from stations.plant.dynamics import Dynamics
+from stations.plant.faults.catalogue import trouble_of
 from stations.plant.fixture import Fixture
 from stations.plant.hidden import hidden_effect
 from stations.plant.journal import Injection, Journal, Write, fingerprint
@@ -25,9 +28,11 @@ from stations.plant.table import Axis
 from stations.profile_files import load_profile
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Callable, Sequence
 
+    from schemas.fault import Fault
     from schemas.recipe import Lot
+    from stations.plant.faults.base import Trouble
     from stations.plant.hidden import HiddenEffect
 
 Array = NDArray[np.float64]
@@ -44,9 +49,10 @@ class Plant:
 
     def __init__(self, config: StationConfig, lot: Lot, hidden: Sequence[HiddenEffect] = ()) -> None:
         sim = config.simulation or Simulation()
-        _refuse_slots(lot)
+        _refuse_slots(lot, config.devices.slots.count)
         self.lock = threading.RLock()
         self.now_us = 0
+        self.emergency_stop = False
         self.preset: Preset = load_preset(lot.device, sim.preset_overrides)
         self.serials = [unit.serial for unit in lot.units]
         self.slots = [unit.slot for unit in lot.units]
@@ -57,9 +63,10 @@ class Plant:
             effect.begin(len(self.slots), stream(lot.seed, "hidden", number))
         self.fixture = Fixture(sim, self.slots, stream(sim.seed, lot.seed, lot.repeat, "air"), effects)
         self._supply = 1.0 + sim.supply_spread * stream(sim.seed, "supply").standard_normal(64)[self.slots]
+        self._sag = np.ones(len(self.slots))
         self._truths = self._draw_truths(sim, lot)
         noise = [stream(sim.seed, lot.seed, lot.repeat, serial, "noise") for serial in self.serials]
-        self._physics = Physics(
+        self.physics = Physics(
             (self.outer, self.inner),
             self.fixture,
             np.stack([t.slot_rotation for t in self._truths]),
@@ -71,12 +78,16 @@ class Plant:
         )
         fifo = load_profile(config.devices.slots.profile).fifo
         registers = fifo.registers if fifo is not None else 0
-        self.sampler = Sampler(self._physics, len(self.slots), self.preset.packing, registers)
+        self.sampler = Sampler(self.physics, len(self.slots), self.preset.packing, registers)
         self._devices = config.devices
-        self.faults: list[Fault] = []
+        self.troubles: list[Trouble] = []
+        self._due: list[tuple[int, int, Callable[[Plant], None]]] = []  # what begins or ends, and when, in µs
+        self.clock_off_s = 0.0
+        self.frozen: dict[int, float] = {}
+        self.frozen_air: float | None = None
         self.banks = build_banks(self, config.devices)
         self.journal = Journal(fingerprint(config, lot))
-        self.fixture.step_to(1.0, self._physics.force_at)
+        self.fixture.step_to(1.0, self.physics.force_at)
         for fault in sim.faults:
             self._arrange(fault)
 
@@ -103,22 +114,37 @@ class Plant:
         """Lets time pass; one call or many make no difference."""
         with self.lock:
             target = self.now_us + microseconds
-            for fault in self.faults:
-                if fault.kind == "door" and self.now_us <= fault.at_s * 1e6 <= target:
-                    self._pass_until(max(self.now_us, round(fault.at_s * 1e6)))
-                    self.fixture.chamber.door_open = True
+            while self._due and self._due[0][0] <= target:
+                at, _, act = heapq.heappop(self._due)
+                self._pass_until(max(self.now_us, at))
+                act(self)
             self._pass_until(target)
 
     def _pass_until(self, target_us: int) -> None:
-        self.fixture.step_to(target_us * 1e-6, self._physics.force_at)
+        self.fixture.step_to(target_us * 1e-6, self.physics.force_at)
         self.now_us = target_us
         self.sampler.advance(target_us)
 
-    def write(self, device_id: int, address: int, words: list[int]) -> None:
-        """A register write, at the plant's time; what a device refuses leaves no trace."""
+    def read(self, device_id: int, address: int, count: int) -> list[tuple[int, list[int]]]:
+        """Words of every register that a span touches, each with its address, as the device tells them now."""
+        found = self.banks[device_id].read(address, count)
+        for trouble in self._now(device_id):
+            found = [(first, trouble.told(self.now_us, first, words)) for first, words in found]
+        return found
+
+    def write(self, device_id: int, address: int, words: list[int]) -> int:
+        """A register write, at the plant's time; the exception code of the answer. What a device refuses leaves no trace."""
         with self.lock:
-            self.banks[device_id].write(address, words)
+            bank, code = self.banks[device_id], 0
+            for trouble in self._now(device_id):
+                held = [word for _, part in bank.read(address, len(words)) for word in part]
+                whole = held if len(held) == len(words) else None
+                code = trouble.taken(words, whole, partial(bank.write, address))
+                break
+            else:
+                bank.write(address, words)
             self.journal.add(Write(self.now_us, device_id, address, tuple(words)))
+            return code
 
     def inject(self, fault: Fault) -> None:
         """Arranges a fault."""
@@ -127,25 +153,37 @@ class Plant:
             self.journal.add(Injection(self.now_us, fault))
 
     def _arrange(self, fault: Fault) -> None:
-        if fault.serial and fault.serial not in self.serials:
-            message = f"fault {fault.kind}: no unit '{fault.serial}'; {did_you_mean(fault.serial, self.serials)}"
-            raise WrongUse(message)
-        self.faults.append(fault)
-        if fault.kind == "dead":
-            self._physics.dead_from[self.serials.index(fault.serial)] = fault.at_s
+        trouble = trouble_of(fault, self.serials)
+        trouble.device_id = self._id_of(fault)
+        trouble.unit = self.serials.index(fault.serial) if fault.serial else 0
+        self.troubles.append(trouble)
+        order = 2 * len(self.troubles)
+        heapq.heappush(self._due, (round(fault.at_s * 1e6), order, trouble.begins))
+        if fault.for_s is not None:
+            heapq.heappush(self._due, (round(fault.until_s * 1e6), order + 1, trouble.ends))
+        self.advance(0)
 
-    def fault_of(self, device_id: int) -> str:
-        """``silent``, ``mute`` or nothing: how the device behind an id answers now."""
-        for fault in self.faults:
-            if fault.kind in {"silent", "mute"} and fault.at_s <= self.now and device_id == self._id_of(fault):
-                return fault.kind
-        return ""
+    def _now(self, device_id: int) -> list[Trouble]:
+        """Troubles that a device has now."""
+        now = self.now
+        return [t for t in self.troubles if t.device_id == device_id and t.fault.at_s <= now < t.fault.until_s]
+
+    def answer_of(self, device_id: int) -> int:
+        """The exception code with which the device behind an id answers everything now; 0 where it answers as always."""
+        return next((code for trouble in self._now(device_id) if (code := trouble.answers())), 0)
 
     def _id_of(self, fault: Fault) -> int:
-        """The device id that a fault is about."""
+        """The device id that a fault is about; 0 where it is about none."""
         if fault.device:
             return int(getattr(self._devices, fault.device).device_id)
-        return self._devices.slots.device_id + self.slots[self.serials.index(fault.serial)]
+        if fault.serial:
+            return self._devices.slots.device_id + self.slots[self.serials.index(fault.serial)]
+        return 0
+
+    def sag(self, units: Sequence[int], factor: float) -> None:
+        """Supplies of some units at a part of what they were."""
+        self._sag[list(units)] = factor
+        self.physics.devices.supply(self._sag)
 
     def truth(self, serial: str) -> Truth:
         """What a unit really is; for tests and benchmarks, never for a client."""
@@ -153,20 +191,23 @@ class Plant:
 
     def air_reading(self) -> float:
         """The chamber's own thermometer, °C."""
+        if self.frozen_air is not None:
+            return self.frozen_air
         noise = AIR_NOISE_K * float(self._noise(AIR, 1)[0])
         return float(self.fixture.air.at(np.array([self.now]))[0]) + noise
 
     def temperature_reading(self) -> list[float]:
         """The thermometers of the slots, °C; empty slots say the air's."""
         element = self.fixture.temperature.at(np.array([self.now]))[0]
-        raw = element + self.preset.thermometer_noise_K * self._noise(THERMOMETER, SLOTS)[: len(element)]
+        raw = element + self.preset.thermometer_noise_K * self._noise(THERMOMETER, len(element))
         step = self.preset.thermometer_resolution_K
-        return self._by_slot(np.round(raw / step) * step, float(self.fixture.air.at(np.array([self.now]))[0]))
+        told = self._by_slot(np.round(raw / step) * step, float(self.fixture.air.at(np.array([self.now]))[0]))
+        return [self.frozen.get(slot, value) for slot, value in enumerate(told)]
 
     def supply_reading(self) -> list[float]:
         """Supply of the slots, V; nothing at empty ones."""
-        noise = SUPPLY_NOISE * self._noise(SUPPLY, SLOTS)[: len(self.slots)]
-        return self._by_slot(self.preset.supply_V * (self._supply + noise), 0.0)
+        noise = SUPPLY_NOISE * self._noise(SUPPLY, len(self.slots))
+        return self._by_slot(self.preset.supply_V * self._sag * (self._supply + noise), 0.0)
 
     def vibration_reading(self) -> float:
         """The fixture's vibration, g rms."""
@@ -177,14 +218,14 @@ class Plant:
         return keyed_normal(self._key, channel, int(self.now), n)
 
     def _by_slot(self, values: Array, empty: float) -> list[float]:
-        out = [empty] * SLOTS
+        out = [empty] * MOST_SLOTS
         for slot, value in zip(self.slots, values, strict=True):
             out[slot] = float(value)
         return out
 
 
-def _refuse_slots(lot: Lot) -> None:
+def _refuse_slots(lot: Lot, count: int) -> None:
     for unit in lot.units:
-        if unit.slot >= SLOTS:
-            message = f"lot: unit {unit.serial} sits in slot {unit.slot}, the fixture has 0 to {SLOTS - 1}; move it"
+        if unit.slot >= count:
+            message = f"lot: unit {unit.serial} sits in slot {unit.slot}, the fixture has 0 to {count - 1}; move it"
             raise WrongUse(message)

@@ -43,12 +43,15 @@ class Sampler:
         self.head = 0
         self.tail = [0] * units
         self.overflow = [False] * units
+        self._lost = 0
+        self._skipped = 0
 
     def start(self, now_us: int) -> None:
         """Starts afresh: counters at zero, flags down."""
         self.running, self._start_us, self.head = True, now_us, 0
         self.tail = [0] * len(self.tail)
         self.overflow = [False] * len(self.overflow)
+        self._lost = self._skipped = 0
         self._source.begin(now_us * 1e-6, self.rate)
 
     def stop(self) -> None:
@@ -64,7 +67,7 @@ class Sampler:
         """Makes every sample that is due at ``now_us``."""
         if not self.running:
             return
-        due = (now_us - self._start_us) * self.millihertz // 10**9
+        due = (now_us - self._start_us) * self.millihertz // 10**9 - self._lost
         while self.head < due:
             self._fill(min(CHUNK, due - self.head))
         for unit, tail in enumerate(self.tail):
@@ -73,10 +76,22 @@ class Sampler:
 
     def _fill(self, n: int) -> None:
         number = np.arange(self.head + 1, self.head + n + 1)
-        counts = self._source.samples(self._start_us * 1e-6 + number / self.rate, self.rate)
-        packed = pack_samples(counts, self.head, self.packing)
+        counts = self._source.samples(self._start_us * 1e-6 + (number + self._lost) / self.rate, self.rate)
+        packed = pack_samples(counts, self.head + self._skipped, self.packing)
         self._ring[:, (number - 1) % self.capacity] = np.swapaxes(packed, 0, 1)
         self.head += n
+
+    def overrun(self, unit: int) -> None:
+        """A unit's ring was written over before it was read: its oldest samples are gone, and the flag is up."""
+        if self.running:
+            self.overflow[unit] = True
+            self._ring[unit] = 0
+
+    def lose(self, samples: int, *, numbered: bool) -> None:
+        """The next samples are never made: told by their numbers, or only missing in the count."""
+        if self.running:
+            self._lost += samples
+            self._skipped += samples if numbered else 0
 
     def words(self, unit: int, first: int, count: int) -> list[int]:
         """``count`` words of a unit's ring from word ``first`` on."""

@@ -19,6 +19,7 @@ from pymodbus.simulator import DataType, SimData, SimDevice
 from schemas.errors import StationRefused
 from stations.codec import NotEncodable
 from stations.plant.bank import Busy
+from stations.plant.faults.base import MUTE
 
 if TYPE_CHECKING:
     from types import TracebackType
@@ -54,16 +55,16 @@ async def _answer(
 ) -> ExcCodes | None:
     """Fills the registers that are read, or hands on those that are written."""
     with plant.lock:
-        fault = plant.fault_of(device_id)
-        if fault == "silent":
-            return ExcCodes.GATEWAY_NO_RESPONSE
-        if fault == "mute":
+        code = plant.answer_of(device_id)
+        if code == MUTE:
             raise NoSuchIdException  # the server, told to ignore missing devices, sends nothing
         try:
-            if written is not None:
-                plant.write(device_id, address, [int(word) for word in written])
-            else:
-                for first, words in plant.banks[device_id].read(address, count):
+            if code == 0 and written is not None:
+                code = plant.write(device_id, address, [int(word) for word in written])
+            if code != 0:
+                return ExcCodes(code)
+            if written is None:
+                for first, words in plant.read(device_id, address, count):
                     registers[first - start : first - start + len(words)] = words
         except NotEncodable:
             return ExcCodes.ILLEGAL_VALUE

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -69,34 +69,75 @@ class Move:
 
 
 class Axis:
-    """One axis: a servo with its encoder."""
+    """One axis: a servo with its encoder, and what may be wrong with it.
+
+    ``zero_deg`` is by how much the encoder is off, ``play_deg`` how far the shaft may lag behind it, ``stuck_at`` what a stuck
+    encoder says; ``homed`` is the drive's own belief.
+    """
 
     def __init__(self, seed: int, channel: int) -> None:
         self._seed, self._channel = seed, channel
         self._moves = 0
         self.move = Move(-1e9, 0.0, 0.0, 0.0, 1.0, 1.0)
+        self.zero_deg, self.play_deg = 0.0, 0.0
+        self.stuck_at: float | None = None
+        self.homed = True
+        self._side = 1.0  # from where the last move came
+        self._stalled = False
+        self._held: tuple[float, float, float] | None = None  # target, speed and acceleration of a move that is held up
 
     def go(self, now: float, target: float, speed: float, acceleration: float) -> None:
         """Starts a move to an absolute target; the axis stands still or rings when this is called."""
+        if self._stalled:
+            self._held = target, speed, acceleration
+            return
         self._moves += 1
         slip = HOLD_DEG * float(keyed_normal(self._seed, self._channel, self._moves, 1)[0])
         origin = float(self.angle(np.array([now]))[0])
+        if abs(target - origin) > self.play_deg:
+            self._side = math.copysign(1.0, target - origin)
         self.move = Move(now, origin, target, target + slip, speed, acceleration)
+
+    def stall(self, now: float) -> None:
+        """Holds the axis up where it is."""
+        if self.moving(now):
+            self._held = self.move.target, self.move.speed, self.move.acceleration
+        self._stalled = True
+        here = float(self.angle(np.array([now]))[0])
+        self.move = Move(now - IN_POSITION_S, here, here, here, 1.0, 1.0)
+
+    def release(self, now: float, *, resumes: bool) -> None:
+        """Sets the axis free; it goes on to its target, or has forgotten it."""
+        held, self._held, self._stalled = self._held, None, False
+        if held is not None and resumes:
+            self.go(now, *held)
+
+    def lose_zero(self, offset: float) -> None:
+        """The encoder says ``offset`` degrees more from now on; the shaft stays where it is."""
+        m = self.move
+        self.move = replace(m, origin=m.origin + offset, target=m.target + offset, rest=m.rest + offset)
+        self.zero_deg += offset
 
     def angle(self, time: Array) -> Array:
         """The shaft's angle as the encoder would see it without noise, degrees."""
         return self.move.angle(time)
 
+    def shaft(self, time: Array) -> Array:
+        """The shaft's true angle, degrees."""
+        return self.angle(time) - self.zero_deg - 0.5 * self._side * self.play_deg
+
     def moving(self, now: float) -> bool:
-        """Whether the profile is running."""
-        return self.move.start <= now < self.move.end
+        """Whether the profile is running, or held up."""
+        return self._held is not None or self.move.start <= now < self.move.end
 
     def in_position(self, now: float) -> bool:
         """Whether the axis has been inside its window long enough."""
-        return now >= self.move.end + IN_POSITION_S
+        return self._held is None and now >= self.move.end + IN_POSITION_S
 
     def encoder(self, now: float) -> float:
         """The encoder's reading: quantised to 0.001°, noise of its own at every millisecond."""
+        if self.stuck_at is not None:
+            return self.stuck_at
         noise = ENCODER_NOISE_DEG * float(keyed_normal(self._seed, self._channel + 1, int(now * 1000), 1)[0])
         angle = float(self.angle(np.array([now]))[0]) + noise
         return round(angle / ENCODER_STEP_DEG) * ENCODER_STEP_DEG

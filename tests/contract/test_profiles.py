@@ -171,4 +171,4 @@ def test_every_preset_can_be_built_and_read(name):
     plant = plant_of(load_station(), lot_of(2, name.lower()))
     plant.advance(1_000_000)
     assert plant.preset == load_preset(name)
-    assert len(plant.temperature_reading()) == 8
+    assert len(plant.temperature_reading()) == 32

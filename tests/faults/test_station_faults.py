@@ -20,7 +20,8 @@ from schemas.errors import (
     StationTimeout,
     WrongUse,
 )
-from schemas.station import Fault, load_station
+from schemas.fault import Fault
+from schemas.station import load_station
 from stations.links.modbus import ModbusLink
 from stations.opening import make_plant, open_station, serve_plant
 from stations.plant.server import PlantServer
@@ -225,8 +226,17 @@ def test_a_station_device_that_falls_silent_stops_the_run_by_name(device):
     [{"kind": "dead"}, {"kind": "door", "serial": "U000"}, {"kind": "mute", "serial": "U000", "device": "reader"}],
 )
 def test_a_fault_that_does_not_say_what_is_meant_is_refused(fault):
-    with pytest.raises(ValidationError, match="correct the fault"):
-        Fault.model_validate(fault)
+    with pytest.raises((ValidationError, RecipeInvalid), match="correct the fault"):
+        make_plant(station_of(faults=[fault]), lot_of())
+
+
+@pytest.mark.parametrize(
+    ("fault", "needed"),
+    [({"kind": "sillent", "serial": "U001"}, "silent"), ({"kind": "vibration", "figures": {"rms": 0.1}}, "rms_g")],
+)
+def test_a_fault_with_a_typo_is_refused_with_what_was_meant(fault, needed):
+    with pytest.raises(RecipeInvalid, match=needed):
+        make_plant(station_of(faults=[fault]), lot_of())
 
 
 def test_hardware_is_not_served():
@@ -236,7 +246,7 @@ def test_hardware_is_not_served():
 
 
 def test_a_fault_of_a_unit_that_is_not_there_is_refused():
-    with pytest.raises(WrongUse, match="U001"):
+    with pytest.raises(RecipeInvalid, match="U001"):
         make_plant(station_of(faults=[{"kind": "dead", "serial": "U0O1"}]), lot_of())
 
 

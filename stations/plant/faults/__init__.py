@@ -1,1 +1,1 @@
-"""Trouble for the simulated station: what a plant floor does to wires and devices, injectable by name."""
+"""Trouble for the simulated station: what a plant floor does to wires and devices, one kind a file, injectable by name."""

@@ -1,0 +1,81 @@
+"""A fault of a simulated station: what goes wrong, with whom, from when and for how long.
+
+Which kinds there are is the plant's business: one file each in ``stations/plant/faults``. Here is only how one is written: in a
+station's file, in a recipe, on the command line, in a test.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Annotated, Literal
+
+from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, ValidationError, model_validator
+
+from schemas.errors import WrongUse
+
+if TYPE_CHECKING:
+    from pydantic_core import ErrorDetails
+
+NotNegative = Annotated[FiniteFloat, Field(ge=0.0)]
+Part = Literal["", "outer", "inner", "chamber", "reader"]
+SEPARATOR = ":"
+
+
+class Fault(BaseModel):
+    """Something that goes wrong at ``at_s`` on the simulated station's clock, for ``for_s`` seconds or for good.
+
+    ``serial`` names the unit that is meant, ``device`` one of the station's own; ``figures`` are the kind's own numbers.
+    """
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    kind: Annotated[str, Field(pattern=r"^[a-z][a-z0-9_]*$")]
+    at_s: NotNegative = 0.0
+    for_s: Annotated[FiniteFloat, Field(gt=0.0)] | None = None
+    serial: str = ""
+    device: Part = ""
+    figures: dict[str, FiniteFloat] = Field(default_factory=dict[str, float])
+
+    @model_validator(mode="after")
+    def _means_one(self) -> Fault:
+        if self.serial and self.device:
+            message = (
+                f"fault {self.kind}: serial '{self.serial}' and device '{self.device}', one of the two can be meant; "
+                "correct the fault"
+            )
+            raise ValueError(message)
+        return self
+
+    @property
+    def until_s(self) -> float:
+        """When it is over; infinite where it stays."""
+        return math.inf if self.for_s is None else self.at_s + self.for_s
+
+
+def parse_fault(text: str) -> Fault:
+    """The fault in ``kind[:key=value…]``: keys of a fault, or else figures of its kind.
+
+    >>> parse_fault("silent:serial=U001:at_s=905").at_s
+    905.0
+    """
+    kind, *pairs = text.split(SEPARATOR)
+    given: dict[str, str | dict[str, str]] = {"kind": kind}
+    figures: dict[str, str] = {}
+    for pair in pairs:
+        key, equals, value = pair.partition("=")
+        if not equals or not key or not value:
+            message = f"fault '{text}': found '{pair}', key=value is needed; write kind:key=value:key=value"
+            raise WrongUse(message)
+        (given if key in Fault.model_fields and key != "figures" else figures)[key] = value
+    try:
+        return Fault.model_validate({**given, "figures": figures})
+    except ValidationError as problem:
+        message = f"fault '{text}': {_sentence(problem.errors(include_url=False)[0])}; write kind:key=value:key=value"
+        raise WrongUse(message) from None
+
+
+def _sentence(detail: ErrorDetails) -> str:
+    """What is wrong, and where."""
+    where = ".".join(str(part) for part in detail["loc"] if part != "figures")
+    reason = detail["msg"].removeprefix("Value error, ")
+    return f"{where}: {reason[:1].lower()}{reason[1:]}" if where else reason
