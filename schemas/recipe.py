@@ -66,12 +66,15 @@ class SoakPart(Strict):
     """What is measured at one soak, where not every pose is measured at every temperature.
 
     ``poses`` and ``verification`` are numbers in the recipe's lists, from 1, in order of measurement; a pose may come again.
-    Left out, all of the list are meant.
+    Left out, all of the list are meant. ``waits_s`` are waits after the move, one for each of ``poses``, in place of the recipe's
+    ``settle_s``. With ``settled = false`` the dwells begin at once, while the devices still follow the chamber.
     """
 
     temperature_C: FiniteFloat
     poses: list[Annotated[int, Field(ge=1)]] | None = None
     verification: list[Annotated[int, Field(ge=1)]] | None = None
+    waits_s: list[NotNegative] | None = None
+    settled: bool = True
 
 
 class Lot(Strict):
@@ -226,7 +229,22 @@ class Recipe(_Measurement):
                         f"soaks: soak {number} names {key} {beyond[0]}, there are {len(listed)}; correct the number"
                     )
                     raise ValueError(message)
+            if part.waits_s is not None and len(part.waits_s) != len(self.poses_at(number - 1)):
+                message = (
+                    f"soaks: soak {number} has {len(part.waits_s)} waits for {len(self.poses_at(number - 1))} poses, each pose "
+                    "needs one; correct waits_s"
+                )
+                raise ValueError(message)
         return self
+
+    def waits_at(self, soak: int) -> list[float]:
+        """Waits after the move to each of the poses of a soak, from 0, s."""
+        waits = self.soaks[soak].waits_s if self.soaks else None
+        return [self.settle_s] * len(self.poses_at(soak)) if waits is None else waits
+
+    def settles_at(self, soak: int) -> bool:
+        """Whether the devices settle at a soak, from 0, before its dwells begin."""
+        return self.soaks[soak].settled if self.soaks else True
 
     def poses_at(self, soak: int) -> list[Pose]:
         """The poses of the fit that are measured at a soak, from 0, in order."""
