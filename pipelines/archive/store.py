@@ -211,8 +211,9 @@ def place_of(address: str | Path | ObjectPath) -> Place:
     try:
         system, key = FileSystem.from_uri(address)
     except (pa.ArrowInvalid, pa.ArrowNotImplementedError, OSError) as problem:
+        shown = _without_secrets(address)
         message = (
-            f"archive: address '{_without_secrets(address)}' cannot be used ({first_line(problem)}), a folder or an address "
+            f"archive: address '{shown}' cannot be used ({first_line(problem).replace(address, shown)}), a folder or an address "
             "such as s3://bucket/folder?endpoint_override=host:port&scheme=http is needed; correct it"
         )
         raise ArchiveUnusable(message) from None

@@ -9,6 +9,7 @@ import pytest
 from capture_double import small_run
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from ledger_events import event
 from typer.testing import CliRunner
 
 from pipelines.archive import Run
@@ -17,14 +18,6 @@ from pipelines.trace import Event, Ledger
 from pipelines.trace.days import day_of, months_after
 from pipelines.trace.validity import calibrations_of, overlapped
 from schemas.errors import ArchiveUnusable, WrongUse
-
-
-def event(serial: str = "A1", start: str = "2026-01-01", until: str = "2027-01-01", **more: object) -> Event:
-    blank = Event(
-        serial=serial, sequence=0, action="certify", device="ADXL355", run="r-1", start=start, until=until, grade="tactical",
-        station="bench", recipe="small", coefficients="c", ends=(), who="", where="", when="", reason="", previous="",
-    )  # fmt: skip
-    return replace(blank, **more)
 
 
 @pytest.fixture(scope="module")

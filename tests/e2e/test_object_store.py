@@ -1,0 +1,149 @@
+"""An archive in an object store: a real S3 server process on loopback, started here."""
+
+import json
+import threading
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from capture_double import CaptureDouble, PulledPlug, small_job, small_run
+from ledger_events import event
+from s3_server import CREDENTIALS, s3_bucket
+from typer.testing import CliRunner
+
+from pipelines.archive import Archive, Run
+from pipelines.archive.locks import alone
+from pipelines.archive.store import ObjectPath
+from pipelines.chain import ORDER
+from pipelines.cli import app
+from pipelines.runner import Runner
+from pipelines.trace import Ledger
+from schemas.errors import ArchiveUnusable, OperatorNeeded
+
+pytestmark = pytest.mark.slow
+
+
+@pytest.fixture(scope="module")
+def query() -> Iterator[str]:
+    with pytest.MonkeyPatch.context() as patch, s3_bucket() as found:
+        for name, value in CREDENTIALS.items():
+            patch.setenv(name, value)
+        yield found
+
+
+@pytest.fixture(scope="module")
+def local(tmp_path_factory: pytest.TempPathFactory) -> Run:
+    return small_run(tmp_path_factory.mktemp("local"))
+
+
+@pytest.fixture(scope="module")
+def address(query: str, tmp_path_factory: pytest.TempPathFactory) -> str:
+    """An archive with a run that was cut off once and went on."""
+    address = f"s3://factory/main?{query}"
+    job = small_job(tmp_path_factory.mktemp("job"))
+    with pytest.raises(PulledPlug):
+        list(Runner(job, Archive(address), measure=CaptureDouble(stop_after=5)).all())
+    double = CaptureDouble()
+    list(Runner(job, Archive(address), measure=double).all())
+    assert len(double.measured) == job.recipe.wanted_records - 5
+    return address
+
+
+def ask(address: str, *arguments: str) -> dict:
+    result = CliRunner().invoke(app, [*arguments, "--archive", address, "--json"])
+    if result.exception and not isinstance(result.exception, SystemExit):
+        raise result.exception
+    return json.loads(result.stdout)
+
+
+def test_a_run_there_has_the_same_bytes_as_one_in_a_folder(address: str, local: Run) -> None:
+    run = Archive(address).run("latest")
+    assert run.id == local.id
+    assert set(run.tables()) == set(local.tables())
+    for name in local.tables():
+        assert (run.path / f"{name}.parquet").read_bytes() == (local.path / f"{name}.parquet").read_bytes()
+
+
+def test_nothing_is_done_twice_there(address: str, tmp_path: Path) -> None:
+    runner = Runner(small_job(tmp_path), Archive(address), measure=CaptureDouble(stop_after=0))
+    assert [done.reused for done in runner.all()] == [True] * len(ORDER)
+
+
+def test_the_commands_work_on_an_address(address: str, local: Run) -> None:
+    assert [run["id"] for run in ask(address, "list")["runs"]] == [local.id]
+    shown = ask(address, "show", "latest")
+    assert {unit["outcome"] for unit in shown["units"]} == {"pass"}
+    assert shown["report"].startswith("s3://factory/main/runs/small-")
+    assert ask(address, "show", "latest", "grades")["rows"]
+    refit = ask(address, "fit", "latest", "--effects", "bias,scale,bias_temperature,misalignment,scale_temperature")
+    assert refit["run"] != local.id
+    (Archive(address).root / "runs" / refit["run"]).remove_all()
+
+
+def test_calibrations_are_certified_and_found_there(address: str) -> None:
+    ask(address, "certify", "latest", "--from", "2026-01-01", "--until", "2099-01-01")
+    assert ask(address, "show", "A2", "--at", "2030-01-01")["calibration"]["certificate"] == "A2/1"
+    ask(address, "revoke", "A2", "--reason", "lost")
+    assert [e.action for e in Ledger(Archive(address)).events("A2")] == ["certify", "revoke"]
+    assert {one.serial for one in Ledger(Archive(address)).all()} == {"A1", "A2", "A3"}
+
+
+def test_eight_writers_of_one_unit_lose_nothing(query: str) -> None:
+    ledger = Ledger(f"s3://factory/ledger?{query}")
+
+    def write(n: int) -> None:
+        ledger.add(event(start=f"2026-01-{n:02d}", until="2099-01-01", run=f"r-{n}"), supersede=True)
+
+    threads = [threading.Thread(target=write, args=(n,)) for n in range(1, 9)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    events = ledger.events("A1")
+    assert [e.sequence for e in events] == list(range(1, 9))
+    assert {e.run for e in events} == {f"r-{n}" for n in range(1, 9)}
+
+
+def test_a_second_capture_is_refused_and_a_dead_one_does_not_block(query: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    place = Archive(f"s3://factory/locks?{query}").root / "captures" / "c"
+    with alone(place), pytest.raises(OperatorNeeded, match="another process is measuring"), alone(place):
+        pass
+    (place / "claim-dead").write_bytes(b"")
+    with pytest.raises(OperatorNeeded), alone(place):
+        pass
+    monkeypatch.setattr("pipelines.archive.locks.LEASE_S", -1.0)  # as if it had not been renewed for long
+    with alone(place):
+        pass
+    assert not list(place.iterdir())
+
+
+def test_a_folder_of_the_store_that_is_no_archive_is_refused(query: str) -> None:
+    archive = Archive(f"s3://factory/foreign?{query}")
+    (archive.root / "holiday.jpg").write_bytes(b"x")
+    with pytest.raises(ArchiveUnusable, match=r"s3://factory/foreign holds other files and no archive"):
+        archive.prepare()
+
+
+@pytest.mark.parametrize("change", ["bucket", "port"])
+def test_a_store_that_cannot_be_reached_is_one_message(query: str, change: str) -> None:
+    if change == "bucket":
+        address = f"s3://nosuch/archive?{query}"
+    else:
+        address = "s3://factory/a?endpoint_override=127.0.0.1:9&scheme=http&region=us-east-1"
+    with pytest.raises(ArchiveUnusable) as problem:
+        Archive(address).prepare()
+    assert len(str(problem.value).splitlines()) == 1
+    assert str(problem.value).startswith("archive: s3://")
+
+
+def test_an_address_that_is_none_is_one_message() -> None:
+    with pytest.raises(ArchiveUnusable, match="address 'nosuch://bucket/x' cannot be used") as problem:
+        Archive("nosuch://someone:secret@bucket/x")
+    assert "secret" not in str(problem.value)
+
+
+def test_places_have_the_names_of_paths() -> None:
+    place = ObjectPath(None, "bucket/a/b.json", "s3", "s3://k:secret@bucket/a")
+    assert (place.name, place.stem, place.suffix) == ("b.json", "b", ".json")
+    assert str(place.parent / "c") == "s3://bucket/a/c"
+    assert "secret" not in repr(place)

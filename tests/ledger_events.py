@@ -1,0 +1,13 @@
+"""Events of calibrations, for tests that need a ledger without a run."""
+
+from dataclasses import replace
+
+from pipelines.trace import Event
+
+
+def event(serial: str = "A1", start: str = "2026-01-01", until: str = "2027-01-01", **more: object) -> Event:
+    blank = Event(
+        serial=serial, sequence=0, action="certify", device="ADXL355", run="r-1", start=start, until=until, grade="tactical",
+        station="bench", recipe="small", coefficients="c", ends=(), who="", where="", when="", reason="", previous="",
+    )  # fmt: skip
+    return replace(blank, **more)
