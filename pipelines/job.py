@@ -40,12 +40,16 @@ ANALYSIS_KEYS = {
 
 @dataclass(frozen=True)
 class Job:
-    """All that decides a run's result, except the code."""
+    """All that decides a run's result, except the code.
+
+    ``captured`` names the capture of a lot that was measured before, by a version that may have named captures otherwise.
+    """
 
     recipe: Recipe
     limits: Limits
     lot: Lot
     station: StationConfig
+    captured: str = ""
 
     def __post_init__(self) -> None:
         """Formulas of the model are effects wherever this job is worked on."""
@@ -54,6 +58,8 @@ class Job:
     @property
     def capture_id(self) -> str:
         """Name of the capture: the same for recipes that differ only in what is made of the data."""
+        if self.captured:
+            return self.captured
         measured = self.recipe.model_dump(mode="json", exclude=ANALYSIS_KEYS)
         if not measured["soaks"]:  # recipes without them keep the names that their captures had before there were any
             del measured["soaks"]
@@ -130,7 +136,8 @@ def job_of_run(run: Run, *, effects: Sequence[str] = (), model: Path | None = No
     if limits:
         recipe = recipe.model_copy(update={"limits": limits})
         chosen = load_limits(recipe)
-    job = Job(recipe, chosen, Lot.model_validate(about["lot"]), StationConfig.model_validate(about["station"]))
+    station = StationConfig.model_validate(about["station"])
+    job = Job(recipe, chosen, Lot.model_validate(about["lot"]), station, captured=about["capture"])
     _refuse_inconsistent(job)
     return job
 

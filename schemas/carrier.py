@@ -37,7 +37,8 @@ class Carried(Strict):
     @model_validator(mode="after")
     def _of_one_kind(self) -> Carried:
         for wanted, names in (("rtu", SERIAL), ("tls", SECURE)):
-            stray = [name for name in names if name in self.model_fields_set and self.link != wanted]
+            given = {} if self.link == wanted else self.model_dump(include=set(names), exclude_defaults=True)
+            stray = [name for name in names if name in given]
             if stray:
                 message = f"{', '.join(stray)}: for link {wanted}, the link is {self.link}; leave it out, or set link"
                 raise ValueError(message)
