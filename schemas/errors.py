@@ -62,6 +62,10 @@ class StationTimeout(StationError):
     """A device that did not answer, or did not reach its target, in time; the attempt may be repeated."""
 
 
+class NotReached(StationTimeout):
+    """A target that was not reached in its time, though the device answers: asking again at once gains nothing."""
+
+
 class LinkLost(StationError):
     """A connection that broke; the attempt may be repeated once it is there again."""
 

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Generator
-from contextlib import ExitStack, contextmanager
-from dataclasses import dataclass, field
+from contextlib import contextmanager
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
+from schemas.errors import RecipeInvalid
 from stations.clock import Clock, WallClock
 from stations.devices.chamber import ThermalChamber
 from stations.devices.reader import Reader
@@ -15,13 +16,16 @@ from stations.devices.slot import Slot
 from stations.devices.table import TableAxis, TiltTable
 from stations.links.modbus import ModbusLink
 from stations.profile_files import load_profile
-from stations.station import Station
+from stations.safety.guarded import PARTING_S, guarded
+from stations.safety.safe_state import safe_steps
+from stations.station import Station, nobody_else
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from schemas.profile import Profile
     from schemas.recipe import Lot
-    from schemas.station import Device, StationConfig
+    from schemas.station import Device, Limits, StationConfig
     from stations.plant.hidden import HiddenEffect
     from stations.plant.plant import Plant
 
@@ -54,9 +58,16 @@ class _Links:
 
 @contextmanager
 def open_station(
-    config: StationConfig, lot: Lot, resume: bytes | None = None, *, hidden: Sequence[HiddenEffect] = ()
+    config: StationConfig,
+    lot: Lot,
+    resume: bytes | None = None,
+    *,
+    hidden: Sequence[HiddenEffect] = (),
+    run: str = "a run",
 ) -> Generator[Station]:
     """A station ready to be driven; closed when the context ends.
+
+    Hardware is leased and watched meanwhile, and left in its safe state, whatever ends the context.
 
     Parameters
     ----------
@@ -64,15 +75,34 @@ def open_station(
     lot : the units in it; a simulated station makes their devices
     resume : ``Station.state()`` of an earlier session: a simulated station goes on exactly there; hardware is where it is
     hidden : physics beyond the station's file, for simulated stations
+    run : what the leases are taken for, as others are told
     """
-    with ExitStack() as stack:
-        if config.kind == "simulated":
-            plant = make_plant(config, lot, resume, hidden)
-            yield stack.enter_context(serve_plant(config, lot, plant))
-            return
-        links = _Links(config)
-        stack.callback(links.close)
-        yield _assemble(config, lot, links, WallClock(), lambda: b"")
+    if config.kind == "simulated":
+        plant = make_plant(config, lot, resume, hidden)
+        with serve_plant(config, lot, plant) as station:
+            yield station
+        return
+    slots = [unit.slot for unit in lot.units]
+    with guarded(config, run) as protection, open_devices(config, slots, resume, protection.require) as station:
+        try:
+            yield station
+        finally:
+            protection.left(station.make_safe(PARTING_S))
+
+
+@contextmanager
+def open_devices(
+    config: StationConfig,
+    slots: Sequence[int],
+    resume: bytes | None = None,
+    require: Callable[[], None] = nobody_else,
+) -> Generator[Station]:
+    """The devices of a station of hardware, not leased and not watched: to look at them, or to make them safe."""
+    links, clock = _Links(config), WallClock(resume)
+    try:
+        yield replace(_assemble(config, slots, links, clock), state=clock.state, exact=False, require=require)
+    finally:
+        links.close()
 
 
 def make_plant(
@@ -89,7 +119,7 @@ def make_plant(
 
 @contextmanager
 def serve_plant(config: StationConfig, lot: Lot, plant: Plant) -> Generator[Station]:
-    """A station whose devices are the plant's, over Modbus TCP on loopback."""
+    """A station whose devices are the plant's, over Modbus TCP on loopback; ``lot`` is what its client expects to find."""
     from stations.plant.clock import PlantClock  # noqa: PLC0415 - hardware needs no plant
     from stations.plant.faults.wire import on_the_wire  # noqa: PLC0415
     from stations.plant.server import PlantServer  # noqa: PLC0415
@@ -97,31 +127,62 @@ def serve_plant(config: StationConfig, lot: Lot, plant: Plant) -> Generator[Stat
     with PlantServer(plant) as server, on_the_wire(plant, server.host, server.port) as address:
         links = _Links(config, address)
         try:
-            yield _assemble(config, lot, links, PlantClock(plant), lambda: plant.journal.state(plant.now_us))
+            station = _assemble(config, [unit.slot for unit in lot.units], links, PlantClock(plant))
+            yield replace(station, state=lambda: plant.journal.state(plant.now_us))
         finally:
             links.close()
 
 
-def _assemble(config: StationConfig, lot: Lot, links: _Links, clock: Clock, state: Callable[[], bytes]) -> Station:
-    """The station's adapters on their links."""
+def _assemble(config: StationConfig, slots: Sequence[int], links: _Links, clock: Clock) -> Station:
+    """The station's adapters on their links, each with the tighter of its profile's and the station's limits."""
 
     def registers(name: str, device: Device) -> Registers:
         return Registers(name, links.to(device.host, device.port), device.device_id, load_profile(device.profile))
 
     devices, limits = config.devices, config.limits
-    low, high = limits.temperature_C
-    outer = TableAxis(registers("outer axis", devices.outer), (limits.outer_deg[0], limits.outer_deg[1]), limits)
-    inner = TableAxis(registers("inner axis", devices.inner), (limits.inner_deg[0], limits.inner_deg[1]), limits)
-    slots = {unit.slot: Slot(_slot_registers(config, links, unit.slot)) for unit in lot.units}
-    return Station(
-        name=config.name,
-        clock=clock,
-        table=TiltTable(outer, inner, clock),
-        chamber=ThermalChamber(registers("chamber", devices.chamber), low, high),
-        reader=Reader(registers("reader", devices.reader), slots, limits.rate_hz),
-        soak_limits=config.soak,
-        state=state,
+    chamber = registers("chamber", devices.chamber)
+    axes = {
+        name: _axis(registers(f"{name} axis", device), bounds, limits)
+        for name, device, bounds in (
+            ("outer", devices.outer, limits.outer_deg),
+            ("inner", devices.inner, limits.inner_deg),
+        )
+    }
+    reader = registers("reader", devices.reader)
+    _, fastest = tighter((0.0, limits.rate_hz), reader.profile, "rate")
+    parts = (
+        TiltTable(axes["outer"], axes["inner"], clock),
+        ThermalChamber(chamber, *tighter(limits.temperature_C, chamber.profile, "set_point")),
+        Reader(reader, {slot: Slot(_slot_registers(config, links, slot)) for slot in slots}, fastest),
     )
+    return Station(config, clock, *parts, safe_steps=safe_steps(config.safety, axes, *parts[1:]))
+
+
+def _axis(registers: Registers, bounds: tuple[float, float], limits: Limits) -> TableAxis:
+    """An axis that keeps within its drive's limits and the station's."""
+    profile = registers.profile
+    speed, acceleration = (
+        tighter((0.0, wanted), profile, name)[1]
+        for name, wanted in (("speed", limits.speed_deg_s), ("acceleration", limits.acceleration_deg_s2))
+    )
+    kept = limits.model_copy(update={"speed_deg_s": speed, "acceleration_deg_s2": acceleration})
+    return TableAxis(registers, tighter(bounds, profile, "target"), kept)
+
+
+def tighter(bounds: tuple[float, float], profile: Profile, register: str) -> tuple[float, float]:
+    """The bounds that both the station's file and a register of the profile allow."""
+    if not profile.has(register):
+        return bounds
+    own = profile.register(register)
+    low = bounds[0] if own.minimum is None else max(bounds[0], own.minimum)
+    high = bounds[1] if own.maximum is None else min(bounds[1], own.maximum)
+    if low >= high:
+        message = (
+            f"profile {profile.name}: {register} from {own.minimum} to {own.maximum} {own.unit}, the station's limits are "
+            f"{bounds[0]:g} to {bounds[1]:g}: nothing is allowed by both; correct [limits] in the station's file"
+        )
+        raise RecipeInvalid(message, key="limits")
+    return low, high
 
 
 def _slot_registers(config: StationConfig, links: _Links, slot: int) -> Registers:

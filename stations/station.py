@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
+import math
 from collections import deque
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
-from schemas.errors import StationTimeout
+from schemas.errors import NotReached
+from stations.safety.safe_state import Reached, SafeStep, reach_safe_state
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from schemas.station import Soak
+    from schemas.station import StationConfig
     from stations.clock import Clock
     from stations.devices.chamber import ThermalChamber
     from stations.devices.reader import Reader
@@ -21,34 +23,61 @@ if TYPE_CHECKING:
 Observe = Callable[[], list[float]]
 
 
+class Unsettled(NotReached):
+    """Devices that have not settled in time; ``slots`` are theirs."""
+
+    def __init__(self, message: str, slots: Sequence[int]) -> None:
+        self.slots = tuple(slots)
+        super().__init__(message)
+
+
 def _no_state() -> bytes:
     return b""
 
 
+def nobody_else() -> None:
+    """A station in this process: nobody else can drive it."""
+
+
 @dataclass(frozen=True)
 class Station:
-    """Everything that a capture drives. ``state()`` is what a simulated station is resumed from; empty on hardware."""
+    """Everything that a capture drives.
 
-    name: str
+    ``state()`` is what it is resumed from. ``exact`` says that a resumed station stands where it stood, to the bit; any
+    other may have been anywhere since, so that its temperature is settled anew. ``require()`` refuses when another has
+    taken the station over. ``safe_steps`` lead to the safe state.
+    """
+
+    config: StationConfig
     clock: Clock
     table: TiltTable
     chamber: ThermalChamber
     reader: Reader
-    soak_limits: Soak
     state: Callable[[], bytes] = _no_state
+    exact: bool = True
+    require: Callable[[], None] = nobody_else
+    safe_steps: list[SafeStep] = field(default_factory=list[SafeStep])
+
+    @property
+    def name(self) -> str:
+        """The station's name."""
+        return self.config.name
+
+    def make_safe(self, patience_s: float = 0.0) -> Reached:
+        """Puts the station into its safe state and tells what was reached."""
+        return reach_safe_state(self.safe_steps, patience_s=patience_s)
 
     def soak(self, target: float, shortest: float, slots: Sequence[int], observe: Observe) -> float:
         """Takes the devices to ``target`` °C and gives the seconds it took until they had settled.
 
         Settled: every device inside the band around the target and changing slower than the rate over the window, and
-        ``shortest`` seconds gone. ``observe`` gives the temperatures by slot and may note them.
+        ``shortest`` seconds gone. ``observe`` gives the temperatures by slot and may note them; what it raises ends the soak.
         """
-        limits, clock = self.soak_limits, self.clock
+        limits, clock = self.config.soak, self.clock
         self.chamber.set_temperature(target)
         start = clock.now()
         past: deque[tuple[float, list[float]]] = deque()
         while True:
-            self.reader.require_closed_door()
             now, temperatures = clock.now(), observe()
             past.append((now, [temperatures[slot] for slot in slots]))
             while past[-1][0] - past[0][0] > limits.window_s:
@@ -56,26 +85,42 @@ class Station:
             if now - start >= shortest and self._settled(past, target):
                 return now - start
             if now - start > shortest + limits.limit_s:
-                worst = max((temperatures[slot] for slot in slots), key=lambda t: abs(t - target))
-                message = (
-                    f"soak: a device at {worst:.2f} °C after {now - start:.0f} s, {target:g} ± {limits.band_K:g} °C and "
-                    f"{limits.rate_K_per_min:g} K/min are needed; check the chamber, or widen [soak] in the station's file"
-                )
-                raise StationTimeout(message)
+                raise self._unsettled(past, target, slots, now - start)
             clock.sleep(limits.poll_s)
 
     def _settled(self, past: deque[tuple[float, list[float]]], target: float) -> bool:
         """Whether the past window lies in the band and its two halves differ by less than the rate allows."""
-        limits = self.soak_limits
+        limits = self.config.soak
         span = past[-1][0] - past[0][0]
         if span < limits.window_s - 1.5 * limits.poll_s:
             return False
-        inside = all(abs(t - target) <= limits.band_K for _, row in past for t in row)
+        return all(self._still([row[k] for _, row in past], target, span) for k in range(len(past[0][1])))
+
+    def _still(self, temperatures: list[float], target: float, span: float) -> bool:
+        """Whether one device has settled over a window of ``span`` seconds; one whose temperature is unknown has not."""
+        limits = self.config.soak
+        if not all(abs(t - target) <= limits.band_K for t in temperatures):
+            return False
+        half = len(temperatures) // 2
+        drift = abs(_mean(temperatures[half:]) - _mean(temperatures[:half]))
+        return drift / (span / 2.0) * 60.0 <= limits.rate_K_per_min
+
+    def _unsettled(
+        self, past: deque[tuple[float, list[float]]], target: float, slots: Sequence[int], seconds: float
+    ) -> Unsettled:
+        """The refusal that names the slots of the devices that have not settled, and how far off the worst of them is."""
+        limits, span = self.config.soak, past[-1][0] - past[0][0]
         rows = [row for _, row in past]
-        half = len(rows) // 2
-        drift = max(abs(_mean(rows[half:], k) - _mean(rows[:half], k)) for k in range(len(rows[0])))
-        return inside and drift / (span / 2.0) * 60.0 <= limits.rate_K_per_min
+        late = {
+            slot: rows[-1][k] for k, slot in enumerate(slots) if not self._still([r[k] for r in rows], target, span)
+        }
+        worst = max(late.values(), key=lambda t: abs(t - target) if math.isfinite(t) else math.inf, default=math.nan)
+        message = (
+            f"soak: a device at {worst:.2f} °C after {seconds:.0f} s, {target:g} ± {limits.band_K:g} °C and "
+            f"{limits.rate_K_per_min:g} K/min are needed; check the chamber, or widen [soak] in the station's file"
+        )
+        return Unsettled(message, list(late))
 
 
-def _mean(rows: list[list[float]], column: int) -> float:
-    return sum(row[column] for row in rows) / len(rows)
+def _mean(values: list[float]) -> float:
+    return sum(values) / len(values)

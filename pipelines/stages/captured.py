@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
@@ -26,6 +27,7 @@ class History:
 
     rows: list[tuple[float, float, int, str, float]] = field(default_factory=list)
     last: float | None = None
+    air: float = math.nan
 
     def due(self, now: float, every: float) -> bool:
         """Whether the last row is old enough."""
@@ -33,7 +35,7 @@ class History:
 
     def add(self, now: float, chamber: float, units: Sequence[Unit], by_slot: Sequence[float]) -> None:
         """Notes the temperatures of air and devices."""
-        self.last = now
+        self.last, self.air = now, chamber
         self.rows += [(now, chamber, unit.slot, unit.serial, by_slot[unit.slot]) for unit in units]
 
     def taken(self) -> pd.DataFrame:
@@ -41,6 +43,33 @@ class History:
         frame = pd.DataFrame(self.rows, columns=["time_s", "chamber_C", "slot", "unit", "unit_C"])
         self.rows, self.last = [], None
         return frame
+
+
+@dataclass
+class Approach:
+    """How air and devices come to a soak's target: where they began, and how far beyond it they went."""
+
+    target: float
+    first: tuple[float, float] | None = None
+    air_K: float = 0.0
+    devices_K: float = 0.0
+
+    def look(self, air: float, devices: Sequence[float]) -> None:
+        """Notes the temperatures of one instant, °C."""
+        known = [t for t in devices if math.isfinite(t)] or [self.target]
+        if self.first is None:
+            self.first = (air, sum(known) / len(known))
+        self.air_K = max(self.air_K, self._beyond(self.first[0], air))
+        self.devices_K = max(self.devices_K, *(self._beyond(self.first[1], t) for t in known))
+
+    def figures(self) -> dict[str, float]:
+        """Overshoot of air and devices for the journal, K."""
+        return {"air_overshoot_K": round(self.air_K, 4), "device_overshoot_K": round(self.devices_K, 4)}
+
+    def _beyond(self, begin: float, now: float) -> float:
+        """How far ``now`` lies behind the target, seen from where it began; 0 before it, or where air is not known."""
+        far = math.copysign(1.0, self.target - begin) * (now - self.target)
+        return max(0.0, far)
 
 
 @dataclass

@@ -1,0 +1,88 @@
+"""The safe state of a station: axes stopped, sampling stopped, the chamber where the station's file says."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+from schemas.errors import StationError
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from schemas.safety import Safety
+    from stations.devices.chamber import ThermalChamber
+    from stations.devices.reader import Reader
+    from stations.devices.table import TableAxis
+
+AGAIN_S = 1.0
+
+
+@dataclass(frozen=True)
+class SafeStep:
+    """One command of the way to the safe state: which part of the station, what is reached, and how."""
+
+    part: str
+    what: str
+    act: Callable[[], None]
+
+
+@dataclass(frozen=True)
+class Reached:
+    """What was done for the safe state, and what could not be done, with the reason."""
+
+    done: list[str] = field(default_factory=list[str])
+    failed: dict[str, str] = field(default_factory=dict[str, str])
+
+    @property
+    def safe(self) -> bool:
+        """Whether everything was done."""
+        return not self.failed
+
+    def sentence(self) -> str:
+        """The same for people."""
+        failed = [f"{what} not done ({why})" for what, why in self.failed.items()]
+        return "; ".join([*self.done, *failed])
+
+
+def safe_steps(
+    safety: Safety, axes: Mapping[str, TableAxis], chamber: ThermalChamber, reader: Reader
+) -> list[SafeStep]:
+    """The commands in order, what moves first; each sets an absolute state, so that it may be given twice."""
+    steps: list[SafeStep] = []
+    if safety.axes == "stop":
+        steps += [SafeStep(part, f"{part} axis stopped", axis.stop) for part, axis in axes.items()]
+    steps.append(SafeStep("reader", "sampling stopped", reader.stop))
+    goal = safety.temperature_C
+    if safety.chamber == "off":
+        steps.append(SafeStep("chamber", "chamber off", chamber.off))
+    elif safety.chamber == "set_point":
+        steps.append(SafeStep("chamber", f"chamber to {goal:g} °C", lambda: chamber.set_temperature(goal)))
+    return steps
+
+
+def reach_safe_state(steps: list[SafeStep], *, patience_s: float = 0.0) -> Reached:
+    """What was done: every part is told, whatever became of the others.
+
+    Parameters
+    ----------
+    steps : what is to be done, in order
+    patience_s : how long a part that does not answer is tried again; 0 tries each once
+    """
+    left, done = list(steps), list[str]()
+    end = time.monotonic() + patience_s
+    while True:
+        failed: dict[str, str] = {}
+        for step in list(left):
+            try:
+                step.act()
+            except StationError as problem:
+                failed[step.what] = str(problem)
+            else:
+                done.append(step.what)
+                left.remove(step)
+        if not left or time.monotonic() + AGAIN_S > end:
+            return Reached(done, failed)
+        time.sleep(AGAIN_S)

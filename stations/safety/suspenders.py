@@ -1,0 +1,98 @@
+"""Conditions that pause a run, judged from what the station reads; nothing here touches a device."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Literal
+
+from schemas.errors import OperatorNeeded
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from schemas.safety import Suspenders
+    from schemas.station import Soak
+    from stations.devices.reader import Instruments
+
+Condition = Literal["door", "vibration", "supply", "chamber", "device", "table", "samples", "link"]
+
+
+@dataclass(frozen=True)
+class Reason:
+    """Why a run pauses: the condition, the sentence for people, and the slots that it is about; none means all."""
+
+    condition: Condition
+    text: str
+    slots: tuple[int, ...] = ()
+
+
+class Suspended(Exception):
+    """A condition holds: the capture pauses and goes back to its last checkpoint. Never leaves the capture."""
+
+    def __init__(self, reasons: Sequence[Reason], *, spoilt: bool) -> None:
+        self.reasons = tuple(reasons)
+        self.spoilt = spoilt
+        super().__init__("; ".join(reason.text for reason in reasons))
+
+
+class EmergencyStop(OperatorNeeded):
+    """Somebody has pressed the emergency stop: nothing waits for its release."""
+
+
+def require_released(instruments: Instruments) -> None:
+    """Ends the run where the emergency stop is pressed."""
+    if instruments.stop_pressed:
+        message = "station: the emergency stop is pressed, released is needed; make sure that nobody is in danger, release it "
+        raise EmergencyStop(message + "and give the command again: the run goes on where it was")
+
+
+@dataclass(frozen=True)
+class Watched:
+    """The rules of a station's file for one run: ``reference`` is the supply by slot when it began, V."""
+
+    rules: Suspenders
+    soak: Soak
+    reference: dict[int, float]
+
+    def around(self, instruments: Instruments, slots: Sequence[int]) -> list[Reason]:
+        """Conditions that only need the reader: door, vibration and the supply of these slots."""
+        found: list[Reason] = []
+        if self.rules.door and instruments.door_open:
+            found.append(Reason("door", "the chamber's door is open, closed is needed"))
+        if not instruments.vibration_g <= self.rules.vibration_g:
+            found.append(
+                Reason(
+                    "vibration", f"vibration {instruments.vibration_g:.3g} g rms, {self.rules.vibration_g:g} is allowed"
+                )
+            )
+        wrong = {slot: text for slot in slots if (text := self._supply(slot, instruments.supply_V[slot]))}
+        if wrong:
+            first = min(wrong)
+            more = f" (and {len(wrong) - 1} more slots)" if len(wrong) > 1 else ""
+            found.append(Reason("supply", f"slot {first}: {wrong[first]}{more}", tuple(wrong)))
+        return found
+
+    def thermal(self, target: float, air: float, instruments: Instruments, slots: Sequence[int]) -> list[Reason]:
+        """Conditions of a record at ``target`` °C: the air, and the devices that must have stayed where they had settled."""
+        found: list[Reason] = []
+        band = max(self.rules.chamber_band_K, self.soak.band_K)
+        if abs(air - target) > band:
+            found.append(Reason("chamber", f"the chamber's air is at {air:.2f} °C, {target:g} ± {band:g} °C is needed"))
+        temperature = instruments.temperature_C
+        left = tuple(
+            s for s in slots if math.isfinite(temperature[s]) and abs(temperature[s] - target) > self.soak.band_K
+        )
+        if left:
+            text = f"slot {left[0]}: device at {temperature[left[0]]:.2f} °C, {target:g} ± {self.soak.band_K:g} °C is needed"
+            found.append(Reason("device", text, left))
+        return found
+
+    def _supply(self, slot: int, volt: float) -> str:
+        """What is wrong with a slot's supply; nothing where it is as it should be."""
+        bounds, start = self.rules.supply_V, self.reference.get(slot)
+        if bounds is not None and not bounds[0] <= volt <= bounds[1]:
+            return f"supply {volt:.4g} V, {bounds[0]:g} to {bounds[1]:g} V is needed"
+        if start is not None and not abs(volt - start) <= self.rules.supply_change * abs(start):
+            return f"supply {volt:.4g} V, {start:.4g} V ± {self.rules.supply_change:.3g} of it is needed"
+        return ""
