@@ -1,5 +1,6 @@
 """Dwells that could be measured next: steps of a station, and the state of a lot with them appended."""
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
@@ -13,6 +14,9 @@ Array = NDArray[np.float64]
 
 _GRAIN_S = 15.0
 """Steps in which air and devices are followed between dwells."""
+
+_STILL_K, _LONG_S = 0.02, 120.0
+"""Difference below which nothing moves any more, and the steps then."""
 
 
 @dataclass(frozen=True)
@@ -41,6 +45,7 @@ class Pace:
     move_s : s of a move of 90°; dwell_s : s of a dwell; overhead_s : s beside each, for commands
     ramp : K/s of the air; lag : s by which the devices follow it
     soak_s : s of the shortest soak; settled : K within which a device counts as settled
+    last_dwell_s : s of the dwells so far; 0 where as long as the next ones
     """
 
     move_s: float = 5.0
@@ -50,6 +55,7 @@ class Pace:
     lag: float = 150.0
     soak_s: float = 900.0
     settled: float = 0.05
+    last_dwell_s: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -83,23 +89,19 @@ def timeline(steps: Sequence[Step], pace: Pace, start: Step | None, device: floa
     follow = _Follow(there.temperature, device)
     rows: list[tuple[float, float, float, float]] = []
     for step in steps:
-        turn = max(_turn(step.outer - there.outer), _turn(step.inner - there.inner))
+        turn = max(abs(step.outer - there.outer), abs(step.inner - there.inner))
         if step.temperature != there.temperature and step.soaked:
             follow.soak(step.temperature, pace)
         elif not step.soaked:
             follow.target = step.temperature
         follow.go_on(step.off, pace)
-        follow.go_on(pace.overhead_s + pace.move_s * np.sqrt(turn / (0.5 * np.pi)), pace)
+        follow.go_on(pace.overhead_s + pace.move_s * math.sqrt(turn / (0.5 * np.pi)), pace)
         follow.go_on(step.wait + 0.5 * pace.dwell_s, pace)
         rows.append((follow.now, step.wait + 0.5 * pace.dwell_s, follow.device, follow.air))
         follow.go_on(0.5 * pace.dwell_s, pace)
         there = step
     time, since, devices, air = np.array(rows).T
     return Timeline(time, since, devices, air, np.array(follow.times), np.array(follow.devices), follow.now)
-
-
-def _turn(angle: float) -> float:
-    return abs(angle)
 
 
 class _Follow:
@@ -113,10 +115,11 @@ class _Follow:
         """Lets some seconds pass."""
         end = self.now + max(seconds, 0.0)
         while self.now < end - 1e-9:
-            grain = min(_GRAIN_S, end - self.now)
+            moving = abs(self.target - self.air) + abs(self.air - self.device) > _STILL_K
+            grain = min(_GRAIN_S if moving else _LONG_S, end - self.now)
             reach = pace.ramp * grain
-            self.air += float(np.clip(self.target - self.air, -reach, reach))
-            self.device += (self.air - self.device) * (1.0 - float(np.exp(-grain / pace.lag)))
+            self.air += min(max(self.target - self.air, -reach), reach)
+            self.device += (self.air - self.device) * (1.0 - math.exp(-grain / pace.lag))
             self.now += grain
             self.times.append(self.now)
             self.devices.append(self.device)
@@ -126,7 +129,7 @@ class _Follow:
         self.target, start = target, self.now
         far = abs(target - self.device)
         ramping = abs(target - self.air) / pace.ramp
-        settling = ramping + pace.lag * float(np.log(max(min(far, pace.ramp * pace.lag) / pace.settled, 1.0)))
+        settling = ramping + pace.lag * math.log(max(min(far, pace.ramp * pace.lag) / pace.settled, 1.0))
         self.go_on(max(pace.soak_s, settling) - (self.now - start), pace)
 
 

@@ -20,20 +20,28 @@ def residuals(problem: Problem, terms: Sequence[Term], train: NDArray[np.bool_])
     ----------
     train : (n,), dwells that are fitted; all are predicted
     """
-    y = problem.series
-    local = [t for t in terms if t.effect.scope != "station"]
-    shared = [t for t in terms if t.effect.scope == "station"]
-    x = _stacked(problem, local)
-    z = _stacked(problem, shared)
-    weight = np.where(np.isfinite(problem.error), 1.0 / problem.error, 0.0) * train
-    solve = _solver(x, weight)
-    if shared:
-        free = (z - x @ solve(z)) * weight[..., None]
-        target = (y - (x @ solve(y[..., None]))[..., 0]) * weight
-        flat = free.reshape(-1, free.shape[-1])
-        y = y - z @ np.linalg.lstsq(flat, target.reshape(-1), rcond=1e-9)[0]
-    left = y - (x @ solve(y[..., None]))[..., 0]
+    left = Fitting(problem, terms).left(problem.series[..., None], train)[..., 0]
     return np.where(np.isfinite(problem.error), left, np.nan)
+
+
+class Fitting:
+    """A model's columns in a problem, ready to be fitted to some dwells of any series."""
+
+    def __init__(self, problem: Problem, terms: Sequence[Term]) -> None:
+        self._x = _stacked(problem, [t for t in terms if t.effect.scope != "station"])
+        self._z = _stacked(problem, [t for t in terms if t.effect.scope == "station"])
+        self._weight = np.where(np.isfinite(problem.error), 1.0 / problem.error, 0.0)
+
+    def left(self, series: Array, train: NDArray[np.bool_]) -> Array:
+        """What a fit to the dwells ``train`` (n,) leaves of series (blocks, n, m), on all dwells."""
+        x, z, weight = self._x, self._z, self._weight * train
+        solve = _solver(x, weight)
+        if z.shape[-1]:
+            free = (z - x @ solve(z)) * weight[..., None]
+            target = (series - x @ solve(series)) * weight[..., None]
+            flat = free.reshape(-1, free.shape[-1])
+            series = series - z @ np.linalg.lstsq(flat, target.reshape(flat.shape[0], -1), rcond=1e-9)[0]
+        return series - x @ solve(series)
 
 
 def heldout_rms(problem: Problem, terms: Sequence[Term]) -> float:

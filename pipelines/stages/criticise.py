@@ -10,11 +10,11 @@ from inertial import effects as catalogue
 from inertial.criticism.diagnosis import Diagnosis
 from inertial.criticism.diagnosis import diagnose as diagnose_lot
 from inertial.criticism.faults import Fault, find_faults
-from inertial.criticism.proposals import proposals
 from inertial.errors import InertialError
 from pipelines.stages.compare import compare
 from pipelines.stages.condense import condense
 from pipelines.stages.measured import Measured, lot_of, measured
+from pipelines.stages.next_measurement import next_measurements
 from schemas.errors import DataRejected
 
 if TYPE_CHECKING:
@@ -128,16 +128,7 @@ def document(found: Measured, faults: list[Fault], diagnosis: Diagnosis | None) 
             "p_value": _probability(diagnosis.unexplained.log_p),
         },
         "unseen": list(diagnosis.unseen),
-        "next_measurements": [
-            {
-                "outer_deg": round(float(np.degrees(p.outer)), 3),
-                "inner_deg": round(float(np.degrees(p.inner)), 3),
-                "chamber_C": p.temperature,
-                "why": p.why,
-            }
-            for n in diagnosis.named
-            for p in proposals(diagnosis.final, n.effects)
-        ],
+        "next_measurements": next_measurements(diagnosis),
     }
 
 

@@ -1,0 +1,213 @@
+"""What a station could do next: sequences of steps, of every kind that parts effects.
+
+Poses in new directions, at the temperatures of the run; waits of different length after a move; approaches from both sides;
+excursions of temperature up and down, soaked or read on the way; the same poses later.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from itertools import product
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from inertial import frames, poses
+from inertial.sequences import Step, n_of, standing
+from inertial.state import T_REFERENCE, State
+
+Array = NDArray[np.float64]
+Kind = Literal["poses", "soaks", "waits", "approach", "excursion", "ramp", "later"]
+
+_DETOUR = np.radians(20.0)
+_EXCURSION_K = 25.0
+_MINOR_K = 8.0
+_VARIED_K = 5.0
+
+
+@dataclass(frozen=True)
+class Reach:
+    """What the station may do.
+
+    outer, inner : rad, bounds of the table
+    temperature : °C, bounds for further soaks; None where the temperature stays as it is
+    settle : s, the usual wait after a move
+    """
+
+    outer: tuple[float, float] = (-np.pi, np.pi)
+    inner: tuple[float, float] = (-2.0 * np.pi, 2.0 * np.pi)
+    temperature: tuple[float, float] | None = None
+    settle: float = 2.0
+
+    def allows(self, step: Step) -> bool:
+        """Whether a step lies within the bounds."""
+        inside = self.outer[0] <= step.outer <= self.outer[1] and self.inner[0] <= step.inner <= self.inner[1]
+        return inside and (self.temperature is None or self.temperature[0] <= step.temperature <= self.temperature[1])
+
+
+@dataclass(frozen=True)
+class Course:
+    """A sequence of steps that is offered as a whole."""
+
+    kind: Kind
+    steps: tuple[Step, ...]
+
+    def times(self, repeats: int) -> "Course":
+        """The same so many times in a row."""
+        return Course(self.kind, self.steps * repeats)
+
+
+def reach_of(state: State) -> Reach:
+    """What the run itself has shown that the station does: its angles, and its temperatures where they varied."""
+    settle = 2.0 if state.since_move is None else float(np.clip(np.median(state.since_move), 0.0, 60.0))
+    if state.temperature is None or float(np.ptp(state.temperature)) < _VARIED_K:
+        return Reach(settle=settle)
+    return Reach(settle=settle, temperature=(float(np.min(state.temperature)), float(np.max(state.temperature))))
+
+
+def pose_grid(reach: Reach, temperature: float) -> list[Step]:
+    """Directions that answer to any curve of the force: a lattice, edges and corners, rings near 0.24, 0.5 and 0.75 g.
+
+    A direction of the force can be reached by two attitudes of the table; both are there: errors of the table differ.
+    """
+    rings = [_ring(axis, level) for axis in range(3) for level in (0.1, 0.24, 0.5, 0.75)]
+    named = [poses.plan(name) for name in ("twenty_six", "orthogonal24")]
+    angles = np.radians(np.concatenate([poses.fibonacci(48), *named, *rings]))
+    other = np.stack([-angles[:, 0], np.where(angles[:, 1] > 0.0, angles[:, 1] - np.pi, angles[:, 1] + np.pi)], axis=1)
+    found = [Step(float(o), float(i), temperature, reach.settle) for o, i in np.concatenate([angles, other])]
+    return [s for s in found if reach.allows(replace(s, temperature=temperature))]
+
+
+def _ring(axis: int, level: float) -> Array:
+    """Angles in degrees of eight directions with ± ``level`` g on an axis."""
+    turn = 2.0 * np.pi * (np.arange(4) + 0.5 * (axis == 1)) / 4.0 + 0.3
+    across = np.sqrt(1.0 - level**2)
+    both = [
+        np.roll(np.array([sign * level, across * np.cos(t), across * np.sin(t)]), axis)
+        for sign in (1.0, -1.0)
+        for t in turn
+    ]
+    outer, inner = frames.angles_from_force(np.array(both))
+    return np.degrees(np.stack([outer, inner], axis=1))
+
+
+def temperatures(state: State, reach: Reach) -> list[float]:
+    """Temperatures of further soaks: the ends and the middle of what may be reached, but for where the station stands."""
+    if reach.temperature is None:
+        return []
+    low, high = reach.temperature
+    here = present(state)
+    return [t for t in (high, low, 0.5 * (low + high)) if abs(t - here) > 2.0]
+
+
+def present(state: State) -> float:
+    """Temperature at which the chamber stands, °C."""
+    there = standing(state)
+    if there is not None:
+        return round(there.temperature, 1)
+    return T_REFERENCE if state.temperature is None else round(float(np.mean(state.temperature[..., -1])), 1)
+
+
+def courses(state: State, reach: Reach, best: Sequence[Step]) -> list[Course]:
+    """Sequences that do not come from picking poses one by one.
+
+    Parameters
+    ----------
+    best : poses that part the rivals by their directions; some are used where any pose would do
+    """
+    here = present(state)
+    chosen = _spread(best, reach, here)
+    found = [
+        *_waits(here),
+        *_approaches(state, reach, here, chosen),
+        *_laters(chosen),
+    ]
+    if reach.temperature is not None:
+        found += [*_excursions(reach, here, chosen), *_ramps(reach, here, chosen)]
+    return [c for c in found if c.steps and all(reach.allows(s) for s in c.steps)]
+
+
+def _spread(best: Sequence[Step], reach: Reach, here: float) -> list[Step]:
+    """Two opposed faces, and the two best poses."""
+    faces = [Step(0.0, 0.0, here, reach.settle), Step(np.pi, 0.0, here, reach.settle)]
+    return [*faces, *(replace(s, temperature=here) for s in best[:2])]
+
+
+def _waits(here: float) -> list[Course]:
+    """Opposed poses in turn, with longer and longer waits after the move."""
+    pairs = (
+        ((0.0, 0.0), (np.pi, 0.0)),
+        ((0.5 * np.pi, 0.0), (-0.5 * np.pi, 0.0)),
+        ((0.5 * np.pi, 0.5 * np.pi), (0.5 * np.pi, -0.5 * np.pi)),
+    )
+    found: list[Course] = []
+    for waits in ((0.0, 20.0, 60.0), (0.0, 10.0, 30.0, 100.0, 300.0), (0.0, 0.0, 0.0, 120.0), (0.0, 600.0)):
+        steps = [Step(o, i, here, w) for w in waits for pair in pairs for o, i in pair]
+        found.append(Course("waits", tuple(steps)))
+        short = [Step(o, i, here, w) for w in waits for o, i in pairs[0]]
+        found.append(Course("waits", tuple(short)))
+    stay = [0.0, *[0.0] * 7]
+    dwell_on = [Step(o, i, here, w) for pair in pairs for o, i in pair for w in stay]
+    found.append(Course("waits", tuple(dwell_on)))  # dwell after dwell at one pose: all of the settling is seen
+    return found
+
+
+def _approaches(state: State, reach: Reach, here: float, chosen: Sequence[Step]) -> list[Course]:
+    """Poses reached from both sides of each axis; the poses of the run in the opposite order."""
+    found: list[Course] = []
+    for count in (2, 4):
+        steps: list[Step] = []
+        for pose in chosen[:count]:
+            for outer, inner in ((_DETOUR, 0.0), (-_DETOUR, 0.0), (0.0, _DETOUR), (0.0, -_DETOUR)):
+                steps += [replace(pose, outer=pose.outer + outer, inner=pose.inner + inner), pose]
+        found.append(Course("approach", tuple(steps)))
+    if state.outer is not None and state.inner is not None:
+        last = range(n_of(state) - 2, max(n_of(state) - 26, -1), -1)
+        outer, inner = np.atleast_2d(state.outer)[0], np.atleast_2d(state.inner)[0]
+        back = [Step(float(outer[k]), float(inner[k]), here, reach.settle) for k in last]
+        found += [Course("approach", tuple(back[:12])), Course("approach", tuple(back))]
+    return found
+
+
+def _laters(chosen: Sequence[Step]) -> list[Course]:
+    """The same poses again and again, with the station left alone between."""
+    found: list[Course] = []
+    for wait, times in ((120.0, 3), (600.0, 1), (600.0, 3), (1800.0, 1), (1800.0, 2)):
+        group = [replace(chosen[0], wait=wait), *chosen[1:], chosen[0]]
+        found.append(Course("later", tuple(group * times)))
+    return found
+
+
+def _excursions(reach: Reach, here: float, chosen: Sequence[Step]) -> list[Course]:
+    """Soaks away from where the station stands and back, up and down, far and near."""
+    if reach.temperature is None:
+        return []
+    low, high = reach.temperature
+    up, down = min(high, here + _EXCURSION_K), max(low, here - _EXCURSION_K)
+    near_up, near_down = min(high, here + _MINOR_K), max(low, here - _MINOR_K)
+    middle = 0.5 * (low + high)
+    ways = (
+        (up, here), (down, here), (up, down, here), (near_up, here), (near_down, here), (near_up, near_down, here),
+        (high, middle), (low, middle), (high, middle, low), (low, middle, high), (high, low), (low, high),
+    )  # fmt: skip
+    found: list[Course] = []
+    for way, count in product(dict.fromkeys(ways), (2, 4)):
+        stops = [t for k, t in enumerate(way) if abs(t - (way[k - 1] if k else here)) > 1.0]
+        steps = [replace(pose, temperature=t) for t in stops for pose in chosen[:count]]
+        found.append(Course("excursion", tuple(steps)))
+    return found
+
+
+def _ramps(reach: Reach, here: float, chosen: Sequence[Step]) -> list[Course]:
+    """Dwell after dwell while the devices follow the air, one way and back."""
+    if reach.temperature is None:
+        return []
+    low, high = reach.temperature
+    found: list[Course] = []
+    for away, times in product((min(high, here + _EXCURSION_K), max(low, here - _EXCURSION_K)), (8, 20)):
+        if abs(away - here) < 5.0:
+            continue
+        out = [replace(chosen[k % 2], temperature=away, soaked=False, wait=15.0) for k in range(times)]
+        back = [replace(s, temperature=here) for s in out]
+        found += [Course("ramp", tuple(out)), Course("ramp", (*out, *back))]
+    return found

@@ -1,0 +1,141 @@
+"""How far measurements part rivals: the chi-square that the wrong one must leave, before and after steps not measured yet.
+
+Every rival is taken as the truth once, with its fitted coefficients and nonlinear parameters; every other one, with the rest
+of the model, is fitted to what it predicts. What is left, whitened for white noise and wander, is the noncentrality of the
+test between the two (Atkinson & Fedorov, Biometrika 62 (1975) 57: T-optimal designs maximise the smallest of these).
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from inertial.criticism.comparison import estimate
+from inertial.criticism.model import Model, Term
+from inertial.criticism.problem import Lot, Problem
+from inertial.criticism.space import Space
+from inertial.sequences import Pace, Step, extended
+
+Array = NDArray[np.float64]
+
+_FEW = 3
+"""Units that stand for the lot: all go through the same steps."""
+
+
+@dataclass(frozen=True)
+class Rivals:
+    """Effects that measurements do not tell apart, as they were fitted.
+
+    lot : a few units of it; weight : units of the whole lot over these
+    rest : the terms of the model beside the rivals
+    predicted : per rival, its coefficients (blocks, p) or (p,) for a station's effect
+    share, variance : of the noise
+    steep : whether the wander has a random walk in it
+    """
+
+    lot: Lot
+    weight: float
+    rest: tuple[Term, ...]
+    terms: tuple[Term, ...]
+    predicted: tuple[Array, ...]
+    share: float
+    variance: float
+    steep: bool
+
+    @property
+    def ids(self) -> tuple[str, ...]:
+        """Effect ids, the best first."""
+        return tuple(t.effect.id for t in self.terms)
+
+
+def rivals_of(model: Model, terms: Sequence[Term], others: Sequence[Term]) -> Rivals:
+    """Rivals with the coefficients that a fit beside the rest of the model gives each of them.
+
+    Parameters
+    ----------
+    model : with everything that was found, for the noise
+    terms : the rivals
+    others : the terms of the model beside them
+    """
+    units = model.problem.lot.state.time.shape[0]
+    pick = np.unique(np.linspace(0, units - 1, min(units, _FEW)).round().astype(int)).tolist()
+    blocks = pick if model.problem.lot.radial else [3 * u + a for u in pick for a in range(3)]
+    predicted = tuple(_coefficients(Model(model.problem, [t, *others], near=model.share), t, blocks) for t in terms)
+    return Rivals(
+        lot=model.problem.lot.units(pick),
+        weight=units / len(pick),
+        rest=tuple(others),
+        terms=tuple(terms),
+        predicted=predicted,
+        share=model.share,
+        variance=model.space.variance,
+        steep=model.problem.steep,
+    )
+
+
+def _coefficients(model: Model, term: Term, blocks: Sequence[int]) -> Array:
+    """Coefficients of the first term of a model: of some blocks, or shared."""
+    found = estimate(model)
+    columns = model.problem.columns(term.effect, term.keywords)[..., : term.first].shape[-1]
+    return found.shared[:columns] if term.effect.scope == "station" else found.local[list(blocks), :columns]
+
+
+def separations(rivals: Rivals, steps: Sequence[Step] = (), pace: Pace | None = None) -> Array:
+    """Chi-square (r, r) that the rival of a column leaves, fitted to what the rival of a row predicts, in the whole lot.
+
+    Parameters
+    ----------
+    steps : taken after what was measured; none for what the measurements so far part
+    """
+    problem = widened(rivals, steps, pace) if steps else Problem(rivals.lot, steep=rivals.steep)
+    rotated = problem.basis.rotate(predictions(rivals, problem))
+    count = len(rivals.terms)
+    left = np.zeros((count, count))
+    for column, wrong in enumerate(rivals.terms):
+        model = Model(problem, [*rivals.rest, wrong])
+        left[:, column] = _left(model, rotated, rivals.share)
+    np.fill_diagonal(left, 0.0)
+    return left * rivals.weight / rivals.variance
+
+
+def smallest(left: Array) -> Array:
+    """Of each pair the smaller of its two directions, (r, r) symmetric: whichever of the two is true."""
+    return np.minimum(left, left.T)
+
+
+def _left(model: Model, targets: Array, share: float) -> Array:
+    """Whitened sums of squares (r,) that a model leaves of some series (blocks, n, r)."""
+    space: Space = model.at(share)
+    free = space.project(targets / space.spread[..., None])
+    blocks, n, count = free.shape
+    flat = free.reshape(blocks * n, count)
+    if model.shared.shape[-1]:
+        shared = space.targets[..., 1:].reshape(blocks * n, -1)
+        size = np.linalg.norm(shared, axis=0)
+        shared = shared / np.where(size > 0.0, size, 1.0)
+        flat = flat - shared @ np.linalg.lstsq(shared, flat, rcond=1e-9)[0]
+    return np.sum(flat**2, axis=0)
+
+
+def predictions(rivals: Rivals, problem: Problem) -> Array:
+    """What each rival adds to the series of a problem of the same units, (blocks, n, r), g."""
+    found: list[Array] = []
+    for term, coefficients in zip(rivals.terms, rivals.predicted, strict=True):
+        columns = problem.columns(term.effect, term.keywords)[..., : term.first]
+        own = np.einsum("bnp,bp->bn", columns, np.broadcast_to(coefficients, (columns.shape[0], columns.shape[-1])))
+        found.append(own)
+    return np.stack(found, axis=-1)
+
+
+def widened(rivals: Rivals, steps: Sequence[Step], pace: Pace | None) -> Problem:
+    """The problem with steps taken after its dwells; readings there are of no account."""
+    lot = rivals.lot
+    units = lot.state.time.shape[0]
+    state = extended(lot.state, steps, pace, response=lot.response)
+    scale = 1.0 if pace is None or pace.last_dwell_s <= 0.0 else float(np.sqrt(pace.last_dwell_s / pace.dwell_s))
+    typical = scale * np.median(np.where(np.isfinite(lot.error), lot.error, np.nan), axis=1, keepdims=True)
+    typical = np.where(np.isfinite(typical), typical, np.nanmedian(typical))
+    error = np.concatenate([lot.error, np.broadcast_to(typical, (units, len(steps), 3))], axis=1)
+    output = np.concatenate([lot.output, np.zeros((units, len(steps), 3))], axis=1)
+    return Problem(replace(lot, state=state, output=output, error=error), steep=rivals.steep)
