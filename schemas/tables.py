@@ -122,6 +122,24 @@ TABLES: dict[str, Table] = {
         },
         finite=("time_s", "chamber_C"),
     ),
+    "events": Table(
+        {
+            "time_s": _number(),
+            "kind": _text(),
+            "record": _whole(-1),  # −1: none
+            "reason": pa.Column(str),
+            "action": pa.Column(str),
+        },
+        finite=("time_s",),
+    ),
+    "soaks": Table(
+        {
+            "time_s": _number(),
+            "record": _whole(),
+            **_numbers(("target_C", "seconds", "air_overshoot_K", "device_overshoot_K")),
+        },
+        finite=("time_s", "target_C", "seconds", "air_overshoot_K", "device_overshoot_K"),
+    ),
     "verdicts": Table(
         {
             "unit": _text(),

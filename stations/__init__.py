@@ -12,8 +12,10 @@ if TYPE_CHECKING:
     from stations.station import Station
 
 
-def open_station(config: StationConfig, lot: Lot, resume: bytes | None = None) -> AbstractContextManager[Station]:
+def open_station(
+    config: StationConfig, lot: Lot, resume: bytes | None = None, *, run: str = "a run"
+) -> AbstractContextManager[Station]:
     """A station ready to be driven, as a context; see :func:`stations.opening.open_station`."""
     from stations.opening import open_station as opened  # noqa: PLC0415 - light until a station is really opened
 
-    return opened(config, lot, resume)
+    return opened(config, lot, resume, run=run)

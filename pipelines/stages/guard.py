@@ -78,18 +78,23 @@ class Guard:
     def during(
         self,
         pose: Pose,
-        target: float,
+        target: float | None,
         angles: tuple[float, float],
         air: float,
         look: Instruments,
         slots: Sequence[int],
     ) -> None:
-        """Suspends a record in which something is not as it must be; it is spoilt then."""
+        """Suspends a record in which something is not as it must be; it is spoilt then.
+
+        Parameters
+        ----------
+        target : °C at which air and devices must be; None where they are read on their way
+        """
         self.station.require()
         require_released(look)
         reasons = [
             *self.watched.around(look, slots),
-            *self.watched.thermal(target, air, look, slots),
+            *([] if target is None else self.watched.thermal(target, air, look, slots)),
             *self._table(pose, angles),
         ]
         if reasons:
