@@ -56,13 +56,18 @@ def load_recipe(name: str = MAIN_JOB) -> Recipe:
 
 def load_limits(recipe: Recipe, folder: Path | None = None) -> Limits:
     """The limits that a recipe names: a file beside the recipe or anywhere, or built-in ones."""
-    for path in ((folder or Path()) / recipe.limits, Path(recipe.limits)):
+    return read_limits(recipe.limits, folder)
+
+
+def read_limits(name: str, folder: Path | None = None) -> Limits:
+    """The limits of a file in a folder or anywhere, or the built-in ones of this name."""
+    for path in ((folder or Path()) / name, Path(name)):
         if path.is_file():
             return parse_limits(read_text(path, "limits"), f"limits {path.name}")
-    built_in = files("schemas") / "samples" / f"limits-{recipe.limits}.toml"
+    built_in = files("schemas") / "samples" / f"limits-{name}.toml"
     if not built_in.is_file():
-        raise unknown_limits(recipe.limits, sample_names("limits-"))
-    return parse_limits(built_in.read_text(encoding="utf-8"), f"limits {recipe.limits}")
+        raise unknown_limits(name, sample_names("limits-"))
+    return parse_limits(built_in.read_text(encoding="utf-8"), f"limits {name}")
 
 
 def lot_of(

@@ -19,6 +19,7 @@ INTERRUPTED = 130  # as shells tell of Ctrl-C
 
 COMMANDS: dict[str, tuple[str, str]] = {
     "run": ("run", "Measure and calibrate a lot, from recipe to report: the main job."),
+    "operator": ("operator", "Answer runs that wait for somebody to load, help or unload."),
     "demo": ("demo", "See a hidden effect found, added and the error fall."),
     "import": ("import_", "Bring recordings of others into the archive."),
     "list": ("list", "List the runs of the archive."),
@@ -26,6 +27,7 @@ COMMANDS: dict[str, tuple[str, str]] = {
     "certify": ("certify", "Certify a run's units that passed: from when until when their calibration holds."),
     "revoke": ("revoke", "Revoke a unit's calibration, with the reason."),
     "fit": ("fit", "Fit a model to archived data again, with other effects if wanted."),
+    "rerun": ("rerun", "Run archived runs through today's code, another model or other limits."),
     "compare": ("compare", "Judge a model on dwells, and on fresh ones."),
     "diagnose": ("diagnose", "Say whether a model is adequate, where it fails, and which effect is missing."),
     "extend": ("extend", "Write the next version of a model with one more effect."),

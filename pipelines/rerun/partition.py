@@ -1,0 +1,62 @@
+"""Portions of an archive's runs for workers: what each is given, does, and gives back are plain values."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+from inertial.errors import InertialError
+from pipelines.archive import Archive
+from pipelines.rerun.again import Outcome, again
+from pipelines.rerun.check import Checked, check
+from pipelines.rerun.wanted import Wanted
+from schemas.errors import TumblelineError
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+MOST = 32
+"""Runs in a portion: a worker that dies loses the time of no more."""
+
+
+@dataclass(frozen=True)
+class Part:
+    """Some runs of an archive, and what is to be done to them."""
+
+    archive: str
+    runs: tuple[str, ...]
+    wanted: Wanted = field(default_factory=Wanted)
+    report: bool = False
+
+
+def parts(archive: Archive, runs: Sequence[str], wanted: Wanted, workers: int, *, report: bool = False) -> list[Part]:
+    """The runs in portions, several for each worker, the same for the same runs."""
+    size = min(MOST, max(1, -(-len(runs) // (4 * max(workers, 1)))))
+    portions = [tuple(runs[start : start + size]) for start in range(0, len(runs), size)]
+    return [Part(archive.address, portion, wanted, report) for portion in portions]
+
+
+def run_again(part: Part) -> list[Outcome]:
+    """What became of every run of a portion; what cannot be run again says why, and the others go on."""
+    archive = Archive(part.archive)
+    return [_one(archive, run_id, part) for run_id in part.runs]
+
+
+def _one(archive: Archive, run_id: str, part: Part) -> Outcome:
+    try:
+        return again(archive, run_id, part.wanted, report=part.report)
+    except (TumblelineError, InertialError) as problem:
+        return Outcome(run_id, error=str(problem))
+
+
+def checked(part: Part) -> list[Checked]:
+    """Whether every run of a portion comes out the same again."""
+    archive = Archive(part.archive)
+    return [_check(archive, run_id) for run_id in part.runs]
+
+
+def _check(archive: Archive, run_id: str) -> Checked:
+    try:
+        return check(archive, run_id)
+    except (TumblelineError, InertialError) as problem:
+        return Checked(run_id, error=str(problem))

@@ -1,0 +1,226 @@
+"""What is to be done to a run of the archive: the stages of the chain for its own job, or those that imported dwells allow."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+import pandas as pd
+from pydantic import ValidationError
+
+from pipelines.archive import code_hash
+from pipelines.chain import BY_NAME, RECORDS, STAGES, Tables
+from pipelines.job import Job
+from pipelines.models import refuse_unknown_effects, use_formulas
+from pipelines.stages.criticise import default_model
+from pipelines.stages.empty import empty_table
+from pipelines.stages.fit import fit
+from pipelines.stages.grade import Evidence, grade, refuse_limits_without_figures
+from pipelines.stages.verify import verify
+from schemas.errors import DataRejected
+from schemas.limits import Limits
+from schemas.recipe import FormulaSpec, Lot, Recipe, explain
+from schemas.station import StationConfig
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from pipelines.archive import Run
+    from pipelines.rerun.wanted import Wanted
+
+RAW = ("validate", "reduce", "noise")
+"""Stages that read the raw samples."""
+PROVENANCE = ("who", "where", "when", "libraries", "rerun_of", "because", "measured")
+
+
+@dataclass(frozen=True)
+class Step:
+    """One stage for one run: as :class:`pipelines.chain.Stage`, with everything that the job decides filled in."""
+
+    name: str
+    inputs: tuple[str, ...]
+    outputs: tuple[str, ...]
+    parameters: dict[str, Any]
+    code: str
+    call: Callable[[Run], Tables]
+
+
+@dataclass(frozen=True)
+class Plan:
+    """All that is to be done to a run.
+
+    name : begins the new run's name; about : what it is kept with; decisive : what its result depends on
+    """
+
+    name: str
+    steps: tuple[Step, ...]
+    about: dict[str, Any]
+    decisive: dict[str, Any]
+
+
+@dataclass(frozen=True)
+class ArchivedJob(Job):
+    """The job of an archived run, which opens no station: capture and station stay as the run tells, whatever they are today."""
+
+    told: dict[str, Any] = field(default_factory=dict[str, Any])
+
+    @property
+    def capture_id(self) -> str:
+        """Name of the capture, which is not made anew."""
+        return self.told["capture"]
+
+    @property
+    def about(self) -> dict[str, Any]:
+        """What is kept beside the run for readers."""
+        decided = {"recipe": self.recipe.model_dump(mode="json"), "limits": self.limits.model_dump(mode="json")}
+        kept = {"station": self.told["station"], "capture": self.told["capture"]}
+        return {**decided, "lot": self.lot.model_dump(mode="json"), **kept}
+
+
+def plan_of(run: Run, wanted: Wanted) -> Plan:
+    """What is to be done to a run, with another model or other limits where they are wanted."""
+    return _captured(run, wanted) if run.about.get("capture") else _imported(run, wanted)
+
+
+def archived_job(run: Run, wanted: Wanted) -> ArchivedJob:
+    """The job of a captured run, with another model or other limits where they are wanted."""
+    about = run.about
+    try:
+        recipe = Recipe.model_validate({**about["recipe"], **_dumped(wanted)})
+        limits = wanted.limits or Limits.model_validate(about["limits"])
+        lot = Lot.model_validate(about["lot"])
+    except ValidationError as problem:
+        raise explain(problem, f"run {run.id}", Recipe) from None
+    if wanted.limits is not None:
+        recipe = recipe.model_copy(update={"limits": wanted.limits_name})
+    told = {"capture": about["capture"], "station": about.get("station", {})}
+    station = StationConfig.model_construct(**told["station"])
+    job = ArchivedJob(recipe=recipe, limits=limits, lot=lot, station=station, told=told)
+    refuse_unknown_effects(recipe.effects, f"run {run.id}")
+    refuse_limits_without_figures(limits, recipe)
+    return job
+
+
+def _dumped(wanted: Wanted) -> dict[str, Any]:
+    keys = wanted.of_model()
+    return {**keys, "formulas": [f.model_dump(mode="json") for f in wanted.formulas]} if keys else {}
+
+
+def _captured(run: Run, wanted: Wanted) -> Plan:
+    job = archived_job(run, wanted)
+    steps = [_capture_step(job)]
+    for stage in STAGES:
+        call = _called(stage.call, job)
+        steps.append(
+            Step(stage.name, stage.inputs, stage.outputs, stage.parameters(job), code_hash(stage.modules), call)
+        )
+    code = {stage.name: code_hash(stage.modules) for stage in STAGES}
+    decisive = {key: value for key, value in job.about.items() if key != "station"}
+    return Plan(job.recipe.name, tuple(steps), job.about, {**decisive, "code": code})
+
+
+def _called(call: Callable[[Job, Run], Tables], job: Job) -> Callable[[Run], Tables]:
+    return lambda run: call(job, run)
+
+
+def _capture_step(job: ArchivedJob) -> Step:
+    names = ("readings", "history")
+
+    def gathered(run: Run) -> Tables:
+        records = run.archive.capture(job.capture_id)
+        return {name: records.gathered(name) for name in names}
+
+    return Step("capture", (RECORDS,), names, {"capture": job.capture_id}, "", gathered)
+
+
+def _imported(run: Run, wanted: Wanted) -> Plan:
+    """Fit, verification and, where limits are known, grades of dwells that were imported."""
+    about = run.about
+    dwells = _fit_for_a_fit(run)
+    model = _model_of(run, dwells, wanted)
+    use_formulas([FormulaSpec.model_validate(f) for f in model["formulas"]], f"run {run.id}")
+    refuse_unknown_effects(model["effects"], f"run {run.id}")
+    limits = wanted.limits or (Limits.model_validate(about["limits"]) if about.get("limits") else None)
+    history = "history" in run.tables()
+    steps = [_import_step(history), _fit_step(model, history), _verify_step(history)]
+    steps += [_grade_step(limits)] if limits else []
+    recipe = {**about.get("recipe", {}), "name": "import", **model}
+    recipe |= {"limits": wanted.limits_name} if wanted.limits else {}
+    kept = {key: value for key, value in about.items() if key not in PROVENANCE}
+    new = {**kept, "recipe": recipe, "limits": limits.model_dump(mode="json") if limits else None}
+    data = {name: run.manifest(name)["sha256"] for name in ("dwells", "history") if name != "history" or history}
+    code = {step.name: step.code for step in steps}
+    return Plan("import", tuple(steps), new, {"data": data, "model": model, "limits": new["limits"], "code": code})
+
+
+def _fit_for_a_fit(run: Run) -> pd.DataFrame:
+    """The run's dwells, refused where the fit of a lot has nothing to work with."""
+    if "dwells" not in run.tables():
+        message = f"run {run.id}: imported without dwells, a fit needs them; import it with poses, a face or --blocks"
+        raise DataRejected(message)
+    dwells = run.table("dwells")
+    wanted = ("force_x", "force_y", "force_z", "sd_x", "sd_y", "sd_z", "n", "kind", "pose", "out_unit")
+    missing = [name for name in wanted if name not in dwells.columns]
+    if missing:
+        message = (
+            f"run {run.id}: its dwells have no {', '.join(missing)}, a fit in the chain needs them; import it again with the "
+            "poses named, or judge it with 'tumbleline diagnose'"
+        )
+        raise DataRejected(message)
+    return dwells
+
+
+def _model_of(run: Run, dwells: pd.DataFrame, wanted: Wanted) -> dict[str, Any]:
+    known = run.about.get("recipe", {})
+    if wanted.effects is not None:
+        return _dumped(wanted)
+    if known.get("effects"):
+        return {key: known[key] for key in ("effects", "formulas", "model_name", "model_version")}
+    return {"effects": default_model(dwells), "formulas": [], "model_name": "", "model_version": 0}
+
+
+def _import_step(history: bool) -> Step:  # noqa: FBT001 - whether the import has one
+    names = ("dwells", *(("history",) if history else ()))
+    return Step("import", (), names, {}, "", lambda run: {name: run.table(name) for name in names})
+
+
+def _history(run: Run) -> pd.DataFrame:
+    return run.table("history") if "history" in run.tables() else empty_table(texts="unit", numbers="time_s unit_C")
+
+
+def _fit_step(model: dict[str, Any], history: bool) -> Step:  # noqa: FBT001
+    stage = BY_NAME["fit"]
+    parameters = {"effects": model["effects"], "formulas": model["formulas"]}
+    inputs = stage.inputs if history else tuple(name for name in stage.inputs if name != "history")
+
+    def call(run: Run) -> Tables:
+        return fit(run.table("dwells"), _history(run), model["effects"])
+
+    return Step("fit", inputs, stage.outputs, parameters, code_hash(stage.modules), call)
+
+
+def _verify_step(history: bool) -> Step:  # noqa: FBT001
+    stage = BY_NAME["verify"]
+    inputs = stage.inputs if history else tuple(name for name in stage.inputs if name != "history")
+
+    def call(run: Run) -> Tables:
+        names = ("coefficients", "covariance", "predictions")
+        return verify(run.table("dwells"), _history(run), *(run.table(name) for name in names))
+
+    return Step("verify", inputs, stage.outputs, {}, code_hash(stage.modules), call)
+
+
+def _grade_step(limits: Limits) -> Step:
+    stage = BY_NAME["grade"]
+    names = ("coefficients", "covariance", "residuals", "verification", "verification_poses")
+
+    def call(run: Run) -> Tables:
+        tables = {name: run.table(name) for name in names}
+        units = list(dict.fromkeys(tables["coefficients"]["unit"].astype(str)))
+        sound = {"unit": units, "slot": range(len(units)), "refused": False, "fault": "", "reason": ""}
+        noise = empty_table(texts="unit axis term unit_text", numbers="value low high", flags="identified")
+        return grade(Evidence(verdicts=pd.DataFrame(sound), **tables, noise=noise), limits)
+
+    return Step(
+        "grade", names, stage.outputs, {"limits": limits.model_dump(mode="json")}, code_hash(stage.modules), call
+    )

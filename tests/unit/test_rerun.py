@@ -1,0 +1,264 @@
+"""Runs of the archive again: only what changed, into a new run, the same bytes from the same code."""
+
+import json
+import shutil
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+from capture_double import CaptureDouble, small_job, small_run
+
+from pipelines.archive import Archive, Run, code_hash
+from pipelines.chain import ORDER
+from pipelines.rerun import steps
+from pipelines.rerun.again import again
+from pipelines.rerun.check import LEFT_OUT, SAME, check
+from pipelines.rerun.partition import Part, run_again
+from pipelines.rerun.selection import selected
+from pipelines.rerun.wanted import Wanted, wanted
+from pipelines.runner import Runner
+from schemas.errors import DataRejected, WrongUse
+
+LARGER = "bias,scale,misalignment,bias_temperature,scale_temperature,third_order"
+
+
+@pytest.fixture(scope="module")
+def original(tmp_path_factory: pytest.TempPathFactory) -> Run:
+    return small_run(tmp_path_factory.mktemp("rerun"))
+
+
+@pytest.fixture
+def run(original: Run, tmp_path: Path) -> Run:
+    """A run of its own in an archive of its own."""
+    shutil.copytree(original.archive.root, tmp_path / "archive")
+    return Archive(tmp_path / "archive").run(original.id)
+
+
+def hashes(run: Run) -> dict[str, str]:
+    return {name: run.manifest(name)["sha256"] for name in run.tables()}
+
+
+def other_code(monkeypatch: pytest.MonkeyPatch, *stages: str) -> None:
+    """As if the code of these stages had been changed."""
+    modules = {steps.BY_NAME[name].modules for name in stages}
+    monkeypatch.setattr(steps, "code_hash", lambda m: "f" * 64 if m in modules else code_hash(m))
+
+
+def files_of(run: Run) -> dict[str, bytes]:
+    return {path.name: path.read_bytes() for path in run.path.iterdir() if path.suffix in {".parquet", ".json"}}
+
+
+def test_nothing_is_done_where_nothing_changed(run: Run) -> None:
+    before = files_of(run)
+    outcome = again(run.archive, run.id, Wanted())
+    assert outcome.new == run.id
+    assert set(outcome.stages.values()) == {"there"}
+    assert files_of(run) == before
+
+
+def test_other_limits_only_grade_again(run: Run) -> None:
+    before = files_of(run)
+    outcome = again(run.archive, run.id, wanted(limits="industrial"))
+    new = run.archive.run(outcome.new)
+    assert outcome.new != run.id
+    assert [name for name, how in outcome.stages.items() if how == "computed"] == ["grade"]
+    assert new.about["rerun_of"] == run.id
+    assert [(b["stage"], b["what"], b["to"]) for b in new.about["because"]] == [("grade", "limits", "industrial")]
+    assert new.about["limits"]["name"] == "industrial"
+    assert files_of(run) == before
+
+
+def test_another_model_begins_at_the_fit_and_says_so(run: Run) -> None:
+    outcome = again(run.archive, run.id, wanted(effects=LARGER))
+    new = run.archive.run(outcome.new)
+    assert {name for name, how in outcome.stages.items() if how == "computed"} == {"fit", "verify", "noise", "grade"}
+    assert "third_order" in set(new.table("coefficients")["effect"])
+    assert new.manifest("dwells")["taken_from"] == run.id
+    assert outcome.because[0]["what"] == "model"
+
+
+def test_changed_code_of_one_stage_leaves_the_stages_before_it(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
+    other_code(monkeypatch, "verify")
+    outcome = again(run.archive, run.id, Wanted())
+    computed = [name for name, how in outcome.stages.items() if how == "computed"]
+    assert computed == ["verify"]  # its tables come out with the same bytes, so the key of the grade is the same
+    assert [b["what"] for b in outcome.because] == ["code"]
+    assert hashes(run.archive.run(outcome.new)) == hashes(run)
+
+
+def test_a_rerun_gives_the_bytes_of_a_first_run_with_that_model(run: Run, tmp_path: Path) -> None:
+    effects = ["bias", "scale", "misalignment", "bias_temperature", "scale_temperature", "third_order"]
+    listed = 'effects = ["bias", "scale", "misalignment", "bias_temperature", "scale_temperature"]'
+    (tmp_path / "first").mkdir()
+    job = small_job(tmp_path / "first", (listed, f"effects = {json.dumps(effects)}"))
+    first = Runner(job, Archive(tmp_path / "first" / "archive"), measure=CaptureDouble())
+    for stage in ORDER[:-1]:
+        first.stage(stage)
+    outcome = again(run.archive, run.id, wanted(effects=",".join(effects)))
+    assert hashes(run.archive.run(outcome.new)) == hashes(first.run)
+    assert outcome.new == first.run.id
+
+
+def test_an_interrupted_rerun_goes_on(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
+    change = wanted(effects=LARGER)
+
+    def unplugged(*_args: object) -> None:
+        raise KeyboardInterrupt
+
+    with monkeypatch.context() as patch:
+        patch.setattr("pipelines.chain.verify", unplugged)
+        with pytest.raises(KeyboardInterrupt):
+            again(run.archive, run.id, change)
+    outcome = again(run.archive, run.id, change)
+    assert outcome.stages["fit"] == "there"
+    assert outcome.stages["verify"] == "computed"
+
+
+def test_an_old_capture_keeps_its_name_whatever_names_are_made_of_today(
+    run: Run, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("pipelines.job.ANALYSIS_KEYS", set())
+    outcome = again(run.archive, run.id, wanted(limits="industrial"))
+    assert run.archive.run(outcome.new).about["capture"] == run.about["capture"]
+
+
+def test_without_raw_samples_it_begins_at_the_dwells(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
+    shutil.rmtree(run.archive.root / "captures")
+    other_code(monkeypatch, "reduce", "grade")
+    outcome = again(run.archive, run.id, Wanted())
+    assert outcome.stages["reduce"] == "kept"
+    assert [(b["stage"], b["what"]) for b in outcome.because] == [("grade", "code")]
+
+
+def test_refuses_another_model_where_the_static_record_is_gone(run: Run) -> None:
+    shutil.rmtree(run.archive.root / "captures")
+    with pytest.raises(DataRejected, match="static record is not in the archive"):
+        again(run.archive, run.id, wanted(effects=LARGER))
+
+
+def test_refuses_a_capture_that_is_not_finished(run: Run) -> None:
+    capture = run.archive.root / "captures" / run.about["capture"]
+    (capture / "complete.json").unlink()
+    with pytest.raises(DataRejected, match=r"its capture has \d+ records and is not finished"):
+        again(run.archive, run.id, Wanted())
+
+
+def test_one_run_that_cannot_be_run_again_does_not_stop_the_others(run: Run) -> None:
+    broken = run.archive.root / "runs" / "broken"
+    broken.mkdir()
+    about = {**run.about, "recipe": {**run.about["recipe"], "dwell_s": -1.0}}
+    (broken / "run.json").write_text(json.dumps(about))
+    outcomes = run_again(Part(run.archive.address, ("broken", run.id)))
+    assert "run broken: key 'dwell_s': found -1.0" in outcomes[0].error
+    assert not outcomes[1].error
+
+
+def test_the_same_code_gives_the_same_bytes(run: Run) -> None:
+    found = check(run.archive, run.id)
+    assert found.same
+    assert set(found.tables.values()) == {SAME}
+    assert set(found.tables) == set(run.tables())
+
+
+def test_a_check_names_the_table_and_the_size_of_what_differs(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
+    real = steps.BY_NAME["verify"].call
+
+    def moved(job: object, own: Run) -> dict[str, pd.DataFrame]:
+        made = real(job, own)
+        made["verification"].loc[3, "error_ug"] += 0.5
+        return made
+
+    changed = [
+        stage if stage.name != "verify" else type(stage)(**{**vars(stage), "call": moved}) for stage in steps.STAGES
+    ]
+    monkeypatch.setattr(steps, "STAGES", tuple(changed))
+    found = check(run.archive, run.id)
+    assert not found.same
+    assert found.differences == [d for d in found.differences if d.startswith("verification: error_ug in 1 of ")]
+    assert "by at most 0.5" in found.differences[0]
+
+
+def test_a_check_writes_nothing(run: Run) -> None:
+    before = sorted(str(path) for path in run.archive.root.rglob("*"))
+    check(run.archive, run.id)
+    assert sorted(str(path) for path in run.archive.root.rglob("*")) == before
+
+
+def test_a_check_says_what_it_could_not_check(run: Run) -> None:
+    shutil.rmtree(run.archive.root / "captures")
+    found = check(run.archive, run.id)
+    assert found.tables["dwells"] == LEFT_OUT
+    assert found.tables["coefficients"] == SAME
+
+
+def test_chooses_runs_by_what_they_are(run: Run) -> None:
+    again(run.archive, run.id, wanted(limits="industrial"))
+    archive = run.archive
+    assert [e.id for e in selected(archive, ["all"])] == [run.id]
+    assert [e.id for e in selected(archive, ["device:ADXL355", "unit:A2"])] == [run.id]
+    assert [e.id for e in selected(archive, ["since:2020-01-01", "until:2999-12-31"])] == [run.id]
+    assert len(selected(archive, ["small"])) == 2
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (["colour:red"], "'colour:red' is not known"),
+        (["device:"], "says nothing after the colon"),
+        (["since:yesterday"], "'yesterday' is no date"),
+        (["station:elsewhere"], "station: simulated"),
+        (["smale"], "no run is called 'smale'; known: small-"),
+        (["until:1999-12-31"], "none of 1 runs is until:1999-12-31; measured"),
+    ],
+)
+def test_says_why_a_selection_names_nothing(run: Run, words: list[str], message: str) -> None:
+    with pytest.raises(WrongUse, match=message):
+        selected(run.archive, words)
+
+
+@pytest.fixture
+def imported(tmp_path: Path) -> Run:
+    """Six faces of one unit as another's recording, kept as an import."""
+    from pipelines.cli.import_ import _import_one
+    from pipelines.importers import mapping
+
+    rng = np.random.default_rng(3)
+    faces = {"+x": (1, 0, 0), "-x": (-1, 0, 0), "+y": (0, 1, 0), "-y": (0, -1, 0), "+z": (0, 0, 1), "-z": (0, 0, -1)}
+    frames = [
+        pd.DataFrame(np.array(up) + 0.01 + rng.normal(0.0, 1e-3, (200, 3)), columns=["x", "y", "z"]).assign(face=face)
+        for face, up in faces.items()
+    ]
+    table = pd.concat(frames, ignore_index=True)
+    table.assign(t=0.01 * table.index).to_csv(tmp_path / "six.csv", index=False)
+    how = mapping.build(
+        {
+            "columns": {"time": "t", "x": "x", "y": "y", "z": "z", "dwell": "face"},
+            "units": {"output": "g", "time": "s"},
+            "unit": "SN1",
+            "poses": {face: face for face in faces},
+            "local_gravity_m_s2": 9.80665,
+        },
+        "test",
+    )
+    archive = tmp_path / "imports"
+    return Archive(archive).run(_import_one(tmp_path / "six.csv", how, "", archive)["run"])
+
+
+def test_imported_dwells_are_fitted_with_the_plain_model(imported: Run) -> None:
+    outcome = again(imported.archive, imported.id, Wanted())
+    new = imported.archive.run(outcome.new)
+    assert outcome.because[0]["what"] == "not fitted yet"
+    bias = new.table("coefficients").query("effect == 'bias'")
+    assert bias["value"].to_numpy() == pytest.approx(0.01, abs=5e-4)
+    assert check(new.archive, new.id).same
+    assert again(new.archive, new.id, Wanted()).new == new.id
+
+
+def test_imported_dwells_are_graded_where_limits_are_named(imported: Run, tmp_path: Path) -> None:
+    limits = tmp_path / "limits.toml"
+    limits.write_text('name = "plain"\n[figures]\nzero_g_offset_mg = { max = 5.0, unit = "mg" }\n')
+    outcome = again(imported.archive, imported.id, wanted(limits=str(limits)))
+    grades = imported.archive.run(outcome.new).table("grades")
+    assert grades["outcome"].tolist() == ["fail"]
+    assert "zero_g_offset_mg fail" in grades["reasons"].iloc[0]
