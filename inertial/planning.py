@@ -14,6 +14,7 @@ from inertial import effects as catalogue
 from inertial.effects import SensorEffect
 from inertial.effects.base import AnyEffect, excited
 from inertial.errors import MissingInput
+from inertial.noise.dwells import whitener
 from inertial.state import State
 
 Array = NDArray[np.float64]
@@ -34,7 +35,7 @@ class Sight:
     left : v, RMS of the column after the base model over its RMS, 0 … 1; the best of its columns, axes and nonlinear values
     by_axis : v per sensor axis, (3,)
     floor : three-sigma floor of the coefficient, g per unit of the coefficient; infinite where unseen
-    alias : effects that it is not told from
+    alias : effects that it is not told from; exact : those of them with which it is one, to rounding
     """
 
     effect: str
@@ -44,6 +45,7 @@ class Sight:
     floor: float
     alias: tuple[str, ...]
     breaker: str
+    exact: tuple[str, ...] = ()
 
     @property
     def variance_inflation(self) -> float:
@@ -51,7 +53,18 @@ class Sight:
         return 1.0 / self.left**2 if self.left > 0.0 else float("inf")
 
 
-def sights(state: State, base: Sequence[str], error: float, candidates: Sequence[str] | None = None) -> list[Sight]:
+EXACT = 1.0 - 1e-9
+"""Cosine from which two effects are one and the same under a plan."""
+
+
+def sights(
+    state: State,
+    base: Sequence[str],
+    error: float,
+    candidates: Sequence[str] | None = None,
+    *,
+    covariance: Array | None = None,
+) -> list[Sight]:
     """How a plan sees every effect of the catalogue that is not in the base model.
 
     Parameters
@@ -60,14 +73,47 @@ def sights(state: State, base: Sequence[str], error: float, candidates: Sequence
     base : ids of the model that is fitted anyway
     error : standard error of a dwell mean, g
     candidates : ids to look at; the whole catalogue otherwise
+    covariance : (n, n), of the dwell means, g²: the floors are then those of a generalised fit; white of ``error`` where None
     """
     span = _span(state, base)
+    noise = None if covariance is None else _Noise(state, base, whitener(covariance))
     names = [n for n in (candidates or catalogue.catalogue()) if n not in set(base)]
     found: dict[str, _Remainder | None] = {}
     for name in names:
         found[name] = _remainder(catalogue.get(name), state, span)
-    aliases = _aliases({n: r for n, r in found.items() if r is not None and r.left > SEEN})
-    return [_sight(n, found[n], error, aliases.get(n, ())) for n in names]
+    aliases = alias_cosines({n: r for n, r in found.items() if r is not None and r.left > SEEN})
+    return [_sight(n, found[n], error if noise is None else noise, aliases.get(n, {})) for n in names]
+
+
+def likeness(
+    state: State, base: Sequence[str], candidates: Sequence[str] | None = None
+) -> tuple[tuple[str, ...], Array]:
+    """The effects that a plan sees, and the cosine (m, m) of what each leaves with the span of each other, 0 … 1.
+
+    Row by column: how far the row's effect lies within the column's; the lowest over the sensor axes that see it.
+    """
+    span = _span(state, base)
+    names = [n for n in (candidates or catalogue.catalogue()) if n not in set(base)]
+    found = {n: _remainder(catalogue.get(n), state, span) for n in names}
+    cosines = alias_cosines({n: r for n, r in found.items() if r is not None and r.left > SEEN})
+    seen = tuple(cosines)
+    return seen, np.array([[1.0 if a == b else cosines[a][b] for b in seen] for a in seen]).reshape(
+        len(seen), len(seen)
+    )
+
+
+class _Noise:
+    """Base model and columns whitened by the covariance of the dwell means."""
+
+    def __init__(self, state: State, base: Sequence[str], white: Array) -> None:
+        self._white = white
+        self._span = _span(state, base, white)
+
+    def largest(self, columns: Array) -> float:
+        """Information that the best of columns (3, n, p) has beside the base model, square root, 1/g."""
+        own = self._white @ columns
+        left = own - self._span @ (np.swapaxes(self._span, -1, -2) @ own)
+        return float(np.max(np.linalg.norm(left, axis=-2)))
 
 
 @dataclass(frozen=True)
@@ -80,10 +126,11 @@ class _Remainder:
     before: Array
 
 
-def _span(state: State, base: Sequence[str]) -> Array:
-    """Orthonormal bases of the base model per axis, (3, n, p)."""
+def _span(state: State, base: Sequence[str], white: Array | None = None) -> Array:
+    """Orthonormal bases of the base model per axis, (3, n, p); of the whitened columns where a whitener is given."""
     sensor, _ = design.split(base or _BASE)
     columns = design.local_columns(sensor, state, design.starting_values(sensor, state))
+    columns = columns if white is None else white @ columns
     size = np.linalg.norm(columns, axis=-2, keepdims=True)
     u, s, _ = np.linalg.svd(columns / np.where(size > 0.0, size, 1.0), full_matrices=False)
     return u * (s > 1e-9)[..., None, :]
@@ -133,27 +180,31 @@ def _columns(effect: AnyEffect, state: State, values: Mapping[str, float]) -> Ar
     return np.moveaxis(effect.force_change(state, **values), -2, 0)
 
 
-def _sight(name: str, found: _Remainder | None, error: float, alias: tuple[str, ...]) -> Sight:
+def _sight(name: str, found: _Remainder | None, noise: float | _Noise, cosines: Mapping[str, float]) -> Sight:
     breaker = catalogue.get(name).breaker
+    alias = tuple(other for other, cosine in cosines.items() if cosine > ALIAS)
+    exact = tuple(other for other in alias if cosines[other] > EXACT)
     if found is None or found.left <= SEEN:
         return Sight(name, False, 0.0 if found is None else found.left, (0.0, 0.0, 0.0), float("inf"), alias, breaker)
-    rest = np.linalg.norm(found.columns, axis=-2)
-    floor = 3.0 * error / float(np.max(rest))
-    return Sight(name, True, found.left, found.by_axis, floor, alias, breaker)
+    if isinstance(noise, _Noise):
+        floor = 3.0 / noise.largest(found.columns)
+    else:
+        floor = 3.0 * noise / float(np.max(np.linalg.norm(found.columns, axis=-2)))
+    return Sight(name, True, found.left, found.by_axis, floor, alias, breaker, exact)
 
 
-def _aliases(seen: Mapping[str, _Remainder]) -> dict[str, tuple[str, ...]]:
-    """Effects whose remaining columns lie within one another's span, axis by axis."""
+def alias_cosines(seen: Mapping[str, _Remainder]) -> dict[str, dict[str, float]]:
+    """How far effects' remaining columns lie within one another's span: the least cosine over directions and axes."""
     spans: dict[str, Array] = {}
     for name, found in seen.items():
         size = np.linalg.norm(found.columns, axis=-2, keepdims=True)
         u, s, _ = np.linalg.svd(found.columns / np.where(size > 0.0, size, 1.0), full_matrices=False)
         spans[name] = u * (s > SEEN)[..., None, :]
-    return {name: tuple(o for o in spans if o != name and _inside(spans[name], spans[o])) for name in spans}
+    return {name: {o: _inside(spans[name], spans[o]) for o in spans if o != name} for name in spans}
 
 
-def _inside(one: Array, other: Array) -> bool:
-    """Whether every direction of one effect is within the other's span, to the alias cosine, on every axis that sees it."""
+def _inside(one: Array, other: Array) -> float:
+    """Least cosine of a direction of one effect with the other's span, over every axis that sees it."""
     inner = np.linalg.norm(np.swapaxes(other, -1, -2) @ one, axis=-2)
     there = np.linalg.norm(one, axis=-2) > 0.5
-    return bool(np.all(inner[there] > ALIAS)) and bool(there.any())
+    return float(np.min(inner[there], initial=1.0)) if there.any() else 0.0

@@ -8,29 +8,47 @@ import numpy as np
 
 from inertial.fits.linear import fit_lot
 from inertial.frames import force_from_angles
-from inertial.state import State
+from inertial.state import History, State
+from pipelines.stages.arrays import HISTORY_POINTS
+from pipelines.stages.capture import steps
+from pipelines.stages.minutes import itinerary, temperatures
 from pipelines.stages.reduce import STANDARD_GRAVITY_M_S2
+from schemas.station import load_station
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from pipelines.stages.minutes import Stretch
     from schemas.recipe import Recipe
+    from schemas.station import StationConfig
 
 NOMINAL_SUPPLY_V = 3.3
 SUPPLY_WANDER_V = 1e-3
 QUIET_G = 1e-3
 
 
-def planned_state(recipe: Recipe) -> State:
-    """The dwells of the fit in order of measurement: all poses at every temperature.
+def planned_state(recipe: Recipe, station: StationConfig | None = None, *, history: bool = False) -> State:
+    """The dwells of the fit in order of measurement, at the times at which a station gets to them.
 
     Quantities that the plan does not set (supply, vibration) wander a little, as they do on a station, so that effects
     of theirs are not refused.
+
+    Parameters
+    ----------
+    station : the built-in simulated one where None
+    history : whether the temperatures between the dwells go along, as a station records them
     """
-    angles = np.radians([(pose.outer_deg, pose.inner_deg) for pose in recipe.poses])
-    soaks, n = len(recipe.temperatures_C), len(recipe.poses)
-    outer, inner = np.tile(angles[:, 0], soaks), np.tile(angles[:, 1], soaks)
-    chamber = np.repeat(np.asarray(recipe.temperatures_C), n)
-    step = recipe.settle_s + recipe.dwell_s
-    time = np.arange(soaks * n) * step + np.repeat(np.arange(soaks) + 1, n) * recipe.soak_min_s
+    config = station or load_station()
+    whole = itinerary(steps(recipe), config, recipe)
+    return state_of(whole, config, recipe, history=history)
+
+
+def state_of(stretches: Sequence[Stretch], station: StationConfig, recipe: Recipe, *, history: bool = False) -> State:
+    """The dwells of the fit among what a station does, see :func:`planned_state`."""
+    dwells = [s for s in stretches if s.kind == "dwell"]
+    outer, inner = np.radians([(s.step.pose.outer_deg, s.step.pose.inner_deg) for s in dwells]).T
+    time = np.array([s.start + 0.5 * s.seconds for s in dwells])
+    chamber = np.array([s.step.temperature for s in dwells])
     wander = np.random.default_rng(0).normal(size=(2, time.size))
     gravity = recipe.local_gravity_m_s2 / STANDARD_GRAVITY_M_S2
     return State(
@@ -39,13 +57,21 @@ def planned_state(recipe: Recipe) -> State:
         temperature=chamber,
         chamber=chamber,
         since_power=time,
-        since_move=np.full(time.size, recipe.settle_s) * (1.0 + 0.05 * wander[0]),
+        since_move=(recipe.settle_s + 0.5 * recipe.dwell_s) * (1.0 + 0.01 * wander[0]),
         supply=NOMINAL_SUPPLY_V + SUPPLY_WANDER_V * wander[1],
         vibration=QUIET_G * (1.0 + 0.1 * np.abs(wander[0])),
         outer=outer,
         inner=inner,
         slot=np.zeros(()),
+        history=_history(stretches, station) if history else None,
     )
+
+
+def _history(stretches: Sequence[Stretch], station: StationConfig) -> History:
+    """Temperatures of a device between the dwells; at the dwells it is where the recipe wants it."""
+    time, _, device = np.array(temperatures(stretches, station)).T
+    grid = np.linspace(time[0], time[-1], min(HISTORY_POINTS, time.size))
+    return History(grid, np.interp(grid, time, device))
 
 
 def refuse_unidentified(recipe: Recipe) -> None:

@@ -6,7 +6,7 @@ import math
 from collections import deque
 from dataclasses import dataclass, replace
 from functools import lru_cache
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal, get_args
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -14,6 +14,8 @@ if TYPE_CHECKING:
     from pipelines.stages.capture import Step
     from schemas.recipe import Pose, Recipe
     from schemas.station import StationConfig
+
+StretchKind = Literal["soak", "move", "dwell", "verification", "allan"]
 
 _POLL_S = 0.25
 """How often the table is asked whether it stands."""
@@ -52,6 +54,18 @@ class Standing:
     soak: int = _FIRST_SOAK
 
 
+@dataclass(frozen=True)
+class Stretch:
+    """One thing that a station does for a step: from ``start`` s on for ``seconds``; air and device as it begins and ends."""
+
+    kind: StretchKind
+    step: Step
+    start: float
+    seconds: float
+    begin: Standing
+    end: Standing
+
+
 def minutes(steps: Sequence[Step], station: StationConfig, recipe: Recipe, start: Standing | None = None) -> Minutes:
     """Station time of steps in order; a change of their ``soak`` is a soak, as capture does it.
 
@@ -62,20 +76,64 @@ def minutes(steps: Sequence[Step], station: StationConfig, recipe: Recipe, start
     recipe : for the shortest soak, the settling after a move and the durations
     start : where the station stands; in the room, level and not soaked where None
     """
+    return spent(itinerary(steps, station, recipe, start))
+
+
+def spent(stretches: Sequence[Stretch]) -> Minutes:
+    """Station time of what a station does."""
+    total = dict.fromkeys(get_args(StretchKind), 0.0)
+    for stretch in stretches:
+        total[stretch.kind] += stretch.seconds / 60.0
+    return Minutes(total["move"], total["soak"], total["dwell"] + total["verification"], total["allan"])
+
+
+def itinerary(
+    steps: Sequence[Step], station: StationConfig, recipe: Recipe, start: Standing | None = None
+) -> list[Stretch]:
+    """What a station does for steps in order: soaks, moves with their settling, records; see :func:`minutes`."""
     room = station.simulation.room_C if station.simulation else station.pace.room_C
-    now = start or Standing(air=room, device=room)
-    moves = soaks = dwells = static = 0.0
+    now, clock = start or Standing(air=room, device=room), 0.0
+    found: list[Stretch] = []
     for step in steps:
+        begin = now
+        parts: list[tuple[StretchKind, float, Standing]] = []
         if step.soak != now.soak:
-            waited, now = soaked(now, step.temperature, station, recipe.soak_min_s)
-            now = replace(now, soak=step.soak)
-            soaks += waited
+            waited, reached = soaked(now, step.temperature, station, recipe.soak_min_s)
+            parts.append(("soak", waited, replace(reached, soak=step.soak)))
+            now = parts[-1][2]
         going = move_seconds(now, step.pose, station) + recipe.settle_s + station.pace.record_s
+        there = replace(_later(now, going, station), outer=step.pose.outer_deg, inner=step.pose.inner_deg)
         lasting = recipe.static_record_s if step.kind == "allan" else recipe.dwell_s
-        static, dwells = (static + lasting, dwells) if step.kind == "allan" else (static, dwells + lasting)
-        moves += going
-        now = _later(replace(now, outer=step.pose.outer_deg, inner=step.pose.inner_deg), going + lasting, station)
-    return Minutes(moves / 60.0, soaks / 60.0, dwells / 60.0, static / 60.0)
+        parts.append(("move", going, there))
+        parts.append((step.kind, lasting, _later(there, lasting, station)))
+        for what, seconds, end in parts:
+            found.append(Stretch(what, step, clock, seconds, begin, end))
+            clock, begin = clock + seconds, end
+        now = begin
+    return found
+
+
+def temperatures(stretches: Sequence[Stretch], station: StationConfig) -> list[tuple[float, float, float]]:
+    """Time in s, air and slowest device in °C along what a station does, as often as it looks at a soak.
+
+    What a settled device is still away from its target is no temperature that a plan may count on: it is taken off.
+    """
+    thermal = _thermal(station)
+    found: list[tuple[float, float, float]] = []
+    for stretch in stretches:
+        target = stretch.step.temperature
+        if stretch.kind != "soak":
+            found.append((stretch.start, target, target))
+            continue
+        air, device = stretch.begin.air, stretch.begin.device
+        ends = (found[-1][2] - device if found else 0.0, target - stretch.end.device)
+        count = math.ceil(stretch.seconds / thermal.poll)
+        for k in range(count):
+            part = k / count
+            found.append((stretch.start + k * thermal.poll, air, device + (1.0 - part) * ends[0] + part * ends[1]))
+            air, device = _followed(air, device, target, thermal)
+    last = stretches[-1]
+    return [*found, (last.start + last.seconds, last.step.temperature, last.step.temperature)]
 
 
 def move_seconds(now: Standing, pose: Pose, station: StationConfig) -> float:

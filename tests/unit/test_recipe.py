@@ -9,6 +9,7 @@ from capture_double import recipe_file, small_job
 from inertial.poses import NAMED
 from pipelines.job import Request
 from pipelines.recipes import load_recipe, sample_names
+from pipelines.stages.capture import steps
 from schemas.errors import RecipeInvalid, WrongUse
 
 POSES = 'poses = "nine"'
@@ -181,3 +182,42 @@ def test_the_capture_is_shared_by_recipes_that_differ_in_the_model_only(tmp_path
 def test_a_fresh_measurement_is_a_capture_of_its_own(tmp_path: Path) -> None:
     path = recipe_file(tmp_path)
     assert Request(recipe=path).job().capture_id != Request(recipe=path, repeat=1).job().capture_id
+
+
+SOAKS = """
+[[soaks]]
+temperature_C = 25.0
+poses = [1, 3, 5, 1]
+
+[[soaks]]
+temperature_C = -10.0
+poses = [2, 4, 6, 8]
+verification = []
+
+[[soaks]]
+temperature_C = 25.0
+"""
+
+
+def in_soaks() -> list[tuple[str, str]]:
+    return [("temperatures_C = [0.0, 50.0]\n", ""), ('limits = "consumer"', 'limits = "consumer"' + SOAKS)]
+
+
+def test_a_recipe_may_say_soak_by_soak_which_poses_are_measured(tmp_path: Path) -> None:
+    recipe = load_recipe(recipe_file(tmp_path, *in_soaks()))
+    assert recipe.temperatures_C == [25.0, -10.0, 25.0]
+    assert [p.name for p in recipe.poses_at(0)] == ["p1", "p3", "p5", "p1"]
+    assert (recipe.verification_at(1), recipe.verification_at(2)) == ([], recipe.verification)
+    records = [s for s in steps(recipe) if s.kind != "allan"]
+    assert len(records) == 4 + len(recipe.verification) + 4 + len(recipe.poses) + len(recipe.verification)
+    assert len(steps(recipe)) == recipe.wanted_records
+
+
+def test_refuses_soaks_that_name_a_pose_that_is_not_there(tmp_path: Path) -> None:
+    with pytest.raises(RecipeInvalid, match="soak 2 names poses 10, there are 9"):
+        load_recipe(recipe_file(tmp_path, *in_soaks(), ("8]", "10]")))
+
+
+def test_a_temperature_may_come_again_but_not_twice_in_a_row(tmp_path: Path) -> None:
+    assert small_job(tmp_path, ("[0.0, 50.0]", "[0.0, 25.0, 50.0, 25.0, 0.0]")).recipe.temperatures_C[-1] == 0.0
+    assert "twice in a row" in refusal(tmp_path, ("[0.0, 50.0]", "[0.0, 25.0, 25.0]"))

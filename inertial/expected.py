@@ -1,0 +1,86 @@
+"""The error to be expected of every coefficient, from the plan and the noise alone, before anything is measured."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from inertial import design
+from inertial.errors import NotIdentified
+from inertial.noise.dwells import whitener
+from inertial.state import State
+
+Array = NDArray[np.float64]
+
+_SINGULAR = 1e-11
+"""Smallest eigenvalue of the scaled normal matrix: below, a coefficient is not determined (as in a fit)."""
+
+
+@dataclass(frozen=True)
+class Expected:
+    """Standard errors that a fit will have.
+
+    names : per axis, (effect id, coefficient) of the p columns; errors : (3, p), g per unit of the column
+    shared_names : likewise of the station's parameters; shared_errors : (q,)
+    """
+
+    names: tuple[tuple[tuple[str, str], ...], ...]
+    errors: Array
+    shared_names: tuple[tuple[str, str], ...]
+    shared_errors: Array
+
+
+def expected_errors(effects: Sequence[str], state: State, covariance: Array, *, units: int = 1) -> Expected:
+    """Standard errors of a generalised least-squares fit of a model to planned dwells.
+
+    (Hᵀ·C⁻¹·H)⁻¹ per axis; parameters of the station, which all units share, after projecting the units' own columns out.
+    Nonlinear parameters stand in the middle of their bounds.
+
+    Parameters
+    ----------
+    effects : ids of the model
+    state : the planned dwells of one unit, (n,)
+    covariance : (n, n), of the dwell means of one axis, g²
+    units : how many units share the station's parameters
+
+    Raises
+    ------
+    NotIdentified
+        The plan cannot determine a coefficient.
+    """
+    sensor, station = design.split(effects)
+    values = design.starting_values([*sensor, *station], state)
+    white = whitener(covariance)
+    h = white @ design.local_columns(sensor, state, values)
+    inverse = np.stack([inverted(part, design.local_names(sensor, axis)) for axis, part in enumerate(h)])
+    shared = np.zeros(0)
+    if station:
+        s = white @ design.shared_columns(station, state, values, np.eye(3))
+        left = s - h @ (inverse @ (np.swapaxes(h, -1, -2) @ s))
+        flat = left.reshape(-1, left.shape[-1])
+        square = inverted(flat, design.shared_names(station)) / units
+        shared = np.sqrt(np.diagonal(square))
+        across = inverse @ (np.swapaxes(h, -1, -2) @ s)
+        inverse = inverse + across @ square @ np.swapaxes(across, -1, -2)
+    return Expected(
+        names=tuple(design.local_names(sensor, axis) for axis in range(3)),
+        errors=np.sqrt(np.diagonal(inverse, axis1=-2, axis2=-1)),
+        shared_names=design.shared_names(station),
+        shared_errors=shared,
+    )
+
+
+def inverted(columns: Array, names: Sequence[tuple[str, str]]) -> Array:
+    """(XᵀX)⁻¹ of whitened columns (n, p), scaled while it is inverted; refuses what they do not determine."""
+    size = np.linalg.norm(columns, axis=0)
+    if np.any(size <= 0.0):
+        effect, name = names[int(np.argmin(size))]
+        raise NotIdentified(f"plan: {effect} ({name}) is zero in every dwell; add poses or conditions that excite it")
+    scaled = columns / size
+    gram = scaled.T @ scaled
+    if float(np.linalg.eigvalsh(gram)[0]) < _SINGULAR:
+        share = np.abs(np.linalg.eigh(gram)[1][:, 0])
+        listed = ", ".join(f"{names[i][0]} ({names[i][1]})" for i in np.argsort(-share) if share[i] > 0.1)
+        raise NotIdentified(f"plan: these cannot be told apart: {listed}; add poses or temperatures that separate them")
+    return np.asarray(np.linalg.inv(gram), dtype=np.float64) / np.outer(size, size)
