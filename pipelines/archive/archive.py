@@ -15,9 +15,9 @@ from datetime import UTC, datetime
 from hashlib import sha256
 from typing import TYPE_CHECKING, Any
 
-from pipelines.archive import files
+from pipelines.archive import chain, files
 from pipelines.archive.keys import digest, libraries
-from pipelines.archive.records import PARTS, Records
+from pipelines.archive.records import COMPLETE, PARTS, Records
 from pipelines.archive.store import address_of, place_of
 from schemas.errors import ArchiveUnusable, WrongUse, did_you_mean
 
@@ -91,6 +91,7 @@ class Run:
         """
         from schemas import tables  # slow to import, and only writers of tables need it
 
+        by, follows = provenance(), self._manifests(about.get("inputs", {}))
         for name, frame in outputs.items():
             data = files.table_bytes(
                 name,
@@ -104,8 +105,8 @@ class Run:
                 "sha256": sha256(data).hexdigest(),
                 "rows": len(frame),
             }
-            manifest = {**provenance(), **content, **about, "schema": tables.VERSION}
-            files.publish(self.path / f"{name}.json", files.json_bytes(manifest))
+            manifest = {**by, **content, **about, "schema": tables.VERSION, "manifests": follows}
+            files.publish(self.path / f"{name}.json", files.manifest_bytes(manifest))
 
     def adopt(self, other: Run, names: tuple[str, ...]) -> None:
         """Take tables over from another run of the same archive, byte for byte, with who made them, when and with what."""
@@ -127,10 +128,24 @@ class Run:
         data = html.encode()
         files.publish(self.report, data)
         content = {"stage": "report", "key": key, "sha256": sha256(data).hexdigest()}
-        files.publish(
-            self.path / "report.json",
-            files.json_bytes({**provenance(), **content, **about}),
-        )
+        manifest = {**provenance(), **content, **about, "manifests": self._manifests(about.get("inputs", {}))}
+        files.publish(self.path / "report.json", files.manifest_bytes(manifest))
+        self.seal()
+
+    def seal(self) -> int:
+        """The number of the entry in the archive's chain that names all manifests of the run as they are."""
+        mark = self.path / "sealed.json"
+        names = [path for path in self.path.glob("*.json") if path.name != mark.name]
+        sealed = {f"runs/{self.id}/{path.name}": files.sha256(path) for path in sorted(names, key=lambda one: one.name)}
+        if self.records is not None and self.records.is_complete():
+            end = self.records.path / COMPLETE
+            sealed[f"captures/{end.parent.name}/{end.name}"] = files.sha256(end)
+        before = files.read_json(mark) if mark.is_file() else {}
+        if before.get("files") == sealed:
+            return int(before["entry"])
+        entry = chain.append(self.archive.root, "run", sealed, {**provenance(), "run": self.id})
+        files.publish(mark, files.json_bytes({"entry": entry, "files": sealed}))
+        return entry
 
     def has_report(self, key: str) -> bool:
         """Whether the report is there, made with this key."""
@@ -155,6 +170,13 @@ class Run:
     def tables(self) -> list[str]:
         """Names of the tables that are there."""
         return sorted(path.stem for path in self.path.glob("*.parquet"))
+
+    def _manifests(self, inputs: Mapping[str, str]) -> dict[str, str]:
+        """Hashes of the manifests of a stage's inputs, and of what the run was started with: each names those before it."""
+        places = {name: self.path / f"{name}.json" for name in ("run", *inputs)}
+        if self.records is not None:
+            places["records"] = self.records.path / COMPLETE
+        return {name: files.sha256(place) for name, place in sorted(places.items()) if place.is_file()}
 
     def _is_made_by(self, name: str, key: str) -> bool:
         path = self.path / f"{name}.parquet"
@@ -210,7 +232,7 @@ class Archive:
         run = Run(self, f"{name}-{digest(decisive)[:10]}")
         if not (run.path / "run.json").is_file():
             self.prepare()
-            files.publish(run.path / "run.json", files.json_bytes({**provenance(), **about}))
+            files.publish(run.path / "run.json", files.manifest_bytes({**provenance(), **about}))
         return run
 
     def capture(self, capture_id: str) -> Records:
@@ -275,6 +297,6 @@ def _info(run: Run) -> RunInfo:
         device=lot.get("device", ""),
         units=tuple(unit["serial"] for unit in lot.get("units", [])),
         started=about["when"],
-        finished=run.report.is_file(),
+        finished=run.report.is_file() or (run.path / "grades.parquet").is_file(),  # re-runs draw none
         stages=tuple(stages),
     )

@@ -14,6 +14,7 @@ import uuid
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
+from pipelines.archive.signatures import signed
 from pipelines.archive.store import ObjectPath, first_line
 from schemas.errors import ArchiveUnusable
 
@@ -133,6 +134,11 @@ def _no_manifest(path: Place) -> str:
 def json_bytes(content: Mapping[str, Any]) -> bytes:
     """Canonical JSON: keys sorted, UTF-8, one newline at the end."""
     return (json.dumps(content, sort_keys=True, indent=1, ensure_ascii=False) + "\n").encode()
+
+
+def manifest_bytes(content: Mapping[str, Any]) -> bytes:
+    """A manifest's bytes, signed where a key is there."""
+    return json_bytes(signed(content))
 
 
 def publish(path: Place, data: bytes, what: str = "archive", remedy: str = IN_ARCHIVE) -> None:

@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from pipelines.archive.store import Place
 
 PARTS = ("samples", "readings", "history")
+COMPLETE = "complete.json"
 
 
 class Records:
@@ -24,6 +25,7 @@ class Records:
 
     def __init__(self, path: Place) -> None:
         self.path = path
+        self._newest = ""  # hash of the manifest that this object stored last
 
     def begin(self) -> None:
         """Clear away what a killed writer left; only the one process that captures may call this."""
@@ -32,11 +34,12 @@ class Records:
 
     def is_complete(self) -> bool:
         """Whether capture came to its end."""
-        return (self.path / "complete.json").is_file()
+        return (self.path / COMPLETE).is_file()
 
     def complete(self) -> None:
         """Note that capture came to its end."""
-        files.publish(self.path / "complete.json", files.json_bytes({"records": len(self.finished())}))
+        content = {"records": len(self.finished()), "previous": self._head()}
+        files.publish(self.path / COMPLETE, files.manifest_bytes(content))
 
     def finished(self) -> set[int]:
         """Numbers of the records that are stored whole."""
@@ -61,20 +64,20 @@ class Records:
         order = len(self.finished())
         state = self._state_path(record)
         files.publish(state, station_state)
-        about = {"record": record, "order": order, "schema": tables.VERSION}
+        about = {"record": record, "order": order, "schema": tables.VERSION, "previous": self._head()}
         hashes = {name: sha256(data).hexdigest() for name, data in content.items()}
-        manifest = files.json_bytes({**about, "content": hashes})
+        manifest = files.manifest_bytes({**about, "content": hashes})
         files.publish_folder(self.path / f"{record:05d}", {**content, "record.json": manifest})
+        self._newest = sha256(manifest).hexdigest()
         for old in state.parent.glob("*.bin"):
             if old != state:
                 old.unlink()
 
     def last_state(self) -> bytes | None:
         """The station's state after the record stored last; None before the first."""
-        folders = list(self._folders())
-        if not folders:
+        last = self._last()
+        if last is None:
             return None
-        last = max(folders, key=lambda folder: files.read_json(folder / "record.json")["order"])
         state = self._state_path(int(last.name))
         return state.read_bytes() if state.is_file() else None
 
@@ -108,6 +111,19 @@ class Records:
         else:
             whole = list(self.path.iterdir()) if self.path.is_dir() else []
         return sorted((folder for folder in whole if folder.name.isdigit()), key=lambda folder: folder.name)
+
+    def _last(self) -> Place | None:
+        """Folder of the record stored last; None before the first."""
+        folders = self._folders()
+        order = {folder: files.read_json(folder / "record.json")["order"] for folder in folders}
+        return max(folders, key=lambda folder: order[folder]) if folders else None
+
+    def _head(self) -> str:
+        """Hash of the manifest of the record stored last: the next one names it; empty before the first."""
+        if self._newest:
+            return self._newest
+        last = self._last()
+        return files.sha256(last / "record.json") if last is not None else ""
 
     def _state_path(self, record: int) -> Place:
         return self.path / "state" / f"{record:05d}.bin"

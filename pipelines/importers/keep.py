@@ -32,4 +32,5 @@ def keep(data: Imported, source: Source, how: Mapping, judged: Judged | None, ar
     there = {name: frame for name, frame in tables.items() if frame is not None}
     if not run.has(tuple(there), key):
         run.save("import", key, there, {"inputs": inputs, "parameters": parameters, "code": code})
+    run.seal()
     return run

@@ -70,6 +70,7 @@ def certify(
     for proposal in proposals:
         event, was_there = ledger.add(proposal, supersede=supersede)
         (result.there if was_there else result.written).append(event)
+    ledger.anchor(result.written)
     return result
 
 

@@ -15,7 +15,7 @@ from datetime import datetime, timedelta
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from pipelines.archive import Archive, files
+from pipelines.archive import Archive, chain, files
 from pipelines.archive.archive import provenance
 from pipelines.archive.locks import alone
 from pipelines.archive.store import ObjectPath, place_of
@@ -145,7 +145,15 @@ class Ledger:
         written = self._append(serial, decided)
         if written is None:  # revoking always has something to write, or raises
             raise WrongUse(_nothing_to_revoke(serial, [], certificate, day))
+        self.anchor([written])
         return written
+
+    def anchor(self, events: Sequence[Event]) -> None:
+        """Name events in the archive's chain, so that one that is taken away is missed."""
+        if events:
+            places = {self._place(one.serial, one.sequence): one for one in events}
+            sealed = {place: files.sha256(self.root / place) for place in sorted(places)}
+            chain.append(self.root, "calibrations", sealed, {**provenance(), "run": events[0].run})
 
     def write_bulk(self, events: Iterable[Event]) -> int:
         """Write events of a new archive at once, without a look at what is there nor a sync per file; how many there were.
@@ -157,7 +165,7 @@ class Ledger:
         count, last = 0, dict[str, str]()
         for event in events:
             data = files.json_bytes(replace(event, previous=last.get(event.serial, "")).document())
-            place = self._folder(event.serial) / f"{event.sequence:06d}.json"
+            place = self.root / self._place(event.serial, event.sequence)
             place.parent.mkdir(parents=True, exist_ok=True)
             place.write_bytes(data)
             last[event.serial] = hashlib.sha256(data).hexdigest()
@@ -174,13 +182,16 @@ class Ledger:
                 if event is None:
                     return None
                 event = _stamped(event, known)
-                data = files.json_bytes(event.document())
-                if files.publish_first(folder / f"{event.sequence:06d}.json", data):
+                data = files.manifest_bytes(event.document())
+                if files.publish_first(self.root / self._place(serial, event.sequence), data):
                     return event
 
     def _folder(self, serial: str) -> Place:
-        name = hashlib.sha256(serial.encode("utf-8", "surrogateescape")).hexdigest()
-        return self.root / FOLDER / name[:2] / name[:16]
+        return self.root / folder_of(serial)
+
+    @staticmethod
+    def _place(serial: str, sequence: int) -> str:
+        return f"{folder_of(serial)}/{sequence:06d}.json"
 
     def _read(self, serial: str) -> list[tuple[Event, str]]:
         found = _events(self._folder(serial))
@@ -192,6 +203,12 @@ class Ledger:
                 )
                 raise ArchiveUnusable(message)
         return found
+
+
+def folder_of(serial: str) -> str:
+    """Folder of a unit's events below the archive's root."""
+    name = hashlib.sha256(serial.encode("utf-8", "surrogateescape")).hexdigest()
+    return f"{FOLDER}/{name[:2]}/{name[:16]}"
 
 
 def refuse_serial(serial: str, where: str) -> None:

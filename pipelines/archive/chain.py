@@ -1,0 +1,75 @@
+"""The archive's chain: numbered entries, each with the hash of the one before and of the manifests that it seals.
+
+``chain/<thousands>/<number>.json``. An entry is created once; of two processes that write the next one, one is told that it is
+there and takes the number after it. Whoever keeps the last entry's hash elsewhere can tell later that nothing before it is gone.
+"""
+
+from __future__ import annotations
+
+from contextlib import nullcontext
+from typing import TYPE_CHECKING, Any
+
+from pipelines.archive import files
+from pipelines.archive.locks import alone
+from pipelines.archive.store import ObjectPath
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Mapping
+
+    from pipelines.archive.store import Place
+
+FOLDER = "chain"
+SHARD = 1000
+
+
+def append(root: Place, kind: str, sealed: Mapping[str, str], about: Mapping[str, Any]) -> int:
+    """The number of a new entry.
+
+    Parameters
+    ----------
+    kind : ``run`` or ``calibrations``.
+    sealed : hashes of files by their place below the archive's root.
+    about : who writes it where and when, and of what.
+    """
+    top = root / FOLDER
+    with alone(top, wait=True) if isinstance(root, ObjectPath) else nullcontext():
+        number = last_number(root) + 1
+        while True:
+            previous = files.sha256(place_of_entry(root, number - 1)) if number > 1 else ""
+            content = {
+                **about,
+                "number": number,
+                "kind": kind,
+                "files": dict(sealed),
+                "previous": previous,
+                "schema": 1,
+            }
+            if files.publish_first(place_of_entry(root, number), files.manifest_bytes(content)):
+                return number
+            number += 1
+
+
+def last_number(root: Place) -> int:
+    """The number of the last entry; 0 where there is none."""
+    top = root / FOLDER
+    shards = sorted((int(one.name) for one in _below(top) if one.name.isdigit()), reverse=True)
+    for shard in shards:
+        numbers = [int(one.stem) for one in _below(top / f"{shard:06d}") if one.stem.isdigit()]
+        if numbers:
+            return max(numbers)
+    return 0
+
+
+def entries(root: Place) -> Iterator[tuple[int, Place]]:
+    """Numbers and places of the entries up to the last, whether they are there or not."""
+    for number in range(1, last_number(root) + 1):
+        yield number, place_of_entry(root, number)
+
+
+def place_of_entry(root: Place, number: int) -> Place:
+    """Where an entry lies."""
+    return root / FOLDER / f"{number // SHARD:06d}" / f"{number:09d}.json"
+
+
+def _below(folder: Place) -> list[Place]:
+    return list(folder.iterdir()) if isinstance(folder, ObjectPath) or folder.is_dir() else []
