@@ -54,13 +54,19 @@ class CaptureSink(Protocol):
 
 @dataclass(frozen=True)
 class Step:
-    """One record to take: its number, what it is for, the soak that it belongs to, and the pose."""
+    """One record to take: its number, what it is for, the soak that it belongs to, and the pose.
+
+    wait_s : after the move; the recipe's where None
+    settled : whether the devices settle at the soak's temperature first, or are read while they follow the chamber
+    """
 
     record: int
     kind: Kind
     soak: int
     temperature: float
     pose: Pose
+    wait_s: float | None = None
+    settled: bool = True
 
 
 def steps(recipe: Recipe) -> list[Step]:
@@ -70,12 +76,11 @@ def steps(recipe: Recipe) -> list[Step]:
     """
     found: list[Step] = []
     for soak, temperature in enumerate(recipe.temperatures_C):
-        parts: tuple[tuple[Kind, list[Pose]], ...] = (
-            ("dwell", recipe.poses_at(soak)),
-            ("verification", recipe.verification_at(soak)),
-        )
-        for kind, poses in parts:
-            found += [Step(len(found) + i, kind, soak, temperature, pose) for i, pose in enumerate(poses)]
+        poses, waits, settled = recipe.poses_at(soak), recipe.waits_at(soak), recipe.settles_at(soak)
+        for pose, wait in zip(poses, waits, strict=True):
+            found.append(Step(len(found), "dwell", soak, temperature, pose, wait, settled))
+        for pose in recipe.verification_at(soak):
+            found.append(Step(len(found), "verification", soak, temperature, pose, settled=settled))
     if recipe.static_record_s > 0.0:
         again = recipe.static_temperature_C == recipe.temperatures_C[-1]
         soak = len(recipe.temperatures_C) - (1 if again else 0)
@@ -250,6 +255,12 @@ class _Work:
         station, config = self.station, self.station.config
         if config.safety.chamber == "off":
             station.chamber.on()
+        if not step.settled:
+            station.chamber.set_temperature(step.temperature)
+            self.guard.note(
+                "soak", step.record, f"soak {step.soak} at {step.temperature:g} °C", "read on the way there"
+            )
+            return
         self.tell(step, f"soak at {step.temperature:g} °C")
         start = station.clock.now()
         self.approach = Approach(step.temperature)
@@ -317,7 +328,7 @@ class _Work:
         """One record, whole; conditions were as they must be before, while and when it was taken."""
         station, recipe = self.station, self.recipe
         station.table.move(step.pose.outer_deg, step.pose.inner_deg)
-        station.clock.sleep(recipe.settle_s)
+        self.rest(recipe.settle_s if step.wait_s is None else step.wait_s)
         self.guard.before(self.slots)
         duration = recipe.static_record_s if step.kind == "allan" else recipe.dwell_s
         powered = station.reader.since_power()
@@ -337,6 +348,15 @@ class _Work:
             raise Suspended(reasons, spoilt=True)
         return record
 
+    def rest(self, seconds: float) -> None:
+        """Lets the devices come to rest after a move, and keeps the history of a long wait."""
+        clock = self.station.clock
+        end = clock.now() + seconds
+        while end - clock.now() > HISTORY_S:
+            clock.sleep(HISTORY_S)
+            self.noted()
+        clock.sleep(end - clock.now())
+
     def _spans(self, record: Record) -> Iterator[float]:
         """Sleeps through a record in spans, short enough for the slots' memories and for the history."""
         memory = min(identity.capacity for identity in self.identities.values()) / record.rate * FILL
@@ -352,7 +372,8 @@ class _Work:
         station = self.station
         angles, air, instruments = station.table.angles(), station.chamber.temperature(), station.reader.instruments()
         self.note(instruments)
-        self.guard.during(step.pose, step.temperature, angles, air, instruments, self.slots)
+        target = step.temperature if step.settled else None
+        self.guard.during(step.pose, target, angles, air, instruments, self.slots)
         record.look(angles, air, instruments)
 
     def empty(self, record: Record) -> None:

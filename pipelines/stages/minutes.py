@@ -97,11 +97,14 @@ def itinerary(
     for step in steps:
         begin = now
         parts: list[tuple[StretchKind, float, Standing]] = []
-        if step.soak != now.soak:
+        if step.soak != now.soak and not step.settled:
+            now = replace(now, air=step.temperature, soak=step.soak)  # read on the way: nobody waits
+        elif step.soak != now.soak:
             waited, reached = soaked(now, step.temperature, station, recipe.soak_min_s)
             parts.append(("soak", waited, replace(reached, soak=step.soak)))
             now = parts[-1][2]
-        going = move_seconds(now, step.pose, station) + recipe.settle_s + station.pace.record_s
+        wait = recipe.settle_s if step.wait_s is None else step.wait_s
+        going = move_seconds(now, step.pose, station) + wait + station.pace.record_s
         there = replace(_later(now, going, station), outer=step.pose.outer_deg, inner=step.pose.inner_deg)
         lasting = recipe.static_record_s if step.kind == "allan" else recipe.dwell_s
         parts.append(("move", going, there))
