@@ -1,0 +1,160 @@
+"""What spoils data pauses a run: it goes back to its checkpoint, measures again, and the journal says why."""
+
+import pandas as pd
+import pytest
+from small_station import QUIET, MemorySink, lot_of, quiet_progress, short_recipe, station_of
+
+from pipelines.stages.capture import capture
+from schemas.errors import OperatorNeeded, StationTimeout
+from schemas.event import MemoryLog
+from stations.opening import make_plant, open_station, serve_plant
+
+RECIPE = short_recipe(poses=3)
+DURING = 912.0  # the second record of RECIPE is being taken then
+
+
+def run(*faults, config=None, lot=None, sink=None, events=None, recipe=RECIPE, **suspenders):
+    config = config or station_of(faults=list(faults), preset_overrides=QUIET)
+    rules = config.suspenders.model_copy(update=suspenders)
+    config = config.model_copy(update={"suspenders": rules})
+    lot = lot or lot_of()
+    sink, events = sink or MemorySink(), events or MemoryLog()
+    with open_station(config, lot, resume=sink.last_state()) as station:
+        capture(station, recipe, lot, sink, progress=quiet_progress, events=events)
+    return sink, events
+
+
+def kinds(events):
+    return [event.kind for event in events.noted() if event.kind not in {"reference", "soak"}]
+
+
+def means(sink):
+    return sink.all(0).groupby(["unit", "record"])[["x", "y", "z"]].mean()
+
+
+@pytest.fixture(scope="module")
+def undisturbed():
+    return run()
+
+
+DISTURBANCES = {
+    "door": {"kind": "door", "at_s": DURING, "for_s": 60.0},
+    "vibration": {"kind": "vibration", "at_s": DURING, "for_s": 60.0},
+    "supply": {"kind": "supply_sag", "at_s": DURING, "for_s": 60.0, "device": "reader"},
+}
+
+
+@pytest.mark.parametrize("condition", DISTURBANCES)
+def test_a_condition_that_passes_costs_time_and_no_data(condition, undisturbed):
+    sink, events = run(DISTURBANCES[condition])
+    assert kinds(events) == ["spoilt", "resumed"]
+    spoilt, resumed = (next(e for e in events.noted() if e.kind == kind) for kind in ("spoilt", "resumed"))
+    assert condition in spoilt.reason
+    assert spoilt.record == resumed.record == 1
+    assert resumed.figures["paused_s"] >= 60.0
+    assert sorted(sink.records) == sorted(undisturbed[0].records)
+    assert (sink.all(1)["status"] == "ok").all()
+    begins = sink.all(1).drop_duplicates("record").set_index("record")["start_s"]
+    assert begins[1] > DURING + 60.0 + 30.0  # gone for a while, and the soak made sure of
+    far = (means(sink) - means(undisturbed[0])).abs().to_numpy().max()
+    assert far < 20.0  # LSB of 1/256000 g: the table does not come to rest twice in the same place
+
+
+def test_a_door_that_stays_open_ends_the_run_with_its_finished_records():
+    with pytest.raises(
+        OperatorNeeded, match=r"paused for 3\d\d s: the chamber's door is open, .* nothing .* is lost"
+    ) as end:
+        run(
+            {"kind": "door", "at_s": DURING}, sink=(sink := MemorySink()), events=(events := MemoryLog()), limit_s=300.0
+        )
+    assert end.value.exit_status == 3
+    assert sorted(sink.records) == [0]
+    assert kinds(events) == ["spoilt", "stopped"]
+    assert events.noted()[-1].action == "outer axis stopped; inner axis stopped; sampling stopped; chamber to 25 °C"
+
+
+def test_a_run_that_the_door_has_ended_goes_on_when_it_is_closed_and_the_command_given_again(undisturbed):
+    fault = {"kind": "door", "at_s": DURING, "for_s": 1200.0}
+    sink, events = MemorySink(), MemoryLog()
+    with pytest.raises(OperatorNeeded, match="door"):
+        run(fault, sink=sink, events=events, limit_s=60.0)
+    first = sink.all(1)
+    run(fault, sink=sink, events=events, limit_s=3600.0)
+    pd.testing.assert_frame_equal(sink.all(1).query("record == 0"), first, check_exact=True)
+    assert sorted(sink.records) == sorted(undisturbed[0].records)
+
+
+def test_the_emergency_stop_waits_for_nothing_and_leaves_the_station_safe():
+    config, lot, events = station_of(faults=[{"kind": "emergency_stop", "at_s": DURING}]), lot_of(), MemoryLog()
+    plant = make_plant(config, lot)
+    with serve_plant(config, lot, plant) as station, pytest.raises(OperatorNeeded, match="emergency stop is pressed"):
+        capture(station, RECIPE, lot, MemorySink(), progress=quiet_progress, events=events)
+    assert events.noted()[-1].kind == "emergency_stop"
+    assert not plant.sampler.running
+    assert plant.fixture.chamber.set_point == 25.0
+    assert plant.now < DURING + 15.0
+
+
+def test_an_emergency_stop_in_the_middle_of_a_move_is_told_by_its_name():
+    lot = lot_of()
+    config = station_of(faults=[{"kind": "emergency_stop", "at_s": 900.5}])
+    with pytest.raises(OperatorNeeded, match="emergency stop is pressed"):
+        run(config=config, lot=lot, recipe=short_recipe(poses=2).model_copy(update={"poses": RECIPE.poses[2:]}))
+
+
+def test_one_supply_that_stays_low_costs_its_unit_and_nobody_else():
+    sink, events = run({"kind": "supply_sag", "at_s": DURING, "serial": "U001"}, limit_s=120.0)
+    readings = sink.all(1)
+    assert "unit_lost" in kinds(events)
+    assert set(readings.query("unit == 'U001'")["status"]) == {"ok", "slot 1: supply out of tolerance"}
+    assert (readings.query("unit != 'U001'")["status"] == "ok").all()
+    assert "U001" not in set(sink.all(0).query("record > 0")["unit"])
+
+
+def test_a_dwell_spoilt_again_and_again_is_given_up_after_the_allowed_attempts():
+    shocks = [{"kind": "vibration", "at_s": at, "for_s": 5.0} for at in (911.0, *range(1020, 1060, 6))]
+    with pytest.raises(OperatorNeeded, match=r"record \d+ \(pose p\d\) spoilt 2 times: vibration"):
+        run(*shocks, attempts=2, clear_s=0.0)
+
+
+def test_soaks_tell_how_far_they_went_beyond():
+    _, events = run(recipe=short_recipe(poses=1, temperatures=(25.0, 60.0)))
+    soaks = [event.figures for event in events.noted() if event.kind == "soak"]
+    assert [soak["target_C"] for soak in soaks] == [25.0, 60.0]
+    assert 0.2 < soaks[1]["air_overshoot_K"] < 2.0
+    assert 0.0 <= soaks[1]["device_overshoot_K"] < soaks[1]["air_overshoot_K"]
+
+
+def test_a_device_that_alone_never_settles_is_refused_and_the_others_go_on():
+    config = station_of(faults=[{"kind": "frozen_temperature", "at_s": 300.0, "serial": "U002"}])
+    config = config.model_copy(update={"soak": config.soak.model_copy(update={"limit_s": 1800.0})})
+    sink, _ = run(config=config, recipe=short_recipe(poses=1, temperatures=(40.0,)))
+    readings = sink.all(1)
+    assert set(readings.query("unit == 'U002'")["status"]) == {"slot 2: does not settle at 40 °C"}
+    assert (readings.query("unit != 'U002'")["status"] == "ok").all()
+
+
+def test_a_device_of_the_station_that_is_silent_for_a_moment_costs_no_run():
+    sink, events = run({"kind": "silent", "at_s": DURING, "for_s": 8.0, "device": "chamber"})
+    assert len(sink.records) == 4
+    assert kinds(events) == ["suspended"]
+
+
+def test_a_device_of_the_station_that_stays_silent_is_named():
+    with pytest.raises(StationTimeout, match="chamber"):
+        run({"kind": "silent", "at_s": DURING, "device": "chamber"})
+
+
+@pytest.mark.parametrize("records", [1, 2])
+def test_a_run_killed_around_a_pause_goes_on_bit_for_bit(records):
+    fault = DISTURBANCES["door"]
+    whole, reasons = run(fault)
+    sink, events = MemorySink(die_after=records), MemoryLog()
+    with pytest.raises(KeyboardInterrupt):
+        run(fault, sink=sink, events=events)
+    sink.die_after = 10**6
+    run(fault, sink=sink, events=events)
+    assert sink.state == whole.state
+    for part in range(3):
+        pd.testing.assert_frame_equal(sink.all(part), whole.all(part), check_exact=True)
+    assert events.noted() == reasons.noted()
