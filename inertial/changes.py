@@ -91,7 +91,7 @@ def _later(state: State) -> State:
     if state.outer is None or state.inner is None:
         return state
     steps = [Step(float(o), float(i), _level(state)) for o, i in zip(state.outer, state.inner, strict=True)]
-    return extended(state, steps, rest=max(3600.0, float(np.ptp(state.time))))
+    return extended(state, steps, Pace(rest=max(3600.0, float(np.ptp(state.time)))))
 
 
 def _soaks(state: State, temperatures: list[float], *, soaked: bool = True) -> State:

@@ -40,12 +40,14 @@ class Step:
 
 @dataclass(frozen=True)
 class Pace:
-    """How long a station takes.
+    """How long a station takes, and where it goes on from.
 
     move_s : s of a move of 90°; dwell_s : s of a dwell; overhead_s : s beside each, for commands
     ramp : K/s of the air; lag : s by which the devices follow it
     soak_s : s of the shortest soak; settled : K within which a device counts as settled
     last_dwell_s : s of the dwells so far; 0 where as long as the next ones
+    start : where table and chamber stand; after the last dwell where None
+    rest : s that have passed since the last dwell
     """
 
     move_s: float = 5.0
@@ -56,6 +58,8 @@ class Pace:
     soak_s: float = 900.0
     settled: float = 0.05
     last_dwell_s: float = 0.0
+    start: Step | None = None
+    rest: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -133,9 +137,7 @@ class _Follow:
         self.go_on(max(pace.soak_s, settling) - (self.now - start), pace)
 
 
-def extended(
-    state: State, steps: Sequence[Step], pace: Pace | None = None, *, response: Array | None = None, rest: float = 0.0
-) -> State:
+def extended(state: State, steps: Sequence[Step], pace: Pace | None = None, *, response: Array | None = None) -> State:
     """A state with steps taken after its last dwell.
 
     What the steps do not set (supply, vibration, other columns) is as it was, dwell for dwell from the beginning.
@@ -144,7 +146,6 @@ def extended(
     ----------
     state : of one unit or a lot, (..., n)
     response : (..., 3, 3), how the force shows on each axis; for states that carry the force felt
-    rest : s that pass before the first step
     """
     pace = pace or Pace()
     count = len(steps)
@@ -152,14 +153,15 @@ def extended(
     wide = (*batch, count)
     last = None if state.temperature is None else np.broadcast_to(state.temperature, (*batch, n_of(state)))[..., -1]
     middle = T_REFERENCE if last is None else float(np.mean(last))
-    ran = timeline(steps, pace, standing(state), middle)
     apart = np.zeros(batch) if last is None else last - middle
+    there = pace.start or standing(state)
+    ran = timeline(steps, pace, there, middle if pace.start is None else pace.start.temperature)
     outer, inner = np.array([s.outer for s in steps]), np.array([s.inner for s in steps])
     scale = float(np.mean(np.linalg.norm(state.force, axis=-1)))
     force = np.broadcast_to(scale * frames.force_from_angles(outer, inner), (*wide, 3))
     whole = np.concatenate([np.broadcast_to(state.force, (*batch, n_of(state), 3)), force], axis=-2)
-    begin = np.max(state.time) + rest + 0.5 * pace.dwell_s
-    powered = None if state.since_power is None else _since_power(state.since_power, steps, rest + ran.time)
+    begin = np.max(state.time) + pace.rest + 0.5 * pace.dwell_s
+    powered = None if state.since_power is None else _since_power(state.since_power, steps, pace.rest + ran.time)
     return replace(
         state,
         force=whole,

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inertial import frames, poses
-from inertial.sequences import Step, n_of, standing
+from inertial.sequences import Pace, Step, n_of, standing
 from inertial.state import T_REFERENCE, State
 
 Array = NDArray[np.float64]
@@ -91,31 +91,30 @@ def _ring(axis: int, level: float) -> Array:
     return np.degrees(np.stack([outer, inner], axis=1))
 
 
-def temperatures(state: State, reach: Reach) -> list[float]:
+def temperatures(here: float, reach: Reach) -> list[float]:
     """Temperatures of further soaks: the ends and the middle of what may be reached, but for where the station stands."""
     if reach.temperature is None:
         return []
     low, high = reach.temperature
-    here = present(state)
     return [t for t in (high, low, 0.5 * (low + high)) if abs(t - here) > 2.0]
 
 
-def present(state: State) -> float:
+def present(state: State, pace: Pace) -> float:
     """Temperature at which the chamber stands, °C."""
-    there = standing(state)
+    there = pace.start or standing(state)
     if there is not None:
         return round(there.temperature, 1)
     return T_REFERENCE if state.temperature is None else round(float(np.mean(state.temperature[..., -1])), 1)
 
 
-def courses(state: State, reach: Reach, best: Sequence[Step]) -> list[Course]:
+def courses(state: State, reach: Reach, best: Sequence[Step], here: float) -> list[Course]:
     """Sequences that do not come from picking poses one by one.
 
     Parameters
     ----------
     best : poses that part the rivals by their directions; some are used where any pose would do
+    here : °C, where the chamber stands
     """
-    here = present(state)
     chosen = _spread(best, reach, here)
     found = [
         *_waits(here),

@@ -76,8 +76,7 @@ class Circumstances:
         if self.minutes is not None:
             return self.minutes(steps)
         state = rivals.lot.state
-        device = present(state) if state.temperature is None else float(np.mean(state.temperature[..., -1]))
-        return timeline(steps, self.pace, standing(state), device).end / 60.0
+        return timeline(steps, self.pace, self.pace.start or standing(state), present(state, self.pace)).end / 60.0
 
 
 def rivals_in(model: Model, group: EffectClass) -> Rivals | None:
@@ -152,13 +151,13 @@ class _Search:
     def _offers(self, held: Sequence[Step]) -> list[Course]:
         """Every course that is worth a look."""
         state = self.rivals.lot.state
-        here = held[-1].temperature if held else present(state)
+        here = held[-1].temperature if held else present(state, self.around.pace)
         picks = self._picked(held, here)
         offers = [Course("poses", tuple(picks[:size])).times(r) for size in _SIZES for r in _REPEATS]
-        for temperature in temperatures(state, self.reach):
+        for temperature in temperatures(here, self.reach):
             further = self._picked(held, temperature)
             offers += [Course("soaks", tuple(further[:size])) for size in _SIZES]
-        return [*offers, *courses(state, self.reach, picks)]
+        return [*offers, *courses(state, self.reach, picks, here)]
 
     def _picked(self, held: Sequence[Step], temperature: float) -> list[Step]:
         """Poses at a temperature, each the one at which the rivals differ most once those before it are fitted."""

@@ -12,6 +12,7 @@ import numpy as np
 import pandas as pd
 
 from inertial.frames import force_from_angles
+from pipelines.stages.pieces import STATIC, Signal, by_record
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
@@ -24,6 +25,7 @@ FEWEST_TO_JUDGE = 10  # samples: fewer equal values in a row happen by chance wh
 CHAMBER_MOVED_K = 5.0
 FOLLOWED_SHARE = 0.2  # a sensor that shows less than a fifth of the chamber's change does not read its temperature
 FORCE_EXPLAINS = 0.5  # of an axis' variance over the poses; a live channel has more than 0.99
+TURNED_G = 0.5  # a follow-up may stay in a few poses: an axis that they hardly turn has nothing to show
 SAMPLES_KEPT = 0.99
 AXES = ("x", "y", "z")
 
@@ -36,14 +38,6 @@ class Fault(NamedTuple):
     reason: str
 
 
-class Scale(NamedTuple):
-    """Where an output can lie: nominal zero, full scale to both sides, and its unit."""
-
-    zero: float
-    full: float
-    unit: str
-
-
 def validate(
     samples: Iterable[pd.DataFrame], readings: pd.DataFrame, units: Sequence[Unit], zero_output: float = 0.0
 ) -> pd.DataFrame:
@@ -51,20 +45,25 @@ def validate(
 
     Parameters
     ----------
-    samples : one table per record.
+    samples : one table per record, or several of a long one.
     readings : of the whole run.
     units : the lot, so that a unit which never answered has a verdict too.
     zero_output : nominal output at 0 g, from which the full scale extends both ways; output unit.
     """
     faults = [*_silent(readings, units), *_reading_faults(readings)]
     means: list[pd.DataFrame] = []
-    for record in samples:
-        faults += _sample_faults(record, readings, zero_output)
-        means.append(record.groupby(["unit", "record"], sort=False)[list(AXES)].mean().reset_index())
+    for record, tables in by_record(samples):
+        here = readings[(readings["record"] == record) & (readings["status"] == "ok")]
+        signals = _signals(here, zero_output)
+        for table in tables:
+            _take_note(table, signals)
+            if table["kind"].iloc[0] != STATIC:
+                means.append(_sums(table))
+        faults += _sample_faults(here, signals)
     answered = readings[readings["status"] == "ok"]
     faults += _stale_temperatures(answered)
     if means:
-        faults += _dead_channels(pd.concat(means, ignore_index=True), answered)
+        faults += _dead_channels(_means(pd.concat(means)), answered)
     return _verdicts(faults, units)
 
 
@@ -117,39 +116,54 @@ def _reading_faults(readings: pd.DataFrame) -> list[Fault]:
     return faults
 
 
-def _sample_faults(samples: pd.DataFrame, readings: pd.DataFrame, zero: float) -> list[Fault]:
+def _signals(here: pd.DataFrame, zero: float) -> dict[str, Signal]:
+    """An empty signal for every unit that answered in a record."""
+    return {str(unit): Signal(zero, float(full)) for unit, full in zip(here["unit"], here["full_scale"], strict=True)}
+
+
+def _take_note(table: pd.DataFrame, signals: dict[str, Signal]) -> None:
+    output = table[list(AXES)].to_numpy(dtype=float)
+    for unit, rows in table.groupby("unit", sort=False).indices.items():
+        if unit in signals:
+            signals[str(unit)].add(output[rows])
+
+
+def _sums(table: pd.DataFrame) -> pd.DataFrame:
+    """Sums and counts of the samples of every unit in one table."""
+    groups = table.groupby(["unit", "record"], sort=False)[list(AXES)]
+    return groups.mean().mul(groups.size(), axis=0).assign(n=groups.size()).reset_index()
+
+
+def _means(sums: pd.DataFrame) -> pd.DataFrame:
+    """Mean samples of every unit and record from the sums of their tables."""
+    total = sums.groupby(["unit", "record"], sort=False).sum()
+    return total[list(AXES)].div(total["n"], axis=0).reset_index()
+
+
+def _sample_faults(here: pd.DataFrame, signals: dict[str, Signal]) -> list[Fault]:
     faults: list[Fault] = []
-    here = readings[readings["record"].isin(samples["record"].unique()) & (readings["status"] == "ok")]
-    groups = samples.groupby(["unit", "record"], sort=False).indices
-    output = samples[list(AXES)].to_numpy(dtype=float)
     for row in here.itertuples():
-        place = f"in record {row.record} (pose {row.pose})"
-        values = output[groups.get((row.unit, row.record), np.array([], dtype=np.int64))]
-        scale = Scale(zero, float(row.full_scale), str(row.out_unit))  # pyright: ignore[reportArgumentType]
-        found = _fault_of(values, scale, int(row.n))  # pyright: ignore[reportArgumentType]
+        found = _fault_of(signals[str(row.unit)], str(row.out_unit), int(row.n))  # pyright: ignore[reportArgumentType]
         if found:
+            place = f"in record {row.record} (pose {row.pose})"
             faults.append(Fault(str(row.unit), found[0], f"{found[1]} {place}; {found[2]}"))
     return faults
 
 
-def _fault_of(values: NDArray[np.float64], scale: Scale, n: int) -> tuple[str, str, str] | None:
-    """Fault, finding and remedy of one unit's samples (n, 3) in one record; None where there is none."""
-    if len(values) < SAMPLES_KEPT * n or len(values) == 0:
-        return "dropped_samples", f"{len(values)} samples of {n}", "measure again"
-    not_finite = np.argwhere(~np.isfinite(values))
-    if len(not_finite):
-        row, axis = not_finite[0]
-        finding = f"{values[row, axis]} on {AXES[axis]} in row {row} ({len(not_finite)} such values)"
-        return "not_finite", finding, "measure again"
-    still = np.flatnonzero(np.ptp(values, axis=0) == 0.0)
-    if len(values) >= FEWEST_TO_JUDGE and still.size:
-        finding = f"constant output {values[0, still[0]]:g} {scale.unit} on {AXES[still[0]]}"
+def _fault_of(signal: Signal, unit: str, n: int) -> tuple[str, str, str] | None:
+    """Fault, finding and remedy of one unit's samples in one record; None where there is none."""
+    if signal.n < SAMPLES_KEPT * n or signal.n == 0:
+        return "dropped_samples", f"{signal.n} samples of {n}", "measure again"
+    if signal.wild is not None:
+        value, axis, row = signal.wild
+        return "not_finite", f"{value} on {AXES[axis]} in row {row} ({signal.wild_count} such values)", "measure again"
+    still = np.flatnonzero(signal.low == signal.high)
+    if signal.n >= FEWEST_TO_JUDGE and still.size:
+        finding = f"constant output {signal.low[still[0]]:g} {unit} on {AXES[still[0]]}"
         return "stuck_output", finding, "check wiring and power of the slot"
-    clipped = np.argwhere(np.abs(values - scale.zero) >= scale.full)
-    if len(clipped) and scale.full > 0.0:
-        axis = clipped[0][1]
-        finding = f"{len(clipped)} samples at full scale ({scale.full:g} {scale.unit} from zero) on {AXES[axis]}"
-        return "clipped", finding, "choose a wider range"
+    if signal.clipped:
+        where = f"({signal.full:g} {unit} from zero) on {AXES[signal.clipped_axis]}"
+        return "clipped", f"{signal.clipped} samples at full scale {where}", "choose a wider range"
     return None
 
 
@@ -177,7 +191,7 @@ def _dead_channels(means: pd.DataFrame, readings: pd.DataFrame) -> list[Fault]:
         if len(rows) < FEWEST_TO_JUDGE // 2:
             continue
         explained = _explained_by_force(rows)
-        dead = np.flatnonzero(explained < FORCE_EXPLAINS)
+        dead = np.flatnonzero((explained < FORCE_EXPLAINS) & _turned(rows))
         if dead.size:
             axis = AXES[dead[0]]
             reason = (
@@ -186,6 +200,12 @@ def _dead_channels(means: pd.DataFrame, readings: pd.DataFrame) -> list[Fault]:
             )
             faults.append(Fault(str(unit), "dead_channel", reason))
     return faults
+
+
+def _turned(rows: pd.DataFrame) -> NDArray[np.bool_]:
+    """Which axes the poses turn far enough to expect an answer of, (3,)."""
+    angles = np.radians(rows[["outer_deg", "inner_deg"]].to_numpy())
+    return np.asarray(np.ptp(force_from_angles(angles[:, 0], angles[:, 1]), axis=0) >= TURNED_G)
 
 
 def _explained_by_force(rows: pd.DataFrame) -> NDArray[np.float64]:
