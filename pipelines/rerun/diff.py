@@ -1,0 +1,150 @@
+"""What differs between two runs: grades, coefficients and figures, by how much against their uncertainty, and because of what."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pandas as pd
+
+from pipelines.rerun.causes import causes
+from pipelines.rows import rows_of
+from schemas.errors import DataRejected
+
+if TYPE_CHECKING:
+    from pipelines.archive import Run
+
+COEFFICIENT = ["unit", "axis", "effect", "name"]
+FIGURE = ["unit", "figure"]
+PLAIN_FACTOR = 2.0
+
+
+def diff(a: Run, b: Run) -> dict[str, Any]:
+    """The differences of two runs as a document: units whose grade flips first, then by the largest change against uncertainty.
+
+    ``over_a`` and ``over_b`` are a change over the standard uncertainty of either, ``over_both`` over that of their difference if
+    the two were independent, √(u_a² + u_b²): two analyses of one measurement are not, so there a change of one standard
+    uncertainty is a large one.
+
+    Raises
+    ------
+    DataRejected
+        The runs have no unit in common, or nothing to compare.
+    """
+    coefficients = _changed(_table(a, "coefficients"), _table(b, "coefficients"), COEFFICIENT, "standard_error")
+    figures = _changed(_standard(a), _standard(b), FIGURE, "standard_error")
+    units = _units(a, b, coefficients)
+    return {
+        "a": a.id,
+        "b": b.id,
+        "same": not any(row["changed"] for row in units) and not len(coefficients) and not len(figures),
+        "because": causes(a, b),
+        "flipped": [row["unit"] for row in units if row["flipped"]],
+        "units": units,
+        "coefficients": _documented(coefficients),
+        "figures": _documented(figures),
+        "only_a": _only(a, b),
+        "only_b": _only(b, a),
+    }
+
+
+def _table(run: Run, name: str) -> pd.DataFrame:
+    """A table of a run, without rows where the run has none."""
+    if name in run.tables():
+        return run.table(name)
+    if name == "coefficients":
+        message = f"run {run.id}: it has no coefficients, a comparison needs them; finish it, or run it again first"
+        raise DataRejected(message)
+    return pd.DataFrame({"unit": [], "figure": [], "value": [], "uncertainty": [], "limit": [], "unit_text": []})
+
+
+def _standard(run: Run) -> pd.DataFrame:
+    """Figures with their standard uncertainty: the table holds the expanded one, by the limits' factor where there is a limit."""
+    figures = _table(run, "figures")
+    factor = (run.about.get("limits") or {}).get("coverage_factor", PLAIN_FACTOR)
+    limited = figures["limit"].notna()
+    return figures.assign(
+        standard_error=figures["uncertainty"].astype(float) / limited.map({True: factor, False: PLAIN_FACTOR})
+    )
+
+
+def _changed(a: pd.DataFrame, b: pd.DataFrame, key: list[str], error: str) -> pd.DataFrame:
+    """Rows of both tables whose value or uncertainty differs, and those that only one of them has."""
+    keep = [*key, "value", error, "unit_text"]
+    both = a[keep].merge(b[keep], on=key, how="outer", suffixes=("_a", "_b"))
+    u_a, u_b = both[f"{error}_a"], both[f"{error}_b"]
+    other_unit = both["unit_text_a"].ne(both["unit_text_b"]) & both["value_a"].notna() & both["value_b"].notna()
+    change = (both["value_b"] - both["value_a"]).mask(other_unit)
+    told = both[key].assign(
+        unit_text=both["unit_text_b"].fillna(both["unit_text_a"]),
+        a=both["value_a"],
+        b=both["value_b"],
+        change=change,
+        u_a=u_a,
+        u_b=u_b,
+        over_a=_over(change, u_a),
+        over_b=_over(change, u_b),
+        over_both=_over(change, (u_a**2 + u_b**2) ** 0.5),
+    )
+    same = (both["value_a"] == both["value_b"]) & (u_a == u_b)
+    told = told[~same]
+    alone = told["a"].isna() | told["b"].isna()
+    largest = told["over_both"].abs().fillna(0.0).mask(alone, np.inf)
+    return told.assign(largest=largest).sort_values(["largest", *key], ascending=[False, *[True] * len(key)])
+
+
+def _over(change: pd.Series, size: pd.Series) -> pd.Series:
+    """A change over an uncertainty; missing where there is none."""
+    return change / size.where(size > 0.0)
+
+
+def _units(a: Run, b: Run, coefficients: pd.DataFrame) -> list[dict[str, Any]]:
+    """One row for every unit of both runs, flips first."""
+    before, after = _grades(a), _grades(b)
+    common = [unit for unit in before if unit in after]
+    if not common:
+        message = f"diff: runs {a.id} and {b.id} have no unit in common, one is needed; name two runs of the same units"
+        raise DataRejected(message)
+    finite = coefficients[np.isfinite(coefficients["largest"].to_numpy(dtype=float))]
+    largest = finite.groupby("unit")["largest"].max().to_dict()
+    moved = set(coefficients["unit"])
+    rows = [_unit_row(unit, before[unit], after[unit], float(largest.get(unit, 0.0)), unit in moved) for unit in common]
+    return sorted(
+        rows, key=lambda row: (not row["flipped"], not row["changed"], -row["largest_over_both"], row["unit"])
+    )
+
+
+def _unit_row(
+    unit: str,
+    before: dict[str, Any],
+    after: dict[str, Any],
+    largest: float,
+    moved: bool,  # noqa: FBT001 - its coefficients
+) -> dict[str, Any]:
+    flipped = (before["outcome"], before["grade"]) != (after["outcome"], after["grade"])
+    return {
+        "unit": unit,
+        "flipped": flipped,
+        "changed": flipped or moved or before["reasons"] != after["reasons"],
+        "outcome": [before["outcome"], after["outcome"]],
+        "grade": [before["grade"], after["grade"]],
+        "reasons": [before["reasons"], after["reasons"]],
+        "largest_over_both": largest,
+    }
+
+
+def _grades(run: Run) -> dict[str, dict[str, Any]]:
+    """Grade of every unit; units of a run that was not graded have none."""
+    if "grades" in run.tables():
+        return {row["unit"]: row for row in rows_of(run.table("grades"))}
+    units = dict.fromkeys(run.table("coefficients")["unit"].astype(str))
+    return {unit: {"outcome": "", "grade": "", "reasons": ""} for unit in units}
+
+
+def _only(one: Run, other: Run) -> list[str]:
+    there = _grades(other)
+    return [unit for unit in _grades(one) if unit not in there]
+
+
+def _documented(rows: pd.DataFrame) -> list[dict[str, Any]]:
+    return rows_of(rows.drop(columns="largest"))

@@ -1,0 +1,112 @@
+"""What differs between two runs: flips first, changes against uncertainty, and the reason named."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from capture_double import CaptureDouble, small_job, small_run
+
+from pipelines.archive import Archive, Run
+from pipelines.chain import ORDER
+from pipelines.rerun.again import again
+from pipelines.rerun.diff import diff
+from pipelines.rerun.wanted import wanted
+from pipelines.runner import Runner
+from schemas.errors import DataRejected
+
+LARGER = "bias,scale,misalignment,bias_temperature,scale_temperature,third_order"
+
+
+@pytest.fixture(scope="module")
+def run(tmp_path_factory: pytest.TempPathFactory) -> Run:
+    return small_run(tmp_path_factory.mktemp("diff"))
+
+
+@pytest.fixture(scope="module")
+def larger(run: Run) -> Run:
+    return run.archive.run(again(run.archive, run.id, wanted(effects=LARGER)).new)
+
+
+def whats(document: dict) -> list[tuple[str, str]]:
+    return [(row["what"], row["stage"]) for row in document["because"]]
+
+
+def test_a_run_does_not_differ_from_itself(run: Run) -> None:
+    document = diff(run, run)
+    assert document["same"]
+    assert document["because"] == []
+    assert [row["flipped"] for row in document["units"]] == [False] * 3
+
+
+def test_other_limits_flip_grades_and_no_coefficient_and_are_named(run: Run, tmp_path: Path) -> None:
+    limits = tmp_path / "hard.toml"
+    figures = run.table("figures").query("figure == 'zero_g_offset_mg'").eval("value = abs(value)")
+    figures = figures.sort_values("value")
+    bias = figures["value"].tolist()
+    limits.write_text(
+        f'name = "hard"\nrule = "simple_acceptance"\n[figures]\nzero_g_offset_mg = {{ max = {bias[1] + 0.1}, unit = "mg" }}\n'
+    )
+    other = run.archive.run(again(run.archive, run.id, wanted(limits=str(limits))).new)
+    document = diff(run, other)
+    worst = figures["unit"].iloc[-1]
+    assert document["coefficients"] == []
+    assert document["flipped"] == [worst]
+    assert document["units"][0]["unit"] == worst
+    assert whats(document) == [("limits", "")]
+    assert "zero_g_offset_mg" in document["because"][0]["name"]
+
+
+def test_another_model_is_named_and_changes_stand_against_both_uncertainties(run: Run, larger: Run) -> None:
+    document = diff(run, larger)
+    assert whats(document) == [("model", "")]
+    assert document["because"][0]["b"] == "5 effects + third_order"
+    own, other = (one.table("coefficients") for one in (run, larger))
+    row = next(r for r in document["coefficients"] if np.isfinite(r["over_a"]) and r["effect"] == "scale")
+    a, b = (
+        t.query(f"unit == '{row['unit']}' and axis == '{row['axis']}' and name == '{row['name']}'").iloc[0]
+        for t in (own, other)
+    )
+    assert row["over_a"] == pytest.approx((b["value"] - a["value"]) / a["standard_error"])
+    assert row["over_b"] == pytest.approx((b["value"] - a["value"]) / b["standard_error"])
+    added = [r for r in document["coefficients"] if r["effect"] == "third_order"]
+    assert len(added) == 9  # three units, three axes
+    assert all(np.isnan(r["a"]) and np.isfinite(r["b"]) for r in added)
+
+
+def test_changes_come_with_the_largest_against_uncertainty_first(run: Run, larger: Run) -> None:
+    ratios = [abs(r["over_both"]) for r in diff(run, larger)["coefficients"] if np.isfinite(r["over_both"])]
+    assert ratios == sorted(ratios, reverse=True)
+
+
+def test_a_fresh_measurement_differs_by_its_data(run: Run, tmp_path: Path) -> None:
+    runner = Runner(small_job(tmp_path, repeat=1), Archive(run.archive.root), measure=CaptureDouble(noise_g=2e-4))
+    for stage in ORDER[:-1]:
+        runner.stage(stage)
+    document = diff(run, runner.run)
+    assert ("data", "") in whats(document)
+    assert document["coefficients"]
+
+
+def test_versions_of_libraries_and_code_are_named(run: Run, larger: Run) -> None:
+    path = larger.path / "verification.json"
+    manifest = json.loads(path.read_text())
+    manifest["libraries"]["numpy"], manifest["code"] = "0.1", "e" * 64
+    before = path.read_bytes()
+    path.write_text(json.dumps(manifest))
+    (larger.path / "verification_poses.json").write_text(
+        json.dumps(manifest | {"sha256": larger.manifest("verification_poses")["sha256"]})
+    )
+    try:
+        document = diff(run, larger)
+    finally:
+        path.write_bytes(before)
+    named = {(row["what"], row["name"]) for row in document["because"]}
+    assert {("library", "numpy"), ("code", "verify")} <= named
+
+
+def test_refuses_runs_without_a_common_unit(run: Run, tmp_path: Path) -> None:
+    (tmp_path / "other").mkdir()
+    other = small_run(tmp_path / "other", None, ('units = ["A1", "A2", "A3"]', 'units = ["B1", "B2"]'))
+    with pytest.raises(DataRejected, match="no unit in common"):
+        diff(run, other)
