@@ -89,18 +89,16 @@ def test_a_fresh_measurement_differs_by_its_data(run: Run, tmp_path: Path) -> No
 
 
 def test_versions_of_libraries_and_code_are_named(run: Run, larger: Run) -> None:
-    path = larger.path / "verification.json"
-    manifest = json.loads(path.read_text())
-    manifest["libraries"]["numpy"], manifest["code"] = "0.1", "e" * 64
-    before = path.read_bytes()
-    path.write_text(json.dumps(manifest))
-    (larger.path / "verification_poses.json").write_text(
-        json.dumps(manifest | {"sha256": larger.manifest("verification_poses")["sha256"]})
-    )
+    before = {name: (larger.path / f"{name}.json").read_bytes() for name in ("verification", "verification_poses")}
+    for name, content in before.items():
+        manifest = json.loads(content) | {"code": "e" * 64}
+        manifest["libraries"] = manifest["libraries"] | {"numpy": "0.1"}
+        (larger.path / f"{name}.json").write_text(json.dumps(manifest))
     try:
         document = diff(run, larger)
     finally:
-        path.write_bytes(before)
+        for name, content in before.items():
+            (larger.path / f"{name}.json").write_bytes(content)
     named = {(row["what"], row["name"]) for row in document["because"]}
     assert {("library", "numpy"), ("code", "verify")} <= named
 
