@@ -69,7 +69,9 @@ def addresses(config: StationConfig, *, every: bool = False) -> dict[Part, str]:
 
 
 def address_of(device: Device | Slots) -> str:
-    """One name for the place of a device: the host's number, port and device id."""
+    """One name for the place of a device: the host's number, port and device id, or its serial line."""
+    if device.serial:
+        return f"{os.path.realpath(device.serial)}/{device.device_id}"
     try:
         host = socket.gethostbyname(device.host)
     except OSError:  # a name that nobody knows now is still the same name
@@ -134,6 +136,10 @@ class Leases:
         for lock in self._locks.values():
             lock.close()
         self._locks.clear()
+
+    def held(self) -> list[Part]:
+        """Parts whose lease is held."""
+        return list(self._locks)
 
     def beat(self) -> None:
         """Tells that the holder lives; one that has been silent for too long has lost its leases for good."""

@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from stations.safety.leases import Leases
 
 READY, DONE = b"ready\n", b"done\n"
+ENDED = "the run's process has ended"
 POLL_S = 0.25
 TAKE_S = 5.0  # the system may close a dead process' pipe a moment before it frees the locks
 RESERVE_S = 5.0
@@ -44,9 +45,9 @@ class Watch:
             ready, _, _ = select.select([0], [], [], POLL_S)
             if ready:
                 word = os.read(0, len(DONE))
-                return "" if word == DONE else "the run's process has ended"
+                return "" if word == DONE else ENDED
             if os.getppid() != self.parent:
-                return "the run's process has ended"
+                return ENDED
             now, (last, token) = time.monotonic(), self.leases.last_beat()
             if token not in {"", self.leases.holder.token}:
                 return ""
@@ -64,8 +65,8 @@ class Watch:
 
         begun, name, folder = time.monotonic(), self.config.name, self.leases.folder
         told(folder, name, "watchdog_acts", run=self.leases.holder.run, why=why)
-        free = {self.leases.wanted[part] for part in self._free()}
-        places = addresses(self.config, every=True)
+        free = {self.leases.wanted[part] for part in self._free(ended=why == ENDED)}
+        places: dict[str, str] = {**addresses(self.config, every=True)}
         with open_devices(self.config, ()) as station:
             steps = [step for step in station.safe_steps if places[step.part] in free]
             left = SAFE_WITHIN_S - RESERVE_S - self.config.safety.lapse_s - (time.monotonic() - begun)
@@ -74,9 +75,9 @@ class Watch:
         told(folder, name, event, run=self.leases.holder.run, what=reached.sentence())
         self.leases.release()
 
-    def _free(self) -> list[Any]:
+    def _free(self, *, ended: bool) -> list[Any]:
         """Parts that this watchdog may command: those whose lease it gets, or all of a run that stands still."""
-        end = time.monotonic() + TAKE_S
+        end = time.monotonic() + (TAKE_S if ended else 0.0)
         got = [part for part in self.leases.wanted if self.leases.try_one(part)]
         while len(got) < len(self.leases.wanted) and time.monotonic() < end:
             time.sleep(POLL_S)

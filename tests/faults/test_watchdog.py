@@ -1,0 +1,255 @@
+"""Processes that die or stand still while they drive: the station is safe soon after, and free for the next."""
+
+import json
+import os
+import platform
+import signal
+import subprocess
+import sys
+import threading
+import time
+from contextlib import contextmanager
+from pathlib import Path
+
+import pytest
+from served_station import modbus_station, served
+from small_station import lot_of
+
+from schemas.errors import OperatorNeeded
+from schemas.safety import SAFE_WITHIN_S
+from stations.opening import open_devices, open_station
+from stations.safety import folder
+from stations.safety.leases import Leases, addresses, holders, new_holder
+
+ROOT = Path(__file__).resolve().parents[2]
+HOT, FAR = 60.0, 170.0
+SOON_S = 15.0
+
+DRIVER = """
+import sys, time
+from schemas.recipe import Lot
+from schemas.station import StationConfig
+from stations.opening import open_station
+config = StationConfig.model_validate_json(sys.argv[1])
+with open_station(config, Lot.model_validate_json(sys.argv[2]), run="the driver") as station:
+    station.chamber.set_temperature(60.0)
+    station.reader.start(100.0)
+    station.table.axes["outer"].start(170.0)
+    print("driving", flush=True)
+    time.sleep(float(sys.argv[3]))
+"""
+
+
+@pytest.fixture(autouse=True)
+def state(tmp_path, monkeypatch):
+    monkeypatch.setenv("TUMBLELINE_STATE", str(tmp_path / "state"))
+    return tmp_path / "state"
+
+
+@contextmanager
+def driver(config, seconds=60.0):
+    """A process that drives the station: hot chamber, a slow move, sampling."""
+    arguments = [sys.executable, "-c", DRIVER, config.model_dump_json(), lot_of().model_dump_json(), str(seconds)]
+    environment = {**os.environ, "PYTHONPATH": str(ROOT)}
+    with subprocess.Popen(arguments, cwd=ROOT, env=environment, stdout=subprocess.PIPE, text=True) as process:
+        try:
+            assert process.stdout.readline() == "driving\n"
+            yield process
+        finally:
+            with_last_breath(process)
+
+
+def with_last_breath(process):
+    if process.poll() is None:
+        process.send_signal(signal.SIGCONT)
+        process.kill()
+    process.wait(10.0)
+
+
+def look(config):
+    """Angle of the outer axis, whether it moves, the chamber's set point, whether samples are taken."""
+    with open_devices(config, ()) as station:
+        registers = station.chamber._registers
+        axis = station.table.axes["outer"]
+        return (
+            axis.position(),
+            axis._registers.flags("status")["move"],
+            registers.number("set_point"),
+            station.reader._registers.text("sampling"),
+        )
+
+
+def safe_within(config, seconds):
+    """Seconds until the station is in its safe state."""
+    begun = time.monotonic()
+    while time.monotonic() - begun < seconds:
+        _, moving, set_point, sampling = look(config)
+        if (moving, set_point, sampling) == (False, 25.0, "stopped"):
+            return time.monotonic() - begun
+        time.sleep(0.1)
+    pytest.fail(f"not safe after {seconds} s: {look(config)}; {folder.log(folder.state_folder())}")
+
+
+def told(event):
+    """The machine's log of one kind of event, once there is one."""
+    end = time.monotonic() + SOON_S
+    while time.monotonic() < end:
+        found = [line for line in folder.log(folder.state_folder()) if line["event"] == event]
+        if found:
+            return found[-1]
+        time.sleep(0.05)
+    return pytest.fail(f"no {event}: {folder.log(folder.state_folder())}")
+
+
+SLOW = {"speed_deg_s": 5.0}
+
+
+def test_a_killed_run_leaves_its_station_safe_and_free():
+    with served() as port:
+        config = modbus_station(port, limits=SLOW)
+        with driver(config) as process:
+            assert look(config)[1:] == (True, HOT, "running")
+            process.kill()
+            process.wait()
+            assert safe_within(config, SOON_S) < SAFE_WITHIN_S
+            assert 0.0 < look(config)[0] < FAR
+        assert "process has ended" in told("watchdog_acts")["why"]
+        assert told("watchdog_safe")["what"].startswith("outer axis stopped")
+        with open_station(config, lot_of(), run="the next"):  # nobody had to delete a file
+            assert {h.run for h, _ in holders(folder.state_folder(), config).values()} == {"the next"}
+
+
+def test_a_run_that_stands_still_is_taken_for_dead_and_may_not_go_on():
+    with served() as port:
+        config = modbus_station(port, limits=SLOW)
+        with driver(config) as process:
+            process.send_signal(signal.SIGSTOP)
+            safe_within(config, SOON_S)
+            assert "not been heard of" in told("watchdog_acts")["why"]
+
+
+def test_a_holder_that_stood_still_is_refused_when_it_wakes(state):
+    config = modbus_station(1)
+    leases = Leases(state, new_holder("served", "a"), addresses(config), lapse_s=0.05)
+    leases.take()
+    leases.require()
+    time.sleep(0.1)
+    leases.beat()  # too late
+    with pytest.raises(OperatorNeeded, match=r"stood still for more than 0\.05 s .* goes on where it was"):
+        leases.require()
+    leases.release()
+
+
+def test_a_run_that_ends_in_peace_leaves_its_station_safe_too():
+    with served() as port:
+        config = modbus_station(port, limits=SLOW)
+        with driver(config, seconds=0.2) as process:
+            assert process.wait(SOON_S) == 0
+            _, moving, set_point, sampling = look(config)
+            assert (moving, set_point, sampling) == (False, 25.0, "stopped")
+        assert [line["event"] for line in folder.log(folder.state_folder())] == ["driven", "left_safe"]
+
+
+def test_a_station_that_is_driven_is_refused_with_who_drives_it():
+    with served() as port:
+        config = modbus_station(port)
+        with (
+            driver(config) as process,
+            pytest.raises(OperatorNeeded, match=f"driven by the driver .process {process.pid} on"),
+            open_station(config, lot_of()),
+        ):
+            pytest.fail("two drive one station")
+
+
+def test_two_files_that_name_one_device_share_its_lease(state):
+    ours = modbus_station(4000, host="127.0.0.1")
+    theirs = modbus_station(4001, host="localhost").model_copy(update={"name": "another"})
+    chamber = ours.devices.chamber.model_copy(update={"host": "localhost"})
+    theirs = theirs.model_copy(update={"devices": theirs.devices.model_copy(update={"chamber": chamber})})
+    first = Leases(state, new_holder("served", "a"), addresses(ours), 10.0)
+    first.take()
+    second = Leases(state, new_holder("another", "b"), addresses(theirs), 10.0)
+    with pytest.raises(OperatorNeeded, match=r"the chamber at 127\.0\.0\.1:4000/3 is driven by a "):
+        second.take()
+    assert second.held() == []  # all or none
+    first.release()
+    second.take()
+    second.release()
+
+
+def test_devices_that_share_a_place_need_one_lease(state):
+    config = modbus_station(4000)
+    same = config.devices.outer
+    both = config.model_copy(update={"devices": config.devices.model_copy(update={"inner": same})})
+    leases = Leases(state, new_holder("served", "a"), addresses(both), 10.0)
+    leases.take()
+    assert set(leases.held()) == {"outer", "chamber", "reader"}
+    leases.release()
+
+
+def foreign(state, config, **about):
+    """Lease files as another holder, gone or far away, has left them."""
+    leases = Leases(state, new_holder("served", "theirs"), addresses(config), 10.0)
+    leases.take()
+    leases.hand_over()
+    for path in (state / "leases").glob("*.json"):
+        path.write_text(json.dumps(json.loads(path.read_text()) | about))
+
+
+def test_a_lease_of_a_dead_process_is_free_at_once(state):
+    config = modbus_station(4000)
+    with subprocess.Popen([sys.executable, "-c", ""]) as process:
+        process.wait()
+    foreign(state, config, pid=process.pid)
+    mine = Leases(state, new_holder("served", "mine"), addresses(config), 10.0)
+    mine.take()
+    assert folder.log(state)[0]["event"] == "lease_taken_over"
+    mine.release()
+
+
+def test_a_lease_of_another_machine_is_free_when_its_heart_has_stopped_for_a_minute(state):
+    config = modbus_station(4000)
+    foreign(state, config, host="elsewhere")
+    mine = Leases(state, new_holder("served", "mine"), addresses(config), 10.0)
+    with pytest.raises(OperatorNeeded, match=r"on elsewhere since .* free at the latest 60 s"):
+        mine.take()
+    for path in (state / "leases").glob("*.json"):
+        os.utime(path, (time.time() - SAFE_WITHIN_S - 1.0,) * 2)
+    mine.take()
+    mine.release()
+
+
+def test_leases_are_taken_by_one_of_many(state):
+    config = modbus_station(4000)
+    won, lost, start = [], [], threading.Barrier(8)
+
+    def compete(number):
+        leases = Leases(state, new_holder("served", f"run {number}"), addresses(config), 10.0)
+        start.wait()
+        try:
+            leases.take()
+            won.append(leases)
+        except OperatorNeeded:
+            lost.append(number)
+
+    threads = [threading.Thread(target=compete, args=(n,)) for n in range(8)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert (len(won), len(lost)) == (1, 7)
+    won[0].release()
+    assert not list((state / "leases").glob("*.json"))
+
+
+def test_a_lease_survives_that_somebody_clears_its_folder(state):
+    config = modbus_station(4000)
+    leases = Leases(state, new_holder("served", "a"), addresses(config), 10.0)
+    leases.take()
+    for path in (state / "leases").glob("*.json"):
+        path.unlink()
+    leases.beat()
+    holder, age = holders(state, config)["chamber"]
+    assert (holder.run, holder.host) == ("a", platform.node())
+    assert age < 5.0
+    leases.release()

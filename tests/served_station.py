@@ -1,0 +1,79 @@
+"""A station like one of hardware: the simulated one served on a port, in wall time, and a file of kind modbus for it."""
+
+import threading
+from collections.abc import Generator
+from contextlib import contextmanager
+from pathlib import Path
+
+from small_station import lot_of, station_of
+
+from schemas.recipe import Lot
+from schemas.station import StationConfig
+from stations.serving import serve
+
+QUICK = {
+    "safety": {"heartbeat_s": 0.2, "lapse_s": 1.0},
+    "soak": {"band_K": 80.0, "rate_K_per_min": 60.0, "window_s": 0.4, "poll_s": 0.1},
+    "link": {"timeout_s": 1.0},
+    "suspenders": {"poll_s": 0.2, "clear_s": 0.2, "limit_s": 5.0},
+}
+
+
+def modbus_station(port: int, host: str = "127.0.0.1", **changes: dict[str, object]) -> StationConfig:
+    """A station of kind modbus, all of whose devices answer at one port; with a safety that acts within a second or two."""
+    content = station_of().model_dump(mode="json")
+    content |= {"kind": "modbus", "name": "served", "simulation": None}
+    for device in content["devices"].values():
+        device |= {"host": host, "port": port}
+    for section in {**QUICK, **changes}:
+        content[section] |= QUICK.get(section, {}) | changes.get(section, {})
+    return StationConfig.model_validate(content)
+
+
+@contextmanager
+def served(lot: Lot | None = None, **simulation: object) -> Generator[int, None, None]:
+    """The simulated station served while the block lasts; gives its port."""
+    stop, listening, found = threading.Event(), threading.Event(), list[int]()
+
+    def ready(_host: str, port: int) -> None:
+        found.append(port)
+        listening.set()
+
+    how = {"host": "127.0.0.1", "port": 0, "speed": 1.0, "stop": stop, "ready": ready}
+    thread = threading.Thread(target=serve, args=(station_of(**simulation), lot or lot_of()), kwargs=how)
+    thread.start()
+    try:
+        assert listening.wait(20.0)
+        yield found[0]
+    finally:
+        stop.set()
+        thread.join(20.0)
+
+
+def station_file(folder: Path, config: StationConfig, name: str = "served.toml") -> Path:
+    """The station as a file."""
+    lines: list[str] = []
+
+    def table(path: str, content: dict) -> None:
+        plain = {k: v for k, v in content.items() if not isinstance(v, dict) and v is not None}
+        if path:
+            lines.append(f"[{path}]")
+        lines.extend(f"{key} = {_toml(value)}" for key, value in plain.items())
+        for key, value in content.items():
+            if isinstance(value, dict):
+                table(f"{path}.{key}".strip("."), value)
+
+    table("", config.model_dump(mode="json"))
+    path = folder / name
+    path.write_text("\n".join(lines) + "\n", encoding="utf-8")
+    return path
+
+
+def _toml(value: object) -> str:
+    if isinstance(value, bool):
+        return str(value).lower()
+    if isinstance(value, str):
+        return f'"{value}"'
+    if isinstance(value, list):
+        return "[" + ", ".join(_toml(one) for one in value) + "]"
+    return repr(value)
