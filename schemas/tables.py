@@ -14,12 +14,13 @@ import pandas as pd
 import pandera.pandas as pa
 from pandera.errors import SchemaError
 
+from schemas import version
 from schemas.errors import DataRejected
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-VERSION = 1
+VERSION = version.VERSION
 AXES = ("x", "y", "z")
 KINDS = ("dwell", "verification", "allan")
 OUTPUT_UNITS = ("V", "LSB", "g", "m/s^2")

@@ -10,43 +10,36 @@ from __future__ import annotations
 import getpass
 import os
 import platform
-from dataclasses import dataclass
+import re
 from datetime import UTC, datetime
 from hashlib import sha256
+from importlib.metadata import version
 from typing import TYPE_CHECKING, Any
 
 from pipelines.archive import chain, files
 from pipelines.archive.keys import digest, libraries
+from pipelines.archive.listing import stages_of
 from pipelines.archive.records import COMPLETE, PARTS, Records
 from pipelines.archive.store import address_of, place_of
 from schemas.errors import ArchiveUnusable, WrongUse, did_you_mean
+from schemas.version import refuse_newer
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
     import pandas as pd
 
+    from pipelines.archive.listing import RunInfo
     from pipelines.archive.store import Place
 
 FORMAT = 1
+START = "run.json"
+PLAIN = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]*")  # a name that cannot lead elsewhere
 
 
 def default_root() -> Place:
     """The archive's place where none is given: the environment's TUMBLELINE_ARCHIVE, else ./archive."""
     return place_of(os.environ.get("TUMBLELINE_ARCHIVE") or "archive")
-
-
-@dataclass(frozen=True)
-class RunInfo:
-    """One line of the archive's list."""
-
-    id: str
-    recipe: str
-    device: str
-    units: tuple[str, ...]
-    started: str
-    finished: bool
-    stages: tuple[str, ...]
 
 
 class Run:
@@ -120,8 +113,9 @@ class Run:
                 )
                 raise ArchiveUnusable(message)
             files.publish(self.path / f"{name}.parquet", data)
-            content = {**manifest, "taken_from": manifest.get("taken_from", other.id)}
-            files.publish(self.path / f"{name}.json", files.json_bytes(content))
+            follows = self._manifests(manifest.get("inputs", {}))
+            content = {**manifest, "taken_from": manifest.get("taken_from", other.id), "manifests": follows}
+            files.publish(self.path / f"{name}.json", files.manifest_bytes(content))
 
     def save_report(self, key: str, html: str, about: Mapping[str, Any]) -> None:
         """Publish the report for people with its manifest."""
@@ -144,7 +138,7 @@ class Run:
         if before.get("files") == sealed:
             return int(before["entry"])
         entry = chain.append(self.archive.root, "run", sealed, {**provenance(), "run": self.id})
-        files.publish(mark, files.json_bytes({"entry": entry, "files": sealed}))
+        files.publish(mark, files.json_bytes({"entry": entry, "files": sealed, "stages": stages_of(self)}))
         return entry
 
     def has_report(self, key: str) -> bool:
@@ -165,7 +159,10 @@ class Run:
 
     def manifest(self, name: str) -> dict[str, Any]:
         """The manifest of a table."""
-        return files.read_json(self.path / f"{name}.json")
+        place = self.path / f"{name}.json"
+        content = files.read_json(place)
+        refuse_newer(content.get("schema"), str(place))
+        return content
 
     def tables(self) -> list[str]:
         """Names of the tables that are there."""
@@ -221,6 +218,16 @@ class Archive:
             raise ArchiveUnusable(message)
         files.publish(mark, files.json_bytes({"product": "tumbleline", "format": FORMAT}))
 
+    def refuse_none(self) -> None:
+        """Refuse a place that holds no archive, or one of another format."""
+        mark = self.root / "archive.json"
+        if not mark.is_file():
+            message = (
+                f"archive: {self.root} holds no archive, one is needed; name it with --archive or TUMBLELINE_ARCHIVE"
+            )
+            raise ArchiveUnusable(message)
+        self._refuse_other_format(files.read_json(mark))
+
     def open_run(self, name: str, about: Mapping[str, Any], decisive: object) -> Run:
         """The run named for ``name`` and the hash of what decides its result: found, or begun.
 
@@ -241,10 +248,12 @@ class Archive:
 
     def run(self, name: str) -> Run:
         """The run of this id, of this unambiguous beginning, or ``latest``."""
-        ids = [info.id for info in self.runs()]
-        if name == "latest" and ids:
-            return Run(self, ids[-1])
-        found = [run_id for run_id in ids if run_id == name] or [i for i in ids if name and i.startswith(name)]
+        if PLAIN.fullmatch(name) and (self.root / "runs" / name / START).is_file():
+            return Run(self, name)
+        if name == "latest" and (infos := self.runs()):
+            return Run(self, infos[-1].id)
+        ids = [one for one in self.run_ids() if (self.root / "runs" / one / START).is_file()]
+        found = [one for one in ids if name and one.startswith(name)]
         if len(found) == 1:
             return Run(self, found[0])
         where = f"archive {self.root}"
@@ -262,11 +271,15 @@ class Archive:
 
     def runs(self) -> list[RunInfo]:
         """Every run, the one started first first."""
-        folder = self.root / "runs"
-        if not folder.is_dir():
-            return []
-        infos = [_info(Run(self, path.parent.name)) for path in folder.glob("*/run.json")]
+        from pipelines.archive.listing import info_of
+
+        infos = [info for run_id in self.run_ids() if (info := info_of(Run(self, run_id))) is not None]
         return sorted(infos, key=lambda info: (info.started, info.id))
+
+    def run_ids(self) -> list[str]:
+        """Names of the runs, in the order of the alphabet; among them may be one that is just being begun."""
+        folder = self.root / "runs"
+        return sorted(place.name for place in folder.iterdir()) if folder.is_dir() else []
 
     def _refuse_other_format(self, mark: Mapping[str, Any]) -> None:
         if mark.get("format") != FORMAT:
@@ -283,20 +296,6 @@ def provenance() -> dict[str, Any]:
         "who": getpass.getuser(),
         "where": platform.node(),
         "when": datetime.now(UTC).isoformat(timespec="milliseconds"),
+        "software": {"tumbleline": version("tumbleline"), "python": platform.python_version()},
         "libraries": libraries(),
     }
-
-
-def _info(run: Run) -> RunInfo:
-    about = run.about
-    stages = dict.fromkeys(files.read_json(run.path / f"{name}.json").get("stage", "") for name in run.tables())
-    lot = about.get("lot", {})
-    return RunInfo(
-        id=run.id,
-        recipe=about.get("recipe", {}).get("name", about.get("name", "")),
-        device=lot.get("device", ""),
-        units=tuple(unit["serial"] for unit in lot.get("units", [])),
-        started=about["when"],
-        finished=run.report.is_file() or (run.path / "grades.parquet").is_file(),  # re-runs draw none
-        stages=tuple(stages),
-    )

@@ -60,6 +60,11 @@ def sha256(path: Place) -> str:
         return hashlib.file_digest(file, "sha256").hexdigest()  # pyright: ignore[reportArgumentType]  # bytes in memory, too
 
 
+def hash_of(data: bytes) -> str:
+    """Hash of bytes, hexadecimal."""
+    return hashlib.sha256(data).hexdigest()
+
+
 def table_bytes(name: str, frame: pd.DataFrame, version: int) -> bytes:
     """A table as Parquet: zstd, no index, no library notes, the table's name and schema version in the metadata."""
     import pyarrow as pa  # a quarter of a second, which commands without a table need not spend
@@ -96,7 +101,8 @@ def read_table(path: Place, name: str, expected: str | None = None) -> pd.DataFr
     except (pa.ArrowInvalid, OSError) as problem:
         message = f"archive: {path} ({len(data)} bytes) is not a whole Parquet file ({first_line(problem)}); {remedy}"
         raise ArchiveUnusable(message) from None
-    mark = (table.schema.metadata or {}).get(TABLE_MARK, b"").decode()
+    marks = table.schema.metadata or {}
+    mark = marks.get(TABLE_MARK, b"").decode(errors="replace")
     if mark != name:
         found = f"holds table '{mark}'" if mark else "was not written by this archive"
         message = f"archive: {path} {found}, table '{name}' is needed; import foreign files with 'tumbleline import'"
@@ -104,7 +110,9 @@ def read_table(path: Place, name: str, expected: str | None = None) -> pd.DataFr
     if expected is not None and hashlib.sha256(data).hexdigest() != expected:
         message = f"archive: {path} has changed since it was written (its hash is not its manifest's); {remedy}"
         raise ArchiveUnusable(message)
-    return table.to_pandas()
+    from schemas.upgrades import upgraded
+
+    return upgraded(name, table.to_pandas(), int(marks.get(SCHEMA_MARK, b"1")), str(path))
 
 
 def read_json(path: Place) -> dict[str, Any]:
@@ -179,24 +187,44 @@ def publish_first(path: Place, data: bytes) -> bool:
             return True
 
 
+def ahead(path: Place) -> Place:
+    """Where files of a folder are written before :func:`publish_folder` publishes them with the rest."""
+    return path if isinstance(path, ObjectPath) else path.parent / f"{TEMPORARY}ahead-{path.name}"
+
+
 def publish_folder(path: Place, files: Mapping[str, bytes]) -> None:
     """Write several files so that they are there together or not at all; a folder that is there already stays.
 
     In an object store the last file of the mapping is put last and must be the one by which readers know that all are there.
+    What was written :func:`ahead` is published with them.
     """
     with writing(path.parent):
         if isinstance(path, ObjectPath):
             for name, data in files.items():
                 (path / name).write_bytes(data)
             return
+        begun = path.parent / f"{TEMPORARY}ahead-{path.name}"
         with _aside(path.parent) as aside:
-            aside.mkdir()
+            if begun.is_dir():
+                begun.rename(aside)
+            else:
+                aside.mkdir()
             for name, data in files.items():
                 _write_durably(aside / name, data)
             _sync_folder(aside)
             if not path.exists():
                 aside.rename(path)
             _sync_folder(path.parent)
+
+
+def drop(folder: Place) -> None:
+    """Remove what was written :func:`ahead`."""
+    with writing(folder.parent):
+        if isinstance(folder, ObjectPath):
+            for one in folder.walk():
+                one.unlink()
+        elif folder.is_dir():
+            shutil.rmtree(folder)
 
 
 def sweep(folder: Place) -> None:

@@ -6,6 +6,7 @@ from hashlib import sha256
 from typing import TYPE_CHECKING
 
 from pipelines.archive import files
+from pipelines.archive.events import Events
 from pipelines.archive.keys import digest
 from pipelines.archive.store import ObjectPath
 
@@ -26,6 +27,12 @@ class Records:
     def __init__(self, path: Place) -> None:
         self.path = path
         self._newest = ""  # hash of the manifest that this object stored last
+        self._ahead: dict[str, str] = {}  # hashes of the parts of a long record that are stored ahead of it
+
+    @property
+    def events(self) -> Events:
+        """The capture's journal: what paused it, and why."""
+        return Events(self.path)
 
     def begin(self) -> None:
         """Clear away what a killed writer left; only the one process that captures may call this."""
@@ -45,6 +52,18 @@ class Records:
         """Numbers of the records that are stored whole."""
         return {int(folder.name) for folder in self._folders()}
 
+    def part(self, record: int, number: int, samples: pd.DataFrame) -> None:
+        """Store a part of the samples of a record that is too long for the memory; part 0 begins anew.
+
+        The parts are of no use without the record: one that was killed on its way is measured again, since noise has no gaps.
+        """
+        place = files.ahead(self.path / f"{record:05d}")
+        if number == 0:
+            self._forget(record)
+        name, data = f"samples-{number:05d}.parquet", self._encoded("samples", samples)
+        files.publish(place / name, data)
+        self._ahead[name] = sha256(data).hexdigest()
+
     def put(
         self,
         record: int,
@@ -52,26 +71,43 @@ class Records:
         readings: pd.DataFrame,
         history: pd.DataFrame,
         station_state: bytes,
+        parts: int = 0,
     ) -> None:
-        """Store one record, durably and all at once, with the station's state after it."""
+        """Store one record, durably and all at once, with the station's state after it.
+
+        Parameters
+        ----------
+        parts : how many parts of its samples are stored already; ``samples`` are the rest then
+        """
+        if parts:
+            self.part(record, parts, samples)
+        else:
+            self._forget(record)
         from schemas import tables
 
         content = {
-            "samples.parquet": self._encoded("samples", samples),
-            "readings.parquet": self._encoded("readings", readings),
-            "history.parquet": self._encoded("history", history),
+            f"{name}.parquet": self._encoded(name, frame)
+            for name, frame in (("readings", readings), ("history", history))
         }
+        if not parts:
+            content = {"samples.parquet": self._encoded("samples", samples), **content}
         order = len(self.finished())
         state = self._state_path(record)
         files.publish(state, station_state)
         about = {"record": record, "order": order, "schema": tables.VERSION, "previous": self._head()}
         hashes = {name: sha256(data).hexdigest() for name, data in content.items()}
-        manifest = files.manifest_bytes({**about, "content": hashes})
+        manifest = files.manifest_bytes({**about, "content": {**self._ahead, **hashes}})
         files.publish_folder(self.path / f"{record:05d}", {**content, "record.json": manifest})
-        self._newest = sha256(manifest).hexdigest()
+        self._newest, self._ahead = sha256(manifest).hexdigest(), {}
         for old in state.parent.glob("*.bin"):
             if old != state:
                 old.unlink()
+
+    def _forget(self, record: int) -> None:
+        """Drops parts of an attempt at a record that was spoilt."""
+        if self._ahead:
+            files.drop(files.ahead(self.path / f"{record:05d}"))
+            self._ahead = {}
 
     def last_state(self) -> bytes | None:
         """The station's state after the record stored last; None before the first."""
@@ -86,7 +122,7 @@ class Records:
         return digest({f.name: files.read_json(f / "record.json")["content"] for f in self._folders()})
 
     def samples(self, records: Collection[int] | None = None) -> Iterator[pd.DataFrame]:
-        """The samples, one table per record in order of record: a lot's samples never lie in memory together.
+        """The samples, one table per record in order of record, or several of a long one: they never lie in memory together.
 
         Parameters
         ----------
@@ -94,13 +130,13 @@ class Records:
         """
         for folder in self._folders():
             if records is None or int(folder.name) in records:
-                yield self._part(folder, "samples")
+                yield from self._frames(folder, "samples")
 
     def gathered(self, part: str) -> pd.DataFrame:
         """Readings, history or samples of all records in one table."""
         import pandas as pd
 
-        parts = [self._part(folder, part) for folder in self._folders()]
+        parts = [frame for folder in self._folders() for frame in self._frames(folder, part)]
         kept = [frame for frame in parts if len(frame)] or parts[:1]
         return pd.concat(kept, ignore_index=True)
 
@@ -129,9 +165,12 @@ class Records:
         return self.path / "state" / f"{record:05d}.bin"
 
     @staticmethod
-    def _part(folder: Place, part: str) -> pd.DataFrame:
-        name = f"{part}.parquet"
-        return files.read_table(folder / name, part, files.read_json(folder / "record.json")["content"][name])
+    def _frames(folder: Place, part: str) -> Iterator[pd.DataFrame]:
+        """The tables of one kind of a record, in order: one, or the parts of a long record's samples."""
+        content = files.read_json(folder / "record.json")["content"]
+        for name in sorted(content):
+            if name == f"{part}.parquet" or name.startswith(f"{part}-"):
+                yield files.read_table(folder / name, part, content[name])
 
     @staticmethod
     def _encoded(name: str, frame: pd.DataFrame) -> bytes:

@@ -42,11 +42,12 @@ def default_key_place() -> Path:
 def signed(content: Mapping[str, Any]) -> dict[str, Any]:
     """The manifest with its signature, where a key is there; as it is otherwise."""
     place = key_place()
+    plain = {name: value for name, value in content.items() if name != ENTRY}  # a copy is signed by who writes it
     if place is None:
-        return dict(content)
+        return plain
     key, name = _private(str(place))
-    value = base64.b64encode(key.sign(_canonical(content))).decode()
-    return {**content, ENTRY: {"key": name, "value": value}}
+    value = base64.b64encode(key.sign(_canonical(plain))).decode()
+    return {**plain, ENTRY: {"key": name, "value": value}}
 
 
 def check(content: Mapping[str, Any], keys: Mapping[str, Ed25519PublicKey]) -> str:

@@ -1,0 +1,80 @@
+"""``tumbleline verify``: whether the archive is as it was written."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from pipelines.cli.options import ArchiveOption, JsonOption, console, error_console, print_json
+from schemas.errors import DONE, PART_FAILED
+
+if TYPE_CHECKING:
+    from pipelines.trace.checks import Report
+
+
+def command(
+    runs: Annotated[
+        list[str] | None,
+        typer.Argument(metavar="[RUN…]", help="Only these and their captures; the whole archive by default."),
+    ] = None,
+    key: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--key", metavar="FILE|HEX", help="A public key; every manifest must be signed by one of those given."
+        ),
+    ] = None,
+    head: Annotated[
+        str,
+        typer.Option(
+            "--head", metavar="HASH", help="Hash of an entry of the chain, as an earlier verification told it."
+        ),
+    ] = "",
+    archive: ArchiveOption = None,
+    *,
+    as_json: JsonOption = False,
+) -> None:
+    """Compute every hash anew: find changed bytes, missing files, edited manifests, foreign tables, false signatures.
+
+    Exit status 1: something is wrong.
+    """
+    from pipelines.archive import Archive
+    from pipelines.archive.signatures import public_keys
+    from pipelines.trace.checks import verify
+
+    store = Archive(archive)
+    store.refuse_none()
+    with error_console().status("reading") as status:
+        report = verify(
+            store,
+            runs or (),
+            keys=public_keys(key or ()),
+            demanded=bool(key),
+            head=head,
+            progress=lambda done, total: status.update(f"reading {done}/{total}"),
+        )
+    if as_json:
+        print_json(report.document())
+    else:
+        _print(report)
+    raise typer.Exit(DONE if report.whole else PART_FAILED)
+
+
+def _print(report: Report) -> None:
+    out, checked = console(), report.checked
+    for finding in checked.findings:
+        out.print(f"{finding.kind:<11} {finding.path} {finding.message}", markup=False, soft_wrap=True)
+    for remark in checked.remarks:
+        out.print(f"  {remark}", markup=False, style="dim", soft_wrap=True)
+    rate = f"{checked.rows / report.seconds:.3g} rows/s, {checked.bytes / report.seconds / 1e6:.3g} MB/s"
+    out.print(
+        f"{report.runs} runs, {report.captures} captures: {checked.tables} tables, {checked.manifests} manifests, "
+        f"{checked.rows} rows in {report.seconds:.2f} s ({rate})",
+        markup=False,
+        soft_wrap=True,
+    )
+    out.print(f"signatures  {report.trust}", markup=False, soft_wrap=True)
+    if report.head:
+        out.print(f"chain       ends with {report.head}", markup=False, soft_wrap=True)
+    verdict = f"{len(checked.findings)} findings" if checked.findings else "nothing is wrong"
+    out.print(verdict, style="bold green" if report.whole else "bold red")

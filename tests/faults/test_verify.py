@@ -1,0 +1,298 @@
+"""What was changed, lost, edited or forged in an archive is found; what is whole is not accused."""
+
+import json
+import shutil
+from collections.abc import Callable
+from pathlib import Path
+
+import pandas as pd
+import pytest
+from capture_double import CaptureDouble, PulledPlug, small_job
+from typer.testing import CliRunner
+
+from pipelines.archive import Archive, Run
+from pipelines.archive.signatures import VARIABLE, make_key, name_of, public_keys
+from pipelines.cli import app
+from pipelines.runner import Runner
+from pipelines.trace import Ledger
+from pipelines.trace.checks import Report, verify
+from schemas.errors import ArchiveUnusable, WrongUse
+
+
+def make(folder: Path) -> Path:
+    """An archive with a finished run, certified, one unit of it revoked."""
+    archive = Archive(folder / "archive")
+    runner = Runner(small_job(folder), archive, measure=CaptureDouble())
+    list(runner.all())
+    ledger = Ledger(archive)
+    ledger.certify(runner.run, start="2026-01-01", until="2099-01-01")
+    ledger.revoke("A2", "dropped")
+    return folder / "archive"
+
+
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv(VARIABLE, "")
+        return make(tmp_path_factory.mktemp("whole"))
+
+
+@pytest.fixture(scope="module")
+def key(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    place = tmp_path_factory.mktemp("keys") / "signing.key"
+    make_key(place)
+    return place
+
+
+@pytest.fixture(scope="module")
+def signed(tmp_path_factory: pytest.TempPathFactory, key: Path) -> Path:
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv(VARIABLE, str(key))
+        return make(tmp_path_factory.mktemp("signed"))
+
+
+@pytest.fixture
+def copy(whole: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.setenv(VARIABLE, "")
+    shutil.copytree(whole, tmp_path / "archive")
+    return tmp_path / "archive"
+
+
+@pytest.fixture
+def signed_copy(signed: Path, key: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.setenv(VARIABLE, str(key))
+    shutil.copytree(signed, tmp_path / "archive")
+    return tmp_path / "archive"
+
+
+def verified(root: Path, **more: object) -> Report:
+    return verify(Archive(root), keys=public_keys(), **more)
+
+
+def run_of(root: Path) -> Run:
+    return Archive(root).run("latest")
+
+
+def one(root: Path, pattern: str) -> Path:
+    found = sorted(root.glob(pattern))
+    assert found, pattern
+    return found[0]
+
+
+def flip(path: Path) -> None:
+    data = bytearray(path.read_bytes())
+    data[len(data) // 2] ^= 1
+    path.write_bytes(data)
+
+
+def edit(path: Path, change: Callable[[dict], None]) -> None:
+    content = json.loads(path.read_text())
+    change(content)
+    path.write_text(json.dumps(content, sort_keys=True, indent=1, ensure_ascii=False) + "\n")
+
+
+def test_a_whole_archive_is_whole_and_says_that_it_is_unsigned(copy: Path) -> None:
+    report = verified(copy)
+    assert report.checked.findings == []
+    assert report.checked.remarks == []
+    assert report.trust.startswith("UNSIGNED")
+    assert report.checked.rows > len(run_of(copy).table("samples"))
+    assert len(report.head) == 64
+
+
+@pytest.mark.parametrize(
+    "pattern",
+    [
+        "runs/*/coefficients.parquet", "runs/*/grades.parquet", "runs/*/report.html",
+        "captures/*/00000/samples.parquet", "captures/*/00003/readings.parquet", "captures/*/00003/history.parquet",
+    ],
+)  # fmt: skip
+def test_one_changed_bit_of_any_table_is_found(copy: Path, pattern: str) -> None:
+    path = one(copy, pattern)
+    flip(path)
+    assert ("changed", str(path.relative_to(copy))) in {(f.kind, f.path) for f in verified(copy).checked.findings}
+
+
+@pytest.mark.parametrize(
+    "pattern",
+    [
+        "runs/*/coefficients.parquet", "runs/*/coefficients.json", "runs/*/dwells.json", "runs/*/run.json",
+        "runs/*/report.html", "runs/*/report.json", "captures/*/00000/samples.parquet", "captures/*/00002/record.json",
+        "captures/*/complete.json", "calibrations/*/*/000001.json", "chain/*/000000001.json",
+    ],
+)  # fmt: skip
+def test_a_missing_file_is_found(copy: Path, pattern: str) -> None:
+    path = one(copy, pattern)
+    path.unlink()
+    found = {f.path for f in verified(copy).checked.findings if f.kind == "missing"}
+    assert any(str(path.relative_to(copy)).startswith(name) for name in found), found
+
+
+def test_a_revocation_that_was_taken_away_is_found(copy: Path) -> None:
+    [path] = copy.glob("calibrations/*/*/000002.json")
+    path.unlink()
+    assert [(f.kind, f.path) for f in verified(copy).checked.findings] == [("missing", str(path.relative_to(copy)))]
+
+
+def test_a_run_that_was_taken_away_is_found(copy: Path) -> None:
+    run = run_of(copy)
+    shutil.rmtree(run.path)
+    assert {f.kind for f in verified(copy).checked.findings} == {"missing"}
+
+
+@pytest.mark.parametrize(
+    ("pattern", "key", "value"),
+    [
+        ("runs/*/dwells.json", "who", "somebody else"),
+        ("runs/*/coefficients.json", "parameters", {"effects": ["bias"], "formulas": []}),
+        ("runs/*/coefficients.json", "rows", 7),
+        ("runs/*/grades.json", "code", "0" * 64),
+        ("runs/*/grades.json", "when", "2020-01-01T00:00:00.000+00:00"),
+        ("runs/*/run.json", "when", "2020-01-01T00:00:00.000+00:00"),
+        ("runs/*/report.json", "who", "somebody else"),
+        ("captures/*/00003/record.json", "record", 4),
+        ("captures/*/complete.json", "records", 3),
+        ("calibrations/*/*/000001.json", "until", "2199-01-01"),
+        ("chain/*/000000001.json", "who", "somebody else"),
+    ],
+)
+def test_an_edited_manifest_is_found_even_unsigned(copy: Path, pattern: str, key: str, value: object) -> None:
+    path = one(copy, pattern)
+    edit(path, lambda content: content.update({key: value}))
+    report = verified(copy)
+    assert report.checked.findings, "nothing found"
+    assert {f.kind for f in report.checked.findings} <= {"edited", "missing"}
+
+
+def test_a_table_with_a_manifest_to_match_is_found_by_the_chain(copy: Path) -> None:
+    """Somebody writes other coefficients, and a manifest with their hash."""
+    from pipelines.archive import files
+
+    run = run_of(copy)
+    frame = run.table("coefficients").assign(value=lambda t: t["value"] * 1.01)
+    path = run.path / "coefficients.parquet"
+    path.write_bytes(files.table_bytes("coefficients", frame, 1))
+    edit(run.path / "coefficients.json", lambda content: content.update(sha256=files.sha256(path)))
+    found = {(f.kind, Path(f.path).name) for f in verified(copy).checked.findings}
+    assert ("edited", "coefficients.json") in found
+
+
+def test_a_foreign_table_is_found_and_disturbs_nothing(copy: Path) -> None:
+    run = run_of(copy)
+    pd.DataFrame({"a": [1]}).to_parquet(run.path / "holiday.parquet")
+    assert [(f.kind, Path(f.path).name) for f in verified(copy).checked.findings] == [("foreign", "holiday.parquet")]
+    assert len(run.table("grades")) == 3
+    assert Archive(copy).runs()[0].finished
+
+
+def test_a_manifest_of_a_newer_schema_is_told_and_not_read(copy: Path) -> None:
+    run = run_of(copy)
+    edit(run.path / "dwells.json", lambda content: content.update(schema=99))
+    kinds = {(f.kind, Path(f.path).name) for f in verified(copy).checked.findings}
+    assert ("newer", "dwells.json") in kinds
+    with pytest.raises(ArchiveUnusable, match=r"dwells\.json has schema 99, this version knows up to \d+; use a newer"):
+        run.table("dwells")
+
+
+def test_a_manifest_that_is_no_json_is_told(copy: Path) -> None:
+    (run_of(copy).path / "grades.json").write_text("not json")
+    assert "unreadable" in {f.kind for f in verified(copy).checked.findings}
+
+
+def test_a_run_that_was_cut_off_is_told_and_is_not_wrong(tmp_path: Path) -> None:
+    archive = Archive(tmp_path / "archive")
+    with pytest.raises(PulledPlug):
+        list(Runner(small_job(tmp_path), archive, measure=CaptureDouble(stop_after=4)).all())
+    report = verified(tmp_path / "archive")
+    assert report.checked.findings == []
+    assert any("4 records are stored" in remark for remark in report.checked.remarks)
+    assert any("give its command again" in remark for remark in report.checked.remarks)
+
+
+def test_only_the_runs_named_are_read(copy: Path) -> None:
+    run = run_of(copy)
+    report = verify(Archive(copy), [run.id], keys={})
+    assert (report.runs, report.captures) == (1, 1)
+    assert report.checked.findings == []
+
+
+def test_a_chain_that_was_written_anew_lacks_the_entry_noted_elsewhere(copy: Path) -> None:
+    head = verified(copy).head
+    assert verified(copy, head=head).whole
+    shutil.rmtree(copy / "chain")
+    Archive(copy).run("latest").path.joinpath("sealed.json").unlink()
+    Archive(copy).run("latest").seal()
+    assert verified(copy).whole
+    assert [f.kind for f in verified(copy, head=head).checked.findings] == ["missing"]
+
+
+def test_a_signed_archive_says_by_which_key(signed_copy: Path, key: Path) -> None:
+    report = verified(signed_copy)
+    assert report.whole
+    [name] = public_keys([])
+    assert report.trust == f"{report.checked.manifests} of {report.checked.manifests} manifests signed by {name}"
+
+
+def test_an_edited_manifest_of_a_signed_archive_has_a_false_signature(signed_copy: Path) -> None:
+    edit(one(signed_copy, "runs/*/grades.json"), lambda content: content.update(who="somebody else"))
+    assert "signature" in {f.kind for f in verified(signed_copy).checked.findings}
+
+
+def test_another_key_is_not_trusted(signed_copy: Path, tmp_path: Path) -> None:
+    other = make_key(tmp_path / "other.key")
+    keys = {name_of(other): other}
+    report = verify(Archive(signed_copy), keys=keys, demanded=True)
+    assert [f.kind for f in report.checked.findings] == ["signature"]
+    assert "by a key that is not known here" in verify(Archive(signed_copy), keys=keys).trust
+
+
+def test_an_unsigned_archive_is_wrong_where_a_key_is_demanded(copy: Path, key: Path, monkeypatch) -> None:
+    monkeypatch.setenv(VARIABLE, str(key))
+    keys = public_keys()
+    report = verify(Archive(copy), keys=keys, demanded=True)
+    assert [f.kind for f in report.checked.findings] == ["signature"]
+    assert "manifests are not signed" in report.checked.findings[0].message
+
+
+def test_signatures_change_no_table(signed: Path, whole: Path) -> None:
+    for path in run_of(whole).path.glob("*.parquet"):
+        assert (run_of(signed).path / path.name).read_bytes() == path.read_bytes()
+
+
+def test_a_key_is_made_once_and_for_its_owner_only(tmp_path: Path) -> None:
+    place = tmp_path / "deep" / "signing.key"
+    make_key(place)
+    assert place.stat().st_mode & 0o777 == 0o600
+    with pytest.raises(WrongUse, match="is there already"):
+        make_key(place)
+
+
+@pytest.mark.parametrize("content", [None, b"no key", b""])
+def test_a_key_that_cannot_be_used_stops_writing_with_one_message(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, content: bytes | None
+) -> None:
+    place = tmp_path / "signing.key"
+    if content is not None:
+        place.write_bytes(content)
+    monkeypatch.setenv(VARIABLE, str(place))
+    with pytest.raises(ArchiveUnusable, match="signing key"):
+        Runner(small_job(tmp_path), Archive(tmp_path / "archive"), measure=CaptureDouble())
+
+
+def test_the_command_leaves_with_status_1_where_something_is_wrong(copy: Path) -> None:
+    arguments = ["verify", "--archive", str(copy), "--json"]
+    sound = CliRunner().invoke(app, arguments)
+    assert sound.exit_code == 0
+    assert json.loads(sound.stdout)["rows_per_s"] > 0
+    flip(one(copy, "runs/*/coefficients.parquet"))
+    spoilt = CliRunner().invoke(app, arguments)
+    assert spoilt.exit_code == 1
+    assert json.loads(spoilt.stdout)["findings"][0]["kind"] == "changed"
+    told = CliRunner().invoke(app, arguments[:-1])
+    assert "coefficients.parquet" in told.stdout
+    assert "UNSIGNED" in told.stdout
+
+
+def test_a_folder_without_an_archive_is_told(tmp_path: Path) -> None:
+    result = CliRunner().invoke(app, ["verify", "--archive", str(tmp_path)])
+    assert "holds no archive, one is needed" in str(result.exception)
