@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -38,11 +38,16 @@ ANALYSIS_KEYS = {
 }
 
 
+GUARDS = {"suspenders", "safety", "self_test"}
+"""Parts of a station that say when a capture pauses and how it ends: one that an operator has eased goes on where it was."""
+
+
 @dataclass(frozen=True)
 class Job:
     """All that decides a run's result, except the code.
 
     ``captured`` names the capture of a lot that was measured before, by a version that may have named captures otherwise.
+    ``parents`` are the runs whose measurements this one goes on with, on the same station from where it stands.
     """
 
     recipe: Recipe
@@ -50,6 +55,7 @@ class Job:
     lot: Lot
     station: StationConfig
     captured: str = ""
+    parents: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         """Formulas of the model are effects wherever this job is worked on."""
@@ -63,8 +69,9 @@ class Job:
         measured = self.recipe.model_dump(mode="json", exclude=ANALYSIS_KEYS)
         if not measured["soaks"]:  # recipes without them keep the names that their captures had before there were any
             del measured["soaks"]
-        station = self.station.model_dump(mode="json", exclude={"pace"})  # pace plans time, and drives nothing
-        content = {"recipe": measured, "lot": self.lot.model_dump(), "station": station}
+        station = self.station.model_dump(mode="json", exclude={"pace", *GUARDS})  # pace plans time, and drives nothing
+        after = {"parents": list(self.parents)} if self.parents else {}
+        content = {"recipe": measured, "lot": self.lot.model_dump(), "station": station, **after}
         return digest(content)[:16]
 
     @property
@@ -76,6 +83,7 @@ class Job:
             "lot": self.lot.model_dump(mode="json"),
             "station": self.station.model_dump(mode="json"),
             "capture": self.capture_id,
+            **({"parents": list(self.parents)} if self.parents else {}),
         }
 
 
@@ -100,6 +108,13 @@ class Request:
         lists = {name: list(getattr(self, name)) for name in ("units", "slots", "faults")}
         return {**asdict(self), "station": str(self.station) if self.station else None, **lists}
 
+    def fillings(self, slots: int) -> list[Request]:
+        """The request in portions that fit a fixture of so many slots; a slot map is one filling as it is."""
+        named = self.units or tuple(load_recipe(self.recipe).units)
+        if self.slots or len(named) <= slots:
+            return [self]
+        return [replace(self, units=units) for units in fillings(named, slots)]
+
     def job(self) -> Job:
         """The job that is asked for, with everything refused that cannot work, before anything moves."""
         recipe = load_recipe(self.recipe)
@@ -119,6 +134,12 @@ def job_of_run(run: Run, *, effects: Sequence[str] = (), model: Path | None = No
     about = run.about
     if not about.get("capture"):
         message = f"run {run.id}: its data were imported, not captured; fit them with 'tumbleline import'"
+        raise WrongUse(message)
+    if about.get("parents"):
+        message = (
+            f"run {run.id}: it measured what run {about['parents'][0]} lacked, and has too few poses for a model of its own; "
+            f"name run {about['parents'][0]}"
+        )
         raise WrongUse(message)
     recipe = Recipe.model_validate(about["recipe"])
     if effects and model is not None:

@@ -30,6 +30,8 @@ COMMANDS: dict[str, tuple[str, str]] = {
     "fit": ("fit", "Fit a model to archived data again, with other effects if wanted."),
     "rerun": ("rerun", "Run archived runs through today's code, another model or other limits."),
     "diff": ("diff", "Tell what differs between two runs, by how much, and because of what."),
+    "whatif": ("whatif", "Tell what a model would make of the archive's lots, before it is released."),
+    "release": ("release", "Make a model the line's from a date, or list the releases."),
     "compare": ("compare", "Judge a model on dwells, and on fresh ones."),
     "diagnose": ("diagnose", "Say whether a model is adequate, where it fails, and which effect is missing."),
     "extend": ("extend", "Write the next version of a model with one more effect."),
@@ -37,7 +39,7 @@ COMMANDS: dict[str, tuple[str, str]] = {
     "plan": ("plan", "Say what a recipe can and cannot see, before it is measured."),
     "report": ("report", "Say where a run's report is; make it where it is missing."),
     "export": ("export", "Write coefficients for firmware and autopilots."),
-    "station": ("station", "Check, serve and describe stations."),
+    "station": ("station", "See, check, serve and describe stations."),
 }
 
 

@@ -12,7 +12,10 @@ from pipelines.cli.options import ArchiveOption, JsonOption, error_console, prin
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Generator
+    from contextlib import AbstractContextManager
 
+    from pipelines.archive import Archive, Run
+    from pipelines.job import Job, Request
     from pipelines.progress import Progress
     from pipelines.runner import Done
 
@@ -25,56 +28,98 @@ def command(
         Path | None,
         typer.Option("--station", metavar="FILE", help="The station; the built-in simulated one by default."),
     ] = None,
-    units: Annotated[str, typer.Option("--units", metavar="SN,…", help="Serial numbers, slot by slot.")] = "",
+    units: Annotated[
+        str,
+        typer.Option(
+            "--units",
+            metavar="SN,…|FILE|scan",
+            help="Serial numbers slot by slot, a slot map (CSV or TOML), or 'scan' to scan them in.",
+        ),
+    ] = "",
     archive: ArchiveOption = None,
     seed: Annotated[int | None, typer.Option("--seed", help="Seed of a simulated station.")] = None,
     repeat: Annotated[
         int,
         typer.Option("--repeat", min=0, help="Count of fresh measurements of the same lot: 1, 2, … measure it anew."),
     ] = 0,
+    fault: Annotated[
+        list[str] | None,
+        typer.Option("--fault", metavar="KIND[:KEY=VALUE…]", help="Trouble for a simulated station; may be repeated."),
+    ] = None,
     *,
+    prompts: Annotated[
+        bool | None,
+        typer.Option(
+            "--prompts/--no-prompts", help="Ask the operator to load and unload; asked on hardware at a terminal."
+        ),
+    ] = None,
     direct: Annotated[bool, typer.Option("--direct", help="Run the same chain without the orchestrator.")] = False,
     as_json: JsonOption = False,
 ) -> None:
     """Measure and calibrate a lot, from recipe to report: the main job.
 
     The same command, given again after it was stopped, goes on where it was; given again after it was finished, it
-    measures nothing and shows the result.
+    measures nothing and shows the result. A lot that is larger than the fixture is measured filling by filling where somebody is
+    there to seat the units.
     """
     from pipelines.archive import Archive
     from pipelines.cli.summary import exit_status, print_summary, summary
+    from pipelines.cli.terminal import attended, scanned
     from pipelines.job import Request
+    from pipelines.seating import SCAN, read_seating
+    from schemas.station import load_station
+
+    config = load_station(station)
+    slots = config.devices.slots.count
+    seating = scanned(slots) if units == SCAN else read_seating(units)
+    wanted = Request(
+        recipe=recipe,
+        station=station,
+        units=seating.units,
+        slots=seating.slots,
+        seed=seed,
+        repeat=repeat,
+        faults=tuple(fault or ()),
+    )
+    asks = prompts if prompts is not None else attended() and not as_json
+    requests = wanted.fillings(slots) if asks else [wanted]
+    asks = asks and (bool(prompts) or len(requests) > 1 or config.kind == "modbus")
+    jobs = [request.job() for request in requests]
+    documents = [
+        summary(_measured(request, job, Archive(archive), direct=direct, asks=asks))
+        for request, job in zip(requests, jobs, strict=True)
+    ]
+    if as_json:
+        print_json(documents[0] if len(documents) == 1 else {"fillings": documents})
+    else:
+        for document in documents:
+            print_summary(document)
+    raise typer.Exit(max(exit_status(document) for document in documents))
+
+
+def _measured(request: Request, job: Job, store: Archive, *, direct: bool, asks: bool) -> Run:
+    """The run of one filling of the fixture."""
+    from pipelines.cli.terminal import Terminal
+    from pipelines.operator import Attendance
     from pipelines.runner import Runner
 
-    request = Request(recipe=recipe, station=station, units=_serials(units), seed=seed, repeat=repeat)
-    job = request.job()
-    store = Archive(archive)
-    with _shown() as (progress, told):
-        if direct:
-            runner = Runner(job, store, progress)
-            for done in runner.all():
-                told(done)
-            run = runner.run
-        else:
+    with _shown() as (progress, told, quiet):
+        operator = Terminal(quiet) if asks else None
+        if not direct:
             from pipelines.flows.local import run_locally
 
-            run = run_locally(request, job, store, progress, told)
-    document = summary(run)
-    if as_json:
-        print_json(document)
-    else:
-        print_summary(document)
-    raise typer.Exit(exit_status(document))
-
-
-def _serials(text: str) -> tuple[str, ...]:
-    """Serial numbers of a comma-separated list; blanks around them do not count."""
-    return tuple(serial.strip() for serial in text.split(",")) if text else ()
+            return run_locally(request, job, store, progress, told, operator)
+        runner = Runner(job, store, progress)
+        if operator is not None:
+            told(Attendance(operator, job, runner.run.id).capture(runner, lambda: runner.stage("capture")))
+        for done in runner.all():
+            told(done)
+        return runner.run
 
 
 @contextmanager
-def _shown() -> Generator[tuple[Progress, Callable[[Done], None]], None, None]:
-    """A progress bar for the capture and a line per stage, on standard error."""
+def _shown() -> Generator[tuple[Progress, Callable[[Done], None], Callable[[], AbstractContextManager[None]]]]:
+    """A progress bar for the capture and a line per stage, on standard error; and a block in which both keep still."""
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 
     out = error_console()
@@ -90,4 +135,12 @@ def _shown() -> Generator[tuple[Progress, Callable[[Done], None]], None, None]:
             bars.console.print(f"{done.stage:<9} {how}", markup=False)
             bars.update(bar, description="computing", completed=0, total=None)
 
-        yield progress, told
+        @contextmanager
+        def quiet() -> Generator[None]:
+            bars.stop()
+            try:
+                yield
+            finally:
+                bars.start()
+
+        yield progress, told, quiet

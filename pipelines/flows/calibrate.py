@@ -18,7 +18,9 @@ from prefect.states import Crashed
 
 from pipelines.archive import Archive
 from pipelines.chain import ORDER
+from pipelines.flows.operator import Paused
 from pipelines.job import Request
+from pipelines.operator import Attendance
 from pipelines.progress import silent
 from pipelines.runner import Done, Runner
 from schemas.errors import LinkLost, StationTimeout
@@ -26,19 +28,24 @@ from schemas.errors import LinkLost, StationTimeout
 if TYPE_CHECKING:
     from collections.abc import Callable, Generator
 
+    from pipelines.operator import Operator
     from pipelines.progress import Progress
 
 HISTORY_S = 20.0
 MANY = 200  # the server's own largest page
 FINAL = {StateType.COMPLETED, StateType.FAILED, StateType.CRASHED, StateType.CANCELLED}
 
-_listeners: list[tuple[Progress, Callable[[Done], None]]] = []
+Listener = tuple["Progress", "Callable[[Done], None]", "Operator | None"]
+
+_listeners: list[Listener] = []
 
 
 @contextmanager
-def listening(progress: Progress, told: Callable[[Done], None]) -> Generator[None, None, None]:
-    """A block in which flows of this process tell how far they are."""
-    _listeners.append((progress, told))
+def listening(
+    progress: Progress, told: Callable[[Done], None], operator: Operator | None = None
+) -> Generator[None, None, None]:
+    """A block in which flows of this process tell how far they are, and ask ``operator`` where there is one."""
+    _listeners.append((progress, told, operator))
     try:
         yield
     finally:
@@ -71,7 +78,7 @@ def stage(name: str, runner: Runner) -> Done:
 
 
 @flow(name="calibrate_lot", persist_result=False, log_prints=False)
-def calibrate_lot(
+def calibrate_lot(  # noqa: PLR0913 - a flow's parameters are its form on the server's page
     recipe: str = "production",
     station: str | None = None,
     units: list[str] | None = None,
@@ -80,20 +87,31 @@ def calibrate_lot(
     seed: int | None = None,
     repeat: int | None = None,
     faults: list[str] | None = None,
+    *,
+    prompts: bool = False,
 ) -> str:
     """Measure and calibrate a lot; the id of its run in the archive.
 
-    Without ``repeat`` every flow run measures the lot anew, and a retry of the same flow run goes on where it was.
+    Without ``repeat`` every flow run measures the lot anew, and a retry of the same flow run goes on where it was. With
+    ``prompts`` the flow run pauses for the operator: to load, to put right what is wrong, to unload.
     """
     anew = int(str(flow_run.id).replace("-", "")[:7], 16) if repeat is None else repeat
-    progress, told = _listeners[-1] if _listeners else (silent, lambda _done: None)
+    progress, told, operator = _listeners[-1] if _listeners else (silent, lambda _done: None, None)
     where = Path(station) if station else None
-    lot = {"units": tuple(units or ()), "slots": tuple(slots or ())}
-    job = Request(recipe=recipe, station=where, **lot, seed=seed, repeat=anew, faults=tuple(faults or ())).job()
+    request = Request(recipe, where, tuple(units or ()), tuple(slots or ()), seed, anew, tuple(faults or ()))
+    job = request.job()
     runner = Runner(job, Archive(archive), progress)
-    for name in ORDER:
+    told(_capture(runner, operator or (Paused() if prompts else None)))
+    for name in ORDER[1:]:
         told(stage(name, runner))
     return runner.run.id
+
+
+def _capture(runner: Runner, operator: Operator | None) -> Done:
+    """The capture, with somebody beside it or not."""
+    if operator is None:
+        return stage("capture", runner)
+    return Attendance(operator, runner.job, runner.run.id).capture(runner, lambda: stage("capture", runner))
 
 
 def settle_history(name: str, stages: int) -> None:

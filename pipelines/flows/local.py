@@ -26,6 +26,7 @@ if TYPE_CHECKING:
 
     from pipelines.archive import Archive, Run
     from pipelines.job import Job, Request
+    from pipelines.operator import Operator
     from pipelines.progress import Progress
     from pipelines.runner import Done
 
@@ -35,15 +36,22 @@ CLIENTS, START_LOCK, ADDRESS = "clients", "start.lock", "server.json"
 _started: list[subprocess.Popen[bytes]] = []  # they end by themselves; kept so that the interpreter does not complain
 
 
-def run_locally(request: Request, job: Job, archive: Archive, progress: Progress, told: Callable[[Done], None]) -> Run:
+def run_locally(
+    request: Request,
+    job: Job,
+    archive: Archive,
+    progress: Progress,
+    told: Callable[[Done], None],
+    operator: Operator | None = None,
+) -> Run:
     """The run that the flow ``calibrate_lot`` made, on the server named by PREFECT_API_URL or on one of our own."""
     archive.prepare()
     progress(0, job.recipe.wanted_records, "starting the orchestrator")
     if os.environ.get("PREFECT_API_URL"):
-        return _run(request, job, archive, progress, told)
+        return _run(request, job, archive, progress, told, operator)
     with local_server(_home(archive)) as environment:
         os.environ.update(environment)
-        return _run(request, job, archive, progress, told)
+        return _run(request, job, archive, progress, told, operator)
 
 
 def _home(archive: Archive) -> Path:
@@ -54,12 +62,19 @@ def _home(archive: Archive) -> Path:
     return cache / "tumbleline" / f"orchestrator-{sha256(archive.address.encode()).hexdigest()[:16]}"
 
 
-def _run(request: Request, job: Job, archive: Archive, progress: Progress, told: Callable[[Done], None]) -> Run:
+def _run(
+    request: Request,
+    job: Job,
+    archive: Archive,
+    progress: Progress,
+    told: Callable[[Done], None],
+    operator: Operator | None,
+) -> Run:
     from pipelines.flows.calibrate import calibrate_lot, close_dead_runs, listening, settle_history
 
     name = f"{job.recipe.name} {job.capture_id}"
     close_dead_runs(name)
-    with listening(progress, told):
+    with listening(progress, told, operator):
         named = calibrate_lot.with_options(flow_run_name=name)
         run_id = str(named(**request.parameters(), archive=archive.address))
     settle_history(name, len(ORDER))
@@ -80,6 +95,13 @@ def local_server(home: Path) -> Generator[dict[str, str], None, None]:
             yield settings(home, port)
         finally:
             client.unlink(missing_ok=True)
+
+
+def environment_of(archive: Archive) -> dict[str, str]:
+    """The environment of the server that runs beside an archive; nothing where none does."""
+    home = _home(archive)
+    port = _running(home)
+    return settings(home, port) if port else {}
 
 
 def _running(home: Path) -> int:

@@ -1,0 +1,66 @@
+"""The operator at a terminal: questions on standard error, answers from standard input, a line each, typed or scanned."""
+
+from __future__ import annotations
+
+import sys
+from typing import TYPE_CHECKING
+
+from pipelines.cli.options import error_console
+from pipelines.seating import Seating, scan
+from schemas.errors import WrongUse
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+    from contextlib import AbstractContextManager
+
+    from pipelines.operator import Answer, Prompt
+
+STOP = frozenset({"stop", "s", "q", "quit", "no", "n"})
+TITLES = {"load": "Load", "confirm": "Seats", "trouble": "Trouble", "unload": "Unload"}
+
+
+class Terminal:
+    """Whoever sits at the terminal; ``quiet`` keeps progress bars still while somebody is asked."""
+
+    def __init__(self, quiet: Callable[[], AbstractContextManager[None]]) -> None:
+        self._quiet = quiet
+
+    def ask(self, prompt: Prompt) -> Answer:
+        """Enter goes on, ``stop`` stops."""
+        with self._quiet():
+            out = error_console()
+            out.print(f"\n[bold]{TITLES[prompt.kind]}[/bold]  ", end="")
+            out.print(f"{prompt.text}.", markup=False, soft_wrap=True)
+            for slot, serial in prompt.slots:
+                out.print(f"  slot {slot:>2}  {serial}", markup=False)
+            return "stop" if _line("Enter when done, 'stop' to leave it: ").lower() in STOP else "go"
+
+
+def scanned(slots: int) -> Seating:
+    """The seating as it is scanned at the terminal, slot by slot."""
+    out = error_console()
+    out.print(f"Scan the units, slot by slot (0 to {slots - 1}); Enter alone leaves a slot empty.", markup=False)
+    found = scan(
+        slots, lambda slot: _line(f"slot {slot:>2}: "), lambda words: out.print(words, style="yellow", markup=False)
+    )
+    if not found.units:
+        message = "scan: no unit was scanned, one is needed at least; give the command again"
+        raise WrongUse(message)
+    return found
+
+
+def attended() -> bool:
+    """Whether somebody sits at the terminal."""
+    return sys.stdin.isatty() and sys.stderr.isatty()
+
+
+def _line(question: str) -> str:
+    """A line of standard input; its end is nobody to ask."""
+    error_console().print(question, end="", markup=False)
+    line = sys.stdin.readline()
+    if not line:
+        message = (
+            "operator: standard input ended before an answer, a line is needed; run with --no-prompts where nobody is"
+        )
+        raise WrongUse(message)
+    return line.strip()

@@ -1,0 +1,78 @@
+"""The operator behind the orchestrator: the flow run pauses with the question, and goes on with the answer.
+
+The answer comes from the server's page, from ``tumbleline operator`` at any terminal, or from any client of the server.
+"""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Literal
+from uuid import UUID
+
+from httpx import HTTPStatusError
+from prefect import pause_flow_run
+from prefect.client.orchestration import SyncPrefectClient, get_client
+from prefect.client.schemas.filters import FlowRunFilter, FlowRunFilterState, FlowRunFilterStateType
+from prefect.client.schemas.objects import FlowRun, StateType
+from prefect.input import RunInput
+
+if TYPE_CHECKING:
+    from pipelines.operator import Answer, Prompt
+
+PATIENCE_S = 7 * 24 * 3600
+POLL_S = 1
+
+
+class Reply(RunInput):
+    """What the operator answers."""
+
+    answer: Literal["go", "stop"] = "go"
+
+
+@dataclass(frozen=True)
+class Waiting:
+    """A flow run that waits for somebody."""
+
+    id: str
+    name: str
+    question: str
+
+
+class Paused:
+    """Whoever answers the paused flow run."""
+
+    def ask(self, prompt: Prompt) -> Answer:
+        """The answer, however long it takes."""
+        seats = "".join(f"\n- slot {slot}: {serial}" for slot, serial in prompt.slots)
+        question = f"{prompt.kind}: {prompt.text}.{seats}"
+        form: type[Reply] = Reply.with_initial_data(description=question)
+        reply = pause_flow_run(form, timeout=PATIENCE_S, poll_interval=POLL_S)
+        return reply.answer
+
+
+def waiting() -> list[Waiting]:
+    """Flow runs that wait for somebody, the first to wait first."""
+    wanted = FlowRunFilter(state=FlowRunFilterState(type=FlowRunFilterStateType(any_=[StateType.PAUSED])))
+    with get_client(sync_client=True) as client:
+        found = [
+            Waiting(str(run.id), run.name, _question(client, run))
+            for run in client.read_flow_runs(flow_run_filter=wanted)
+        ]
+    return [one for one in found if one.question]
+
+
+def answer(flow_run: str, reply: Answer) -> None:
+    """Lets a flow run go on with an answer."""
+    with get_client(sync_client=True) as client:
+        client.resume_flow_run(UUID(flow_run), run_input={"answer": reply})
+
+
+def _question(client: SyncPrefectClient, run: FlowRun) -> str:
+    keys = run.state.state_details.run_input_keyset if run.state else None
+    if not keys:
+        return ""
+    try:
+        return str(json.loads(client.read_flow_run_input(run.id, keys["description"])))
+    except (HTTPStatusError, ValueError):  # paused by something else than a question of ours
+        return ""

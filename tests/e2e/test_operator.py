@@ -1,0 +1,153 @@
+"""The person at the station: asked at a terminal, or by the orchestrator, and answered from either."""
+
+import json
+import os
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+from capture_double import CaptureDouble, recipe_file, small_job
+from typer.testing import CliRunner
+
+from pipelines.archive import Archive
+from pipelines.cli import app
+from pipelines.cli.terminal import scanned
+from pipelines.flows.local import local_server
+from pipelines.operator import Answer, Attendance, Prompt
+from pipelines.runner import Runner
+from schemas.errors import OperatorNeeded
+from schemas.fault import Fault
+from schemas.station import with_faults
+
+ROOT = Path(__file__).resolve().parents[2]
+
+
+class Told:
+    """An operator who notes what is asked and answers from a list; ``go`` when it is used up."""
+
+    def __init__(self, *answers: Answer) -> None:
+        self.answers, self.asked = list(answers), []
+
+    def ask(self, prompt: Prompt) -> Answer:
+        self.asked.append(prompt)
+        return self.answers.pop(0) if self.answers else "go"
+
+
+def attended(folder: Path, operator: Told, measure: object = None, fault: Fault | None = None) -> None:
+    job = small_job(folder)
+    if fault is not None:
+        job = type(job)(job.recipe, job.limits, job.lot, with_faults(job.station, [fault]))
+    runner = Runner(job, Archive(folder / "archive"), measure=measure or CaptureDouble())
+    Attendance(operator, job, runner.run.id).capture(runner, lambda: runner.stage("capture"))
+
+
+def test_units_are_asked_for_before_and_after_and_not_again_when_a_run_goes_on(tmp_path: Path) -> None:
+    first, again = Told(), Told()
+    attended(tmp_path, first)
+    assert [prompt.kind for prompt in first.asked] == ["load", "unload"]
+    assert first.asked[0].slots == ((0, "A1"), (1, "A2"), (2, "A3"))
+    attended(tmp_path, again)
+    assert not again.asked
+
+
+def test_seats_that_are_not_as_the_slot_map_says_are_asked_for_until_somebody_stops(tmp_path: Path) -> None:
+    operator = Told("go", "go", "stop")
+    with pytest.raises(OperatorNeeded, match="stopped at 'confirm'"):
+        attended(tmp_path, operator, fault=Fault(kind="swapped_slots", serial="A1"))
+    assert [prompt.kind for prompt in operator.asked] == ["load", "confirm", "confirm"]
+    assert "slot 0: 'A2' sits there, 'A1' is needed; slot 1: 'A1' sits there" in operator.asked[1].text
+
+
+def test_trouble_is_asked_about_and_the_run_goes_on_behind_its_last_record(tmp_path: Path) -> None:
+    class Blocked(CaptureDouble):
+        def __call__(self, job, records, progress):
+            if not records.finished():
+                self.stop_after = 3
+                try:
+                    super().__call__(job, records, progress)
+                except BaseException as stopped:
+                    self.stop_after = 10**6
+                    raise OperatorNeeded("reader: the chamber's door is open") from stopped
+            super().__call__(job, records, progress)
+
+    operator, measure = Told(), Blocked()
+    attended(tmp_path, operator, measure)
+    assert [prompt.kind for prompt in operator.asked] == ["load", "trouble", "unload"]
+    assert measure.measured == sorted(set(measure.measured))
+
+
+def run_at_a_terminal(folder: Path, typed: str, *options: str):
+    command = ["run", recipe_file(folder), "--direct", "--prompts", "--archive", str(folder / "archive"), *options]
+    return CliRunner().invoke(app, command, input=typed)
+
+
+def test_a_terminal_is_asked_and_a_scanner_types_the_serials(tmp_path: Path) -> None:
+    result = run_at_a_terminal(tmp_path, "S1\nS2\n\n\n\n\n\n\n\n\n", "--units", "scan", "--json")
+    assert result.exit_code in (0, 1), result.output
+    assert [unit["unit"] for unit in json.loads(result.stdout)["units"]] == ["S1", "S2"]
+    for words in ("slot  0:", "Load", "Unload", "slot  1  S2"):
+        assert words in result.stderr
+
+
+def test_an_operator_who_stops_gets_status_3_and_nothing_is_measured(tmp_path: Path) -> None:
+    result = run_at_a_terminal(tmp_path, "stop\n")
+    assert isinstance(result.exception, OperatorNeeded)
+    assert not list(tmp_path.glob("archive/captures/*/0*"))
+
+
+def test_a_lot_larger_than_the_fixture_is_measured_filling_by_filling(tmp_path: Path) -> None:
+    serials = [f"S{n}" for n in range(10)]
+    result = run_at_a_terminal(tmp_path, "\n" * 4, "--units", ",".join(serials), "--json")
+    assert result.exit_code in (0, 1), result.output
+    fillings = json.loads(result.stdout)["fillings"]
+    assert [[unit["unit"] for unit in one["units"]] for one in fillings] == [serials[:8], serials[8:]]
+    assert result.stderr.count("Load") == result.stderr.count("Unload") == 2
+
+
+def test_a_scan_of_nothing_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    import io
+
+    monkeypatch.setattr("sys.stdin", io.StringIO("\n\n"))
+    with pytest.raises(Exception, match="no unit was scanned"):
+        scanned(2)
+
+
+@pytest.mark.slow
+def test_a_paused_flow_run_is_answered_from_another_terminal(tmp_path: Path) -> None:
+    archive = tmp_path / "archive"
+    code = (
+        "from pipelines.flows.calibrate import calibrate_lot; import sys; "
+        "calibrate_lot(recipe=sys.argv[1], archive=sys.argv[2], repeat=0, prompts=True)"
+    )
+    with local_server(tmp_path / "orchestrator") as address:
+        environment = {**os.environ, **address, "PYTHONPATH": str(ROOT)}
+        command = [sys.executable, "-c", code, recipe_file(tmp_path), str(archive)]
+        with subprocess.Popen(command, cwd=ROOT, env=environment) as flow:
+            questions = [answered(environment), answered(environment)]
+            assert flow.wait(120) == 0
+    assert questions[0].startswith("load: seat the units as listed")
+    assert "slot 1: A2" in questions[0]
+    assert questions[1].startswith("unload")
+    [info] = Archive(archive).runs()
+    assert info.finished
+
+
+def answered(environment: dict[str, str]) -> str:
+    """What a flow run asked; it is answered."""
+    end = time.monotonic() + 120.0
+    while time.monotonic() < end:
+        found = operator(environment)["waiting"]
+        if found:
+            assert operator(environment, found[0]["id"], "--go")["answered"] == "go"
+            return found[0]["question"]
+        time.sleep(0.2)
+    pytest.fail("no flow run asked for anything")
+
+
+def operator(environment: dict[str, str], *arguments: str) -> dict:
+    command = [sys.executable, "-m", "pipelines.cli", "operator", *arguments, "--json"]
+    done = subprocess.run(command, cwd=ROOT, env=environment, capture_output=True, text=True, timeout=60, check=False)
+    assert done.returncode == 0, done.stderr
+    return json.loads(done.stdout)
