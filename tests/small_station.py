@@ -53,15 +53,29 @@ class MemorySink:
     die_after: int = 10**6
     records: dict[int, tuple[pd.DataFrame, pd.DataFrame, pd.DataFrame]] = field(default_factory=dict)
     state: bytes | None = None
+    ahead: list[pd.DataFrame] = field(default_factory=list)
 
     def finished(self) -> set[int]:
         return set(self.records)
 
+    def part(self, record: int, number: int, samples: pd.DataFrame) -> None:
+        if number == 0:
+            self.ahead = []
+        self.ahead.append(samples)
+
     def put(
-        self, record: int, samples: pd.DataFrame, readings: pd.DataFrame, history: pd.DataFrame, station_state: bytes
+        self,
+        record: int,
+        samples: pd.DataFrame,
+        readings: pd.DataFrame,
+        history: pd.DataFrame,
+        station_state: bytes,
+        parts: int = 0,
     ) -> None:
         if len(self.records) >= self.die_after:
             raise KeyboardInterrupt
+        if parts:
+            samples = pd.concat([*self.ahead[:parts], samples], ignore_index=True)
         self.records[record] = (samples, readings, history)
         self.state = station_state
 

@@ -72,11 +72,22 @@ class _Kept:
         """Nothing was there before."""
         return set()
 
+    def part(self, record: int, number: int, samples: pd.DataFrame) -> None:
+        """Keep a part of a record."""
+        del record, number
+        self.samples.append(samples)
+
     def put(
-        self, record: int, samples: pd.DataFrame, readings: pd.DataFrame, history: pd.DataFrame, station_state: bytes
+        self,
+        record: int,
+        samples: pd.DataFrame,
+        readings: pd.DataFrame,
+        history: pd.DataFrame,
+        station_state: bytes,
+        parts: int = 0,
     ) -> None:
         """Keep one record."""
-        del record, station_state
+        del record, station_state, parts
         self.samples.append(samples)
         self.readings.append(readings)
         self.history.append(history)

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
     from pipelines.progress import Progress
     from schemas.event import EventLog
-    from schemas.recipe import Lot, Pose, Recipe
+    from schemas.recipe import Lot, Pose, Recipe, Unit
     from stations.devices.reader import Instruments
     from stations.devices.slot import Identity
     from stations.station import Station
@@ -31,6 +31,8 @@ Kind = Literal["dwell", "verification", "allan"]
 OBSERVATIONS = 5  # looks at encoders and instruments within a dwell
 HISTORY_S = 10.0
 OK = "ok"
+LONG_ROWS = 1_000_000  # samples of a record that lie in memory together; of a longer one they are stored in pieces
+PIECE_ROWS = 250_000
 FILL = 0.5  # part of the slots' memory that may fill before it is emptied
 
 
@@ -41,10 +43,20 @@ class CaptureSink(Protocol):
         """Numbers of the records that are stored."""
         ...
 
+    def part(self, record: int, number: int, samples: pd.DataFrame) -> None:
+        """Stores a part of the samples of a long record ahead of the rest; part 0 begins anew."""
+        ...
+
     def put(
-        self, record: int, samples: pd.DataFrame, readings: pd.DataFrame, history: pd.DataFrame, station_state: bytes
+        self,
+        record: int,
+        samples: pd.DataFrame,
+        readings: pd.DataFrame,
+        history: pd.DataFrame,
+        station_state: bytes,
+        parts: int = 0,
     ) -> None:
-        """Stores a record durably, with the station's state after it."""
+        """Stores a record durably, with the station's state after it; ``parts`` of its samples are stored already."""
         ...
 
     def last_state(self) -> bytes | None:
@@ -214,6 +226,11 @@ class _Work:
         """Slots whose units still answer."""
         return [unit.slot for unit in self.lot.units if unit.serial not in self.lost]
 
+    @property
+    def answering(self) -> list[Unit]:
+        """Units that still answer."""
+        return [unit for unit in self.lot.units if unit.serial not in self.lost]
+
     def lose(self, serial: str, text: str) -> None:
         """Gives a unit up; its readings say why, in a resumed run too."""
         self.lost[serial] = text
@@ -321,7 +338,7 @@ class _Work:
             self.guard.named(problem)
             raise
         samples, readings = self.tables(record)
-        self.sink.put(step.record, samples, readings, self.history.taken(), self.station.state())
+        self.sink.put(step.record, samples, readings, self.history.taken(), self.station.state(), record.pieces)
         self.remaining.taken(step, self.station.clock.now() - begun)
 
     def measured(self, step: Step) -> Record:
@@ -339,6 +356,8 @@ class _Work:
         for _ in self._spans(record):
             self.observe(step, record)
             self.empty(record)
+            if duration * recipe.rate_hz * len(self.slots) > LONG_ROWS and record.rows() >= PIECE_ROWS:
+                self.sink.part(step.record, record.pieces, record.piece(self.answering))
         station.reader.stop()
         self.empty(record)
         counts = {u.slot: record.count(u.serial) for u in self.lot.units if u.serial not in self.lost}
@@ -392,4 +411,4 @@ class _Work:
             readings_row(record, unit, self.identities.get(unit.serial, of_the_lot), self.lost.get(unit.serial, OK))
             for unit in self.lot.units
         ]
-        return record.samples([u for u in self.lot.units if u.serial not in self.lost]), pd.DataFrame(rows)
+        return record.samples(self.answering), pd.DataFrame(rows)

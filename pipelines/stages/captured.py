@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from stations.devices.slot import Identity, Samples
 
 AXES = ("x", "y", "z")
+SHARED = 4  # numbers of a look that all slots share: two angles, air, vibration
 
 
 @dataclass
@@ -85,33 +86,63 @@ class Record:
     rate: float
     since_move: float = 0.0
     since_power: float = 0.0
-    angles: list[tuple[float, float]] = field(default_factory=list)
-    chamber: list[float] = field(default_factory=list)
-    instruments: list[Instruments] = field(default_factory=list)
+    looks: list[NDArray[np.float64]] = field(default_factory=list)
     parts: dict[str, list[Samples]] = field(default_factory=dict)
+    stored: dict[str, int] = field(default_factory=dict)
+    lossy: set[str] = field(default_factory=set)
+    pieces: int = 0
 
     def look(self, angles: tuple[float, float], chamber: float, instruments: Instruments) -> None:
         """Notes encoders, air and instruments of one instant."""
-        self.angles.append(angles)
-        self.chamber.append(chamber)
-        self.instruments.append(instruments)
+        row = (*angles, chamber, instruments.vibration_g, *instruments.temperature_C, *instruments.supply_V)
+        self.looks.append(np.array(row))
+
+    def seen(self, slot: int) -> dict[str, float]:
+        """Means over the looks: what a unit's slot and the station showed."""
+        means = np.mean(self.looks, axis=0)
+        slots = (len(means) - SHARED) // 2
+        return {
+            "outer_deg": float(means[0]),
+            "inner_deg": float(means[1]),
+            "chamber_C": float(means[2]),
+            "unit_C": float(means[SHARED + slot]),
+            "supply_V": float(means[SHARED + slots + slot]),
+            "vibration_g": float(means[3]),
+        }
 
     def keep(self, serial: str, samples: Samples) -> None:
         """Adds samples of a unit."""
         self.parts.setdefault(serial, []).append(samples)
+        if samples.overflow:
+            self.lossy.add(serial)
 
     def count(self, serial: str) -> int:
         """Samples of a unit so far."""
-        return sum(len(part.outputs) for part in self.parts.get(serial, []))
+        return self.stored.get(serial, 0) + self._held(serial)
 
     def overflow(self, serial: str) -> bool:
         """Whether samples of a unit were lost."""
-        return any(part.overflow for part in self.parts.get(serial, []))
+        return serial in self.lossy
+
+    def rows(self) -> int:
+        """Samples of all units that are held in memory."""
+        return sum(self._held(serial) for serial in self.parts)
+
+    def piece(self, units: Sequence[Unit]) -> pd.DataFrame:
+        """The samples that are held, for the store; they are not held any longer."""
+        frame = self.samples(units)
+        self.stored = {serial: self.count(serial) for serial in self.parts}
+        self.parts = {serial: [] for serial in self.parts}
+        self.pieces += 1
+        return frame
+
+    def _held(self, serial: str) -> int:
+        return sum(len(part.outputs) for part in self.parts.get(serial, []))
 
     def samples(self, units: Sequence[Unit]) -> pd.DataFrame:
         """The samples of these units, one row each; a sample's time follows from its number since the start."""
-        units = [unit for unit in units if self.count(unit.serial)]
-        counts = [self.count(unit.serial) for unit in units]
+        units = [unit for unit in units if self._held(unit.serial)]
+        counts = [self._held(unit.serial) for unit in units]
         numbers = [_numbers(self.parts[unit.serial]) for unit in units]
         outputs = [part.outputs for unit in units for part in self.parts[unit.serial]]
         table = np.concatenate(outputs) if outputs else np.zeros((0, 3))
@@ -133,8 +164,7 @@ def _numbers(parts: Sequence[Samples]) -> NDArray[np.float64]:
 
 def readings_row(record: Record, unit: Unit, identity: Identity, status: str) -> dict[str, object]:
     """What the station read beside a unit's samples: means over the looks of a record."""
-    outer, inner = np.mean(record.angles, axis=0)
-    looks = record.instruments
+    seen = record.seen(unit.slot)
     return {
         "unit": unit.serial,
         "slot": unit.slot,
@@ -142,14 +172,11 @@ def readings_row(record: Record, unit: Unit, identity: Identity, status: str) ->
         "kind": record.kind,
         "pose": record.pose.name,
         "soak": record.soak,
-        "outer_deg": float(outer),
-        "inner_deg": float(inner),
+        "outer_deg": seen["outer_deg"],
+        "inner_deg": seen["inner_deg"],
         "outer_command_deg": record.pose.outer_deg,
         "inner_command_deg": record.pose.inner_deg,
-        "chamber_C": float(np.mean(record.chamber)),
-        "unit_C": float(np.mean([look.temperature_C[unit.slot] for look in looks])),
-        "supply_V": float(np.mean([look.supply_V[unit.slot] for look in looks])),
-        "vibration_g": float(np.mean([look.vibration_g for look in looks])),
+        **{name: seen[name] for name in ("chamber_C", "unit_C", "supply_V", "vibration_g")},
         "since_move_s": record.since_move,
         "since_power_s": record.since_power,
         "start_s": record.start,

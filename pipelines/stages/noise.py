@@ -12,15 +12,19 @@ from inertial.noise.allan import AllanCurve, overlapping
 from inertial.noise.terms import FLICKER_FLOOR, Terms, fit_terms, model_deviation
 from pipelines.stages.calibration import read_calibration
 from pipelines.stages.empty import empty_table
+from pipelines.stages.pieces import by_record
 from schemas.errors import DataRejected
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
+    from collections.abc import Iterable, Sequence
 
     from numpy.typing import NDArray
 
 AXES = ("x", "y", "z")
 MICRO = 1e6
+MOST_SAMPLES = (
+    2**18
+)  # of a channel that lie in memory: 24 h at 100 Hz are means of 33 samples, and tau begins at 0.33 s
 UNEXPLAINED_P = 1e-6  # the covariance of the curve is itself estimated, so only a plain misfit counts
 N_ONE_SIDED = "n_d"
 B_BOUND = "B_bound"
@@ -32,17 +36,22 @@ def noise(
     """Allan curves (table ``allan``) and noise terms (table ``noise``) of every calibrated unit, in µg.
 
     Terms: Q, N, B, K, R as in IEEE Std 952 (N is two-sided: σ(τ) = N/√τ); ``n_d`` = N·√2 is the one-sided density of
-    data sheets; ``B_bound`` = min σ/0.664 is only an upper bound of B.
+    data sheets; ``B_bound`` = min σ/0.664 is only an upper bound of B. Records longer than 2¹⁸ samples are read table by
+    table and averaged down to that many, so that their curves begin at a longer averaging time.
     """
     static = readings[(readings["kind"] == "allan") & (readings["status"] == "ok")]
     if static.empty or coefficients.empty:
         return _nothing()
     calibration = read_calibration(coefficients, covariance)
     records = set(static["record"])
-    kept = [record[record["kind"] == "allan"] for record in samples if record["record"].iloc[0] in records]
+    size = -(-int(static.loc[static["unit"].isin(calibration.units), "n"].max()) // MOST_SAMPLES)
+    series = Series(calibration.units, size)
+    for record, tables in by_record(samples):
+        for table in tables:
+            if record in records:
+                series.add(table)
     scale = np.diagonal(calibration.response, axis1=-2, axis2=-1)
-    output = _series(pd.concat(kept, ignore_index=True), calibration.units)
-    curve = overlapping(MICRO * output / scale[..., None], float(static["rate_hz"].iloc[0]))
+    curve = overlapping(MICRO * series.values() / scale[..., None], float(static["rate_hz"].iloc[0]) / size)
     try:
         terms = fit_terms(curve)
     except ValueError as problem:
@@ -74,11 +83,32 @@ def limits_where_unexplained(curve: AllanCurve, terms: Terms) -> Terms:
     )
 
 
-def _series(samples: pd.DataFrame, units: tuple[str, ...]) -> NDArray[np.float64]:
-    """Outputs (units, 3, n) of the static record, as long as the shortest."""
-    series = [samples.loc[samples["unit"] == unit, list(AXES)].to_numpy(dtype=float) for unit in units]
-    shortest = min(len(one) for one in series)
-    return np.stack([one[:shortest].T for one in series])
+class Series:
+    """Outputs of the static record, gathered table by table; of a long one the means of ``size`` samples each.
+
+    The Allan deviation of means is that of the samples themselves, from an averaging time of ``size`` samples on.
+    """
+
+    def __init__(self, units: Sequence[str], size: int) -> None:
+        self._size = max(size, 1)
+        self._rest: dict[str, NDArray[np.float64]] = {unit: np.zeros((0, 3)) for unit in units}
+        self._means: dict[str, list[NDArray[np.float64]]] = {unit: [] for unit in units}
+
+    def add(self, samples: pd.DataFrame) -> None:
+        """Takes the samples that follow those before."""
+        output = samples[list(AXES)].to_numpy(dtype=float)
+        for unit, rows in samples.groupby("unit", sort=False).indices.items():
+            if unit in self._rest:
+                joined = np.concatenate((self._rest[str(unit)], output[rows]))
+                whole = len(joined) // self._size * self._size
+                self._means[str(unit)].append(joined[:whole].reshape(-1, self._size, 3).mean(axis=1))
+                self._rest[str(unit)] = joined[whole:]
+
+    def values(self) -> NDArray[np.float64]:
+        """Outputs (units, 3, n), as long as the shortest."""
+        series = [np.concatenate(parts or [np.zeros((0, 3))]) for parts in self._means.values()]
+        shortest = min(len(one) for one in series)
+        return np.stack([one[:shortest].T for one in series])
 
 
 def _curve_rows(units: tuple[str, ...], curve: AllanCurve, terms: Terms) -> pd.DataFrame:

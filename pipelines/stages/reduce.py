@@ -8,6 +8,7 @@ import numpy as np
 import pandas as pd
 
 from inertial.frames import force_from_angles
+from pipelines.stages.pieces import dwells_whole
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -48,14 +49,15 @@ def reduce(
 
     Parameters
     ----------
-    samples : one table per record.
+    samples : one table per record, or several of a long one.
     readings : of the whole run; the reference force comes from the encoders as they were read.
     verdicts : of the validate stage.
     local_gravity_m_s2 : at the station; the force is stated in standard g.
     """
     accepted = set(verdicts.loc[~verdicts["refused"], "unit"])
-    kept = [_means(record[record["unit"].isin(accepted) & (record["kind"] != "allan")]) for record in samples]
-    means = pd.concat([frame for frame in kept if len(frame)] or kept[:1], ignore_index=True)
+    kept = [_means(record[record["unit"].isin(accepted)]) for record in dwells_whole(samples)]
+    nothing = [_means(pd.DataFrame(columns=["unit", "record", *AXES]))]
+    means = pd.concat([frame for frame in kept if len(frame)] or kept[:1] or nothing, ignore_index=True)
     static = readings[readings["unit"].isin(accepted) & (readings["kind"] != "allan")]
     columns = static[[*KEPT, "start_s"]].assign(time_s=static["start_s"] + 0.5 * static["duration_s"])
     dwells = columns.drop(columns="start_s").merge(means, on=["unit", "record"], validate="one_to_one")

@@ -8,6 +8,9 @@ from __future__ import annotations
 import hashlib
 import json
 import zlib
+from array import array
+from collections import deque
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -15,21 +18,33 @@ from schemas.errors import ArchiveUnusable, DataRejected
 from schemas.fault import Fault
 
 if TYPE_CHECKING:
+    from schemas.profile import Space
     from schemas.recipe import Lot
     from schemas.station import StationConfig
     from stations.plant.plant import Plant
 
 VERSION = 1
+HEAD = 4  # numbers before the words of a write
 
 
 @dataclass(frozen=True)
 class Write:
-    """Words written to a device's registers at a time of the plant."""
+    """Words, or bits, written to a device's registers at a time of the plant."""
 
     at_us: int
     device_id: int
     address: int
     words: tuple[int, ...]
+    space: Space = "holding"
+
+
+@dataclass(frozen=True)
+class Said:
+    """An order given to a device in a line of text, at a time of the plant."""
+
+    at_us: int
+    device_id: int
+    line: str
 
 
 @dataclass(frozen=True)
@@ -40,7 +55,7 @@ class Injection:
     fault: Fault
 
 
-Event = Write | Injection
+Event = Write | Said | Injection
 
 
 def fingerprint(config: StationConfig, lot: Lot) -> str:
@@ -50,15 +65,32 @@ def fingerprint(config: StationConfig, lot: Lot) -> str:
 
 
 class Journal:
-    """Events in order."""
+    """Events in order. Writes are kept packed: a day of them takes a few megabytes."""
 
     def __init__(self, belongs_to: str) -> None:
         self._belongs_to = belongs_to
-        self._events: list[Event] = []
+        self._writes = array("q")  # time, device, address, count, words; one after the other
+        self._count = 0
+        self._injections: list[tuple[int, Injection]] = []  # with the number of writes before each
 
     def add(self, event: Event) -> None:
         """Notes an event that has happened."""
-        self._events.append(event)
+        if isinstance(event, Injection):
+            self._injections.append((self._count, event))
+            return
+        self._writes.extend((event.at_us, event.device_id, event.address, len(event.words), *event.words))
+        self._count += 1
+
+    def events(self) -> Iterator[Event]:
+        """Every event, in order."""
+        waiting, at = deque(self._injections), 0
+        for number in range(self._count + 1):
+            while waiting and waiting[0][0] == number:
+                yield waiting.popleft()[1]
+            if number < self._count:
+                time, device_id, address, words = self._writes[at : at + HEAD]
+                at += HEAD + words
+                yield Write(time, device_id, address, tuple(self._writes[at - words : at]))
 
     def state(self, now_us: int) -> bytes:
         """The journal and the time as bytes."""
@@ -66,7 +98,7 @@ class Journal:
             "version": VERSION,
             "belongs_to": self._belongs_to,
             "now_us": now_us,
-            "events": [_as_json(event) for event in self._events],
+            "events": [_as_json(event) for event in self.events()],
         }
         return zlib.compress(json.dumps(content, separators=(",", ":")).encode(), 6)
 
@@ -84,17 +116,20 @@ class Journal:
             plant.advance(int(item["at_us"]) - plant.now_us)
             if "fault" in item:
                 plant.inject(Fault.model_validate(item["fault"]))
+            elif "line" in item:
+                plant.say(item["device_id"], item["line"])
             else:
-                plant.write(item["device_id"], item["address"], list(item["words"]))
+                plant.write(item["device_id"], item["address"], list(item["words"]), item.get("space", "holding"))
         plant.advance(int(content["now_us"]) - plant.now_us)
 
 
 def _as_json(event: Event) -> dict[str, object]:
     if isinstance(event, Injection):
         return {"at_us": event.at_us, "fault": event.fault.model_dump()}
-    return {
-        "at_us": event.at_us,
-        "device_id": event.device_id,
-        "address": event.address,
-        "words": list(event.words),
-    }
+    if isinstance(event, Said):
+        return {"at_us": event.at_us, "device_id": event.device_id, "line": event.line}
+    found: dict[str, object] = {"at_us": event.at_us, "device_id": event.device_id, "address": event.address}
+    found["words"] = list(event.words)
+    if event.space != "holding":
+        found["space"] = event.space
+    return found
