@@ -41,8 +41,9 @@ def from_station(job: Job, records: Records, progress: Progress) -> None:
     from pipelines.stages.capture import capture  # a re-run of archived data opens no station
     from stations import open_station
 
-    with open_station(job.station, job.lot, resume=records.last_state()) as station:
-        capture(station, job.recipe, job.lot, records, progress=progress)
+    run = f"{job.recipe.name} {job.capture_id}"
+    with open_station(job.station, job.lot, resume=records.last_state(), run=run) as station:
+        capture(station, job.recipe, job.lot, records, progress=progress, events=records.events)
 
 
 class Runner:
@@ -90,7 +91,8 @@ class Runner:
         about = {"inputs": inputs, "parameters": parameters, "code": ""}
         key = stage_key("capture", inputs, parameters, "")
         if not self.run.has(("readings", "history"), key):
-            outputs = {name: records.gathered(name) for name in ("readings", "history")}
+            told = {"events": records.events.table(), "soaks": records.events.soaks()}
+            outputs = {**told, **{name: records.gathered(name) for name in ("readings", "history")}}
             self.run.save("capture", key, outputs, about)
         return was_there
 
