@@ -58,6 +58,8 @@ def again(archive: Archive, run_id: str, wanted: Wanted, *, report: bool = False
             from pipelines.report import make_report  # plots are slow to import
 
             stages["report"] = THERE if make_report(new) else COMPUTED
+        if COMPUTED in stages.values():
+            new.seal()
     return Outcome(old.id, new.id, because, stages, time.perf_counter() - start)
 
 

@@ -1,0 +1,132 @@
+"""``tumbleline release``: make a model the line's, from a date; or list which model is the line's, and since when."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from pipelines.cli.options import ArchiveOption, EffectFileOption, JsonOption, console, print_json, print_table
+from schemas.errors import WrongUse
+
+if TYPE_CHECKING:
+    from pipelines.archive import Archive
+    from pipelines.rerun.releases import Release
+
+
+def command(
+    model: Annotated[Path | None, typer.Argument(metavar="[MODEL]", help="A model file.")] = None,
+    since: Annotated[str, typer.Option("--from", metavar="DATE", help="Use it from this date on (UTC).")] = "",
+    device: Annotated[str, typer.Option("--device", metavar="KIND", help="For this kind of device only.")] = "",
+    station: Annotated[str, typer.Option("--station", metavar="NAME", help="For this station only.")] = "",
+    reason: Annotated[str, typer.Option("--reason", metavar="TEXT", help="Why it is released.")] = "",
+    effect_file: EffectFileOption = None,
+    archive: ArchiveOption = None,
+    *,
+    force: Annotated[bool, typer.Option("--force", help="Release it without a what-if that says better.")] = False,
+    listed: Annotated[bool, typer.Option("--list", help="List the releases.")] = False,
+    as_json: JsonOption = False,
+) -> None:
+    """Make a model the line's from a date, or list the releases.
+
+    Recipes with model = "line" use it from then on. The model needs a what-if in the archive that says it is better (see
+    'tumbleline whatif'), or --force and a reason. A record is never changed: the next release comes after it.
+    """
+    from pipelines.archive import Archive
+
+    store = Archive(archive)
+    if listed:
+        _refuse_both(model)
+        _list(store, as_json=as_json)
+        return
+    record = _released(
+        store, model, since, effect_file, {"device": device, "station": station, "reason": reason, "force": force}
+    )
+    if as_json:
+        print_json({"archive": str(store.root), **_document(record)})
+        return
+    out = console()
+    out.print(
+        f"release {record.number}: {_name(record)} for {_where(record)} from {record.since:%Y-%m-%d %H:%M} UTC",
+        markup=False,
+    )
+    out.print(f"  {', '.join(record.effects)}", markup=False, soft_wrap=True)
+    out.print(f"  evidence: {record.evidence or 'none'}{', forced' if record.forced else ''}", markup=False)
+
+
+def _released(
+    store: Archive, model: Path | None, since: str, effect_file: list[Path] | None, how: dict[str, Any]
+) -> Release:
+    from pipelines.rerun.releases import release
+    from pipelines.rerun.selection import moment
+    from pipelines.rerun.wanted import wanted
+
+    if model is None or not since:
+        missing = "a model file" if model is None else "--from DATE"
+        message = f"release: {missing} is missing, both are needed; name the model and from when, or give --list"
+        raise WrongUse(message)
+    return release(store, wanted("", model, "", effect_file, where="release"), moment(since, "--from"), **how)
+
+
+def _refuse_both(model: Path | None) -> None:
+    if model is not None:
+        message = f"release: --list and the model {model.name} are both given, one is needed; leave one out"
+        raise WrongUse(message)
+
+
+def _list(store: Archive, *, as_json: bool) -> None:
+    from datetime import UTC, datetime
+
+    from pipelines.rerun.releases import released, releases
+
+    records = releases(store)
+    now = datetime.now(UTC)
+    valid = {one.number for one in records if released(store, one.device, one.station, now) == one}
+    if as_json:
+        rows = [{**_document(one), "in_use": one.number in valid} for one in records]
+        print_json({"archive": str(store.root), "releases": rows})
+        return
+    if not records:
+        console().print(
+            f"no model is released in {store.root}; make one the line's with 'tumbleline release'", markup=False
+        )
+        return
+    lines = [
+        [
+            str(one.number),
+            _name(one),
+            _where(one),
+            f"{one.since:%Y-%m-%d}",
+            "yes" if one.number in valid else "",
+            one.who,
+            one.reason,
+        ]
+        for one in records
+    ]
+    print_table(["no.", "model", "for", "from", "in use", "by", "why"], lines, whole=4)
+
+
+def _name(record: Release) -> str:
+    return f"{record.model_name} version {record.model_version}"
+
+
+def _where(record: Release) -> str:
+    return f"{record.device or 'every device'} on {record.station or 'every station'}"
+
+
+def _document(record: Release) -> dict[str, Any]:
+    return {
+        "release": record.number,
+        "model": record.model_name,
+        "version": record.model_version,
+        "effects": list(record.effects),
+        "from": record.since.isoformat(),
+        "device": record.device,
+        "station": record.station,
+        "reason": record.reason,
+        "evidence": record.evidence,
+        "forced": record.forced,
+        "by": record.who,
+        "at": record.when,
+    }

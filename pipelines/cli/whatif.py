@@ -1,0 +1,125 @@
+"""``tumbleline whatif``: what a model would make of the archive's lots, before it is released to the line."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from pipelines.cli.options import (
+    ArchiveOption,
+    EffectFileOption,
+    JsonOption,
+    console,
+    error_console,
+    print_json,
+    print_table,
+    short,
+)
+from pipelines.cli.rerun import DaskOption, WorkersOption
+
+if TYPE_CHECKING:
+    from pipelines.archive import Archive
+    from pipelines.rerun.judged import Fresh, Judged
+    from pipelines.rerun.wanted import Wanted
+
+SHOWN = 12
+
+
+def command(
+    model: Annotated[Path, typer.Argument(metavar="MODEL", help="A model file.")],
+    selection: Annotated[
+        list[str] | None,
+        typer.Argument(metavar="[SELECTION…]", help="Runs as for 'tumbleline rerun'; all by default."),
+    ] = None,
+    limits: Annotated[str, typer.Option("--limits", metavar="FILE", help="Other limits: a file or a name.")] = "",
+    effect_file: EffectFileOption = None,
+    archive: ArchiveOption = None,
+    dask: DaskOption = "",
+    workers: WorkersOption = None,
+    *,
+    as_json: JsonOption = False,
+) -> None:
+    """Tell what a model would make of the archive's lots: yield, error and error on fresh runs, old model against new.
+
+    The lots are fitted, verified and graded in memory; kept is only the result, as evidence for 'tumbleline release'. Exit
+    status 1: the model is no better.
+    """
+    from pipelines.archive import Archive
+    from pipelines.rerun.releases import keep_evidence
+    from pipelines.rerun.selection import selected
+    from pipelines.rerun.wanted import wanted
+    from pipelines.rerun.whatif import BETTER, summary
+
+    change = wanted("", model, limits, effect_file, where="whatif")
+    store = Archive(archive)
+    runs = [entry.id for entry in selected(store, selection or ["all"])]
+    judged, fresh = _judged(store, runs, change, dask, workers)
+    document: dict[str, Any] = {
+        "name": change.model_name,
+        "version": change.model_version,
+        "effects": list(change.effects or ()),
+        "limits": change.limits_name or "as each lot had them",
+        **summary(judged, fresh),
+    }
+    document["evidence"] = keep_evidence(store, change, document, runs)
+    if as_json:
+        print_json({"archive": str(store.root), **document})
+    else:
+        _print(document)
+    raise typer.Exit(0 if document["verdict"] == BETTER else 1)
+
+
+def _judged(
+    store: Archive, runs: list[str], change: Wanted, dask: str, workers: int | None
+) -> tuple[list[Judged], list[Fresh]]:
+    """Every lot under both models, and the fresh errors of those whose units were measured before."""
+    from pathlib import Path as LocalPath
+
+    from pipelines.flows.partitions import map_partitions, processors
+    from pipelines.rerun.judged import fresh, judged
+    from pipelines.rerun.partition import parts
+    from pipelines.rerun.whatif import fresh_tasks
+
+    count = max(1, min(workers or processors(), len(runs)))
+    home = store.root.resolve() / "orchestrator" if isinstance(store.root, LocalPath) else None
+    how: dict[str, Any] = {"workers": count, "home": home}
+    with error_console().status(f"judging {len(runs)} lots, {count} at a time"):
+        portions = map_partitions(judged, parts(store, runs, change, count), dask, **how, name="what if")
+        found = [one for portion in portions for one in portion]
+        tasks = fresh_tasks(found, store.address, change)
+        size = max(1, -(-len(tasks) // (4 * count)))
+        chunks = [tasks[start : start + size] for start in range(0, len(tasks), size)]
+        done = map_partitions(fresh, chunks, dask, **how, name="what if, fresh runs")
+    return found, [one for chunk in done for one in chunk]
+
+
+def _print(document: dict[str, Any]) -> None:
+    out = console()
+    title = f"{document['name']} version {document['version']} on {document['lots']} lots: old → new"
+    lines = [_line(f"{row['device']} on {row['station']}", row) for row in document["groups"]]
+    lines.append(_line("all", document["total"]))
+    heads = ["device", "lots", "units", "yield", "fit\nµg", "not fitted\nµg", "fresh run\nµg"]
+    print_table(heads, lines, title=title)
+    for key, words in (("to_fail", "would no longer pass"), ("to_pass", "would pass")):
+        rows = document["flips"][key]
+        if rows:
+            out.print(f"{len(rows)} units {words}")
+            for row in rows[:SHOWN]:
+                out.print(
+                    f"  {row['unit']} in {row['run']}: {row['reasons']}", markup=False, soft_wrap=True, style="dim"
+                )
+    for row in document["failed"]:
+        out.print(f"  {row['run']}: {row['error']}", style="bold red", markup=False, soft_wrap=True)
+    style = {"better": "bold green", "worse": "bold red"}.get(document["verdict"], "bold")
+    out.print(f"{document['verdict']}: {document['words']}", style=style, markup=False, soft_wrap=True)
+    out.print(f"evidence  {document['evidence']}", markup=False)
+
+
+def _line(name: str, row: dict[str, Any]) -> list[str]:
+    rates = " → ".join("" if value is None else f"{value:.1%}" for value in row["yield"])
+    errors = [
+        " → ".join(short(value) for value in row[key]) for key in ("fit_rms_ug", "verification_rms_ug", "fresh_rms_ug")
+    ]
+    return [name, str(row["lots"]), str(row["units"]), rates, *(text if text != " → " else "" for text in errors)]

@@ -1,0 +1,147 @@
+"""What a model would make of the archive: yield and errors of all lots, old model against new, by station and kind of device."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from typing import TYPE_CHECKING, Any
+
+from pipelines.rerun.judged import FreshTask, Judged
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from pipelines.rerun.judged import Fresh, Side, Sums
+    from pipelines.rerun.wanted import Wanted
+
+FALLS = 0.005
+"""Share by which an error must change to count."""
+BETTER, WORSE, EQUAL, NOTHING = "better", "worse", "no better", "nothing to judge"
+SIDES = ("old", "new")
+
+
+def fresh_tasks(found: Sequence[Judged], archive: str, wanted: Wanted) -> list[FreshTask]:
+    """For every run, the calibrations of the run before in which each of its units was measured."""
+    last: dict[str, Judged] = {}
+    tasks: list[FreshTask] = []
+    for judged in found:
+        if judged.old is None or judged.new is None:
+            continue
+        earlier: dict[str, list[str]] = defaultdict(list)
+        runs = {before.entry.id: before for before in last.values()}
+        for unit in judged.new.fitted:
+            if unit in last:
+                earlier[last[unit].entry.id].append(unit)
+            last[unit] = judged
+        pairs = tuple((tuple(units), *_calibrations(runs[run])) for run, units in earlier.items())
+        if pairs:
+            tasks.append(FreshTask(archive, judged.entry.id, wanted, pairs))
+    return tasks
+
+
+def _calibrations(judged: Judged) -> tuple[Any, Any]:
+    return (judged.old.calibration if judged.old else None, judged.new.calibration if judged.new else None)
+
+
+def summary(found: Sequence[Judged], fresh: Sequence[Fresh]) -> dict[str, Any]:
+    """The what-if as a document: total, by station and device, units that flip, lots that could not be judged, and a verdict."""
+    by_run = {one.run: one for one in fresh}
+    whole = [judged for judged in found if judged.old is not None and judged.new is not None]
+    groups: dict[tuple[str, str], list[Judged]] = defaultdict(list)
+    for judged in whole:
+        groups[judged.entry.station, judged.entry.device].append(judged)
+    rows = [
+        {"station": station, "device": device, **_figures(own, by_run)}
+        for (station, device), own in sorted(groups.items())
+    ]
+    total = _figures(whole, by_run)
+    verdict, words = _verdict(total, rows)
+    return {
+        "lots": len(whole),
+        "total": total,
+        "groups": rows,
+        "flips": _flips(whole),
+        "failed": [{"run": judged.entry.id, "error": judged.error} for judged in found if judged.error],
+        "verdict": verdict,
+        "words": words,
+    }
+
+
+def _figures(found: Sequence[Judged], fresh: dict[str, Fresh]) -> dict[str, Any]:
+    """Yield and root mean square errors of some lots, each [old, new]."""
+    sides = [[judged.old for judged in found], [judged.new for judged in found]]
+    again = [fresh[judged.entry.id] for judged in found if judged.entry.id in fresh]
+    on_fresh = [[one.old for one in again], [one.new for one in again]]
+    units = sum(len(side.outcome) for side in sides[0] if side)
+    return {
+        "lots": len(found),
+        "units": units,
+        "yield": [_passed(own) / units if units else None for own in sides],
+        "fit_rms_ug": [_rms([side.fitted for side in own if side]) for own in sides],
+        "verification_rms_ug": [_rms([side.verified for side in own if side]) for own in sides],
+        "fresh_rms_ug": [_rms(own) for own in on_fresh],
+        "fresh_units": sum(len(one) for one in on_fresh[1]),
+    }
+
+
+def _passed(sides: Sequence[Side | None]) -> int:
+    return sum(outcome == "pass" for side in sides if side for outcome in side.outcome.values())
+
+
+def _rms(parts: Sequence[Sums]) -> float | None:
+    squares = sum(square for part in parts for square, _ in part.values())
+    count = sum(number for part in parts for _, number in part.values())
+    return (squares / count) ** 0.5 if count else None
+
+
+def _flips(found: Sequence[Judged]) -> dict[str, list[dict[str, str]]]:
+    """Units that would no longer pass, and those that would."""
+    flips: dict[str, list[dict[str, str]]] = {"to_fail": [], "to_pass": []}
+    for judged in found:
+        if judged.old is None or judged.new is None:
+            continue
+        for unit, before in judged.old.outcome.items():
+            after = judged.new.outcome.get(unit, "")
+            if (before == "pass") == (after == "pass"):
+                continue
+            worse = before == "pass"
+            reasons = (judged.new if worse else judged.old).reasons[unit]
+            row = {"run": judged.entry.id, "unit": unit, "old": before, "new": after, "reasons": reasons}
+            flips["to_fail" if worse else "to_pass"].append(row)
+    return flips
+
+
+def _verdict(total: dict[str, Any], rows: Sequence[dict[str, Any]]) -> tuple[str, str]:
+    """Whether the new model is better, judged by data that no coefficient was fitted to."""
+    figure, where = _telling(total)
+    if not figure:
+        return NOTHING, "no lot has dwells that were not fitted; nothing tells the models apart"
+    share = _share(total[figure])
+    hurt = [
+        f"{row['device']} on {row['station']}" for row in rows if figure in _known(row) and _share(row[figure]) > FALLS
+    ]
+    before, after = total["yield"]
+    old, new = total[figure]
+    said = f"the error {where} goes from {old:.3g} to {new:.3g} µg, the yield from {before:.1%} to {after:.1%}"
+    if share > FALLS:
+        return WORSE, f"{said}: it rises"
+    if hurt:
+        return WORSE, f"{said}; it rises for {', '.join(hurt)}"
+    if share < -FALLS:
+        return BETTER, f"{said}: it falls"
+    return EQUAL, f"{said}: it does not fall"
+
+
+def _telling(total: dict[str, Any]) -> tuple[str, str]:
+    known = _known(total)
+    if "fresh_rms_ug" in known:
+        return "fresh_rms_ug", "on fresh runs"
+    return ("verification_rms_ug", "in poses that were not fitted") if "verification_rms_ug" in known else ("", "")
+
+
+def _known(row: dict[str, Any]) -> list[str]:
+    names = ("fresh_rms_ug", "verification_rms_ug")
+    return [name for name in names if None not in row[name] and row[name][0]]
+
+
+def _share(pair: Sequence[float]) -> float:
+    return pair[1] / pair[0] - 1.0

@@ -1,0 +1,186 @@
+"""A model before it is released: yield and errors of all lots, and the records that make it the line's."""
+
+from datetime import UTC, datetime
+from pathlib import Path
+
+import numpy as np
+import pytest
+from capture_double import CaptureDouble, small_job
+
+from pipelines.archive import Archive
+from pipelines.chain import ORDER
+from pipelines.rerun.again import again
+from pipelines.rerun.judged import applied, fresh, judged
+from pipelines.rerun.partition import Part
+from pipelines.rerun.releases import evidence_for, keep_evidence, line_model, release, released, releases
+from pipelines.rerun.wanted import Wanted, wanted
+from pipelines.rerun.whatif import fresh_tasks, summary
+from pipelines.runner import Runner
+from pipelines.stages.calibration import read_calibration
+from schemas.errors import RecipeInvalid, WrongUse
+
+FULL = 'effects = ["bias", "scale", "misalignment", "bias_temperature", "scale_temperature"]'
+POOR = 'effects = ["bias", "scale", "misalignment", "bias_temperature"]'
+LIMITS = """
+name = "plain"
+rule = "simple_acceptance"
+[figures]
+verification_norm_ug = { max = 300.0, unit = "µg" }
+"""
+MODEL = """
+[model]
+name = "better"
+version = 2
+effects = [{}]
+"""
+GOOD = ("bias", "scale", "misalignment", "bias_temperature", "scale_temperature")
+
+
+@pytest.fixture(scope="module")
+def archive(tmp_path_factory: pytest.TempPathFactory) -> Archive:
+    """Two measurements of one lot whose scale depends on temperature, under a model that does not know it."""
+    folder = tmp_path_factory.mktemp("whatif")
+    (folder / "plain.toml").write_text(LIMITS)
+    for repeat, noise in enumerate((1e-4, 2e-4)):
+        job = small_job(folder, (FULL, POOR), ('limits = "consumer"', 'limits = "plain.toml"'), repeat=repeat)
+        runner = Runner(job, Archive(folder / "archive"), measure=CaptureDouble(noise_g=noise))
+        for stage in ORDER[:-1]:
+            runner.stage(stage)
+    return Archive(folder / "archive")
+
+
+def model_file(folder: Path, effects: tuple[str, ...] = GOOD) -> Path:
+    path = folder / "better.toml"
+    path.write_text(MODEL.format(", ".join(f'"{e}"' for e in effects)))
+    return path
+
+
+def what_if(archive: Archive, change: Wanted) -> dict:
+    runs = [info.id for info in archive.runs() if "rerun_of" not in archive.run(info.id).about]
+    found = judged(Part(archive.address, tuple(runs), change))
+    return summary(found, fresh(fresh_tasks(found, archive.address, change)))
+
+
+@pytest.fixture(scope="module")
+def better(archive: Archive, tmp_path_factory: pytest.TempPathFactory) -> tuple[Wanted, dict]:
+    change = wanted("", model_file(tmp_path_factory.mktemp("model")))
+    return change, what_if(archive, change)
+
+
+def test_a_model_with_the_missing_effect_is_better_on_fresh_runs_and_in_yield(better: tuple[Wanted, dict]) -> None:
+    _, document = better
+    total = document["total"]
+    assert document["verdict"] == "better"
+    assert document["lots"] == 2
+    assert total["fresh_units"] == 3
+    assert total["fresh_rms_ug"][1] < 0.2 * total["fresh_rms_ug"][0]
+    assert total["yield"] == [0.0, 1.0]
+    assert len(document["flips"]["to_pass"]) == 6
+    assert [(row["device"], row["station"]) for row in document["groups"]] == [("adxl355", "simulated")]
+
+
+def test_the_new_side_is_what_a_rerun_makes(archive: Archive, better: tuple[Wanted, dict]) -> None:
+    change, _ = better
+    run = archive.runs()[0].id
+    side = judged(Part(archive.address, (run,), change))[0].new
+    made = archive.run(again(archive, run, change).new)
+    assert side is not None
+    assert side.calibration is not None
+    stored = read_calibration(made.table("coefficients"), made.table("covariance"))
+    np.testing.assert_array_equal(side.calibration.coefficients, stored.coefficients)
+    grades = made.table("grades")
+    assert side.outcome == dict(zip(grades["unit"], grades["outcome"], strict=True))
+
+
+def test_the_error_on_a_fresh_run_is_that_of_the_corrected_norm(archive: Archive) -> None:
+    first, again_ = (archive.run(info.id) for info in archive.runs()[:2])
+    found = read_calibration(first.table("coefficients"), first.table("covariance"))
+    dwells = again_.table("dwells")
+    sums = applied(found, ["A2"], dwells, again_.table("history"))
+    own = dwells[(dwells["unit"] == "A2") & dwells["kind"].isin(["dwell", "verification"])]
+    u = found.units.index("A2")
+    names = {name: c for c, (name, _) in enumerate(found.names[0])}
+    theta = own["unit_C"].to_numpy() - 25.0
+    c = found.coefficients[u]
+    offset = c[:, names["bias"]][None, :] + theta[:, None] * c[:, names["bias_temperature"]][None, :]
+    force = np.linalg.solve(found.response[u], (own[["out_x", "out_y", "out_z"]].to_numpy() - offset).T).T
+    true = np.linalg.norm(own[["force_x", "force_y", "force_z"]].to_numpy(), axis=1)
+    expected = 1e6 * (np.linalg.norm(force, axis=1) - true)
+    assert sums["A2"][0] == pytest.approx(float(np.sum(expected**2)), rel=1e-6)
+    assert sums["A2"][1] == len(own)
+
+
+def test_a_model_that_was_there_already_is_no_better(archive: Archive, tmp_path: Path) -> None:
+    same = wanted("", model_file(tmp_path, GOOD[:-1]))
+    document = what_if(archive, same)
+    assert document["verdict"] == "no better"
+    assert document["total"]["fresh_rms_ug"][0] == pytest.approx(document["total"]["fresh_rms_ug"][1])
+
+
+def test_a_lot_that_the_model_cannot_be_fitted_to_is_named(archive: Archive, tmp_path: Path) -> None:
+    document = what_if(archive, wanted("", model_file(tmp_path, (*GOOD, "bias_temperature_quadratic"))))
+    assert document["verdict"] == "nothing to judge"
+    assert all("bias_temperature_quadratic" in row["error"] for row in document["failed"])
+
+
+def test_a_release_needs_evidence_or_force_and_a_reason(archive: Archive, tmp_path: Path) -> None:
+    own = Archive(tmp_path / "archive")
+    own.prepare()
+    change, since = wanted("", model_file(tmp_path)), datetime(2026, 3, 1, tzinfo=UTC)
+    with pytest.raises(WrongUse, match="a what-if is needed"):
+        release(own, change, since, reason="it looks good")
+    with pytest.raises(WrongUse, match="no reason"):
+        release(own, change, since, reason=" ", force=True)
+    record = release(own, change, since, reason="the line stands still", force=True)
+    assert record.forced
+    assert record.evidence == ""
+
+
+def test_a_release_rests_on_a_what_if_of_its_device_and_station(tmp_path: Path, better: tuple[Wanted, dict]) -> None:
+    change, document = better
+    own = Archive(tmp_path / "archive")
+    name = keep_evidence(own, change, document, ["a"])
+    since = datetime(2026, 3, 1, tzinfo=UTC)
+    assert evidence_for(own, change, "ADXL355", "") is not None
+    with pytest.raises(WrongUse, match="lots of SF1500"):
+        release(own, change, since, device="SF1500", reason="same family")
+    assert release(own, change, since, device="ADXL355", reason="fresh error falls").evidence == name
+
+
+def test_a_what_if_that_says_worse_does_not_release(tmp_path: Path, better: tuple[Wanted, dict]) -> None:
+    change, document = better
+    own = Archive(tmp_path / "archive")
+    keep_evidence(own, change, {**document, "verdict": "worse", "words": "it rises"}, ["a"])
+    with pytest.raises(WrongUse, match="says worse: it rises"):
+        release(own, change, datetime(2026, 3, 1, tzinfo=UTC), reason="hope")
+
+
+def test_the_line_uses_the_narrowest_release_whose_date_is_reached(tmp_path: Path) -> None:
+    own = Archive(tmp_path / "archive")
+    own.prepare()
+
+    def made(version: int, month: int, **where: str) -> int:
+        path = tmp_path / "m.toml"
+        path.write_text(f'[model]\nname = "m"\nversion = {version}\neffects = ["bias", "scale"]\n')
+        since = datetime(2026, month, 1, tzinfo=UTC)
+        return release(own, wanted("", path), since, reason="test", force=True, **where).number
+
+    def valid(month: int, device: str = "ADXL355", station: str = "s1") -> int | None:
+        found = released(own, device, station, datetime(2026, month, 15, tzinfo=UTC))
+        return found.number if found else None
+
+    first, later, own_device, own_station = (
+        made(1, 2),
+        made(2, 6),
+        made(3, 4, device="adxl355"),
+        made(4, 5, station="s2"),
+    )
+    assert [valid(1), valid(2), valid(3), valid(4), valid(7)] == [None, first, first, own_device, own_device]
+    assert valid(7, device="SF1500") == later
+    assert [valid(4, station="s2"), valid(5, station="s2")] == [own_device, own_station]
+    assert len(releases(own)) == 4
+    assert line_model(own, "ADXL355", "s1", datetime(2026, 4, 2, tzinfo=UTC))["model_version"] == 3
+    with pytest.raises(
+        RecipeInvalid, match=r"no model is released at 2026-01-02 \(released: every device from 2026-02-01"
+    ):
+        line_model(own, "ADXL355", "s1", datetime(2026, 1, 2, tzinfo=UTC))
