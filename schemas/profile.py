@@ -36,8 +36,9 @@ LONGEST_WRITE = 123  # registers in one FC16 request (Modbus Application Protoco
 class Register(Strict):
     """One value, or ``count`` of the same kind in a row, at a wire address of one of Modbus' four spaces.
 
-    ``value = raw · scale``; ``minimum`` and ``maximum`` bound the value, in ``unit``. A string has ``count`` words of two
-    characters. ``disputed`` says what sources disagree about. ``source`` is the profile's where none is named.
+    ``value = raw · scale``, over ten to the power that the register ``scaled_by`` holds where one is named; ``minimum`` and
+    ``maximum`` bound the value, in ``unit``. A string has ``count`` words of two characters. ``disputed`` says what sources
+    disagree about. ``source`` is the profile's where none is named.
     """
 
     name: Annotated[str, Field(pattern=r"^[a-z][a-z0-9_]*$")]
@@ -48,6 +49,7 @@ class Register(Strict):
     count: Annotated[int, Field(ge=1)] = 1
     word_order: WordOrder | None = None
     scale: Annotated[FiniteFloat, Field(gt=0.0)] = 1.0
+    scaled_by: str = ""
     unit: str = ""
     minimum: FiniteFloat | None = None
     maximum: FiniteFloat | None = None
@@ -61,6 +63,10 @@ class Register(Strict):
     def writable(self) -> bool:
         """Whether it may be written at all."""
         return self.access != "read"
+
+    def with_decimals(self, decimals: int) -> Register:
+        """The same register, its values in steps of ten to the power of minus ``decimals``."""
+        return self.model_copy(update={"scale": self.scale * 10.0**-decimals, "scaled_by": ""})
 
     @property
     def words(self) -> int:
@@ -152,6 +158,9 @@ class Profile(Strict):
             message = f"links {carriers}: a device on ascii has commands alone, any other registers alone; correct it"
             raise ValueError(message)
         _refuse_overlaps(self)
+        for register in self.registers:
+            if register.scaled_by:
+                self.register(register.scaled_by)
         for group, names in self.groups.items():
             _refuse_gaps(group, [self.register(name) for name in names])
         return self
@@ -171,6 +180,10 @@ class Profile(Strict):
                 return command
         message = f"profile {self.name}: no command '{name}'; {did_you_mean(name, (c.name for c in self.commands))}"
         raise RecipeInvalid(message, key=name)
+
+    def entry(self, name: str) -> Register | Command:
+        """The register or command of that name."""
+        return self.command(name) if self.commands else self.register(name)
 
     def has(self, name: str) -> bool:
         """Whether there is a register, command or group of that name."""

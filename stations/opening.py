@@ -3,18 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Generator
-from contextlib import contextmanager
-from dataclasses import dataclass, field, replace
+from contextlib import ExitStack, contextmanager
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from schemas.errors import RecipeInvalid
 from stations.clock import Clock, WallClock
-from stations.devices.chamber import ThermalChamber
+from stations.devices.adapters import axis_adapter, chamber_adapter
+from stations.devices.commands import Commands
 from stations.devices.reader import Reader
 from stations.devices.registers import Registers
 from stations.devices.slot import Slot
-from stations.devices.table import TableAxis, TiltTable
-from stations.links.modbus import ModbusLink
+from stations.devices.table import TiltTable
+from stations.links.making import Links
 from stations.profile_files import load_profile
 from stations.safety.guarded import PARTING_S, guarded
 from stations.safety.safe_state import safe_steps
@@ -23,37 +24,13 @@ from stations.station import Station, nobody_else
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from schemas.profile import Profile
+    from schemas.profile import Carrier, Profile
     from schemas.recipe import Lot
     from schemas.station import Device, Limits, StationConfig
+    from stations.devices.axis import TableAxis
+    from stations.devices.chamber import ThermalChamber
     from stations.plant.hidden import HiddenEffect
     from stations.plant.plant import Plant
-
-Address = tuple[str, int]
-
-
-@dataclass
-class _Links:
-    """Links by address; a simulated station puts all of its devices at one."""
-
-    config: StationConfig
-    simulated_at: Address | None = None
-    made: dict[Address, ModbusLink] = field(default_factory=dict[Address, ModbusLink])
-
-    def to(self, host: str, port: int) -> ModbusLink:
-        """The link to an address, made once."""
-        address = self.simulated_at or (host, port)
-        if address not in self.made:
-            patience = self.config.link
-            self.made[address] = ModbusLink(
-                *address, timeout_s=patience.timeout_s, read_attempts=patience.read_attempts
-            )
-        return self.made[address]
-
-    def close(self) -> None:
-        """Closes every link."""
-        for link in self.made.values():
-            link.close()
 
 
 @contextmanager
@@ -98,7 +75,7 @@ def open_devices(
     require: Callable[[], None] = nobody_else,
 ) -> Generator[Station]:
     """The devices of a station of hardware, not leased and not watched: to look at them, or to make them safe."""
-    links, clock = _Links(config), WallClock(resume)
+    links, clock = Links(config), WallClock(resume)
     try:
         yield replace(_assemble(config, slots, links, clock), state=clock.state, exact=False, require=require)
     finally:
@@ -119,74 +96,93 @@ def make_plant(
 
 @contextmanager
 def serve_plant(config: StationConfig, lot: Lot, plant: Plant) -> Generator[Station]:
-    """A station whose devices are the plant's, over Modbus TCP on loopback; ``lot`` is what its client expects to find."""
+    """A station whose devices are the plant's, on loopback; ``lot`` is what its client expects to find."""
     from stations.plant.clock import PlantClock  # noqa: PLC0415 - hardware needs no plant
-    from stations.plant.faults.wire import on_the_wire  # noqa: PLC0415
+
+    with serve_devices(config, plant) as links:
+        station = _assemble(config, [unit.slot for unit in lot.units], links, PlantClock(plant))
+        yield replace(station, state=lambda: plant.journal.state(plant.now_us))
+
+
+@contextmanager
+def serve_devices(config: StationConfig, plant: Plant) -> Generator[Links]:
+    """The links to a plant's devices, served on loopback: registers over Modbus TCP, lines beside it."""
+    from stations.plant.faults.wire import on_the_wire  # noqa: PLC0415 - hardware needs no plant
+    from stations.plant.line_server import LineServer  # noqa: PLC0415
     from stations.plant.server import PlantServer  # noqa: PLC0415
 
-    with PlantServer(plant) as server, on_the_wire(plant, server.host, server.port) as address:
-        links = _Links(config, address)
-        try:
-            station = _assemble(config, [unit.slot for unit in lot.units], links, PlantClock(plant))
-            yield replace(station, state=lambda: plant.journal.state(plant.now_us))
-        finally:
-            links.close()
+    with ExitStack() as stack:
+        server = stack.enter_context(PlantServer(plant))
+        at: dict[Carrier, tuple[str, int]] = {"tcp": stack.enter_context(on_the_wire(plant, server.host, server.port))}
+        for device_id in plant.speakers:
+            lines = stack.enter_context(LineServer(plant, device_id))
+            at["ascii"] = (lines.host, lines.port)
+        links = Links(config, at)
+        stack.callback(links.close)
+        yield links
 
 
-def _assemble(config: StationConfig, slots: Sequence[int], links: _Links, clock: Clock) -> Station:
+def _assemble(config: StationConfig, slots: Sequence[int], links: Links, clock: Clock) -> Station:
     """The station's adapters on their links, each with the tighter of its profile's and the station's limits."""
-
-    def registers(name: str, device: Device) -> Registers:
-        return Registers(name, links.to(device.host, device.port), device.device_id, load_profile(device.profile))
-
     devices, limits = config.devices, config.limits
-    chamber = registers("chamber", devices.chamber)
     axes = {
-        name: _axis(registers(f"{name} axis", device), bounds, limits)
-        for name, device, bounds in (
-            ("outer", devices.outer, limits.outer_deg),
-            ("inner", devices.inner, limits.inner_deg),
-        )
+        "outer": _axis(_registers("outer axis", "outer", devices.outer, links), limits.outer_deg, limits),
+        "inner": _axis(_registers("inner axis", "inner", devices.inner, links), limits.inner_deg, limits),
     }
-    reader = registers("reader", devices.reader)
+    reader = _registers("reader", "reader", devices.reader, links)
     _, fastest = tighter((0.0, limits.rate_hz), reader.profile, "rate")
     parts = (
         TiltTable(axes["outer"], axes["inner"], clock),
-        ThermalChamber(chamber, *tighter(limits.temperature_C, chamber.profile, "set_point")),
+        _chamber(devices.chamber, links, limits),
         Reader(reader, {slot: Slot(_slot_registers(config, links, slot)) for slot in slots}, fastest),
     )
     return Station(config, clock, *parts, safe_steps=safe_steps(config.safety, axes, *parts[1:]))
 
 
+def _registers(name: str, place: str, device: Device, links: Links) -> Registers:
+    return Registers(name, links.registers(place), device.device_id, load_profile(device.profile))
+
+
+def _chamber(device: Device, links: Links, limits: Limits) -> ThermalChamber:
+    """The chamber by its controller's family, on registers or on lines."""
+    profile = load_profile(device.profile)
+    adapter = chamber_adapter(profile)
+    spoken = device.link == "ascii"
+    values = (
+        Commands("chamber", links.lines("chamber"), profile)
+        if spoken
+        else _registers("chamber", "chamber", device, links)
+    )
+    return adapter(values, *tighter(limits.temperature_C, profile, "set_point"))
+
+
 def _axis(registers: Registers, bounds: tuple[float, float], limits: Limits) -> TableAxis:
-    """An axis that keeps within its drive's limits and the station's."""
+    """An axis by its drive's family, that keeps within the drive's limits and the station's."""
     profile = registers.profile
     speed, acceleration = (
         tighter((0.0, wanted), profile, name)[1]
         for name, wanted in (("speed", limits.speed_deg_s), ("acceleration", limits.acceleration_deg_s2))
     )
     kept = limits.model_copy(update={"speed_deg_s": speed, "acceleration_deg_s2": acceleration})
-    return TableAxis(registers, tighter(bounds, profile, "target"), kept)
+    return axis_adapter(profile)(registers, tighter(bounds, profile, "target"), kept)
 
 
-def tighter(bounds: tuple[float, float], profile: Profile, register: str) -> tuple[float, float]:
-    """The bounds that both the station's file and a register of the profile allow."""
-    if not profile.has(register):
+def tighter(bounds: tuple[float, float], profile: Profile, name: str) -> tuple[float, float]:
+    """The bounds that both the station's file and a value of the profile allow."""
+    if not profile.has(name):
         return bounds
-    own = profile.register(register)
+    own = profile.entry(name)
     low = bounds[0] if own.minimum is None else max(bounds[0], own.minimum)
     high = bounds[1] if own.maximum is None else min(bounds[1], own.maximum)
     if low >= high:
         message = (
-            f"profile {profile.name}: {register} from {own.minimum} to {own.maximum} {own.unit}, the station's limits are "
+            f"profile {profile.name}: {name} from {own.minimum} to {own.maximum} {own.unit}, the station's limits are "
             f"{bounds[0]:g} to {bounds[1]:g}: nothing is allowed by both; correct [limits] in the station's file"
         )
         raise RecipeInvalid(message, key="limits")
     return low, high
 
 
-def _slot_registers(config: StationConfig, links: _Links, slot: int) -> Registers:
+def _slot_registers(config: StationConfig, links: Links, slot: int) -> Registers:
     where = config.devices.slots
-    return Registers(
-        f"slot {slot}", links.to(where.host, where.port), where.device_id + slot, load_profile(where.profile)
-    )
+    return Registers(f"slot {slot}", links.registers("slots"), where.device_id + slot, load_profile(where.profile))

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from contextlib import ExitStack
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from schemas.errors import StationError, WrongUse
-from stations.codec import decode, named
-from stations.links.modbus import ModbusLink
+from stations.codec import named
+from stations.devices.commands import Commands
+from stations.devices.registers import Registers
+from stations.links.making import Links
 from stations.profile_files import load_profile
 
 if TYPE_CHECKING:
@@ -18,17 +21,18 @@ if TYPE_CHECKING:
     from schemas.recipe import Lot
     from schemas.station import StationConfig
     from stations.codec import Value
-    from stations.links.link import Link
 
 TICK_S = 0.05
 OCCUPIED = "occupied"
+NAMES = (("outer axis", "outer"), ("inner axis", "inner"), ("chamber", "chamber"), ("reader", "reader"))
 
 
 @dataclass(frozen=True)
 class Served:
-    """Where a device of a station answers, and by which profile."""
+    """Where a device of a station answers, and by which profile; ``place`` is what the station's file calls it."""
 
     name: str
+    place: str
     device_id: int
     profile: str
     host: str = ""
@@ -51,15 +55,13 @@ class Reading:
 def served(config: StationConfig, slots: list[int]) -> list[Served]:
     """Every device of a station, the slots of these numbers among them."""
     devices = config.devices
-    named_devices = (
-        ("outer axis", devices.outer),
-        ("inner axis", devices.inner),
-        ("chamber", devices.chamber),
-        ("reader", devices.reader),
-    )
-    found = [Served(name, d.device_id, d.profile, d.host, d.port) for name, d in named_devices]
+    found = [
+        Served(name, place, device.device_id, device.profile, device.host, device.port)
+        for name, place in NAMES
+        if (device := getattr(devices, place))
+    ]
     s = devices.slots
-    return found + [Served(f"slot {i}", s.device_id + i, s.profile, s.host, s.port) for i in slots]
+    return found + [Served(f"slot {i}", "slots", s.device_id + i, s.profile, s.host, s.port) for i in slots]
 
 
 def serve(
@@ -74,17 +76,22 @@ def serve(
 ) -> None:
     """Comes back when ``stop`` is set; until then the station's time goes on at ``speed`` times the wall's.
 
-    ``ready`` is told host and port once they listen. Nothing is sampled unless a client starts it.
+    ``ready`` is told host and port once they listen; a device that is spoken to in lines has the port behind. Nothing is sampled
+    unless a client starts it.
     """
     if config.kind != "simulated":
         message = f"station {config.name}: kind {config.kind}, only a simulated station can be served; give such a file"
         raise WrongUse(message)
     from stations.clock import WallClock  # noqa: PLC0415 - only serving needs these
     from stations.opening import make_plant  # noqa: PLC0415
+    from stations.plant.line_server import LineServer  # noqa: PLC0415
     from stations.plant.server import PlantServer  # noqa: PLC0415
 
     plant = make_plant(config, lot)
-    with PlantServer(plant, host, port) as server:
+    with ExitStack() as stack:
+        server = stack.enter_context(PlantServer(plant, host, port))
+        for number, device_id in enumerate(plant.speakers, server.port + 1):
+            stack.enter_context(LineServer(plant, device_id, host, number))
         ready(server.host, server.port)
         clock, done = WallClock(), 0.0
         while not stop.wait(TICK_S):
@@ -98,54 +105,57 @@ def look(config: StationConfig, lot: Lot | None) -> list[Reading]:
 
     ``lot`` is what sits in a simulated station; hardware has what it has.
     """
+    once = config.model_copy(update={"link": config.link.model_copy(update={"read_attempts": 1})})
     if config.kind == "simulated":
         if lot is None:
             message = f"station {config.name}: simulated, it needs a lot of units to look at; give one"
             raise WrongUse(message)
-        from stations.opening import make_plant  # noqa: PLC0415 - hardware needs no plant
-        from stations.plant.server import PlantServer  # noqa: PLC0415
+        from stations.opening import make_plant, serve_devices  # noqa: PLC0415 - hardware needs no plant
 
-        with PlantServer(make_plant(config, lot)) as server:
-            return list(_look(config, (server.host, server.port)))
-    return list(_look(config, None))
+        with serve_devices(once, make_plant(config, lot)) as links:
+            return list(_look(once, links))
+    links = Links(once)
+    try:
+        return list(_look(once, links))
+    finally:
+        links.close()
 
 
-def _look(config: StationConfig, address: tuple[str, int] | None) -> Iterator[Reading]:
+def _look(config: StationConfig, links: Links) -> Iterator[Reading]:
     slots: list[int] = []
     for device in served(config, []):
-        link = _link(config, address or (device.host, device.port))
-        try:
-            for reading in _registers(link, device):
-                if device.name == "reader" and reading.register == OCCUPIED and not reading.fault:
-                    mask = int(float(reading.value))
-                    slots = [i for i in range(mask.bit_length()) if mask >> i & 1]
-                yield reading
-        finally:
-            link.close()
-    for device in served(config, slots)[4:]:
-        link = _link(config, address or (device.host, device.port))
-        try:
-            yield from _registers(link, device)
-        finally:
-            link.close()
+        for reading in _values(links, device):
+            if device.name == "reader" and reading.register == OCCUPIED and not reading.fault:
+                mask = int(float(reading.value))
+                slots = [i for i in range(mask.bit_length()) if mask >> i & 1]
+            yield reading
+    for device in served(config, slots)[len(NAMES) :]:
+        yield from _values(links, device)
 
 
-def _link(config: StationConfig, address: tuple[str, int]) -> ModbusLink:
-    return ModbusLink(*address, timeout_s=config.link.timeout_s, read_attempts=1)
-
-
-def _registers(link: Link, device: Served) -> Iterator[Reading]:
-    """The readable registers of one device; after the first that stays silent the others are not asked."""
+def _values(links: Links, device: Served) -> Iterator[Reading]:
+    """What one device tells; after the first question that it leaves unanswered the others are not asked."""
     profile = load_profile(device.profile)
+    if profile.commands:
+        commands = Commands(device.name, links.lines(device.place), profile)
+        for number, command in enumerate(profile.commands):
+            try:
+                value = commands.text(command.name)
+            except StationError as problem:
+                yield Reading(device.name, device.device_id, command.name, number, "", command.unit, str(problem))
+                return
+            yield Reading(device.name, device.device_id, command.name, number, value, command.unit)
+        return
+    registers = Registers(device.name, links.registers(device.place), device.device_id, profile)
     for register in profile.registers:
         if register.access == "write":
             continue
         try:
-            words = link.read(device.device_id, register.address, register.words, f"{device.name} {register.name}")
+            value = registers.read(register.name)
         except StationError as problem:
             yield _reading(device, register, "", str(problem))
             return
-        yield _reading(device, register, _shown(register, decode(register, profile.order(register), words)), "")
+        yield _reading(device, register, _shown(register, value), "")
 
 
 def _reading(device: Served, register: Register, value: str, fault: str) -> Reading:

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from schemas.errors import StationRefused
+from schemas.errors import LinkLost, StationRefused, StationTimeout
 from stations.codec import NotEncodable, Value, decode, encode, named
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from schemas.profile import Profile
+    from schemas.profile import Profile, Register
     from stations.links.link import Link
 
 
@@ -22,11 +22,18 @@ class Registers:
         self.profile = profile
         self._link = link
         self._device_id = device_id
+        self._decimals: dict[str, int] = {}
+
+    def has(self, name: str) -> bool:
+        """Whether the device has a register or group of that name."""
+        return self.profile.has(name)
 
     def read(self, name: str) -> Value:
         """The value of a register: a number, a list where it has a count, a text."""
-        register = self.profile.register(name)
-        words = self._link.read(self._device_id, register.address, register.words, f"{self.name} {name}")
+        register = self._scaled(name)
+        words = self._link.read(
+            self._device_id, register.address, register.words, f"{self.name} {name}", register.space
+        )
         return decode(register, self.profile.order(register), words)
 
     def number(self, name: str) -> float:
@@ -60,32 +67,82 @@ class Registers:
         value = int(self.number(name))
         return {flag: bool(value >> bit & 1) for flag, bit in self.profile.register(name).bits.items()}
 
+    def step(self, name: str) -> float:
+        """The smallest change that a register can hold; zero for a float."""
+        register = self._scaled(name)
+        return 0.0 if register.type == "float32" else register.scale
+
     def read_group(self, group: str) -> dict[str, Value]:
         """Values of a group of registers, read in one request and so of one instant."""
-        registers = [self.profile.register(name) for name in self.profile.groups[group]]
+        registers = [self._scaled(name) for name in self.profile.groups[group]]
         first = registers[0].address
-        words = self._link.read(self._device_id, first, registers[-1].end - first, f"{self.name} {group}")
+        words = self._link.read(
+            self._device_id, first, registers[-1].end - first, f"{self.name} {group}", registers[0].space
+        )
         return {r.name: decode(r, self.profile.order(r), words[r.address - first : r.end - first]) for r in registers}
 
     def write(self, name: str, value: Value) -> None:
         """Writes one register, once."""
-        register = self.profile.register(name)
-        words = self._encoded(name, value)
-        self._link.write(self._device_id, register.address, words, f"{self.name} {name} = {value}")
+        register = self._scaled(name)
+        words = self._encoded(register, value)
+        what = f"{self.name} {name} = {value}"
+        self._link.write(self._device_id, register.address, words, what, register.space)
 
     def write_group(self, group: str, values: Mapping[str, Value]) -> None:
         """Writes a group of registers in one request, once."""
-        names = self.profile.groups[group]
-        words = [word for name in names for word in self._encoded(name, values[name])]
-        address = self.profile.register(names[0]).address
-        self._link.write(self._device_id, address, words, f"{self.name} {group} {dict(values)}")
+        registers = [self._scaled(name) for name in self.profile.groups[group]]
+        words = [word for register in registers for word in self._encoded(register, values[register.name])]
+        what = f"{self.name} {group} {dict(values)}"
+        self._link.write(self._device_id, registers[0].address, words, what, registers[0].space)
+
+    def set_group(self, group: str, values: Mapping[str, Value]) -> None:
+        """Writes registers that start nothing in one request, once, and refuses to go on unless all read back as written."""
+        self.write_group(group, values)
+        found = self.read_group(group)
+        for name, value in values.items():
+            register = self._scaled(name)
+            if found[name] != decode(register, self.profile.order(register), self._encoded(register, value)):
+                message = (
+                    f"{self.name}: {name} is {found[name]} {register.unit} after {value} was written; nothing was started; "
+                    "check the device"
+                )
+                raise StationRefused(message)
+
+    def set(self, name: str, value: Value) -> None:
+        """Writes a register that keeps what it is given, once, and reads it back; where the answer was lost, that decides."""
+        try:
+            self.write(name, value)
+        except (StationTimeout, LinkLost):
+            if not self._holds(name, value):
+                raise
+        else:
+            if not self._holds(name, value):
+                message = (
+                    f"{self.name}: {name} is {self.read(name)} after {value} was written, {value} is needed; "
+                    "check the device's panel and its write protection"
+                )
+                raise StationRefused(message)
 
     def words(self, address: int, count: int, what: str) -> list[int]:
         """Raw words, for windows that have no names."""
         return self._link.read(self._device_id, address, count, f"{self.name} {what}")
 
-    def _encoded(self, name: str, value: Value) -> list[int]:
+    def _holds(self, name: str, value: Value) -> bool:
+        """Whether a register holds what a value becomes on the wire."""
+        register = self._scaled(name)
+        return self.read(name) == decode(register, self.profile.order(register), self._encoded(register, value))
+
+    def _scaled(self, name: str) -> Register:
+        """The register, its values in the steps that the device is set to; asked once."""
         register = self.profile.register(name)
+        by = register.scaled_by
+        if not by:
+            return register
+        if by not in self._decimals:
+            self._decimals[by] = int(self.number(by))
+        return register.with_decimals(self._decimals[by])
+
+    def _encoded(self, register: Register, value: Value) -> list[int]:
         try:
             return encode(register, self.profile.order(register), value)
         except NotEncodable as problem:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from stations.codec import NotEncodable, Value, decode, encode
 
 if TYPE_CHECKING:
-    from schemas.profile import Profile, Register
+    from schemas.profile import Profile, Register, Space
 
 Source = Callable[[], Value]
 Sink = Callable[[dict[str, Value]], None]
@@ -25,6 +25,15 @@ def refuse_write(values: dict[str, Value]) -> None:
     raise NotEncodable(message)
 
 
+def number(values: dict[str, Value], name: str) -> float:
+    """The number that is written to a register."""
+    value = values[name]
+    if not isinstance(value, int | float):
+        message = f"{name}: {value!r} is not a number"
+        raise NotEncodable(message)
+    return float(value)
+
+
 class Bank:
     """What a device's registers hold now, and what a write to them means."""
 
@@ -35,29 +44,35 @@ class Bank:
         self._sources = dict(sources)
         self._sink = sink
         self._window = window
+        self._registers = [self._scaled(register) for register in profile.registers]
         missing = [r.name for r in profile.registers if r.access != "write" and r.name not in self._sources]
         if missing:
             message = f"profile {profile.name}: the plant has nothing for {', '.join(missing)}; add a source for each"
             raise LookupError(message)
 
-    def read(self, address: int, count: int) -> list[tuple[int, list[int]]]:
-        """Words of every register that the span touches, each with its address."""
+    def _scaled(self, register: Register) -> Register:
+        """The register in the decimals that the device is set to."""
+        decimals = self._sources[register.scaled_by]() if register.scaled_by in self._sources else 0
+        return register.with_decimals(decimals) if isinstance(decimals, int) and register.scaled_by else register
+
+    def read(self, address: int, count: int, space: Space = "holding") -> list[tuple[int, list[int]]]:
+        """Words, or bits, of every register that the span touches, each with its address."""
         fifo = self.profile.fifo
-        if fifo is not None and self._window is not None and address >= fifo.address:
+        if fifo is not None and self._window is not None and address >= fifo.address and space == "holding":
             return [(address, self._window(address - fifo.address, count))]
         end = address + count
         return [
             (r.address, encode(r, self.profile.order(r), self._sources[r.name]()))
-            for r in self.profile.registers
-            if r.address < end and r.end > address and r.name in self._sources
+            for r in self._registers
+            if r.space == space and r.address < end and r.end > address and r.name in self._sources
         ]
 
-    def write(self, address: int, words: list[int]) -> None:
+    def write(self, address: int, words: list[int], space: Space = "holding") -> None:
         """Acts on the registers in the span; half a register, a value outside its limits or a read-only one is refused."""
         end = address + len(words)
         values: dict[str, Value] = {}
-        for register in self.profile.registers:
-            if register.address < end and register.end > address:
+        for register in self._registers:
+            if register.space == space and register.address < end and register.end > address:
                 values[register.name] = self._value(register, address, words)
         self._sink(values)
 

@@ -12,19 +12,20 @@ from array import array
 from collections import deque
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, get_args
 
 from schemas.errors import ArchiveUnusable, DataRejected
 from schemas.fault import Fault
+from schemas.profile import Space
 
 if TYPE_CHECKING:
-    from schemas.profile import Space
     from schemas.recipe import Lot
     from schemas.station import StationConfig
     from stations.plant.plant import Plant
 
 VERSION = 1
-HEAD = 4  # numbers before the words of a write
+SPACES: tuple[Space, ...] = get_args(Space)
+HEAD = 5  # numbers before the words of a write
 
 
 @dataclass(frozen=True)
@@ -69,28 +70,29 @@ class Journal:
 
     def __init__(self, belongs_to: str) -> None:
         self._belongs_to = belongs_to
-        self._writes = array("q")  # time, device, address, count, words; one after the other
+        self._writes = array("q")  # time, device, space, address, count, words; one after the other
         self._count = 0
-        self._injections: list[tuple[int, Injection]] = []  # with the number of writes before each
+        self._others: list[tuple[int, Said | Injection]] = []  # with the number of writes before each
 
     def add(self, event: Event) -> None:
         """Notes an event that has happened."""
-        if isinstance(event, Injection):
-            self._injections.append((self._count, event))
+        if not isinstance(event, Write):
+            self._others.append((self._count, event))
             return
-        self._writes.extend((event.at_us, event.device_id, event.address, len(event.words), *event.words))
+        place = event.device_id, SPACES.index(event.space), event.address
+        self._writes.extend((event.at_us, *place, len(event.words), *event.words))
         self._count += 1
 
     def events(self) -> Iterator[Event]:
         """Every event, in order."""
-        waiting, at = deque(self._injections), 0
+        waiting, at = deque(self._others), 0
         for number in range(self._count + 1):
             while waiting and waiting[0][0] == number:
                 yield waiting.popleft()[1]
             if number < self._count:
-                time, device_id, address, words = self._writes[at : at + HEAD]
+                time, device_id, space, address, words = self._writes[at : at + HEAD]
                 at += HEAD + words
-                yield Write(time, device_id, address, tuple(self._writes[at - words : at]))
+                yield Write(time, device_id, address, tuple(self._writes[at - words : at]), SPACES[space])
 
     def state(self, now_us: int) -> bytes:
         """The journal and the time as bytes."""

@@ -12,13 +12,13 @@ from numpy.typing import NDArray
 
 from schemas.errors import WrongUse
 from schemas.station import MOST_SLOTS, Simulation, StationConfig
-from stations.plant.banks import build_banks
+from stations.plant.banks import build_banks, build_speakers
 from stations.plant.device import Devices, Truth, draw_truth, rotation, stream
 from stations.plant.dynamics import Dynamics
 from stations.plant.faults.catalogue import trouble_of
 from stations.plant.fixture import Fixture
 from stations.plant.hidden import hidden_effect
-from stations.plant.journal import Injection, Journal, Write, fingerprint
+from stations.plant.journal import Injection, Journal, Said, Write, fingerprint
 from stations.plant.keyed import keyed_normal
 from stations.plant.noise import Noise
 from stations.plant.physics import Physics
@@ -31,6 +31,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
     from schemas.fault import Fault
+    from schemas.profile import Space
     from schemas.recipe import Lot
     from stations.plant.faults.base import Trouble
     from stations.plant.hidden import HiddenEffect
@@ -86,6 +87,7 @@ class Plant:
         self.frozen: dict[int, float] = {}
         self.frozen_air: float | None = None
         self.banks = build_banks(self, config.devices)
+        self.speakers = build_speakers(self, config.devices)
         self.journal = Journal(fingerprint(config, lot))
         self.fixture.step_to(1.0, self.physics.force_at)
         for fault in sim.faults:
@@ -125,26 +127,36 @@ class Plant:
         self.now_us = target_us
         self.sampler.advance(target_us)
 
-    def read(self, device_id: int, address: int, count: int) -> list[tuple[int, list[int]]]:
-        """Words of every register that a span touches, each with its address, as the device tells them now."""
-        found = self.banks[device_id].read(address, count)
+    def read(self, device_id: int, address: int, count: int, space: Space = "holding") -> list[tuple[int, list[int]]]:
+        """Words, or bits, of every register that a span touches, each with its address, as the device tells them now."""
+        found = self.banks[device_id].read(address, count, space)
         for trouble in self._now(device_id):
             found = [(first, trouble.told(self.now_us, first, words)) for first, words in found]
         return found
 
-    def write(self, device_id: int, address: int, words: list[int]) -> int:
+    def write(self, device_id: int, address: int, words: list[int], space: Space = "holding") -> int:
         """A register write, at the plant's time; the exception code of the answer. What a device refuses leaves no trace."""
         with self.lock:
             bank, code = self.banks[device_id], 0
             for trouble in self._now(device_id):
-                held = [word for _, part in bank.read(address, len(words)) for word in part]
+                held = [word for _, part in bank.read(address, len(words), space) for word in part]
                 whole = held if len(held) == len(words) else None
-                code = trouble.taken(words, whole, partial(bank.write, address))
+                code = trouble.taken(words, whole, partial(bank.write, address, space=space))
                 break
             else:
-                bank.write(address, words)
-            self.journal.add(Write(self.now_us, device_id, address, tuple(words)))
+                bank.write(address, words, space)
+            self.journal.add(Write(self.now_us, device_id, address, tuple(words), space))
             return code
+
+    def say(self, device_id: int, line: str) -> str | None:
+        """What a device that is spoken to in lines answers, at the plant's time; None where nothing comes back."""
+        with self.lock:
+            if self.answer_of(device_id):
+                return None
+            answer, acted = self.speakers[device_id].answer(line)
+            if acted:
+                self.journal.add(Said(self.now_us, device_id, line))
+            return answer
 
     def inject(self, fault: Fault) -> None:
         """Arranges a fault."""

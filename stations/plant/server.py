@@ -9,7 +9,7 @@ import asyncio
 import logging
 import threading
 from functools import partial
-from typing import TYPE_CHECKING, Self
+from typing import TYPE_CHECKING, Self, get_args
 
 from pymodbus.constants import ExcCodes
 from pymodbus.exceptions import NoSuchIdException
@@ -17,6 +17,7 @@ from pymodbus.server import ModbusTcpServer
 from pymodbus.simulator import DataType, SimData, SimDevice
 
 from schemas.errors import StationRefused
+from schemas.profile import BITS, Space
 from stations.codec import NotEncodable
 from stations.plant.bank import Busy
 from stations.plant.faults.base import MUTE
@@ -28,25 +29,49 @@ if TYPE_CHECKING:
     from stations.plant.plant import Plant
 
 LOOPBACK = "127.0.0.1"
+WORD = 16
+SPACES: dict[int, Space] = {
+    1: "coil", 5: "coil", 15: "coil", 2: "discrete", 4: "input",
+    3: "holding", 6: "holding", 16: "holding", 22: "holding", 23: "holding",
+}  # fmt: skip
 START_S = 20.0
 
 
 def sim_device(device_id: int, profile: Profile, plant: Plant) -> SimDevice:
     """What pymodbus needs to serve a bank: every register of its profile, none beside them."""
-    data = [
-        SimData(r.address, count=r.words, values=0, datatype=DataType.REGISTERS, readonly=r.access == "read")
-        for r in profile.registers
-    ]
+    data = {space: _blocks(profile, space) for space in get_args(Space)}
     if profile.fifo is not None:
         fifo = profile.fifo
-        data.append(SimData(fifo.address, count=fifo.registers, datatype=DataType.REGISTERS, readonly=True))
-    return SimDevice(device_id, simdata=data, action=partial(_answer, plant, device_id))
+        data["holding"].append(SimData(fifo.address, count=fifo.registers, datatype=DataType.REGISTERS, readonly=True))
+    action = partial(_answer, plant, device_id)
+    if not any(data[space] for space in ("coil", "discrete", "input")):
+        return SimDevice(device_id, simdata=data["holding"], action=action)
+    nobody = {"coil": _bits(0, 1), "discrete": _bits(0, 1), "input": _words(0, 1), "holding": _words(0, 1)}
+    filled = [data[space] or [nobody[space]] for space in ("coil", "discrete", "holding", "input")]
+    return SimDevice(device_id, simdata=(filled[0], filled[1], filled[2], filled[3]), action=action)
+
+
+def _blocks(profile: Profile, space: Space) -> list[SimData]:
+    """The registers of one space; the bits of one as a single block, holes are refused when they are asked for."""
+    registers = [r for r in profile.registers if r.space == space]
+    if space not in BITS or not registers:
+        return [_words(r.address, r.words, readonly=not r.writable) for r in registers]
+    first = min(r.address for r in registers)
+    return [_bits(first, max(r.end for r in registers) - first)]
+
+
+def _words(address: int, count: int, *, readonly: bool = True) -> SimData:
+    return SimData(address, count=count, values=0, datatype=DataType.REGISTERS, readonly=readonly)
+
+
+def _bits(address: int, count: int) -> SimData:
+    return SimData(address, values=[False] * count, datatype=DataType.BITS)
 
 
 async def _answer(
     plant: Plant,
     device_id: int,
-    _function: int,
+    function: int,
     start: int,
     address: int,
     count: int,
@@ -54,23 +79,41 @@ async def _answer(
     written: list[int] | list[bool] | None,
 ) -> ExcCodes | None:
     """Fills the registers that are read, or hands on those that are written."""
+    space = SPACES[function]
+    if not any(r.space == space and r.address <= address < r.end for r in plant.banks[device_id].profile.registers):
+        fifo = plant.banks[device_id].profile.fifo
+        if fifo is None or space != "holding" or address < fifo.address:
+            return ExcCodes.ILLEGAL_ADDRESS
     with plant.lock:
         code = plant.answer_of(device_id)
         if code == MUTE:
             raise NoSuchIdException  # the server, told to ignore missing devices, sends nothing
         try:
             if code == 0 and written is not None:
-                code = plant.write(device_id, address, [int(word) for word in written])
+                code = plant.write(device_id, address, [int(word) for word in written], space)
             if code != 0:
                 return ExcCodes(code)
             if written is None:
-                for first, words in plant.read(device_id, address, count):
-                    registers[first - start : first - start + len(words)] = words
+                _fill(plant, device_id, space, (address, count), (start, registers))
         except NotEncodable:
             return ExcCodes.ILLEGAL_VALUE
         except Busy:
             return ExcCodes.DEVICE_BUSY
     return None
+
+
+def _fill(plant: Plant, device_id: int, space: Space, span: tuple[int, int], held: tuple[int, list[int]]) -> None:
+    """Puts what a device tells into pymodbus' words; bits lie in them sixteen to a word, and are counted so."""
+    (address, count), (start, registers) = span, held
+    bits = space in BITS
+    for first, values in plant.read(device_id, address, count * WORD if bits else count, space):
+        if not bits:
+            registers[first - start : first - start + len(values)] = values
+            continue
+        for place, value in enumerate(values, first):
+            word, bit = place // WORD - start, place % WORD
+            if word < len(registers):
+                registers[word] = registers[word] & ~(1 << bit) | value << bit
 
 
 class PlantServer:

@@ -112,6 +112,13 @@ class Axis:
         if held is not None and resumes:
             self.go(now, *held)
 
+    def halt(self, now: float) -> None:
+        """Stops a move where it is, and forgets the rest."""
+        self._held = None
+        if self.moving(now):
+            here = float(self.angle(np.array([now]))[0])
+            self.move = Move(now, here, here, here, 1.0, 1.0)
+
     def lose_zero(self, offset: float) -> None:
         """The encoder says ``offset`` degrees more from now on; the shaft stays where it is."""
         m = self.move

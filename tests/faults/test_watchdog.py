@@ -69,7 +69,7 @@ def with_last_breath(process):
 def look(config):
     """Angle of the outer axis, whether it moves, the chamber's set point, whether samples are taken."""
     with open_devices(config, ()) as station:
-        registers = station.chamber._registers
+        registers = station.chamber._values
         axis = station.table.axes["outer"]
         return (
             axis.position(),

@@ -168,6 +168,7 @@ class _Connection:
         self._proxy = proxy
         self._sockets = (client, server)
         self._dead = threading.Event()  # half open: swallows everything
+        self._broken = False
         self._ways: list[threading.Thread] = []
         ways: tuple[tuple[Way, socket.socket, socket.socket], ...] = (
             ("request", client, server),
@@ -215,12 +216,15 @@ class _Connection:
         self._hang_up()
 
     def _hang_up(self) -> None:
+        if self._broken:
+            return  # with a reset: a polite end would come before it
         for one in self._sockets:
             with suppress(OSError):
                 one.shutdown(socket.SHUT_RDWR)
 
     def _break_off(self) -> None:
         """Ends both connections with a reset; the reading side is woken first, without a word to the peer."""
+        self._broken = True
         self._dead.set()
         for one in self._sockets:
             with suppress(OSError):

@@ -1,0 +1,36 @@
+"""What an adapter needs of a device's values, whatever carries them."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Protocol
+
+if TYPE_CHECKING:
+    from schemas.profile import Profile
+    from stations.codec import Value
+
+
+class Values(Protocol):
+    """Values of one device by the names of its profile; ``name`` is what messages call the device."""
+
+    name: str
+    profile: Profile
+
+    def has(self, name: str) -> bool:
+        """Whether the device has a value of that name."""
+        ...
+
+    def number(self, name: str) -> float:
+        """A number."""
+        ...
+
+    def text(self, name: str) -> str:
+        """A text, or the name of an enumerated value."""
+        ...
+
+    def step(self, name: str) -> float:
+        """The smallest change that a value can have on its way; zero where that is none."""
+        ...
+
+    def write(self, name: str, value: Value) -> None:
+        """Writes a value, once."""
+        ...

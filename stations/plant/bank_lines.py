@@ -1,0 +1,61 @@
+"""A simulated chamber that is spoken to in lines: ESPEC's P300."""
+
+from __future__ import annotations
+
+import re
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from schemas.profile import Profile
+    from stations.plant.plant import Plant
+
+SET = re.compile(r"TEMP, S(-?\d+(?:\.\d+)?)")
+MODES = {"CONSTANT": True, "STANDBY": False, "OFF": False}
+UNKNOWN, OUTSIDE, WRONG = "NA:CMD ERR", "NA:DATA OUT OF RANGE", "NA:PARA ERR"
+
+
+class P300:
+    """The controller in front of the plant's chamber; it begins in constant operation."""
+
+    def __init__(self, plant: Plant, profile: Profile) -> None:
+        self._plant = plant
+        point = profile.command("set_point")
+        self._low, self._high = point.minimum or 0.0, point.maximum or 0.0
+        self._mode = "CONSTANT"
+
+    def answer(self, line: str) -> tuple[str, bool]:
+        """The answer to a line, and whether the line has changed anything."""
+        if line.endswith("?"):
+            return self._told(line), False
+        if line.startswith("TEMP,"):
+            return self._set(line)
+        if line.startswith("MODE,"):
+            return self._switch(line)
+        return UNKNOWN, False
+
+    def _told(self, question: str) -> str:
+        chamber = self._plant.fixture.chamber
+        answers = {
+            "TEMP?": f"{self._plant.air_reading():.1f},{chamber.set_point:.1f},{self._high:.1f},{self._low:.1f}",
+            "MODE?": self._mode,
+            "ALARM?": "0",
+        }
+        return answers.get(question, UNKNOWN)
+
+    def _set(self, line: str) -> tuple[str, bool]:
+        found = SET.fullmatch(line)
+        if found is None:
+            return WRONG, False
+        value = float(found[1])
+        if not self._low <= value <= self._high:
+            return OUTSIDE, False
+        self._plant.fixture.chamber.set_point = value
+        return f"OK:{line}", True
+
+    def _switch(self, line: str) -> tuple[str, bool]:
+        mode = line.removeprefix("MODE,")
+        if mode not in MODES:
+            return WRONG, False
+        self._mode = mode
+        self._plant.fixture.chamber.running = MODES[mode]
+        return f"OK:{line}", True
