@@ -69,7 +69,8 @@ class Job:
         measured = self.recipe.model_dump(mode="json", exclude=ANALYSIS_KEYS)
         if not measured["soaks"]:  # recipes without them keep the names that their captures had before there were any
             del measured["soaks"]
-        station = self.station.model_dump(mode="json", exclude={"pace", *GUARDS})  # pace plans time, and drives nothing
+        unmoved = {"pace", "reference", *GUARDS}  # plan time, name standards, guard: they drive nothing
+        station = self.station.model_dump(mode="json", exclude=unmoved)
         after = {"parents": list(self.parents)} if self.parents else {}
         content = {"recipe": measured, "lot": self.lot.model_dump(), "station": station, **after}
         return digest(content)[:16]

@@ -12,6 +12,7 @@ from schemas.carrier import Carried
 from schemas.errors import RecipeInvalid, WrongUse
 from schemas.fault import Fault
 from schemas.recipe import Strict, explain, read_text
+from schemas.reference import Reference
 from schemas.safety import Safety, SelfTest, Suspenders
 
 if TYPE_CHECKING:
@@ -155,6 +156,7 @@ class StationConfig(Strict):
     safety: Safety = Safety()
     self_test: SelfTest = SelfTest()
     simulation: Simulation | None = None
+    reference: list[Reference] = Field(default_factory=list[Reference])
 
     @model_validator(mode="after")
     def _can_be_safe(self) -> StationConfig:
