@@ -88,25 +88,32 @@ def rivals_in(model: Model, group: EffectClass) -> Rivals | None:
     return rivals_of(model, [m.term for m in group.members[:_MEMBERS]], others)
 
 
-def proposal(model: Model, group: EffectClass, around: Circumstances | None = None) -> Proposal | None:
-    """The steps that best part the members of a class; None where nothing the station does parts them."""
+def proposal(
+    model: Model, group: EffectClass, around: Circumstances | None = None, already: Sequence[Step] = ()
+) -> Proposal | None:
+    """The steps that best part the members of a class; None where nothing the station does parts them.
+
+    Parameters
+    ----------
+    already : steps that are to be measured anyway, for another class; the proposal comes after them
+    """
     rivals = rivals_in(model, group)
     if rivals is None:
         return None
     around = around or Circumstances()
     scores = np.array([m.score for m in group.members[:_MEMBERS]])
-    return _Search(rivals, scores, around).best()
+    return _Search(rivals, scores, around, already).best()
 
 
 class _Search:
     """The choice of courses for one class."""
 
-    def __init__(self, rivals: Rivals, scores: Array, around: Circumstances) -> None:
-        self.rivals, self.around = rivals, around
+    def __init__(self, rivals: Rivals, scores: Array, around: Circumstances, already: Sequence[Step]) -> None:
+        self.rivals, self.around, self.already = rivals, around, tuple(already)
         self.reach = around.reach or reach_of(rivals.lot.state)
         self.weight = np.maximum(np.exp(-0.5 * scores), _LEAST_WEIGHT)
         self.needed = _needed(rivals)
-        self.before = separations(rivals)
+        self.before = separations(rivals, self.already, around.pace)
 
     def worth(self, left: Array) -> float:
         """Share of what is wanted that separations bring, 0 … 1: each truth by how likely it is, none counted beyond need."""
@@ -119,20 +126,18 @@ class _Search:
         chosen: list[Course] = []
         now = self.worth(self.before)
         for _ in range(_ROUNDS):
-            found = self._next(chosen, now)
+            found = self._next(chosen, now) if now <= 1.0 - _WORTH else None
             if found is None:
                 break
             course, now = found
             chosen.append(course)
-            if now > 1.0 - _WORTH:
-                break
         if not chosen:
             return None
         return self._told(chosen, now)
 
     def _next(self, chosen: Sequence[Course], now: float) -> tuple[Course, float] | None:
         """The course that brings most per minute beside those chosen; the cheapest of those that part everything."""
-        held = [s for c in chosen for s in c.steps]
+        held = [*self.already, *(s for c in chosen for s in c.steps)]
         spent = self.around.cost(self.rivals, held)
         best: tuple[float, Course, float] | None = None
         for course in self._offers(held):
@@ -185,7 +190,8 @@ class _Search:
 
     def _told(self, chosen: Sequence[Course], worth: float) -> Proposal:
         steps = [s for c in chosen for s in c.steps]
-        after = separations(self.rivals, steps, self.around.pace)
+        whole = [*self.already, *steps]
+        after = separations(self.rivals, whole, self.around.pace)
         before, later = smallest(self.before), smallest(after)
         names = self.rivals.ids
         nearest = [k for k in range(len(names)) if k]
@@ -194,7 +200,7 @@ class _Search:
             steps=tuple(steps),
             ids=names,
             pairs=tuple([self._pair(later - before)] * len(steps)),
-            minutes=self.around.cost(self.rivals, steps),
+            minutes=self.around.cost(self.rivals, whole) - self.around.cost(self.rivals, self.already),
             before=float(min(before[0, k] for k in nearest)),
             after=float(min(later[0, k] for k in nearest)),
             settled=worth,

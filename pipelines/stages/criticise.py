@@ -14,13 +14,15 @@ from inertial.errors import InertialError
 from pipelines.stages.compare import compare
 from pipelines.stages.condense import condense
 from pipelines.stages.measured import Measured, lot_of, measured
-from pipelines.stages.next_measurement import next_measurements
+from pipelines.stages.next_measurement import next_measurements, proposals
 from schemas.errors import DataRejected
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     import pandas as pd
+
+    from pipelines.stages.next_measurement import Proposed
 
 __all__ = ["compare", "default_model", "diagnose", "document", "examined"]
 
@@ -78,8 +80,15 @@ def examined(
         raise DataRejected(str(problem)) from None
 
 
-def document(found: Measured, faults: list[Fault], diagnosis: Diagnosis | None) -> dict[str, Any]:
-    """The document of a diagnosis; where every unit has a data fault, nothing is said of physics."""
+def document(
+    found: Measured, faults: list[Fault], diagnosis: Diagnosis | None, proposed: Proposed | None = None
+) -> dict[str, Any]:
+    """The document of a diagnosis; where every unit has a data fault, nothing is said of physics.
+
+    Parameters
+    ----------
+    proposed : what to measure next; by what the run itself shows of its station where None
+    """
     blocked = [_fault(found, f) for f in faults]
     if diagnosis is None:
         return {
@@ -128,7 +137,7 @@ def document(found: Measured, faults: list[Fault], diagnosis: Diagnosis | None) 
             "p_value": _probability(diagnosis.unexplained.log_p),
         },
         "unseen": list(diagnosis.unseen),
-        "next_measurements": next_measurements(diagnosis),
+        "next_measurements": next_measurements(proposals(diagnosis) if proposed is None else proposed),
     }
 
 

@@ -1,0 +1,236 @@
+"""Closes the loop on runs that begin ambiguous: `python benchmarks/investigate.py --seeds 3 --jobs 2`.
+
+An effect is hidden in the simulated station by its mechanism (stations/plant/hidden.py, no column of the fit), and the recipe
+has a blind spot: edges without directions between, one wait, soaks one way, one temperature. Counted are the runs whose first
+diagnosis had the truth in a class with others, or among what it could not see; printed is in how many of them the truth stood
+alone in its class at the end, and what station time the follow-ups took beside the first run.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import sys
+import tempfile
+import time
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+for _name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
+    os.environ.setdefault(_name, "1")  # before numpy: threads of two processes fight over two cores
+
+ROOT = Path(__file__).resolve().parents[1]
+sys.path.insert(0, str(ROOT))
+
+PLAIN = ("bias", "scale", "misalignment")
+THERMAL = (*PLAIN, "bias_temperature", "bias_temperature_quadratic", "scale_temperature")
+QUIET = {
+    "noise_density_ug": 8.0, "bias_instability_ug": 1.5, "rate_random_walk_ug": 0.003, "linearity_pct_fs": 0.0,
+}  # fmt: skip
+STEADY = {"bias_tempco_ug_per_K": 2.0, "scale_tempco_ppm_per_K": 4.0}
+
+
+@dataclass(frozen=True)
+class Scene:
+    """A hidden mechanism, the effects that are it, and a recipe with a blind spot.
+
+    truths : ids of the catalogue that describe the mechanism: one of them alone in its class is right
+    """
+
+    name: str
+    kind: str
+    truths: tuple[str, ...]
+    figures: dict[str, float]
+    plan: str
+    repeats: int = 1
+    temperatures: tuple[float, ...] = (25.0,)
+    settle_s: float = 2.0
+
+
+SCENES = (
+    Scene("cubic on 26", "cubic_transfer", ("third_order",), {"hardening": 60e-6}, "twenty_six", 2),
+    Scene("cubic on 18", "cubic_transfer", ("third_order",), {"hardening": 90e-6}, "eighteen", 2),
+    Scene("cubic on 24 even", "cubic_transfer", ("third_order",), {"hardening": 25e-6}, "fibonacci24", 2),
+    Scene("pendulum on faces and edges", "pendulous_mass", ("cross_coupling",), {"compliance": 30e-6}, "eighteen", 2),
+    Scene("harmonic on 12 edges", "encoder_harmonic", ("encoder_harmonic",), {"size": 50e-6}, "twelve", 3),
+    Scene("harmonic on 18", "encoder_harmonic", ("encoder_harmonic",), {"size": 50e-6}, "eighteen", 2),
+    Scene("level on 12 edges", "level_error", ("level_error",), {"about_x": 0.0, "about_y": -60e-6}, "twelve", 3),
+    Scene("creep with one wait", "creep", ("creep_after_move",), {"size": 50e-6, "tau": 30.0}, "eighteen", 2),
+    Scene("warm-up seen late", "warm_up", ("warm_up",), {"size": 200e-6, "tau": 2500.0}, "eighteen", 2),
+    Scene(
+        "hysteresis with three soaks", "hysteresis_play", ("thermal_hysteresis",), {"gain": 8e-6, "width": 10.0},
+        "nine", 1, (25.0, 60.0, -10.0, 20.0),
+    ),
+    Scene(
+        "vibration with three soaks", "vibration_rectification", ("vibration_rectification",), {"coefficient": 2.5e4},
+        "nine", 1, (25.0, 60.0, -10.0, 20.0),
+    ),
+)  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """One inquiry: the scene and seed, the first classes and the last, and the station time."""
+
+    scene: str
+    seed: int
+    first: list[list[str]]
+    last: list[list[str]]
+    unseen: bool
+    ambiguous: bool
+    alone: bool
+    first_minutes: float
+    extra_minutes: float
+    rounds: int
+    ended: str
+    seconds: float
+    why: list[str] = field(default_factory=list)
+
+
+def job_of(scene: Scene, seed: int, units: int) -> Any:
+    """The job of a scene: a lot of quiet units on the simulated station with the mechanism in it."""
+    import numpy as np
+
+    from inertial import poses
+    from pipelines.job import Job
+    from pipelines.recipes import load_limits, load_recipe
+    from schemas.recipe import Lot, Pose, Recipe, Unit
+    from schemas.station import Hidden, load_station
+
+    rng = np.random.default_rng([seed, 7])
+    angles = np.concatenate([rng.permutation(poses.plan(scene.plan)) for _ in range(scene.repeats)])
+    varied = len(scene.temperatures) > 1
+    plain = load_recipe()
+    changes = {
+        "name": scene.name.replace(" ", "-"),
+        "description": "a recipe with a blind spot",
+        "poses": [
+            {"name": f"p{k + 1:03d}", "outer_deg": o, "inner_deg": i} for k, (o, i) in enumerate(angles.tolist())
+        ],
+        "verification": [],
+        "temperatures_C": list(scene.temperatures),
+        "settle_s": scene.settle_s,
+        "dwell_s": 8.0,
+        "rate_hz": 25.0,
+        "static_record_s": 60.0,
+        "static_temperature_C": scene.temperatures[-1],
+        "effects": list(THERMAL if varied else PLAIN),
+    }
+    recipe = Recipe.model_validate({**plain.model_dump(), **changes})
+    lot = Lot(units=[Unit(serial=f"Q{k + 1:03d}", slot=k) for k in range(units)], device=recipe.device, seed=seed)
+    station = load_station()
+    hidden = [Hidden(kind=scene.kind, figures=scene.figures)]
+    overrides = QUIET if varied else QUIET | STEADY
+    made = station.simulation.model_copy(update={"seed": seed, "hidden": hidden, "preset_overrides": overrides})
+    del Pose
+    return Job(recipe, load_limits(recipe), lot, station.model_copy(update={"simulation": made}))
+
+
+def one(task: tuple[str, int, int, float]) -> Outcome:
+    """One inquiry in an archive of its own."""
+    from pipelines.archive import Archive
+    from pipelines.inquiry.play import Table, Terms, play
+
+    name, seed, units, share = task
+    scene = next(s for s in SCENES if s.name == name)
+    looks: list[Any] = []
+    begin = time.perf_counter()
+    with tempfile.TemporaryDirectory() as folder:
+        job = job_of(scene, seed, units)
+        terms = Terms(job.recipe.effects, None if share <= 0.0 else share)
+        document = play(job, Archive(folder), terms, Table(looked=looks.append, stage=quickly))
+    return outcome(scene, seed, looks, document, time.perf_counter() - begin)
+
+
+def quickly(name: str, runner: Any) -> Any:
+    """A stage as a plain call; what the inquiry does not read is left out."""
+    from pipelines.runner import Done
+
+    if name in {"fit", "verify", "noise", "grade", "report"}:
+        return Done(name, True, 0.0)
+    return runner.stage(name)
+
+
+def outcome(scene: Scene, seed: int, looks: list[Any], document: dict[str, Any], seconds: float) -> Outcome:
+    """What came of an inquiry."""
+    first = [group["effects"] for group in looks[0].told["classes"]]
+    last = [group["effects"] for group in document["classes"]]
+    held = [group for group in first if set(group) & set(scene.truths)]
+    unseen = bool(set(looks[0].told["unseen"]) & set(scene.truths))
+    minutes = document["minutes"]
+    return Outcome(
+        scene=scene.name,
+        seed=seed,
+        first=first,
+        last=last,
+        unseen=unseen,
+        ambiguous=bool(held and len(held[0]) > 1) or (unseen and not held),
+        alone=any(len(group) == 1 and group[0] in scene.truths for group in last),
+        first_minutes=minutes["first_run"],
+        extra_minutes=minutes["follow_ups"],
+        rounds=len(document["rounds"]),
+        ended=document["ended"],
+        seconds=seconds,
+        why=[text for r in document["rounds"] for text in r["why"]],
+    )
+
+
+def show(found: list[Outcome]) -> None:
+    """Prints a line per inquiry, then the figures."""
+    for o in found:
+        first, last = (" ; ".join("|".join(g) for g in groups) or "nothing" for groups in (o.first, o.last))
+        mark = "ok  " if o.alone else ("MISS" if o.ambiguous else "    ")
+        print(
+            f"{mark} {o.scene} [{o.seed}] {'ambiguous' if o.ambiguous else 'clear'}: {first} -> {last} "
+            f"({o.rounds} rounds, {o.extra_minutes:.1f} of {o.first_minutes:.0f} min extra, {o.ended}, {o.seconds:.0f} s)"
+        )
+    begun = [o for o in found if o.ambiguous]
+    if not begun:
+        print("no run began ambiguous")
+        return
+    alone = sum(o.alone for o in begun)
+    shares = sorted(o.extra_minutes / o.first_minutes for o in begun)
+    print(
+        f"{len(found)} runs, {len(begun)} began ambiguous: truth alone in its class in {alone} "
+        f"({100.0 * alone / len(begun):.0f} %); extra station time {100.0 * sum(shares) / len(shares):.0f} % in the mean, "
+        f"{100.0 * shares[len(shares) // 2]:.0f} % in the median, {100.0 * shares[-1]:.0f} % at the most"
+    )
+
+
+def arguments() -> argparse.Namespace:
+    """The command line."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--seeds", type=int, default=1, help="runs of each scene")
+    parser.add_argument("--first", type=int, default=1, help="the first seed")
+    parser.add_argument("--scene", action="append", choices=[s.name for s in SCENES], help="only these (repeatable)")
+    parser.add_argument("--units", type=int, default=4)
+    parser.add_argument("--budget", type=float, default=0.0, help="station minutes; 30 % of the first run's by default")
+    parser.add_argument("--jobs", type=int, default=1)
+    parser.add_argument("--out", type=Path, help="JSON lines with every outcome")
+    return parser.parse_args()
+
+
+def main() -> None:
+    options = arguments()
+    names = options.scene or [s.name for s in SCENES]
+    tasks = [
+        (n, s, options.units, options.budget)
+        for n in names
+        for s in range(options.first, options.first + options.seeds)
+    ]
+    found: list[Outcome] = []
+    with ProcessPoolExecutor(options.jobs) as pool:
+        for result in pool.map(one, tasks) if options.jobs > 1 else map(one, tasks):
+            found.append(result)
+            print(f"\r{len(found)}/{len(tasks)} {result.scene:28}", end="", file=sys.stderr, flush=True)
+    print(file=sys.stderr)
+    if options.out:
+        options.out.write_text("".join(json.dumps(vars(o)) + "\n" for o in found))
+    show(found)
+
+
+if __name__ == "__main__":
+    main()

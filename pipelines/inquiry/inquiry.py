@@ -1,0 +1,287 @@
+"""The inquiry of one lot: what is known from all measurements so far, and what is to be measured next, or why nothing is."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any, Literal
+
+from threadpoolctl import threadpool_limits
+
+from pipelines.archive import code_hash, files, stage_key
+from pipelines.inquiry.followup import circumstances, follow_up
+from pipelines.inquiry.lineage import Lineage
+from pipelines.inquiry.words import why
+from pipelines.job import Job
+from pipelines.runner import Runner
+from pipelines.stages.criticise import document, examined
+from pipelines.stages.next_measurement import proposals
+from schemas.limits import Limits
+from schemas.recipe import Lot, Recipe
+from schemas.station import StationConfig
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from inertial.criticism.diagnosis import Diagnosis
+    from inertial.criticism.proposals import Proposal
+    from inertial.sequences import Step
+    from pipelines.archive import Archive, Records, Run
+    from pipelines.progress import Progress
+    from pipelines.stages.measured import Measured
+
+End = Literal["adequate", "told_apart", "nothing_parts", "budget", "declined", "asked", "blocked", "unexplained"]
+
+EXTRA = 0.3
+"""Share of the first run's station time that follow-ups may take where no budget is given."""
+
+MOST_ROUNDS = 6
+FOLLOW_UP = ("capture", "validate", "reduce")
+TABLE_OF_CODE = ("inertial", "pipelines.stages.criticise", "pipelines.stages.measured")
+FILE = "inquiry.json"
+
+
+@dataclass(frozen=True)
+class Finding:
+    """The diagnosis of all measurements of a lineage together."""
+
+    lineage: Lineage
+    effects: tuple[str, ...]
+    told: dict[str, Any]
+    found: Measured
+    diagnosis: Diagnosis | None
+    proposed: tuple[Proposal, ...]
+
+    @property
+    def ambiguous(self) -> list[list[str]]:
+        """Classes of more than one effect."""
+        return [group["effects"] for group in self.told["classes"] if len(group["effects"]) > 1]
+
+
+@dataclass(frozen=True)
+class Move:
+    """A measurement that is proposed, or was begun already.
+
+    rows : of the proposal, as in the document; why : a sentence per class
+    """
+
+    job: Job
+    rows: tuple[dict[str, Any], ...]
+    why: tuple[str, ...]
+    minutes: float
+    begun: bool = False
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """Why nothing more is measured."""
+
+    end: End
+    text: str
+
+
+@dataclass
+class Inquiry:
+    """An inquiry that stands at some point of its way.
+
+    effects : the model that is judged; the recipe's where empty
+    budget : station minutes for follow-ups
+    """
+
+    archive: Archive
+    jobs: list[Job]
+    lineage: Lineage
+    effects: tuple[str, ...]
+    budget: float
+    rounds: list[dict[str, Any]] = field(default_factory=list[dict[str, Any]])
+
+    @property
+    def base(self) -> Job:
+        """The job of the first run."""
+        return self.jobs[0]
+
+    @property
+    def spent(self) -> float:
+        """Station minutes of the follow-ups so far."""
+        return sum(self.lineage.minutes()[1:])
+
+    def look(self) -> Finding:
+        """The diagnosis of everything that was measured so far, with what the station could measure next."""
+        dwells, history = self.lineage.dwells(), self.lineage.history()
+        around = circumstances(self.base, self.jobs[-1], self.budget - self.spent)
+        with threadpool_limits(1):
+            found, faults, diagnosis = examined(dwells, history, self.effects)
+            proposed = [] if diagnosis is None else proposals(diagnosis, around)
+            told = document(found, faults, diagnosis, proposed)
+        told.update(_named(found, self.effects, diagnosis))
+        return Finding(
+            self.lineage, self.effects, told, found, diagnosis, tuple(p for _, p in proposed if p is not None)
+        )
+
+    def next(self, finding: Finding) -> Move | Verdict:
+        """What to measure next, or why nothing."""
+        begun = self._begun()
+        if begun is not None:
+            return begun
+        ended = _ended(finding)
+        if ended is not None:
+            return ended
+        if len(self.lineage.runs) > MOST_ROUNDS:
+            return Verdict("nothing_parts", f"{MOST_ROUNDS} follow-ups have not told {_classes(finding)} apart")
+        return self._proposed(finding)
+
+    def _proposed(self, finding: Finding) -> Move | Verdict:
+        diagnosis = finding.diagnosis
+        if diagnosis is None:
+            return Verdict("blocked", "every unit has a data fault")
+        left = self.budget - self.spent
+        free = finding.proposed
+        if not free:
+            costly = proposals(diagnosis, circumstances(self.base, self.jobs[-1], float("inf")))
+            wanted = [p for _, p in costly if p is not None]
+            if not wanted:
+                return Verdict("nothing_parts", f"nothing that this station does parts {_classes(finding)}")
+            needed = sum(p.minutes for p in wanted)
+            text = (
+                f"telling {_classes(finding)} apart takes {needed:.0f} min more, {max(left, 0.0):.0f} of {self.budget:.0f} min "
+                f"are left; give --budget {self.spent + needed:.0f}"
+            )
+            return Verdict("budget", text)
+        base = [e for e in self.effects if all(e not in p.ids for p in free)]
+        reasons = tuple(why(diagnosis.problem.lot.state, base, p) for p in free)
+        steps: list[Step] = [s for p in free for s in p.steps]
+        job = follow_up(steps, self.base, self.jobs[-1], self.lineage.ids, "; ".join(reasons))
+        recipe = job.recipe.model_copy(update={"effects": list(self.effects)})
+        job = Job(recipe, job.limits, job.lot, job.station, parents=job.parents)
+        return Move(job, tuple(finding.told["next_measurements"]), reasons, sum(p.minutes for p in free))
+
+    def _begun(self) -> Move | None:
+        """A follow-up of this lineage that was begun before: it was approved then, and goes on."""
+        for info in reversed(self.archive.runs()):
+            about = self.archive.run(info.id).about
+            mine = about.get("parents") == list(self.lineage.ids)
+            if mine and about["recipe"]["effects"] == list(self.effects):
+                return Move(_job_of(about), (), (str(about["recipe"]["description"]),), 0.0, begun=True)
+        return None
+
+    def runner(self, move: Move, progress: Progress) -> Runner:
+        """The runner of a follow-up: its station goes on from where the newest run left it."""
+        before = self.archive.capture(self.jobs[-1].capture_id)
+        return Runner(move.job, self.archive, progress, measure=_going_on(before))
+
+    def measured(self, move: Move, run: Run) -> None:
+        """Takes a follow-up that was measured into the lineage."""
+        self.jobs.append(move.job)
+        self.lineage = self.lineage.with_run(run)
+        minutes = self.lineage.minutes()[-1]
+        self.rounds.append(
+            {
+                "run": run.id,
+                "why": list(move.why),
+                "next_measurements": list(move.rows),
+                "planned_minutes": round(move.minutes, 2),
+                "minutes": round(minutes, 2),
+                "begun_before": move.begun,
+            }
+        )
+
+    def keep(self, finding: Finding) -> None:
+        """Keeps what the newest follow-up has told, with the report of the diagnosis of all runs together."""
+        run = self.lineage.runs[-1]
+        if len(self.lineage.runs) < 2:
+            return
+        inputs = {"dwells": run.manifest("dwells")["sha256"]}
+        for parent in self.lineage.runs[:-1]:
+            inputs[f"dwells of {parent.id}"] = parent.manifest("dwells")["sha256"]
+        parameters = {"effects": list(self.effects), "parents": list(self.lineage.ids[:-1])}
+        code = code_hash(TABLE_OF_CODE)
+        key = stage_key("inquiry", inputs, parameters, code)
+        if run.has_report(key):
+            return
+        from pipelines.report.diagnosis import render_diagnosis
+
+        content = {"runs": list(self.lineage.ids), "effects": list(self.effects), "diagnosis": plain_rows(finding.told)}
+        files.publish(run.path / FILE, files.json_bytes({**content, "round": self.rounds[-1]}))
+        html = render_diagnosis(finding.told, finding.found, finding.diagnosis, " + ".join(self.lineage.ids))
+        run.save_report(key, html, {"inputs": inputs, "parameters": parameters, "code": code})
+
+    def document(self, finding: Finding, verdict: Verdict) -> dict[str, Any]:
+        """The whole inquiry as one document."""
+        minutes = self.lineage.minutes()
+        return {
+            "run": self.lineage.ids[0],
+            "runs": list(self.lineage.ids),
+            "ended": verdict.end,
+            "text": verdict.text,
+            "minutes": {
+                "first_run": round(minutes[0], 2),
+                "follow_ups": round(sum(minutes[1:]), 2),
+                "budget": round(self.budget, 2),
+                "share": round(sum(minutes[1:]) / minutes[0], 4),
+            },
+            "rounds": self.rounds,
+            **finding.told,
+        }
+
+
+def begin(archive: Archive, job: Job, run: Run, effects: Sequence[str], budget: float | None) -> Inquiry:
+    """The inquiry of a run that was measured: with the budget given, or a share of the station time that it took."""
+    lineage = Lineage((run,))
+    allowed = EXTRA * lineage.minutes()[0] if budget is None else budget
+    return Inquiry(archive, [job], lineage, tuple(effects or job.recipe.effects), allowed)
+
+
+def _going_on(before: Records) -> Any:
+    """A measurement that begins with the station as another capture left it."""
+
+    def measure(job: Job, records: Records, progress: Progress) -> None:
+        from pipelines.stages.capture import capture
+        from stations import open_station
+
+        state = records.last_state() or before.last_state()
+        run = f"{job.recipe.name} {job.capture_id}"
+        with open_station(job.station, job.lot, resume=state, run=run) as station:
+            capture(station, job.recipe, job.lot, records, progress=progress, events=records.events)
+
+    return measure
+
+
+def _job_of(about: dict[str, Any]) -> Job:
+    return Job(
+        Recipe.model_validate(about["recipe"]),
+        Limits.model_validate(about["limits"]),
+        Lot.model_validate(about["lot"]),
+        StationConfig.model_validate(about["station"]),
+        captured=about["capture"],
+        parents=tuple(about["parents"]),
+    )
+
+
+def _ended(finding: Finding) -> Verdict | None:
+    told = finding.told
+    if finding.diagnosis is None:
+        return Verdict("blocked", "every unit has a data fault; no physics is diagnosed until it is mended")
+    if told["adequate"]:
+        return Verdict("adequate", "the model leaves nothing but the noise that is there")
+    if finding.ambiguous:
+        return None
+    if not told["classes"]:
+        return Verdict("unexplained", "the model is not adequate, and no effect of the catalogue explains the rest")
+    return Verdict("told_apart", f"one effect a class stands: {', '.join(told['recommended'])}")
+
+
+def _classes(finding: Finding) -> str:
+    return ", and ".join(" | ".join(group) for group in finding.ambiguous)
+
+
+def _named(found: Measured, effects: Sequence[str], diagnosis: Diagnosis | None) -> dict[str, Any]:
+    """What reports and people need beside the fixed keys."""
+    from inertial import effects as catalogue
+
+    unseen = diagnosis.unseen if diagnosis is not None else ()
+    breakers = {name: catalogue.get(name).breaker for name in unseen}
+    return {"effects": list(effects), "units": list(found.units), "breakers": breakers, "offer": None}
+
+
+def plain_rows(told: dict[str, Any]) -> dict[str, Any]:
+    """A document without what only pictures need."""
+    return {key: value for key, value in told.items() if key not in {"breakers", "offer"}}

@@ -1,0 +1,64 @@
+"""Runs that go on with one another's measurements, as one set of dwells: one station, one lot, one clock."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import pandas as pd
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from pipelines.archive import Run
+
+NUMBERED = ("dwell", "record")
+
+
+@dataclass(frozen=True)
+class Lineage:
+    """A first run and those that went on from it, in order."""
+
+    runs: tuple[Run, ...]
+
+    @property
+    def ids(self) -> tuple[str, ...]:
+        """Names of the runs."""
+        return tuple(run.id for run in self.runs)
+
+    def dwells(self) -> pd.DataFrame:
+        """Dwells of all runs, numbered through; units that one of them refused are left out."""
+        tables = [run.table("dwells") for run in self.runs]
+        accepted = set.intersection(*(set(table["unit"].astype(str)) for table in tables))
+        return _numbered_through([table[table["unit"].isin(accepted)] for table in tables])
+
+    def history(self) -> pd.DataFrame:
+        """Temperatures against time through all runs."""
+        return pd.concat([run.table("history") for run in self.runs], ignore_index=True)
+
+    def minutes(self) -> list[float]:
+        """Station time of each run, min."""
+        ends = [_end(run) for run in self.runs]
+        return [(end - begin) / 60.0 for begin, end in zip([0.0, *ends], ends, strict=False)]
+
+    def with_run(self, run: Run) -> Lineage:
+        """The lineage with one more run."""
+        return Lineage((*self.runs, run))
+
+
+def _numbered_through(tables: Sequence[pd.DataFrame]) -> pd.DataFrame:
+    """Tables below one another, the numbers of dwells and soaks of each beginning after those before it."""
+    found: list[pd.DataFrame] = []
+    for table in tables:
+        shifted = table.copy()
+        for column in (*NUMBERED, "soak"):
+            if found and column in table.columns:
+                shifted[column] = table[column] + 1 + max(int(before[column].max()) for before in found)
+        found.append(shifted)
+    return pd.concat(found, ignore_index=True)
+
+
+def _end(run: Run) -> float:
+    """When the last record of a run ended, s of the station's clock."""
+    readings = run.table("readings")
+    return float((readings["start_s"] + readings["duration_s"]).max())

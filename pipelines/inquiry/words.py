@@ -1,0 +1,80 @@
+"""Why a measurement is proposed, in the user's terms."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from inertial import frames
+from inertial.errors import InertialError
+from inertial.reasons import cause
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from inertial.criticism.proposals import Proposal
+    from inertial.sequences import Step
+    from inertial.state import State
+
+DRAWN_OUT_S = 5.0
+
+
+def why(state: State, base: Sequence[str], found: Proposal) -> str:
+    """One sentence: what hides the difference of the rivals, what is measured, and what it brings.
+
+    Parameters
+    ----------
+    state : the dwells so far
+    base : ids of the model beside the rivals
+    """
+    first, second = found.pairs[0]
+    rivals = " and ".join([", ".join(found.ids[:-1]), found.ids[-1]])
+    hidden = _hidden(state, base, first, second)
+    parted = f"χ² between {first} and its nearest rival goes from {found.before:.1f} to {found.after:.0f}"
+    return f"{rivals} fit alike: {hidden}. {what(found)} parts them ({parted}; {found.minutes:.1f} min)"
+
+
+def _hidden(state: State, base: Sequence[str], first: str, second: str) -> str:
+    """What in the plan makes one rival look like the other."""
+    try:
+        reason = cause(state, first, [*base, second])
+    except InertialError:
+        reason = None
+    if reason is None:
+        return f"in what was measured {first} and {second} differ by less than the noise"
+    return f"{reason.found} {reason.does}".strip() if reason.found else reason.does
+
+
+def what(found: Proposal) -> str:
+    """The steps in words."""
+    words = {
+        "poses": lambda: f"measuring {_directions(found.steps)}",
+        "soaks": lambda: f"measuring at {_temperatures(found.steps)}",
+        "waits": lambda: f"waiting {_waits(found.steps)} after a move",
+        "approach": lambda: "coming to the same poses from both sides",
+        "excursion": lambda: f"going to {_temperatures(found.steps)} in this order",
+        "ramp": lambda: f"reading while the temperature moves to {_temperatures(found.steps)}",
+        "later": lambda: f"measuring the same poses again after {_waits(found.steps)}",
+    }
+    text = ", and ".join(words[kind]() for kind in found.kinds)
+    return text[:1].upper() + text[1:]
+
+
+def _directions(steps: Sequence[Step]) -> str:
+    force = np.abs([frames.force_from_angles(s.outer, s.inner) for s in steps])
+    levels = sorted({f"{v:.2f}" for v in np.round(force[(force > 0.02) & (force < 0.98)] / 0.05) * 0.05})
+    shown = ", ".join(levels[:4]) + (" …" if len(levels) > 4 else "")
+    return f"{len(steps)} dwells" + (f" with |f| of {shown} g on an axis" if levels else " on faces")
+
+
+def _temperatures(steps: Sequence[Step]) -> str:
+    stops = [s.temperature for k, s in enumerate(steps) if k == 0 or s.temperature != steps[k - 1].temperature]
+    return ", ".join(f"{t:g}" for t in stops) + " °C"
+
+
+def _waits(steps: Sequence[Step]) -> str:
+    long = sorted({round(s.wait) for s in steps})
+    if len(long) == 1 or long[-1] < DRAWN_OUT_S:
+        return f"{long[-1]} s"
+    return f"{long[0]} to {long[-1]} s"
