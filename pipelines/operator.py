@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from pipelines.job import Job
     from pipelines.runner import Done, Runner
 
-Kind = Literal["load", "confirm", "trouble", "unload"]
+Kind = Literal["load", "confirm", "trouble", "unload", "approve"]
 Answer = Literal["go", "stop"]
 
 
@@ -23,7 +23,7 @@ class Prompt:
     """Something that a person has to do before the run goes on.
 
     ``load``: seat the units. ``confirm``: the slots say something else than the slot map. ``trouble``: the station needs a hand;
-    the run goes on after its last record. ``unload``: take the units out.
+    the run goes on after its last record. ``unload``: take the units out. ``approve``: station time beyond what was asked for.
     """
 
     kind: Kind

@@ -34,6 +34,7 @@ COMMANDS: dict[str, tuple[str, str]] = {
     "release": ("release", "Make a model the line's from a date, or list the releases."),
     "compare": ("compare", "Judge a model on dwells, and on fresh ones."),
     "diagnose": ("diagnose", "Say whether a model is adequate, where it fails, and which effect is missing."),
+    "investigate": ("investigate", "Measure a lot, and then only what tells apart what its model may lack."),
     "extend": ("extend", "Write the next version of a model with one more effect."),
     "history": ("history", "Show the error over the versions of a model."),
     "plan": ("plan", "Say what a recipe can and cannot see, before it is measured."),

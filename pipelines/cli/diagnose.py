@@ -85,12 +85,15 @@ def diagnosed(
 def _extras(units: tuple[str, ...], effects: list[str], diagnosis: Diagnosis | None) -> dict[str, Any]:
     """What the document says beyond its fixed keys: the model judged, breakers of what was unseen, the formula on offer."""
     from inertial import effects as catalogue
+    from inertial.reasons import reason
     from pipelines.stages.offers import as_toml, offer
 
     extras: dict[str, Any] = {"effects": effects, "units": list(units), "breakers": {}, "offer": None}
     if diagnosis is None:
         return extras
     extras["breakers"] = {name: catalogue.get(name).breaker for name in diagnosis.unseen}
+    state = diagnosis.problem.lot.state
+    extras["reasons"] = {name: reason(state, name, effects) for name in diagnosis.unseen}
     if diagnosis.unexplained is not None:
         formula = offer(diagnosis.unexplained, diagnosis.problem.lot.state)
         extras["offer"] = None if formula is None else {**formula, "toml": as_toml(formula)}

@@ -92,7 +92,14 @@ def rows(table: pd.DataFrame) -> list[dict[str, Any]]:
     return [plain(row) for row in table.to_dict("records")]
 
 
-def print_table(columns: Sequence[str], lines: Sequence[Sequence[str]], title: str = "", *, whole: int = 1) -> None:
+def print_table(
+    columns: Sequence[str],
+    lines: Sequence[Sequence[str]],
+    title: str = "",
+    *,
+    whole: int = 1,
+    out: Console | None = None,
+) -> None:
     """A table for people; numbers stand to the right, and the first ``whole`` columns are never broken."""
     from rich import box
     from rich.table import Table
@@ -110,7 +117,7 @@ def print_table(columns: Sequence[str], lines: Sequence[Sequence[str]], title: s
         )
     for line in lines:
         table.add_row(*line)
-    console().print(table)
+    (out or console()).print(table)
 
 
 def _is_number(text: str) -> bool:

@@ -103,7 +103,7 @@ def _measured(request: Request, job: Job, store: Archive, *, direct: bool, asks:
     from pipelines.operator import Attendance
     from pipelines.runner import Runner
 
-    with _shown() as (progress, told, quiet):
+    with shown() as (progress, told, quiet):
         operator = Terminal(quiet) if asks else None
         if not direct:
             from pipelines.flows.local import run_locally
@@ -118,7 +118,7 @@ def _measured(request: Request, job: Job, store: Archive, *, direct: bool, asks:
 
 
 @contextmanager
-def _shown() -> Generator[tuple[Progress, Callable[[Done], None], Callable[[], AbstractContextManager[None]]]]:
+def shown() -> Generator[tuple[Progress, Callable[[Done], None], Callable[[], AbstractContextManager[None]]]]:
     """A progress bar for the capture and a line per stage, on standard error; and a block in which both keep still."""
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from pipelines.operator import Answer, Prompt
 
 STOP = frozenset({"stop", "s", "q", "quit", "no", "n"})
-TITLES = {"load": "Load", "confirm": "Seats", "trouble": "Trouble", "unload": "Unload"}
+TITLES = {"load": "Load", "confirm": "Seats", "trouble": "Trouble", "unload": "Unload", "approve": "Approve"}
 
 
 class Terminal:

@@ -22,13 +22,18 @@ def print_diagnosis(document: dict[str, Any], *, source: str, model: Path | None
     """
     out = console()
     out.print(verdict(document), style="bold green" if document["adequate"] else "bold red", soft_wrap=True)
-    _faults(document["blocked_by"])
-    _where(document["where"])
-    _classes(document)
+    print_findings(document)
     _unexplained(out, document, model)
     _next_command(out, document, source, model)
     _unseen(document)
-    _measurements(document["next_measurements"])
+    measurements_table(document["next_measurements"])
+
+
+def print_findings(document: dict[str, Any]) -> None:
+    """Print data faults, the places where the model fails, and the classes of what is missing."""
+    _faults(document["blocked_by"])
+    _where(document["where"])
+    _classes(document)
 
 
 def verdict(document: dict[str, Any]) -> str:
@@ -158,11 +163,38 @@ def _next_command(out: Console, document: dict[str, Any], source: str, model: Pa
 
 def _unseen(document: dict[str, Any]) -> None:
     if document["unseen"]:
-        lines = [[name, document["breakers"][name]] for name in document["unseen"]]
-        print_table(["effect", "what would show it"], lines, title="This plan could not have seen", whole=1)
+        reasons = document.get("reasons", {})
+        lines = [[name, reasons.get(name) or document["breakers"][name]] for name in document["unseen"]]
+        print_table(["effect", "why, and what would show it"], lines, title="This plan could not have seen", whole=1)
 
 
-def _measurements(proposed: list[dict[str, Any]]) -> None:
-    if proposed:
-        lines = [[short(p["outer_deg"]), short(p["inner_deg"]), short(p["chamber_C"]), p["why"]] for p in proposed]
-        print_table(["outer\n°", "inner\n°", "chamber\n°C", "decides between"], lines, title="Measure next")
+def measurements_table(proposed: list[dict[str, Any]], out: Console | None = None) -> None:
+    """Print what to measure next, step by step, with what it costs and brings.
+
+    Parameters
+    ----------
+    out : standard output where None
+    """
+    if not proposed:
+        return
+    lines = [
+        [
+            short(p["outer_deg"]),
+            short(p["inner_deg"]),
+            short(p["chamber_C"]) + ("" if p.get("soaked", True) else " (on the way)"),
+            short(p.get("wait_s")),
+            str(p.get("repeats", 1)),
+            p["why"],
+        ]
+        for p in proposed
+    ]
+    title = "Measure next, in this order"
+    print_table(
+        ["outer\n°", "inner\n°", "chamber\n°C", "wait\ns", "times", "decides between"], lines, title=title, out=out
+    )
+    for row in {p["why"]: p for p in proposed if "minutes" in p}.values():
+        text = (
+            f"{row['why']}: {short(row['minutes'])} min of station time; χ² between the best and its nearest rival "
+            f"{row['separation_before']:.1f} now, {row['separation_after']:.0f} expected then"
+        )
+        (out or console()).print(text, style="dim", markup=False, soft_wrap=True)

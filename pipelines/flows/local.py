@@ -47,11 +47,19 @@ def run_locally(
     """The run that the flow ``calibrate_lot`` made, on the server named by PREFECT_API_URL or on one of our own."""
     archive.prepare()
     progress(0, job.recipe.wanted_records, "starting the orchestrator")
-    if os.environ.get("PREFECT_API_URL"):
+    with reached(archive):
         return _run(request, job, archive, progress, told, operator)
+
+
+@contextmanager
+def reached(archive: Archive) -> Generator[None]:
+    """A block in which an orchestrator answers: the one named by PREFECT_API_URL, or one of our own beside the archive."""
+    if os.environ.get("PREFECT_API_URL"):
+        yield
+        return
     with local_server(_home(archive)) as environment:
         os.environ.update(environment)
-        return _run(request, job, archive, progress, told, operator)
+        yield
 
 
 def _home(archive: Archive) -> Path:

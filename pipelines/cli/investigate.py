@@ -1,0 +1,160 @@
+"""``tumbleline investigate``: run, diagnose, propose, measure only that, diagnose again, until one effect a class stands."""
+
+from __future__ import annotations
+
+import shlex
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from pipelines.cli.options import ArchiveOption, EffectsOption, JsonOption, error_console, print_json
+from pipelines.cli.run import shown
+from schemas.errors import DONE, PART_FAILED
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+    from contextlib import AbstractContextManager
+
+    from pipelines.inquiry.inquiry import Finding, Inquiry, Move
+    from pipelines.inquiry.play import Approval, Consent, Table, Terms
+    from pipelines.job import Request
+
+SETTLED = frozenset({"adequate", "told_apart"})
+
+
+def command(
+    recipe: Annotated[
+        str, typer.Argument(metavar="[RECIPE]", help="A recipe file or a built-in recipe.")
+    ] = "production",
+    station: Annotated[
+        Path | None,
+        typer.Option("--station", metavar="FILE", help="The station; the built-in simulated one by default."),
+    ] = None,
+    units: Annotated[
+        str, typer.Option("--units", metavar="SN,…|FILE", help="Serial numbers slot by slot, or a slot map.")
+    ] = "",
+    archive: ArchiveOption = None,
+    seed: Annotated[int | None, typer.Option("--seed", help="Seed of a simulated station.")] = None,
+    repeat: Annotated[
+        int,
+        typer.Option("--repeat", min=0, help="Count of fresh measurements of the same lot: 1, 2, … measure it anew."),
+    ] = 0,
+    effects: EffectsOption = "",
+    budget: Annotated[
+        float | None,
+        typer.Option(
+            "--budget",
+            min=0.0,
+            metavar="MIN",
+            help="Station minutes for follow-ups; 30 % of the first run's by default.",
+        ),
+    ] = None,
+    *,
+    yes: Annotated[
+        bool | None,
+        typer.Option(
+            "--yes/--ask",
+            help="Spend the budget without asking; or ask, at the terminal or through a paused flow run.",
+        ),
+    ] = None,
+    direct: Annotated[bool, typer.Option("--direct", help="Work without the orchestrator.")] = False,
+    as_json: JsonOption = False,
+) -> None:
+    """Measure a lot, diagnose it, and let the station measure only what tells apart the effects that may be missing.
+
+    It ends when one effect a class stands, when the model leaves nothing but noise, or when the budget is spent. The same
+    command, given again after it was stopped, goes on where it was. Exit status 0: that is so; 1: rivals are left.
+    """
+    from pipelines.archive import Archive
+    from pipelines.cli.investigated import print_inquiry
+    from pipelines.cli.terminal import attended
+    from pipelines.inquiry.play import Terms
+    from pipelines.job import Request
+    from pipelines.models import chosen_effects
+    from pipelines.seating import read_seating
+
+    seating = read_seating(units)
+    request = Request(recipe, station, seating.units, seating.slots, seed, repeat)
+    terms = Terms(tuple(chosen_effects(effects, None, "investigate") or ()), budget)
+    here = attended() and not as_json
+    paused = yes is False and not here and not direct
+    document = _inquired(request, Archive(archive), terms, _consent(yes=yes, here=here), direct=direct, paused=paused)
+    document["command"] = _again(document) if document["ended"] in {"asked", "declined"} else None
+    if as_json:
+        print_json(document)
+    else:
+        print_inquiry(document)
+    raise typer.Exit(DONE if document["ended"] in SETTLED else PART_FAILED)
+
+
+def _consent(*, yes: bool | None, here: bool) -> Callable[[Callable[[], AbstractContextManager[None]]], Approval]:
+    """Who approves the extra minutes: nobody has to, whoever sits at the terminal, or nobody is there."""
+    from pipelines.inquiry.play import always
+
+    def asked(quiet: Callable[[], AbstractContextManager[None]]) -> Approval:
+        def ask(inquiry: Inquiry, finding: Finding, move: Move) -> Consent:
+            with quiet():
+                return _question(inquiry, finding, move)
+
+        return ask
+
+    def nobody(inquiry: Inquiry, finding: Finding, move: Move) -> Consent:
+        del inquiry, finding, move
+        return "nobody"
+
+    if yes:
+        return lambda _quiet: always
+    return asked if here else lambda _quiet: nobody
+
+
+def _question(inquiry: Inquiry, finding: Finding, move: Move) -> Consent:
+    """What the person at the terminal says to a proposal."""
+    from pipelines.cli.verdict import measurements_table
+
+    out = error_console()
+    for sentence in move.why:
+        out.print(f"\n{sentence}.", markup=False, soft_wrap=True)
+    measurements_table(list(move.rows), out)
+    del finding
+    left = inquiry.budget - inquiry.spent
+    text = f"Measure for {move.minutes:.1f} min more ({left:.1f} of {inquiry.budget:.1f} min are left)?"
+    return "go" if typer.confirm(text, default=True, err=True) else "stop"
+
+
+def _inquired(
+    request: Request,
+    archive: Any,
+    terms: Terms,
+    consent: Callable[[Callable[[], AbstractContextManager[None]]], Approval],
+    *,
+    direct: bool,
+    paused: bool,
+) -> dict[str, Any]:
+    """The document of the inquiry."""
+    from pipelines.inquiry.play import Table, directly, play
+
+    with shown() as (progress, told, quiet):
+        table: Table = Table(directly, consent(quiet), progress, told, _tell)
+        if direct:
+            return play(request.job(), archive, terms, table)
+        from pipelines.flows.investigate import investigate_locally
+
+        return investigate_locally(request, archive, terms, table, ask=paused)
+
+
+def _tell(finding: Finding) -> None:
+    """A line for each diagnosis on the way."""
+    from pipelines.cli.verdict import verdict
+
+    error_console().print(
+        f"diagnosis of {len(finding.lineage.runs)}: {verdict(finding.told)}", markup=False, soft_wrap=True
+    )
+
+
+def _again(document: dict[str, Any]) -> str:
+    """The command that goes on with what was proposed."""
+    del document
+    given = [a for a in sys.argv[1:] if a not in {"--ask", "--json"}]
+    return shlex.join(["tumbleline", *given, "--yes"])

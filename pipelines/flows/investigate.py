@@ -1,0 +1,110 @@
+"""The flow ``investigate``: run, diagnose, propose, measure only that, diagnose again; a task per stage of every run.
+
+Where a person has to approve the extra minutes the flow run pauses with the question and waits for the answer, as it does for the
+operator: from the server's page, from ``tumbleline operator``, or from any client of the server.
+"""
+
+from __future__ import annotations
+
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from prefect import flow
+from prefect.runtime import flow_run
+
+from pipelines.archive import Archive
+from pipelines.chain import ORDER
+from pipelines.flows.calibrate import close_dead_runs, settle_history, stage
+from pipelines.flows.local import reached
+from pipelines.flows.operator import Paused
+from pipelines.inquiry.play import Consent, Table, Terms, always, play
+from pipelines.job import Request
+from pipelines.operator import Prompt
+
+if TYPE_CHECKING:
+    from collections.abc import Generator
+
+    from pipelines.inquiry.inquiry import Finding, Inquiry, Move
+    from pipelines.runner import Done, Runner
+
+_tables: list[Table] = []
+
+
+@dataclass(frozen=True)
+class Asked:
+    """Approval by whoever answers the paused flow run."""
+
+    paused: Paused
+
+    def __call__(self, inquiry: Inquiry, finding: Finding, move: Move) -> Consent:
+        """The answer, however long it takes."""
+        del finding
+        why = "; ".join(move.why)
+        text = f"measure for {move.minutes:.1f} min more ({inquiry.budget - inquiry.spent:.1f} min are left): {why}"
+        return self.paused.ask(Prompt("approve", inquiry.lineage.ids[0], text))
+
+
+def _stage(name: str, runner: Runner) -> Done:
+    """A stage as a task."""
+    return stage.with_options(task_run_name=f"{runner.job.recipe.name} {name}")(name, runner)
+
+
+@contextmanager
+def seated(table: Table) -> Generator[None]:
+    """A block in which inquiries of this process tell, and ask, those at the table."""
+    _tables.append(table)
+    try:
+        yield
+    finally:
+        _tables.pop()
+
+
+@flow(name="investigate", persist_result=False, log_prints=False)
+def investigate(  # noqa: PLR0913 - a flow's parameters are its form on the server's page
+    recipe: str = "production",
+    station: str | None = None,
+    units: list[str] | None = None,
+    slots: list[int] | None = None,
+    archive: str | None = None,
+    seed: int | None = None,
+    repeat: int | None = None,
+    faults: list[str] | None = None,
+    *,
+    effects: list[str] | None = None,
+    budget_min: float | None = None,
+    ask: bool = False,
+) -> dict[str, Any]:
+    """Measure a lot, and then only what tells apart what may be missing in its model; the document of the inquiry.
+
+    Without ``repeat`` every flow run measures the lot anew, and a retry of the same flow run goes on where it was. With ``ask``
+    the flow run pauses before every follow-up until somebody approves its minutes.
+    """
+    anew = int(str(flow_run.id).replace("-", "")[:7], 16) if repeat is None else repeat
+    where = Path(station) if station else None
+    job = Request(recipe, where, tuple(units or ()), tuple(slots or ()), seed, anew, tuple(faults or ())).job()
+    table = _tables[-1] if _tables else Table()
+    approve = Asked(Paused()) if ask else (table.approve if _tables else always)
+    at = Table(_stage, approve, table.progress, table.told, table.looked)
+    return play(job, Archive(archive), Terms(tuple(effects or ()), budget_min), at)
+
+
+def investigate_locally(request: Request, archive: Archive, terms: Terms, table: Table, *, ask: bool) -> dict[str, Any]:
+    """The inquiry as the flow makes it, on the server named by PREFECT_API_URL or on one of our own."""
+    archive.prepare()
+    job = request.job()
+    name = f"investigate {job.recipe.name} {job.capture_id}"
+    with reached(archive):
+        close_dead_runs(name)
+        with seated(table):
+            named = investigate.with_options(flow_run_name=name)
+            found: Any = named(
+                **request.parameters(),
+                archive=archive.address,
+                effects=list(terms.effects),
+                budget_min=terms.budget,
+                ask=ask,
+            )
+        settle_history(name, len(ORDER))
+    return found
