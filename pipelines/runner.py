@@ -20,6 +20,8 @@ from pipelines.progress import silent
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
+    import pandas as pd
+
     from pipelines.job import Job
     from pipelines.progress import Progress
 
@@ -44,6 +46,12 @@ def from_station(job: Job, records: Records, progress: Progress) -> None:
     run = f"{job.recipe.name} {job.capture_id}"
     with open_station(job.station, job.lot, resume=records.last_state(), run=run) as station:
         capture(station, job.recipe, job.lot, records, progress=progress, events=records.events)
+
+
+def captured_tables(records: Records) -> dict[str, pd.DataFrame]:
+    """What a run keeps of its capture besides the samples: readings, temperatures against time, soaks, what happened."""
+    told = {"events": records.events.table(), "soaks": records.events.soaks()}
+    return {**told, **{name: records.gathered(name) for name in ("readings", "history")}}
 
 
 class Runner:
@@ -91,9 +99,7 @@ class Runner:
         about = {"inputs": inputs, "parameters": parameters, "code": ""}
         key = stage_key("capture", inputs, parameters, "")
         if not self.run.has(("readings", "history"), key):
-            told = {"events": records.events.table(), "soaks": records.events.soaks()}
-            outputs = {**told, **{name: records.gathered(name) for name in ("readings", "history")}}
-            self.run.save("capture", key, outputs, about)
+            self.run.save("capture", key, captured_tables(records), about)
         return was_there
 
     def _compute(self, stage: Stage) -> bool:

@@ -20,6 +20,7 @@ from pipelines.archive import chain, files
 from pipelines.archive.keys import digest, libraries
 from pipelines.archive.listing import stages_of
 from pipelines.archive.records import COMPLETE, PARTS, Records
+from pipelines.archive.signatures import ENTRY
 from pipelines.archive.store import address_of, place_of
 from schemas.errors import ArchiveUnusable, WrongUse, did_you_mean
 from schemas.version import refuse_newer
@@ -114,7 +115,8 @@ class Run:
                 raise ArchiveUnusable(message)
             files.publish(self.path / f"{name}.parquet", data)
             follows = self._manifests(manifest.get("inputs", {}))
-            content = {**manifest, "taken_from": manifest.get("taken_from", other.id), "manifests": follows}
+            kept = {key: value for key, value in manifest.items() if key != ENTRY}  # what is told anew is signed anew
+            content = {**kept, "taken_from": manifest.get("taken_from", other.id), "manifests": follows}
             files.publish(self.path / f"{name}.json", files.manifest_bytes(content))
 
     def save_report(self, key: str, html: str, about: Mapping[str, Any]) -> None:

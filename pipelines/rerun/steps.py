@@ -9,9 +9,11 @@ import pandas as pd
 from pydantic import ValidationError
 
 from pipelines.archive import code_hash
+from pipelines.archive.signatures import ENTRY
 from pipelines.chain import BY_NAME, RECORDS, STAGES, Tables
 from pipelines.job import Job
 from pipelines.models import refuse_unknown_effects, use_formulas
+from pipelines.runner import captured_tables
 from pipelines.stages.criticise import default_model
 from pipelines.stages.empty import empty_table
 from pipelines.stages.fit import fit
@@ -28,9 +30,10 @@ if TYPE_CHECKING:
     from pipelines.archive import Run
     from pipelines.rerun.wanted import Wanted
 
+CAPTURED = ("readings", "history")
 RAW = ("validate", "reduce", "noise")
 """Stages that read the raw samples."""
-PROVENANCE = ("who", "where", "when", "libraries", "rerun_of", "because", "measured")
+PROVENANCE = ("who", "where", "when", "software", "libraries", ENTRY, "rerun_of", "because", "measured")
 
 
 @dataclass(frozen=True)
@@ -60,21 +63,18 @@ class Plan:
 
 @dataclass(frozen=True)
 class ArchivedJob(Job):
-    """The job of an archived run, which opens no station: capture and station stay as the run tells, whatever they are today."""
+    """The job of an archived run, which opens no station: what the run tells of its capture and station stays as it is.
+
+    told : what ``run.json`` holds, without who made it, where and when
+    """
 
     told: dict[str, Any] = field(default_factory=dict[str, Any])
-
-    @property
-    def capture_id(self) -> str:
-        """Name of the capture, which is not made anew."""
-        return self.told["capture"]
 
     @property
     def about(self) -> dict[str, Any]:
         """What is kept beside the run for readers."""
         decided = {"recipe": self.recipe.model_dump(mode="json"), "limits": self.limits.model_dump(mode="json")}
-        kept = {"station": self.told["station"], "capture": self.told["capture"]}
-        return {**decided, "lot": self.lot.model_dump(mode="json"), **kept}
+        return {**self.told, **decided, "lot": self.lot.model_dump(mode="json")}
 
 
 def plan_of(run: Run, wanted: Wanted) -> Plan:
@@ -93,9 +93,10 @@ def archived_job(run: Run, wanted: Wanted) -> ArchivedJob:
         raise explain(problem, f"run {run.id}", Recipe) from None
     if wanted.limits is not None:
         recipe = recipe.model_copy(update={"limits": wanted.limits_name})
-    told = {"capture": about["capture"], "station": about.get("station", {})}
-    station = StationConfig.model_construct(**told["station"])
-    job = ArchivedJob(recipe=recipe, limits=limits, lot=lot, station=station, told=told)
+    told = {key: value for key, value in about.items() if key not in PROVENANCE}
+    station = StationConfig.model_construct(**about.get("station", {}))
+    capture = about["capture"]
+    job = ArchivedJob(recipe=recipe, limits=limits, lot=lot, station=station, captured=capture, told=told)
     refuse_unknown_effects(recipe.effects, f"run {run.id}")
     refuse_limits_without_figures(limits, recipe)
     return job
@@ -108,7 +109,7 @@ def _dumped(wanted: Wanted) -> dict[str, Any]:
 
 def _captured(run: Run, wanted: Wanted) -> Plan:
     job = archived_job(run, wanted)
-    steps = [_capture_step(job)]
+    steps = [_capture_step(run, job)]
     for stage in STAGES:
         call = _called(stage.call, job)
         steps.append(
@@ -123,14 +124,16 @@ def _called(call: Callable[[Job, Run], Tables], job: Job) -> Callable[[Run], Tab
     return lambda run: call(job, run)
 
 
-def _capture_step(job: ArchivedJob) -> Step:
-    names = ("readings", "history")
+def _capture_step(run: Run, job: ArchivedJob) -> Step:
+    """What the run keeps of its capture: all that it has, which for runs of earlier versions is less than today."""
+    there = run.tables()
+    more = tuple(name for name in ("events", "soaks") if name in there or "readings" not in there)
 
-    def gathered(run: Run) -> Tables:
-        records = run.archive.capture(job.capture_id)
-        return {name: records.gathered(name) for name in names}
+    def gathered(new: Run) -> Tables:
+        tables = captured_tables(new.archive.capture(job.capture_id))
+        return {name: tables[name] for name in (*CAPTURED, *more)}
 
-    return Step("capture", (RECORDS,), names, {"capture": job.capture_id}, "", gathered)
+    return Step("capture", (RECORDS,), (*CAPTURED, *more), {"capture": job.capture_id}, "", gathered)
 
 
 def _imported(run: Run, wanted: Wanted) -> Plan:
