@@ -61,10 +61,10 @@ class Safety(Strict):
 class SelfTest(Strict):
     """The self-test before a shift: a move there and back, the noise of every slot, and a check standard.
 
-    ``noise_max`` is the largest standard deviation of a sample on any axis, in the output's unit; where it is left out only a
-    dead or a wild channel is found. ``standard`` is the serial number of the unit that is measured every time; its offset and
-    scale on z must lie within ``offset`` and ``scale`` (output's unit, output's unit per g), or where these are left out within
-    three sigma of its own history, once that has ``history_min`` entries.
+    ``noise_max`` is the largest standard deviation of a sample on any axis, in the output's unit; where it is left out, no slot
+    may be three times as noisy as they usually are. ``standard`` is the serial number of the unit that is measured every time;
+    its offset and scale on z must lie within ``offset`` and ``scale`` (output's unit, output's unit per g), or where these are
+    left out within three sigma of its own history, once that has ``history_min`` entries.
     """
 
     outer_deg: FiniteFloat = 10.0

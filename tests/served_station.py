@@ -5,6 +5,7 @@ from collections.abc import Generator
 from contextlib import contextmanager
 from pathlib import Path
 
+import tomlkit
 from small_station import lot_of, station_of
 
 from schemas.recipe import Lot
@@ -52,28 +53,6 @@ def served(lot: Lot | None = None, **simulation: object) -> Generator[int, None,
 
 def station_file(folder: Path, config: StationConfig, name: str = "served.toml") -> Path:
     """The station as a file."""
-    lines: list[str] = []
-
-    def table(path: str, content: dict) -> None:
-        plain = {k: v for k, v in content.items() if not isinstance(v, dict) and v is not None}
-        if path:
-            lines.append(f"[{path}]")
-        lines.extend(f"{key} = {_toml(value)}" for key, value in plain.items())
-        for key, value in content.items():
-            if isinstance(value, dict):
-                table(f"{path}.{key}".strip("."), value)
-
-    table("", config.model_dump(mode="json"))
     path = folder / name
-    path.write_text("\n".join(lines) + "\n", encoding="utf-8")
+    path.write_text(tomlkit.dumps(config.model_dump(mode="json", exclude_none=True)), encoding="utf-8")
     return path
-
-
-def _toml(value: object) -> str:
-    if isinstance(value, bool):
-        return str(value).lower()
-    if isinstance(value, str):
-        return f'"{value}"'
-    if isinstance(value, list):
-        return "[" + ", ".join(_toml(one) for one in value) + "]"
-    return repr(value)

@@ -1,33 +1,32 @@
-"""``tumbleline station``: profiles, a look at every register, and the simulated station served alone."""
+"""``tumbleline station``: its state, its self-test, its log, its temperatures; profiles, and the simulated station served."""
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from pipelines.cli.options import JsonOption, console, error_console, print_json, print_table
+from pipelines.cli.options import JsonOption, console, print_json, print_table
+from pipelines.cli.station_check import check
+from pipelines.cli.station_log import log
+from pipelines.cli.station_lot import DeviceOption, StationOption, UnitsOption, made_up
+from pipelines.cli.station_status import status
+from pipelines.cli.station_watch import watch
 
 if TYPE_CHECKING:
-    from schemas.recipe import Lot
     from stations.serving import Served
 
 app = typer.Typer(
-    help="Check, serve and describe stations.",
+    help="See, check, serve and describe stations.",
     no_args_is_help=True,
     add_completion=False,
     pretty_exceptions_enable=False,
 )
 
-StationOption = Annotated[
-    Path | None,
-    typer.Option("--station", metavar="FILE", help="The station; the built-in simulated one by default."),
-]
-DeviceOption = Annotated[str, typer.Option("--device", help="Preset of the simulated devices under test.")]
-UnitsOption = Annotated[
-    int, typer.Option("--units", min=1, max=32, help="How many simulated devices sit in the slots.")
-]
+app.command()(status)
+app.command()(check)
+app.command()(log)
+app.command()(watch)
 
 
 @app.command()
@@ -67,34 +66,7 @@ def serve(
             )
             console().print("stop with Ctrl-C", markup=False)
 
-    run(config, _lot(device, units, seed), host=host, port=port, speed=speed, stop=stop, ready=ready)
-
-
-@app.command()
-def check(
-    station: StationOption = None,
-    device: DeviceOption = "ADXL355",
-    units: UnitsOption = 8,
-    *,
-    as_json: JsonOption = False,
-) -> None:
-    """Read every register of every device of a station once; exit 3 when one does not answer."""
-    from dataclasses import asdict
-
-    from schemas.errors import STATION
-    from schemas.station import load_station
-    from stations.serving import look
-
-    readings = look(load_station(station), _lot(device, units, 1))
-    faults = [reading for reading in readings if reading.fault]
-    if as_json:
-        print_json({"ok": not faults, "registers": [asdict(reading) for reading in readings]})
-    else:
-        lines = [[r.device, r.register, str(r.address), "—" if r.fault else r.value, r.unit] for r in readings]
-        print_table(["device", "register", "address", "value", "unit"], lines)
-        for reading in faults:
-            error_console().print(reading.fault, markup=False)
-    raise typer.Exit(STATION if faults else 0)
+    run(config, made_up(device, units, seed), host=host, port=port, speed=speed, stop=stop, ready=ready)
 
 
 @app.command()
@@ -120,13 +92,6 @@ def profiles(
         return
     lines = [[p.name, p.kind, f"{p.maker} {p.model}", "yes" if p.verified else "no"] for p in found]
     print_table(["profile", "kind", "device", "held against hardware"], lines)
-
-
-def _lot(device: str, units: int, seed: int) -> Lot:
-    """A lot of made-up serial numbers, one per slot."""
-    from schemas.recipe import Lot, Unit
-
-    return Lot(units=[Unit(serial=f"SIM{i:04d}", slot=i) for i in range(units)], device=device, seed=seed)
 
 
 def _where(device: Served) -> dict[str, object]:

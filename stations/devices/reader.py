@@ -77,6 +77,15 @@ class Reader:
         """Stops sampling; the samples stay in the slots' memories."""
         self._registers.write("sampling", "stopped")
 
+    def sampling(self) -> str:
+        """Whether samples are taken: ``running`` or ``stopped``."""
+        return self._registers.text("sampling")
+
+    def occupied(self) -> list[int]:
+        """Slots with a device in them."""
+        mask = int(self._registers.number("occupied"))
+        return [slot for slot in range(mask.bit_length()) if mask >> slot & 1]
+
     def instruments(self) -> Instruments:
         """Temperatures, supplies and vibration now.
 

@@ -1,0 +1,112 @@
+"""Lines over time, drawn in a terminal with braille dots: two by four to a character."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from rich.text import Text
+
+DOTS = ((0x01, 0x08), (0x02, 0x10), (0x04, 0x20), (0x40, 0x80))
+BLANK = 0x2800
+MARGIN = 9  # characters of the labels at the left
+
+
+@dataclass(frozen=True)
+class Line:
+    """One line: its name, its colour, and its points (time in s, value); a value that is not finite leaves a gap."""
+
+    name: str
+    style: str
+    points: Sequence[tuple[float, float]]
+
+
+def chart(title: str, lines: Sequence[Line], width: int, height: int, span: tuple[float, float]) -> Text:
+    """The lines as a text of ``height`` rows and about ``width`` columns, with values at the left and times below.
+
+    Parameters
+    ----------
+    span : first and last time that are shown, s
+    """
+    from rich.text import Text
+
+    shown = [[(t, v) for t, v in line.points if span[0] <= t <= span[1] and math.isfinite(v)] for line in lines]
+    values = [v for points in shown for _, v in points]
+    text = Text(f"{title}   ")
+    for line in lines:
+        text.append(f"━ {line.name}  ", style=line.style)
+    text.append("\n")
+    if not values:
+        return text.append("no data yet\n")
+    low, high = _round(min(values), max(values))
+    columns = max(10, width - MARGIN - 2)
+    cells = _drawn(lines, shown, (columns, height), span, (low, high))
+    for row in range(height):
+        at = high - (high - low) * row / (height - 1)
+        label = f"{at:{MARGIN - 1}.1f} " if row % 2 == 0 else " " * MARGIN
+        text.append(f"{label}│", style="dim")
+        for column in range(columns):
+            mask, style = cells.get((row, column), (0, ""))
+            text.append(chr(BLANK + mask) if mask else " ", style=style)
+        text.append("\n")
+    return text.append(_times(span, columns), style="dim")
+
+
+def _drawn(
+    lines: Sequence[Line],
+    shown: Sequence[Sequence[tuple[float, float]]],
+    size: tuple[int, int],
+    span: tuple[float, float],
+    bounds: tuple[float, float],
+) -> dict[tuple[int, int], tuple[int, str]]:
+    """Dots and colour of every cell that a line passes through; the line drawn last gives the colour."""
+    columns, rows = size
+    cells: dict[tuple[int, int], tuple[int, str]] = {}
+    for line, points in zip(lines, shown, strict=True):
+        dots = [
+            (
+                round((t - span[0]) / max(span[1] - span[0], 1e-9) * (2 * columns - 1)),
+                round((bounds[1] - v) / (bounds[1] - bounds[0]) * (4 * rows - 1)),
+            )
+            for t, v in points
+        ]
+        for x, y in _joined(dots):
+            cell = (y // 4, x // 2)
+            cells[cell] = (cells.get(cell, (0, ""))[0] | DOTS[y % 4][x % 2], line.style)
+    return cells
+
+
+def _joined(dots: Sequence[tuple[int, int]]) -> list[tuple[int, int]]:
+    """The dots with straight lines between them."""
+    found = list(dots[:1])
+    for (x, y), (u, v) in itertools.pairwise(dots):
+        steps = max(abs(u - x), abs(v - y))
+        found += [(round(x + (u - x) * k / steps), round(y + (v - y) * k / steps)) for k in range(1, steps + 1)]
+    return found
+
+
+def _round(low: float, high: float) -> tuple[float, float]:
+    """Bounds that leave a little room, and are never the same."""
+    room = 0.05 * (high - low) or 0.5
+    return low - room, high + room
+
+
+def _times(span: tuple[float, float], columns: int) -> str:
+    first, last = clock(span[0]), clock(span[1])
+    middle = clock((span[0] + span[1]) / 2.0)
+    line = first.ljust(columns)
+    at = max(0, columns // 2 - len(middle) // 2)
+    line = line[:at] + middle + line[at + len(middle) :]
+    line = line[: columns - len(last)] + last
+    return " " * (MARGIN + 1) + line + "\n"
+
+
+def clock(seconds: float) -> str:
+    """A time of a run in hours, minutes and seconds."""
+    hours, rest = divmod(round(seconds), 3600)
+    return f"{hours}:{rest // 60:02d}:{rest % 60:02d}"

@@ -1,0 +1,113 @@
+"""``tumbleline station check``: the self-test before a shift."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from pipelines.cli.options import JsonOption, error_console, print_json, print_table
+from pipelines.cli.station_lot import DeviceOption, StationOption, UnitsOption, made_up
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from schemas.recipe import Lot
+    from schemas.station import StationConfig
+    from stations.self_test import Bench, Finding
+    from stations.serving import Reading
+
+
+def check(
+    station: StationOption = None,
+    device: DeviceOption = "ADXL355",
+    units: UnitsOption = 8,
+    *,
+    registers: Annotated[
+        bool, typer.Option("--registers", help="Only read every register once; move nothing.")
+    ] = False,
+    as_json: JsonOption = False,
+) -> None:
+    """Test a station before a shift: registers, instruments, moves, noise of every slot, a check standard.
+
+    It leases the station as a run does and leaves it safe. Exit 3 names what failed.
+    """
+    from dataclasses import asdict
+
+    from schemas.errors import STATION
+    from schemas.station import load_station
+    from stations.serving import look
+
+    config = load_station(station)
+    readings = look(config, made_up(device, units, 1))
+    silent = [reading.fault for reading in readings if reading.fault]
+    findings = [] if registers or silent else _tested(config, device, units)
+    failed = [*silent, *(finding.message for finding in findings if not finding.ok)]
+    if as_json:
+        document: dict[str, Any] = {"ok": not failed, "failed": failed, "registers": [asdict(r) for r in readings]}
+        print_json(document | ({} if registers else {"checks": [asdict(finding) for finding in findings]}))
+    else:
+        _print(readings, findings, registers=registers)
+        for message in failed:
+            error_console().print(message, markup=False)
+    raise typer.Exit(STATION if failed else 0)
+
+
+def _tested(config: StationConfig, device: str, units: int) -> list[Finding]:
+    """The findings of the self-test; a standard within its limits goes into its history."""
+    from stations.opening import open_station
+    from stations.safety.folder import state_folder
+    from stations.self_test import Bench, Finding, keep, read_history
+
+    path = state_folder() / "checks" / f"{config.name}.jsonl"
+    history = read_history(path)
+    lot = made_up(device, units, 1, repeat=len(history)) if config.kind == "simulated" else _seated(config)
+    if lot is None:
+        return [
+            Finding("slots", "reader", ok=False, message="reader: no slot is occupied, one unit is needed; seat one")
+        ]
+    with open_station(config, lot, run="station check") as opened:
+        bench = Bench(opened, config.self_test, history)
+        findings = bench.run()
+    _keep(path, bench, keep)
+    return findings
+
+
+def _keep(path: Path, bench: Bench, keep: Any) -> None:
+    controlled = [finding.ok for finding in bench.findings if finding.check in {"offset", "scale"}]
+    if bench.standard is not None and controlled and all(controlled):
+        keep(path, bench.standard)
+
+
+def _seated(config: StationConfig) -> Lot | None:
+    """Who sits in the slots of hardware, as they say themselves; None where nobody does."""
+    from schemas.recipe import Lot, Unit
+    from stations.overview import looked_at
+
+    with looked_at(config, made_up("hardware", 1, 1)) as look:
+        units = [Unit(serial=s.serial or f"slot-{s.slot}", slot=s.slot) for s in look().slots]
+    return Lot(units=units, device="hardware") if units else None
+
+
+def _print(readings: list[Reading], findings: list[Finding], *, registers: bool) -> None:
+    if registers:
+        lines = [[r.device, r.register, str(r.address), "—" if r.fault else r.value, r.unit] for r in readings]
+        print_table(["device", "register", "address", "value", "unit"], lines)
+        return
+    devices = len({reading.device for reading in readings})
+    print_table(
+        ["", "part", "test", "found", "allowed", "unit"],
+        [["✓", f"{devices} devices", "registers", f"{len(readings)} read", "", ""], *map(_line, findings)]
+        if findings
+        else [["✗", f"{devices} devices", "registers", "not all answer", "all", ""]],
+    )
+
+
+def _line(finding: Finding) -> list[str]:
+    value = finding.value if isinstance(finding.value, str) else f"{finding.value:.6g}"
+    sides = ["" if side is None else f"{side:.6g}" for side in (finding.low, finding.high)]
+    if finding.high is not None and finding.low == -finding.high:
+        allowed = f"± {sides[1]}"
+    else:
+        allowed = " to ".join(sides) if all(sides) else f"from {sides[0]}" if sides[0] else ""
+    return ["✓" if finding.ok else "✗", finding.part, finding.check, value, allowed, finding.unit]

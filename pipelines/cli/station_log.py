@@ -1,0 +1,98 @@
+"""``tumbleline station log``: what paused or ended runs, and what became of the stations, in order of time."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from pipelines.cli.options import ArchiveOption, JsonOption, console, print_json
+
+if TYPE_CHECKING:
+    from pipelines.archive import Archive
+
+STYLES = {
+    "spoilt": "yellow",
+    "suspended": "yellow",
+    "resumed": "green",
+    "unit_lost": "magenta",
+    "emergency_stop": "bold red",
+    "stopped": "red",
+    "not_safe": "bold red",
+    "watchdog_acts": "yellow",
+    "watchdog_failed": "bold red",
+}
+QUIET = {"reference", "soak"}  # told with --all only: they happen in every run
+
+
+def log(
+    run: Annotated[str, typer.Argument(metavar="[RUN]", help="Only this run of the archive.")] = "",
+    archive: ArchiveOption = None,
+    limit: Annotated[int, typer.Option("--limit", min=1, help="How many of the newest.")] = 50,
+    *,
+    everything: Annotated[bool, typer.Option("--all", help="Soaks and references too.")] = False,
+    as_json: JsonOption = False,
+) -> None:
+    """Tell what paused or ended runs, from the archive, and what became of stations, from this machine's log."""
+    from pipelines.archive import Archive
+
+    found = [*_of_runs(Archive(archive), run), *([] if run else _of_machine())]
+    wanted = [event for event in found if everything or event["kind"] not in QUIET]
+    wanted = sorted(wanted, key=lambda event: event["when"])[-limit:]
+    if as_json:
+        print_json({"events": wanted})
+        return
+    if not wanted:
+        console().print("nothing has happened", markup=False)
+        return
+    for event in wanted:
+        _print(event)
+
+
+def _print(event: dict[str, Any]) -> None:
+    """One event for people: when, where and what; below it why, and what was done."""
+    from rich.padding import Padding
+    from rich.text import Text
+
+    record = f", record {event['record']}" if event.get("record", -1) >= 0 else ""
+    head = Text.assemble(
+        (event["when"][:19].replace("T", " "), "dim"),
+        f"  {event['where']}{record}  ",
+        (event["kind"].replace("_", " "), STYLES.get(event["kind"], "")),
+    )
+    console().print(head)
+    words = " → ".join(part for part in (event["reason"], event["action"]) if part)
+    if words:
+        console().print(Padding(Text(words), (0, 0, 0, 4)))
+
+
+def _of_runs(store: Archive, run: str) -> list[dict[str, Any]]:
+    """Events of the captures of the archive, each once, under the name of the first run that used it."""
+    runs = [store.run(run)] if run else [store.run(info.id) for info in store.runs()]
+    captures: dict[str, str] = {}
+    for one in runs:
+        captures.setdefault(str(one.about.get("capture") or ""), one.id)
+    return [
+        {"where": run_id, **event}
+        for capture, run_id in captures.items()
+        if capture
+        for event in store.capture(capture).events.documents()
+    ]
+
+
+def _of_machine() -> list[dict[str, Any]]:
+    """What happened to stations on this machine: driven, left safe, made safe by a watchdog."""
+    from stations.safety.folder import log as machine_log
+    from stations.safety.folder import state_folder
+
+    known = {"when", "station", "event", "why", "what"}
+    return [
+        {
+            "when": line["when"],
+            "where": line["station"],
+            "kind": line["event"],
+            "reason": line.get("why", ""),
+            "action": line.get("what") or ", ".join(f"{k} {v}" for k, v in line.items() if k not in known),
+        }
+        for line in machine_log(state_folder())
+    ]

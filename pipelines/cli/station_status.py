@@ -1,0 +1,108 @@
+"""``tumbleline station status``: angles, temperatures, states, slots and lease of a station, once or live."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from pipelines.cli.options import JsonOption, console, error_console, print_json
+from pipelines.cli.station_lot import DeviceOption, StationOption, UnitsOption, made_up
+
+if TYPE_CHECKING:
+    from rich.console import Group
+
+    from stations.overview import Overview
+
+GOOD, BAD = "green", "bold red"
+
+
+def status(
+    station: StationOption = None,
+    device: DeviceOption = "ADXL355",
+    units: UnitsOption = 8,
+    every: Annotated[float, typer.Option("--every", min=0.1, help="Seconds between two looks of --watch.")] = 1.0,
+    *,
+    watch: Annotated[bool, typer.Option("--watch", help="Look again and again, until Ctrl-C.")] = False,
+    as_json: JsonOption = False,
+) -> None:
+    """Show angles, temperatures, states, slots and who drives the station; exit 3 when a part does not answer.
+
+    Nothing is moved and no lease is needed: a run that is under way is not disturbed.
+    """
+    from schemas.errors import STATION
+    from schemas.station import load_station
+    from stations.overview import looked_at
+
+    config = load_station(station)
+    with looked_at(config, made_up(device, units, 1)) as look:
+        now = look()
+        if as_json:
+            print_json({"ok": not now.faults, **now.document()})
+        elif watch:
+            now = _live(look, every)
+        else:
+            console().print(picture(now))
+    if not as_json:
+        for fault in now.faults.values():
+            error_console().print(fault, markup=False)
+    raise typer.Exit(STATION if now.faults else 0)
+
+
+def _live(look: object, every: float) -> Overview:
+    """The picture renewed until Ctrl-C; the last look."""
+    import time
+
+    from rich.live import Live
+
+    now: Overview = look()  # pyright: ignore[reportCallIssue]
+    with Live(picture(now), console=console(), refresh_per_second=4, screen=False) as live:
+        try:
+            while True:
+                time.sleep(every)
+                now = look()  # pyright: ignore[reportCallIssue]
+                live.update(picture(now))
+        except KeyboardInterrupt:
+            return now
+
+
+def picture(now: Overview) -> Group:
+    """A station for people."""
+    from rich.console import Group
+    from rich.table import Table
+
+    parts = Table(box=None, show_header=False, pad_edge=False)
+    for name in ("outer", "inner"):
+        angle = now.angles_deg.get(name)
+        parts.add_row(f"{name} axis", "—" if angle is None else f"{angle:9.3f}°", now.axes.get(name, ""))
+    air = "—" if now.chamber_C is None else f"{now.chamber_C:9.2f} °C"
+    goal = "" if now.set_point_C is None else f"{now.chamber}, set point {now.set_point_C:g} °C"
+    parts.add_row("chamber", air, goal)
+    shaken = "—" if now.vibration_g is None else f"{now.vibration_g * 1e6:9.1f} µg"
+    parts.add_row("vibration", shaken, "")
+    parts.add_row("door", "", _word(now.door, "closed"))
+    parts.add_row("emergency stop", "", _word(now.emergency_stop, "released"))
+    parts.add_row("sampling", "", now.sampling)
+    parts.add_row("driven by", "", driven_by(now))
+    slots = Table(box=None, pad_edge=False, padding=(0, 2, 0, 0))
+    for heading in ("slot", "unit", "°C", "V"):
+        slots.add_column(heading, justify="left" if heading == "unit" else "right")
+    for slot in now.slots:
+        slots.add_row(str(slot.slot), slot.serial or "—", f"{slot.unit_C:.2f}", f"{slot.supply_V:.4f}")
+    return Group(f"{now.station} ({now.kind})", parts, "", slots)
+
+
+def driven_by(now: Overview) -> str:
+    """Who drives a station, in words."""
+    if now.kind == "simulated":
+        return "every run has a simulated station of its own"
+    if now.lease is None:
+        return "nobody"
+    lease = now.lease
+    who = f"{lease['run']}, process {lease['pid']} on {lease['host']} since {lease['since']}, heard of {lease['heard_s']:g} s ago"
+    return f"the watchdog of {who}" if lease["role"] == "watchdog" else who
+
+
+def _word(found: str, good: str) -> str:
+    style = GOOD if found == good else BAD
+    return f"[{style}]{found or '—'}[/{style}]"

@@ -1,0 +1,181 @@
+"""``tumbleline station watch``: temperatures and angles over time, drawn in the terminal."""
+
+from __future__ import annotations
+
+import math
+import sys
+from collections.abc import Callable
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from pipelines.cli.chart import Line, chart, clock
+from pipelines.cli.options import ArchiveOption, JsonOption, console, print_json
+from pipelines.cli.station_lot import StationOption, made_up
+
+if TYPE_CHECKING:
+    from collections.abc import Generator
+    from pathlib import Path
+
+    from rich.console import Group
+
+    from pipelines.archive import Records
+    from stations.overview import Overview
+
+MOVE_S = 5.0  # a table stands where it stood until shortly before the next record
+Points = list[tuple[float, float]]
+Look = Callable[[], "Seen"]
+
+
+@dataclass
+class Seen:
+    """What there is to draw: temperatures in °C and angles in degrees against the station's time, s."""
+
+    title: str
+    chamber: Points = field(default_factory=list[tuple[float, float]])
+    coldest: Points = field(default_factory=list[tuple[float, float]])
+    warmest: Points = field(default_factory=list[tuple[float, float]])
+    outer: Points = field(default_factory=list[tuple[float, float]])
+    inner: Points = field(default_factory=list[tuple[float, float]])
+    over: bool = False
+
+    @property
+    def last(self) -> float:
+        """The newest time that is known."""
+        return max((points[-1][0] for points in (self.chamber, self.outer) if points), default=0.0)
+
+    def document(self) -> dict[str, Any]:
+        """The same for JSON."""
+        series = ("chamber", "coldest", "warmest", "outer", "inner")
+        return {"title": self.title, "over": self.over, **{name: getattr(self, name) for name in series}}
+
+
+def watch(
+    run: Annotated[
+        str, typer.Argument(metavar="[RUN]", help="A run of the archive; the newest by default.")
+    ] = "latest",
+    station: StationOption = None,
+    archive: ArchiveOption = None,
+    minutes: Annotated[
+        float, typer.Option("--minutes", min=0.1, help="How far back is shown; all by default.")
+    ] = math.inf,
+    every: Annotated[float, typer.Option("--every", min=0.1, help="Seconds between two looks.")] = 1.0,
+    *,
+    once: Annotated[bool, typer.Option("--once", help="Draw once and leave.")] = False,
+    as_json: JsonOption = False,
+) -> None:
+    """Draw temperatures and angles over time, live: of a run in the archive, or with --station of a station itself."""
+    with _source(run, station, archive) as look:
+        if as_json:
+            print_json(look().document())
+        elif once or not sys.stdout.isatty():
+            console().print(picture(look(), minutes))
+        else:
+            _live(look, minutes, every)
+
+
+@contextmanager
+def _source(run: str, station: Path | None, archive: str | None) -> Generator[Look]:
+    if station is None:
+        from pipelines.archive import Archive
+        from schemas.errors import WrongUse
+
+        found = Archive(archive).run(run)
+        records = found.records
+        if records is None:
+            message = f"run {found.id}: its data were imported, there is no station to watch; name a captured run"
+            raise WrongUse(message)
+        yield lambda: of_records(found.id, records)
+        return
+    from schemas.station import load_station
+    from stations.overview import looked_at
+
+    config = load_station(station)
+    with looked_at(config, made_up("ADXL355", 8, 1)) as look:
+        seen = Seen(config.name)
+        yield lambda: _added(seen, look())
+
+
+def of_records(title: str, records: Records) -> Seen:
+    """What the records of a capture tell so far."""
+    if not records.finished():
+        return Seen(title)
+    history, readings = records.gathered("history"), records.gathered("readings")
+    by_time = history.groupby("time_s").agg(air=("chamber_C", "first"), low=("unit_C", "min"), high=("unit_C", "max"))
+    by_record = readings.drop_duplicates("record").sort_values("start_s")
+    times = [float(t) for t in by_time.index]
+
+    def series(name: str) -> Points:
+        return list(zip(times, map(float, by_time[name]), strict=True))
+
+    def stairs(name: str) -> Points:
+        starts, values = list(map(float, by_record["start_s"])), list(map(float, by_record[name]))
+        ends = [start - MOVE_S for start in starts[1:]] + [starts[-1] + float(by_record["duration_s"].iloc[-1])]
+        return [(t, v) for start, end, v in zip(starts, ends, values, strict=True) for t in (start, max(start, end))]
+
+    return Seen(
+        title,
+        series("air"),
+        series("low"),
+        series("high"),
+        stairs("outer_deg"),
+        stairs("inner_deg"),
+        records.is_complete(),
+    )
+
+
+def _added(seen: Seen, now: Overview) -> Seen:
+    """The picture with one more look at the station."""
+    time = now.time_s
+    if now.chamber_C is not None:
+        seen.chamber.append((time, now.chamber_C))
+    known = [slot.unit_C for slot in now.slots if slot.unit_C is not None and math.isfinite(slot.unit_C)]
+    if known:
+        seen.coldest.append((time, min(known)))
+        seen.warmest.append((time, max(known)))
+    for name, points in (("outer", seen.outer), ("inner", seen.inner)):
+        if name in now.angles_deg:
+            points.append((time, now.angles_deg[name]))
+    return seen
+
+
+def picture(seen: Seen, minutes: float) -> Group:
+    """Both charts, as wide and high as the terminal."""
+    from rich.console import Group
+
+    out = console()
+    width, height = out.width, max(6, min(16, (out.height - 8) // 2))
+    last = seen.last
+    first = min((points[0][0] for points in (seen.chamber, seen.outer) if points), default=0.0)
+    span = (max(first, last - 60.0 * minutes), max(last, first + 1.0))
+    temperatures = [
+        Line("chamber", "cyan", seen.chamber),
+        Line("coldest unit", "blue", seen.coldest),
+        Line("warmest unit", "red", seen.warmest),
+    ]
+    angles = [Line("outer", "green", seen.outer), Line("inner", "magenta", seen.inner)]
+    state = "over" if seen.over else f"at {clock(last)}"
+    return Group(
+        f"{seen.title}, {state}",
+        chart("°C", temperatures, width, height, span),
+        chart("deg", angles, width, height, span),
+    )
+
+
+def _live(look: Look, minutes: float, every: float) -> None:
+    """The picture renewed until the run is over, or Ctrl-C."""
+    import time
+
+    from rich.live import Live
+
+    with Live(picture(look(), minutes), console=console(), refresh_per_second=4) as live:
+        try:
+            seen = look()
+            while not seen.over:
+                time.sleep(every)
+                seen = look()
+                live.update(picture(seen, minutes))
+        except KeyboardInterrupt:
+            return

@@ -1,0 +1,144 @@
+"""A station at one instant: angles, temperatures, states, who sits in the slots, and who drives it."""
+
+from __future__ import annotations
+
+from contextlib import contextmanager
+from dataclasses import asdict, dataclass, field
+from typing import TYPE_CHECKING, Any
+
+from schemas.errors import StationError
+from stations.safety.folder import state_folder
+from stations.safety.leases import holders
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Generator
+
+    from schemas.recipe import Lot
+    from schemas.station import StationConfig
+    from stations.station import Station
+
+AXES = ("outer", "inner")
+
+
+@dataclass
+class SlotNow:
+    """A slot as it is now."""
+
+    slot: int
+    serial: str
+    unit_C: float | None
+    supply_V: float | None
+
+
+@dataclass
+class Overview:
+    """A station as it is now; ``faults`` says of each part that does not answer why."""
+
+    station: str
+    kind: str
+    time_s: float = 0.0
+    angles_deg: dict[str, float] = field(default_factory=dict[str, float])
+    axes: dict[str, str] = field(default_factory=dict[str, str])
+    chamber_C: float | None = None
+    set_point_C: float | None = None
+    chamber: str = ""
+    door: str = ""
+    emergency_stop: str = ""
+    vibration_g: float | None = None
+    sampling: str = ""
+    slots: list[SlotNow] = field(default_factory=list[SlotNow])
+    lease: dict[str, Any] | None = None
+    faults: dict[str, str] = field(default_factory=dict[str, str])
+
+    def document(self) -> dict[str, Any]:
+        """The same for JSON."""
+        return asdict(self)
+
+
+@contextmanager
+def looked_at(config: StationConfig, lot: Lot) -> Generator[Callable[[], Overview]]:
+    """A block in which the station can be looked at again and again; nothing is moved, and no lease is needed.
+
+    Parameters
+    ----------
+    lot : what sits in a simulated station; hardware is asked who sits there
+    """
+    from stations.opening import make_plant, open_devices, serve_plant  # noqa: PLC0415 - light until it is looked at
+
+    if config.kind == "simulated":
+        with serve_plant(config, lot, make_plant(config, lot)) as station:
+            yield lambda: look_at(config, station)
+        return
+    with open_devices(config, ()) as empty:
+        slots = _occupied(empty)
+    with open_devices(config, slots) as station:
+        yield lambda: look_at(config, station)
+
+
+def look_at(config: StationConfig, station: Station) -> Overview:
+    """The station as it is now; a part that does not answer is told, the others are shown all the same."""
+    now = Overview(config.name, config.kind, station.clock.now())
+    _ask(now, "table", lambda: _table(now, station))
+    _ask(now, "chamber", lambda: _chamber(now, station))
+    _ask(now, "reader", lambda: _reader(now, station))
+    if config.kind != "simulated":
+        now.lease = _lease(config)
+    return now
+
+
+def _ask(now: Overview, part: str, question: Callable[[], None]) -> None:
+    try:
+        question()
+    except StationError as problem:
+        now.faults[part] = str(problem)
+
+
+def _table(now: Overview, station: Station) -> None:
+    for name, axis in station.table.axes.items():
+        state = axis.state()
+        words = state.alarm or ("moving" if state.moving else "in position" if state.in_position else "standing")
+        now.axes[name] = words if state.homed else f"{words}, no home"
+        now.angles_deg[name] = axis.position()
+
+
+def _chamber(now: Overview, station: Station) -> None:
+    now.chamber_C = station.chamber.temperature()
+    now.set_point_C = station.chamber.set_point()
+    now.chamber = station.chamber.mode()
+
+
+def _reader(now: Overview, station: Station) -> None:
+    reader = station.reader
+    now.sampling = reader.sampling()
+    instruments = reader.instruments()
+    now.door = "open" if instruments.door_open else "closed"
+    now.emergency_stop = "pressed" if instruments.stop_pressed else "released"
+    now.vibration_g = instruments.vibration_g
+    for number, slot in sorted(reader.slots.items()):
+        try:
+            serial = slot.identity().serial
+        except StationError as problem:
+            serial = ""
+            now.faults[f"slot {number}"] = str(problem)
+        temperature, supply = instruments.temperature_C[number], instruments.supply_V[number]
+        now.slots.append(SlotNow(number, serial, temperature, supply))
+
+
+def _occupied(station: Station) -> list[int]:
+    """Slots with a device in them, as the reader says; none where it does not answer, which the look then tells."""
+    try:
+        return station.reader.occupied()
+    except StationError:
+        return []
+
+
+def _lease(config: StationConfig) -> dict[str, Any] | None:
+    """Who drives the station; None where nobody does."""
+    found = [entry for entry in holders(state_folder(), config).values() if entry is not None]
+    if not found:
+        return None
+    holder, age = found[0]
+    return {
+        **{k: getattr(holder, k) for k in ("run", "pid", "host", "since", "role", "tripped")},
+        "heard_s": round(age, 1),
+    }

@@ -1,0 +1,224 @@
+"""The self-test of a station before a shift: what it reads, how it moves, how its slots are silent, and a check standard."""
+
+from __future__ import annotations
+
+import json
+import math
+from dataclasses import asdict, dataclass, field
+from datetime import UTC, datetime
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from schemas.errors import StationError
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+    from pathlib import Path
+
+    from numpy.typing import NDArray
+
+    from schemas.safety import SelfTest
+    from stations.station import Station
+
+WILD = 0.05  # of full scale: no device at rest is so noisy
+NOISIER = 3.0  # times what is usual among the slots, of which there must be so many:
+FEWEST_TO_COMPARE = 3
+KEPT = 0.99  # of the samples that should be there
+SIGMAS = 3.0
+MOVING_RANGE = 1.128  # mean range of two over sigma, normal: NIST/SEMATECH e-Handbook of Statistical Methods, 6.3.2.2
+UP, DOWN = (0.0, 0.0), (180.0, 0.0)
+
+
+@dataclass(frozen=True)
+class Finding:
+    """One thing that was tested: what was found, what is allowed, whether it is good, and a sentence where it is not."""
+
+    check: str
+    part: str
+    ok: bool
+    value: float | str = ""
+    unit: str = ""
+    low: float | None = None
+    high: float | None = None
+    message: str = ""
+
+
+@dataclass(frozen=True)
+class Standard:
+    """The check standard as it was measured once; ``offset`` in the output's unit, ``scale`` in that per g."""
+
+    serial: str
+    offset: float
+    scale: float
+    unit_C: float
+    when: str = ""
+
+
+@dataclass
+class Bench:
+    """The self-test of one station; findings gather as it goes on, and a part that fails leaves the others to be tested."""
+
+    station: Station
+    rules: SelfTest
+    history: list[Standard] = field(default_factory=list[Standard])
+    findings: list[Finding] = field(default_factory=list[Finding])
+    standard: Standard | None = None
+
+    def run(self) -> list[Finding]:
+        """Every finding, in the order of the test."""
+        self._tested("instruments", "reader", self._instruments)
+        if all(finding.ok for finding in self.findings if finding.check in {"door", "emergency stop"}):
+            for check, part, test in (
+                ("chamber", "chamber", self._chamber),
+                ("move", "table", self._moves),
+                ("noise", "slots", self._noise),
+                ("check standard", "slots", self._standard),
+            ):
+                self._tested(check, part, test)
+        return self.findings
+
+    def _tested(self, check: str, part: str, test: Callable[[], None]) -> None:
+        try:
+            test()
+        except StationError as problem:
+            self.findings.append(Finding(check, part, ok=False, message=str(problem)))
+
+    def _found(self, check: str, part: str, value: float, unit: str, bounds: tuple[float, float]) -> None:
+        low, high = bounds
+        ok = low <= value <= high
+        text = "" if ok else f"{part}: {check} {value:.6g} {unit}, {low:.6g} to {high:.6g} {unit} is needed"
+        self.findings.append(Finding(check, part, ok, value, unit, _finite(low), _finite(high), text))
+
+    def _state(self, check: str, part: str, found: str, needed: str) -> None:
+        ok = found == needed
+        text = "" if ok else f"{part}: {check} is {found}, {needed} is needed"
+        self.findings.append(Finding(check, part, ok, found, message=text))
+
+    def _instruments(self) -> None:
+        now, limits = self.station.reader.instruments(), self.station.config.suspenders
+        self._state("door", "reader", "open" if now.door_open else "closed", "closed")
+        self._state("emergency stop", "reader", "pressed" if now.stop_pressed else "released", "released")
+        self._found("vibration", "reader", now.vibration_g, "g rms", (0.0, limits.vibration_g))
+        for slot in sorted(self.station.reader.slots):
+            self._found("temperature", f"slot {slot}", now.temperature_C[slot], "°C", (-100.0, 250.0))
+            self._found("supply", f"slot {slot}", now.supply_V[slot], "V", limits.supply_V or (0.5, 60.0))
+
+    def _chamber(self) -> None:
+        chamber = self.station.chamber
+        self._found("air", "chamber", chamber.temperature(), "°C", (-100.0, 250.0))
+        self._state("mode", "chamber", chamber.mode(), chamber.running)
+
+    def _moves(self) -> None:
+        """There and back, each confirmed by the encoders."""
+        allowed = self.station.config.limits.position_deg
+        for outer, inner in ((self.rules.outer_deg, self.rules.inner_deg), UP):
+            self.station.table.move(outer, inner)
+            found = self.station.table.angles()
+            for name, target, angle in (("outer axis", outer, found[0]), ("inner axis", inner, found[1])):
+                self._found(f"move to {target:g}°", name, angle - target, "deg", (-allowed, allowed))
+
+    def _noise(self) -> None:
+        """Standard deviation of a sample at rest, the noisiest axis; samples that are missing, axes that say nothing."""
+        self.station.table.move(*UP)
+        deviations: dict[int, NDArray[np.float64]] = {}
+        for slot, samples in self._sampled().items():
+            wanted = self.rules.sample_s * self.rules.rate_hz
+            self._found("samples", f"slot {slot}", float(len(samples)), "", (math.floor(KEPT * wanted) - 1.0, math.inf))
+            if len(samples) > 1:
+                deviations[slot] = np.std(samples, axis=0, ddof=1)
+        shaking = self.station.reader.instruments().vibration_g
+        allowed = (0.0, self.station.config.suspenders.vibration_g)
+        self._found("vibration at rest", "reader", shaking, "g rms", allowed)
+        usual = float(np.median([deviation.max() for deviation in deviations.values()])) if deviations else 0.0
+        for slot, deviation in deviations.items():
+            self._silent_or_wild(slot, deviation, usual if len(deviations) >= FEWEST_TO_COMPARE else math.inf)
+
+    def _silent_or_wild(self, slot: int, deviation: NDArray[np.float64], usual: float) -> None:
+        """The noise of one slot, (3,), against what is allowed, or what is usual among its neighbours."""
+        part, identity = f"slot {slot}", self.station.reader.slots[slot].identity()
+        if deviation.min() == 0.0:
+            axis = "xyz"[int(np.argmin(deviation))]
+            text = f"{part}: the output on {axis} stands still, a living one is needed; check wiring and power"
+            self.findings.append(Finding("noise", part, ok=False, value=0.0, unit=identity.out_unit, message=text))
+            return
+        most = self.rules.noise_max or min(NOISIER * usual, WILD * identity.full_scale)
+        self._found("noise", part, float(deviation.max()), identity.out_unit, (0.0, most))
+
+    def _standard(self) -> None:
+        """Offset and scale on z of the check standard from two poses, against its control limits."""
+        if not self.rules.standard:
+            return
+        slots = self.station.reader.slots
+        found = [number for number, slot in slots.items() if slot.identity().serial == self.rules.standard]
+        if not found:
+            text = f"slots: check standard {self.rules.standard} sits in none of them; seat it, or correct [self_test]"
+            self.findings.append(Finding("check standard", "slots", ok=False, message=text))
+            return
+        means: list[float] = []
+        for pose in (UP, DOWN):
+            self.station.table.move(*pose)
+            means.append(float(self._sampled()[found[0]][:, 2].mean()))
+        unit = slots[found[0]].identity().out_unit
+        temperature = self.station.reader.instruments().temperature_C[found[0]]
+        self.standard = Standard(
+            self.rules.standard, (means[0] + means[1]) / 2.0, (means[0] - means[1]) / 2.0, temperature, _now()
+        )
+        part, past = f"standard {self.rules.standard}", [s for s in self.history if s.serial == self.rules.standard]
+        self._controlled("offset", part, self.standard.offset, unit, self.rules.offset, [s.offset for s in past])
+        self._controlled("scale", part, self.standard.scale, f"{unit}/g", self.rules.scale, [s.scale for s in past])
+
+    def _controlled(
+        self, check: str, part: str, value: float, unit: str, given: tuple[float, float] | None, past: list[float]
+    ) -> None:
+        bounds = given or control_limits(past, self.rules.history_min) or (-math.inf, math.inf)
+        self._found(check, part, value, unit, bounds)
+
+    def _sampled(self) -> dict[int, NDArray[np.float64]]:
+        """Samples by slot, (n, 3) in each output's unit, at the pose where the table stands."""
+        reader, clock = self.station.reader, self.station.clock
+        clock.sleep(self.rules.settle_s)
+        reader.start(self.rules.rate_hz)
+        clock.sleep(self.rules.sample_s)
+        reader.stop()
+        return {number: slot.take().outputs for number, slot in sorted(reader.slots.items())}
+
+
+def control_limits(past: Sequence[float], fewest: int) -> tuple[float, float] | None:
+    """Limits of an individuals chart, mean ± 3 sigma with sigma from the moving range; None before ``fewest`` values.
+
+    NIST/SEMATECH e-Handbook of Statistical Methods, 6.3.2.2.
+    """
+    if len(past) < fewest:
+        return None
+    values = np.array(past, dtype=np.float64)
+    sigma = float(np.abs(np.diff(values)).mean()) / MOVING_RANGE
+    centre = float(values.mean())
+    return centre - SIGMAS * sigma, centre + SIGMAS * sigma
+
+
+def read_history(path: Path) -> list[Standard]:
+    """Earlier measurements of check standards, oldest first; a torn line is left out."""
+    found: list[Standard] = []
+    for line in path.read_text("utf-8").splitlines() if path.is_file() else []:
+        try:
+            content: dict[str, Any] = json.loads(line)
+            found.append(Standard(**content))
+        except (ValueError, TypeError):
+            continue
+    return found
+
+
+def keep(path: Path, standard: Standard) -> None:
+    """Adds a measurement that was within its limits to the history."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    with path.open("a", encoding="utf-8") as file:
+        file.write(json.dumps(asdict(standard)) + "\n")
+
+
+def _finite(value: float) -> float | None:
+    return value if math.isfinite(value) else None
+
+
+def _now() -> str:
+    return datetime.now(UTC).isoformat(timespec="seconds")
