@@ -10,7 +10,7 @@ from inertial.errors import InertialError
 from pipelines.archive.keys import digest
 from pipelines.models import read_model, refuse_unknown_effects, use_formulas
 from pipelines.planned import refuse_unidentified
-from pipelines.recipes import MAIN_JOB, load_limits, load_recipe, lot_of
+from pipelines.recipes import MAIN_JOB, load_limits, load_recipe, lot_of, units_of
 from pipelines.stages.grade import refuse_limits_without_figures
 from schemas.errors import RecipeInvalid, WrongUse
 from schemas.fault import parse_fault
@@ -21,7 +21,7 @@ from schemas.station import StationConfig, load_station, with_faults
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from pipelines.archive import Run
+    from pipelines.archive import Archive, Run
 
 ANALYSIS_KEYS = {
     "name",
@@ -111,14 +111,19 @@ class Request:
 
     def fillings(self, slots: int) -> list[Request]:
         """The request in portions that fit a fixture of so many slots; a slot map is one filling as it is."""
-        named = self.units or tuple(load_recipe(self.recipe).units)
+        named = self.units or tuple(units_of(self.recipe))
         if self.slots or len(named) <= slots:
             return [self]
         return [replace(self, units=units) for units in fillings(named, slots)]
 
-    def job(self) -> Job:
-        """The job that is asked for, with everything refused that cannot work, before anything moves."""
-        recipe = load_recipe(self.recipe)
+    def job(self, archive: Archive | None = None) -> Job:
+        """The job that is asked for, with everything refused that cannot work, before anything moves.
+
+        Parameters
+        ----------
+        archive : where the line's model is released, for recipes that ask for it; the default one where None
+        """
+        recipe = load_recipe(self.recipe, lambda device: self._line_model(archive, device))
         limits = load_limits(recipe, Path(self.recipe).parent)
         lot = lot_of(recipe, self.units, self.slots, seed=self.seed, repeat=self.repeat)
         station = with_faults(load_station(self.station), [*recipe.faults, *map(parse_fault, self.faults)])
@@ -128,6 +133,12 @@ class Request:
         _refuse_beyond_station(job)
         _refuse_inconsistent(job)
         return job
+
+    def _line_model(self, archive: Archive | None, device: str) -> dict[str, Any]:
+        from pipelines.archive import Archive as Store
+        from pipelines.rerun.releases import line_model
+
+        return line_model(archive or Store(), device, load_station(self.station).name)
 
 
 def job_of_run(run: Run, *, effects: Sequence[str] = (), model: Path | None = None, limits: str = "") -> Job:

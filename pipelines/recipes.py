@@ -5,6 +5,7 @@ Nothing here touches a station: what cannot work is refused before anything move
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from importlib.resources import files
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -27,13 +28,21 @@ if TYPE_CHECKING:
 MAIN_JOB = "production"
 SAME_POSE_DEG = 1.0
 AXES = ("x", "y", "z")
+LINE = "line"
+"""What a recipe says in place of a model file for the model that is released to the line."""
+LineModel = Callable[[str], dict[str, Any]]
 
 
-def load_recipe(name: str = MAIN_JOB) -> Recipe:
-    """The recipe of a file, or the built-in one of this name, resolved and checked."""
+def load_recipe(name: str = MAIN_JOB, line: LineModel | None = None) -> Recipe:
+    """The recipe of a file, or the built-in one of this name, resolved and checked.
+
+    Parameters
+    ----------
+    line : the keys that say the line's model for a kind of device; refused where a recipe asks for it and it is None
+    """
     text, source, folder = _recipe_text(name)
     file = parse_recipe(text, source)
-    model = _model(file, folder, source)
+    model = _model(file, folder, source, line)
     fit_poses = _resolve(file.poses, "p", "poses", source)
     verification = _resolve(file.verification, "v", "verification", source)
     _refuse_flat_plan(fit_poses, file.span_min_g)
@@ -52,6 +61,12 @@ def load_recipe(name: str = MAIN_JOB) -> Recipe:
         )
     except ValidationError as problem:
         raise explain(problem, source, RecipeFile) from None
+
+
+def units_of(name: str = MAIN_JOB) -> list[str]:
+    """The units that a recipe names, whatever its model is."""
+    text, source, _ = _recipe_text(name)
+    return parse_recipe(text, source).units
 
 
 def load_limits(recipe: Recipe, folder: Path | None = None) -> Limits:
@@ -118,8 +133,16 @@ def _recipe_text(name: str) -> tuple[str, str, Path]:
     raise RecipeInvalid(message, close=close_matches(name, sample_names()))
 
 
-def _model(file: RecipeFile, folder: Path, source: str) -> dict[str, Any]:
+def _model(file: RecipeFile, folder: Path, source: str, line: LineModel | None) -> dict[str, Any]:
     """Effects, formulas, name and version of the model; name and version are empty for a list of effects."""
+    if file.model == LINE:
+        if line is None:
+            message = (
+                f"{source}: key 'model': '{LINE}' is the model that is released in an archive, which this command does not ask; "
+                "name a model file or effects"
+            )
+            raise RecipeInvalid(message, key="model")
+        return line(file.device)
     if not file.model:
         refuse_unknown_effects(file.effects, f"{source}: key 'effects'")
         return {"effects": file.effects}

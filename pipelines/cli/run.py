@@ -84,7 +84,7 @@ def command(
     asks = prompts if prompts is not None else attended() and not as_json
     requests = wanted.fillings(slots) if asks else [wanted]
     asks = asks and (bool(prompts) or len(requests) > 1 or config.kind == "modbus")
-    jobs = [request.job() for request in requests]
+    jobs = [request.job(Archive(archive)) for request in requests]
     documents = [
         summary(_measured(request, job, Archive(archive), direct=direct, asks=asks))
         for request, job in zip(requests, jobs, strict=True)

@@ -99,7 +99,7 @@ def calibrate_lot(  # noqa: PLR0913 - a flow's parameters are its form on the se
     progress, told, operator = _listeners[-1] if _listeners else (silent, lambda _done: None, None)
     where = Path(station) if station else None
     request = Request(recipe, where, tuple(units or ()), tuple(slots or ()), seed, anew, tuple(faults or ()))
-    job = request.job()
+    job = request.job(Archive(archive))
     runner = Runner(job, Archive(archive), progress)
     told(_capture(runner, operator or (Paused() if prompts else None)))
     for name in ORDER[1:]:

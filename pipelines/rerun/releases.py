@@ -15,6 +15,7 @@ from pipelines.archive import chain, files
 from pipelines.archive.archive import provenance
 from pipelines.archive.keys import digest
 from pipelines.archive.locks import alone
+from pipelines.recipes import LINE
 from schemas.errors import RecipeInvalid, WrongUse
 from schemas.recipe import FormulaSpec
 
@@ -26,7 +27,6 @@ if TYPE_CHECKING:
 
 FOLDER, EVIDENCE = "releases", "whatif"
 SCHEMA = 1
-LINE = "line"
 
 
 @dataclass(frozen=True)

@@ -5,10 +5,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from capture_double import CaptureDouble, small_job
+from capture_double import CaptureDouble, recipe_file, small_job
 
 from pipelines.archive import Archive
 from pipelines.chain import ORDER
+from pipelines.job import Request
+from pipelines.recipes import load_recipe
 from pipelines.rerun.again import again
 from pipelines.rerun.judged import applied, fresh, judged
 from pipelines.rerun.partition import Part
@@ -184,3 +186,19 @@ def test_the_line_uses_the_narrowest_release_whose_date_is_reached(tmp_path: Pat
         RecipeInvalid, match=r"no model is released at 2026-01-02 \(released: every device from 2026-02-01"
     ):
         line_model(own, "ADXL355", "s1", datetime(2026, 1, 2, tzinfo=UTC))
+
+
+def test_a_recipe_asks_for_the_line_s_model_of_its_device_and_station(tmp_path: Path) -> None:
+    own = Archive(tmp_path / "archive")
+    own.prepare()
+    request = Request(recipe=recipe_file(tmp_path, (FULL, 'model = "line"')))
+    with pytest.raises(RecipeInvalid, match="for adxl355 on simulated no model is released"):
+        request.job(own)
+    release(own, wanted("", model_file(tmp_path)), datetime(2026, 1, 1, tzinfo=UTC), reason="test", force=True)
+    recipe = request.job(own).recipe
+    assert (recipe.model_name, recipe.model_version, tuple(recipe.effects)) == ("better", 2, GOOD)
+
+
+def test_a_command_without_an_archive_says_that_the_line_s_model_is_none_of_its_business(tmp_path: Path) -> None:
+    with pytest.raises(RecipeInvalid, match="'line' is the model that is released in an archive"):
+        load_recipe(recipe_file(tmp_path, (FULL, 'model = "line"')))
