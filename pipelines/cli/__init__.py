@@ -26,6 +26,7 @@ COMMANDS: dict[str, tuple[str, str]] = {
     "show": ("show", "Show a run, one of its tables, or which calibration of a unit holds on a date."),
     "certify": ("certify", "Certify a run's units that passed: from when until when their calibration holds."),
     "revoke": ("revoke", "Revoke a unit's calibration, with the reason."),
+    "lineage": ("lineage", "Tell where certificates, tables and samples came from, and what was made of them."),
     "verify": ("verify", "Compute every hash of the archive anew: find what was changed, edited or lost."),
     "fit": ("fit", "Fit a model to archived data again, with other effects if wanted."),
     "rerun": ("rerun", "Run archived runs through today's code, another model or other limits."),
