@@ -100,11 +100,14 @@ def _list(store: Archive, *, as_json: bool) -> None:
             f"{one.since:%Y-%m-%d}",
             "yes" if one.number in valid else "",
             one.who,
-            one.reason,
         ]
         for one in records
     ]
-    print_table(["no.", "model", "for", "from", "in use", "by", "why"], lines, whole=4)
+    print_table(["no.", "model", "for", "from", "in use", "by"], lines, whole=4)
+    for one in records:
+        console().print(
+            f"  {one.number}: {one.reason}{' (forced)' if one.forced else ''}", markup=False, soft_wrap=True
+        )
 
 
 def _name(record: Release) -> str:
@@ -112,7 +115,7 @@ def _name(record: Release) -> str:
 
 
 def _where(record: Release) -> str:
-    return f"{record.device or 'every device'} on {record.station or 'every station'}"
+    return f"{record.device} on {record.station}".removeprefix(" on ").removesuffix(" on ") or "all"
 
 
 def _document(record: Release) -> dict[str, Any]:

@@ -97,11 +97,11 @@ def _judged(
 
 def _print(document: dict[str, Any]) -> None:
     out = console()
-    title = f"{document['name']} version {document['version']} on {document['lots']} lots: old → new"
-    lines = [_line(f"{row['device']} on {row['station']}", row) for row in document["groups"]]
-    lines.append(_line("all", document["total"]))
-    heads = ["device", "lots", "units", "yield", "fit\nµg", "not fitted\nµg", "fresh run\nµg"]
-    print_table(heads, lines, title=title)
+    title = f"{document['name']} version {document['version']} on {document['lots']} lots"
+    rows = [(f"{row['device']} on {row['station']}", row) for row in document["groups"]]
+    lines = [line for name, row in [*rows, ("all", document["total"])] for line in _lines(name, row)]
+    heads = ["device", "model", "units", "yield", "fit\nµg", "not\nfitted\nµg", "fresh\nrun\nµg"]
+    print_table(heads, lines, title=title, whole=2)
     for key, words in (("to_fail", "would no longer pass"), ("to_pass", "would pass")):
         rows = document["flips"][key]
         if rows:
@@ -117,9 +117,11 @@ def _print(document: dict[str, Any]) -> None:
     out.print(f"evidence  {document['evidence']}", markup=False)
 
 
-def _line(name: str, row: dict[str, Any]) -> list[str]:
-    rates = " → ".join("" if value is None else f"{value:.1%}" for value in row["yield"])
-    errors = [
-        " → ".join(short(value) for value in row[key]) for key in ("fit_rms_ug", "verification_rms_ug", "fresh_rms_ug")
-    ]
-    return [name, str(row["lots"]), str(row["units"]), rates, *(text if text != " → " else "" for text in errors)]
+def _lines(name: str, row: dict[str, Any]) -> list[list[str]]:
+    """A group under the old and the new model."""
+    said = [[name, "old", str(row["units"])], ["", "new", ""]]
+    for number, line in enumerate(said):
+        rate = row["yield"][number]
+        errors = [short(row[key][number]) for key in ("fit_rms_ug", "verification_rms_ug", "fresh_rms_ug")]
+        line += ["" if rate is None else f"{rate:.1%}", *errors]
+    return said
