@@ -8,12 +8,15 @@ from typing import TYPE_CHECKING, Literal, Protocol
 import numpy as np
 import pandas as pd
 
-from pipelines.stages.captured import Approach, History, Record, readings_row
+from pipelines.stages.approach import Approach
+from pipelines.stages.captured import History, Record, readings_row
 from pipelines.stages.guard import LINK_ATTEMPTS, LOST_FOR, WARMING, Guard, StillSuspended, short_of_samples
 from pipelines.stages.remaining import Remaining
+from pipelines.stages.soundness import Soundness
 from schemas.errors import LinkLost, NotReached, OperatorNeeded, StationError, StationTimeout
 from schemas.event import NO_RECORD, MemoryLog
-from stations.safety.suspenders import Suspended
+from stations.devices.slot import SamplesLost
+from stations.safety.suspenders import Reason, Suspended
 from stations.station import Unsettled
 
 if TYPE_CHECKING:
@@ -158,7 +161,12 @@ class _Work:
     lost: dict[str, str] = field(default_factory=dict)
     identities: dict[str, Identity] = field(default_factory=dict)
     approach: Approach | None = None
+    soundness: Soundness = field(init=False)
     at: int = NO_RECORD
+
+    def __post_init__(self) -> None:
+        """Data are judged by what the slots say of their units."""
+        self.soundness = Soundness(self.station.reader, self.identities)
 
     def run(self, plan: list[Step]) -> None:
         """Every step that is not done; whatever the station ends the run with is noted, and leaves it safe."""
@@ -235,6 +243,11 @@ class _Work:
         """Gives a unit up; its readings say why, in a resumed run too."""
         self.lost[serial] = text
         self.guard.note("unit_lost", max(self.at, 0), text, f"unit {serial} is refused, the others go on")
+        if not self.answering and self.at != NO_RECORD:
+            message = (
+                f"reader: no unit of the lot is left ({text}), one is needed at least; check reader, power and cables"
+            )
+            raise OperatorNeeded(message)
 
     def lose_slots(self, slots: Sequence[int], text: str) -> None:
         """Gives the units of these slots up."""
@@ -288,7 +301,7 @@ class _Work:
                 raise
             self.lose_slots(problem.slots, f"does not settle at {step.temperature:g} °C")
         seconds = station.clock.now() - start
-        self.remaining.soaked(step, seconds, whole=shortest > 0.0)
+        self.remaining.soaked(step, seconds, self.approach if shortest > 0.0 else None)
         figures = {"target_C": step.temperature, "seconds": seconds, **self.approach.figures()}
         self.guard.note("soak", step.record, f"soak {step.soak} at {step.temperature:g} °C", "settled", figures)
         self.approach = None
@@ -302,7 +315,8 @@ class _Work:
             self.guard.named(problem)
             raise
         if self.approach is not None:
-            self.approach.look(self.history.air, [instruments.temperature_C[slot] for slot in self.slots])
+            now, devices = self.station.clock.now(), [instruments.temperature_C[slot] for slot in self.slots]
+            self.approach.look(now, self.history.air, devices)
         worst = max((instruments.temperature_C[s] for s in self.slots), key=lambda t: abs(t - step.temperature))
         self.tell(step, f"soak at {step.temperature:g} °C, device at {worst:.1f} °C")
         return instruments.temperature_C
@@ -347,6 +361,7 @@ class _Work:
         station.table.move(step.pose.outer_deg, step.pose.inner_deg)
         self.rest(recipe.settle_s if step.wait_s is None else step.wait_s)
         self.guard.before(self.slots)
+        self.guard.require_steady_clocks(spoilt=False)
         duration = recipe.static_record_s if step.kind == "allan" else recipe.dwell_s
         powered = station.reader.since_power()
         station.reader.start(recipe.rate_hz)
@@ -357,14 +372,21 @@ class _Work:
             self.observe(step, record)
             self.empty(record)
             if duration * recipe.rate_hz * len(self.slots) > LONG_ROWS and record.rows() >= PIECE_ROWS:
+                self.soundness.refuse_strays(record, self.answering)
                 self.sink.part(step.record, record.pieces, record.piece(self.answering))
         station.reader.stop()
         self.empty(record)
+        self.guard.require_steady_clocks(spoilt=True)
+        for unit, problem in self.soundness.others(self.answering):
+            self.lose(unit.serial, fault_text(unit.slot, problem))
         counts = {u.slot: record.count(u.serial) for u in self.lot.units if u.serial not in self.lost}
         overflow = {u.slot for u in self.lot.units if u.serial not in self.lost and record.overflow(u.serial)}
         reasons = short_of_samples(counts, overflow, duration, recipe.rate_hz)
         if reasons:
             raise Suspended(reasons, spoilt=True)
+        self.soundness.refuse_strays(record, self.answering)
+        if step.kind != "allan" and step.settled:
+            self.soundness.refuse_contradiction(record, self.answering)
         return record
 
     def rest(self, seconds: float) -> None:
@@ -401,6 +423,8 @@ class _Work:
             if unit.serial not in self.lost:
                 try:
                     record.keep(unit.serial, self.station.reader.slots[unit.slot].take())
+                except SamplesLost as problem:
+                    raise Suspended([Reason("samples", str(problem), (unit.slot,))], spoilt=True) from None
                 except StationError as problem:
                     self.lose(unit.serial, fault_text(unit.slot, problem))
 

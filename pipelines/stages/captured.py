@@ -19,6 +19,9 @@ if TYPE_CHECKING:
     from stations.devices.slot import Identity, Samples
 
 AXES = ("x", "y", "z")
+STRAY_SIGMA = 20.0
+STRAY_PART = 1e-3  # of the full scale: what is less moves a mean of a hundred samples by no more than a part in 100 000
+FEWEST_TO_STRAY = 20
 SHARED = 4  # numbers of a look that all slots share: two angles, air, vibration
 
 
@@ -44,33 +47,6 @@ class History:
         frame = pd.DataFrame(self.rows, columns=["time_s", "chamber_C", "slot", "unit", "unit_C"])
         self.rows, self.last = [], None
         return frame
-
-
-@dataclass
-class Approach:
-    """How air and devices come to a soak's target: where they began, and how far beyond it they went."""
-
-    target: float
-    first: tuple[float, float] | None = None
-    air_K: float = 0.0
-    devices_K: float = 0.0
-
-    def look(self, air: float, devices: Sequence[float]) -> None:
-        """Notes the temperatures of one instant, °C."""
-        known = [t for t in devices if math.isfinite(t)] or [self.target]
-        if self.first is None:
-            self.first = (air, sum(known) / len(known))
-        self.air_K = max(self.air_K, self._beyond(self.first[0], air))
-        self.devices_K = max(self.devices_K, *(self._beyond(self.first[1], t) for t in known))
-
-    def figures(self) -> dict[str, float]:
-        """Overshoot of air and devices for the journal, K."""
-        return {"air_overshoot_K": round(self.air_K, 4), "device_overshoot_K": round(self.devices_K, 4)}
-
-    def _beyond(self, begin: float, now: float) -> float:
-        """How far ``now`` lies behind the target, seen from where it began; 0 before it, or where air is not known."""
-        far = math.copysign(1.0, self.target - begin) * (now - self.target)
-        return max(0.0, far)
 
 
 @dataclass
@@ -135,6 +111,34 @@ class Record:
         self.parts = {serial: [] for serial in self.parts}
         self.pieces += 1
         return frame
+
+    def means(self, units: Sequence[Unit]) -> dict[str, NDArray[np.float64]]:
+        """Mean outputs (3,) of these units, of the samples that are held."""
+        held = {unit.serial: self._outputs(unit.serial) for unit in units}
+        return {serial: output.mean(axis=0) for serial, output in held.items() if len(output)}
+
+    def stray(self, serial: str, lsb: float, full_scale: float) -> str:
+        """The sample of a unit that stands far out of the others that are held; nothing where none does.
+
+        In a static dwell it was changed on its way, or the unit was knocked.
+        """
+        output = self._outputs(serial)
+        if len(output) < FEWEST_TO_STRAY:
+            return ""
+        low, middle, high = np.percentile(output, (15.87, 50.0, 84.13), axis=0)
+        allowed = np.maximum(STRAY_SIGMA * np.maximum(0.5 * (high - low), lsb), STRAY_PART * full_scale)
+        far = np.argwhere(~(np.abs(output - middle) <= allowed))
+        if not len(far):
+            return ""
+        row, axis = far[0].tolist()
+        found, usual = output[row, axis], middle[axis]
+        return (
+            f"sample {self.stored.get(serial, 0) + row} says {found:g} on {AXES[axis]} where the others say {usual:g}"
+        )
+
+    def _outputs(self, serial: str) -> NDArray[np.float64]:
+        parts = [part.outputs for part in self.parts.get(serial, [])]
+        return np.concatenate(parts) if parts else np.zeros((0, 3))
 
     def _held(self, serial: str) -> int:
         return sum(len(part.outputs) for part in self.parts.get(serial, []))

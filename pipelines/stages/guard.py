@@ -21,9 +21,11 @@ if TYPE_CHECKING:
 LINK_ATTEMPTS = 3  # times a record is begun anew after a device did not answer; each costs its time-outs
 FEWEST_SAMPLES = 0.99  # part of the samples that a record should have
 LASTING = {"door", "vibration", "supply"}  # waited for; what is settled anew or measured anew needs no waiting
-WARMING = {"door", "chamber", "device", "supply"}  # after these the shortest soak counts from its beginning
+WARMING = {"door", "chamber", "device", "supply", "clock"}  # after these the shortest soak counts from its beginning
 LOST_FOR = {"supply": "supply out of tolerance", "device": "left its temperature", "samples": "samples missing"}
 VOLT = "_V"
+CLOCK_S = 1.0  # by which the clocks of station and reader may differ; a slow link costs less
+CLOCK_PART = 1e-3
 
 
 @dataclass
@@ -33,6 +35,7 @@ class Guard:
     station: Station
     events: EventLog
     watched: Watched = field(init=False)
+    clocks: tuple[float, float] | None = None
 
     def __post_init__(self) -> None:
         config = self.station.config
@@ -67,9 +70,24 @@ class Guard:
         if reasons:
             raise Suspended(reasons, spoilt=False)
 
+    def require_steady_clocks(self, *, spoilt: bool) -> None:
+        """Suspends what is under way where the station's clock and the reader's have gone apart since the last look.
+
+        One of them jumped, or the reader and the devices in it were without power for a moment.
+        """
+        now, powered = self.station.clock.now(), self.station.reader.since_power()
+        before, self.clocks = self.clocks, (now, powered)
+        if before is None:
+            return
+        ours, theirs = now - before[0], powered - before[1]
+        if not abs(ours - theirs) <= CLOCK_S + CLOCK_PART * abs(theirs):
+            text = f"{ours:.1f} s have passed by the station's clock and {theirs:.1f} s by the reader's, the same is needed"
+            raise Suspended([Reason("clock", text)], spoilt=spoilt)
+
     def soaking(self, instruments: Instruments) -> None:
-        """Suspends a soak while the door is open; what only spoils records does not matter yet."""
+        """Suspends a soak while the door is open or a clock jumps; what only spoils records does not matter yet."""
         self.station.require()
+        self.require_steady_clocks(spoilt=False)
         require_released(instruments)
         reasons = [reason for reason in self.watched.around(instruments, ()) if reason.condition == "door"]
         if reasons:
@@ -101,6 +119,17 @@ class Guard:
             raise Suspended(reasons, spoilt=True)
 
     def _table(self, pose: Pose, angles: tuple[float, float]) -> list[Reason]:
+        """Axes that do not stand where they were told; one that still says so when it is asked again needs a person."""
+        away = self._away(pose, angles)
+        if away and (still := self._away(pose, self.station.table.angles())):
+            message = (
+                f"{still[0].text}, and nothing moved it: either the axis was pushed or its zero is lost; look at the table, home "
+                "the axis at the drive and check its zero"
+            )
+            raise OperatorNeeded(message)
+        return away
+
+    def _away(self, pose: Pose, angles: tuple[float, float]) -> list[Reason]:
         allowed = self.station.config.limits.position_deg
         wanted = (("outer", pose.outer_deg, angles[0]), ("inner", pose.inner_deg, angles[1]))
         return [

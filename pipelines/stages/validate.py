@@ -13,6 +13,7 @@ import pandas as pd
 
 from inertial.frames import force_from_angles
 from pipelines.stages.pieces import STATIC, Signal, by_record
+from pipelines.stages.pointing import contradicts, pointing_of
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
@@ -63,7 +64,9 @@ def validate(
     answered = readings[readings["status"] == "ok"]
     faults += _stale_temperatures(answered)
     if means:
-        faults += _dead_channels(_means(pd.concat(means)), answered)
+        output = _means(pd.concat(means))
+        faults += _dead_channels(output, answered)
+        faults += _table(output, readings, units, {fault.unit for fault in faults})
     return _verdicts(faults, units)
 
 
@@ -180,6 +183,12 @@ def _stale_temperatures(readings: pd.DataFrame) -> list[Fault]:
         )
         for unit, chamber, own in zip(stale.index, stale["chamber_C"], stale["unit_C"], strict=True)
     ]
+
+
+def _table(output: pd.DataFrame, readings: pd.DataFrame, units: Sequence[Unit], unsound: set[str]) -> list[Fault]:
+    """Every unit, where the sound ones say that the table did not stand where its encoders said."""
+    reason = contradicts(pointing_of(output[~output["unit"].isin(unsound)], readings))
+    return [Fault(unit.serial, "table_angles", reason) for unit in units] if reason else []
 
 
 def _dead_channels(means: pd.DataFrame, readings: pd.DataFrame) -> list[Fault]:

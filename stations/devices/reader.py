@@ -72,6 +72,8 @@ class Reader:
                 )
                 raise StationRefused(message)
         registers.write("sampling", "running")
+        for slot in self.slots.values():
+            slot.begin()
 
     def stop(self) -> None:
         """Stops sampling; the samples stay in the slots' memories."""

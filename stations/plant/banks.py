@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from functools import partial
 from typing import TYPE_CHECKING
 
 from stations.codec import NotEncodable, Value
@@ -83,7 +82,7 @@ def _slot(plant: Plant, unit: int, name: str) -> Bank:
         sampler.tail[unit] = tail
 
     sources = {
-        "serial": lambda: plant.serials[unit],
+        "serial": lambda: plant.serials[plant.seats[unit]],
         "packing": lambda: preset.packing,
         "output_unit": lambda: UNITS[preset.output_unit],
         "lsb": lambda: preset.lsb,
@@ -93,4 +92,4 @@ def _slot(plant: Plant, unit: int, name: str) -> Bank:
         "tail": lambda: sampler.tail[unit],
         "flags": flags,
     }
-    return Bank(profile, sources, taken, partial(sampler.words, unit))
+    return Bank(profile, sources, taken, lambda first, count: sampler.words(plant.seats[unit], first, count))

@@ -54,9 +54,11 @@ class Plant:
         self.lock = threading.RLock()
         self.now_us = 0
         self.emergency_stop = False
+        self.heard: set[int] = set()  # ids that were asked something since somebody last cleared this
         self.preset: Preset = load_preset(lot.device, sim.preset_overrides)
         self.serials = [unit.serial for unit in lot.units]
         self.slots = [unit.slot for unit in lot.units]
+        self.seats = list(range(len(lot.units)))  # which unit sits where another one should
         self._key = int(stream(sim.seed, lot.seed, lot.repeat).integers(2**62))
         self.outer, self.inner = Axis(self._key, OUTER), Axis(self._key, INNER)
         effects = [*hidden, *(hidden_effect(h.kind, h.figures) for h in sim.hidden)]

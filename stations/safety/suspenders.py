@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from schemas.station import Soak
     from stations.devices.reader import Instruments
 
-Condition = Literal["door", "vibration", "supply", "chamber", "device", "table", "samples", "link"]
+Condition = Literal["door", "vibration", "supply", "chamber", "device", "table", "samples", "link", "clock"]
 
 
 @dataclass(frozen=True)

@@ -13,15 +13,15 @@ if TYPE_CHECKING:
 
 @dataclass
 class SwappedSlots(Trouble):
-    """A unit and the next one of the lot change places: each slot tells the other's serial number."""
+    """A unit and the next one of the lot change places: each slot has the other's serial number and samples."""
 
     kind: ClassVar[str] = "swapped_slots"
     about: ClassVar[tuple[str, ...]] = (UNIT,)
 
     def begins(self, plant: Plant) -> None:
         """They change places."""
-        other = (self.unit + 1) % len(plant.serials)
-        plant.serials[self.unit], plant.serials[other] = plant.serials[other], plant.serials[self.unit]
+        other, seats = (self.unit + 1) % len(plant.serials), plant.seats
+        seats[self.unit], seats[other] = seats[other], seats[self.unit]
 
     def ends(self, plant: Plant) -> None:
         """They change back."""
