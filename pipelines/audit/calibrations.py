@@ -1,0 +1,134 @@
+"""All calibrations of an archive side by side: who, where, when, and the parameters."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from datetime import UTC, datetime, timedelta
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from pipelines.audit.parameters import FAMILY_OF, NAMES
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    import pandas as pd
+    from numpy.typing import NDArray
+
+    from pipelines.audit.index import Index
+
+    Array = NDArray[np.float64]
+    Texts = NDArray[np.object_]
+    Flags = NDArray[np.bool_]
+
+DAY_S = 86400.0
+
+
+@dataclass(frozen=True)
+class Calibrations:
+    """Calibrations in order of unit, device, day and run; n of them.
+
+    day : (n,), days since 1970, UTC; values, errors : (n, p), in the units of the parameters, NaN where the model has none
+    """
+
+    run: Texts
+    unit: Texts
+    device: Texts
+    station: Texts
+    slot: NDArray[np.int64]
+    outcome: Texts
+    day: Array
+    values: Array
+    errors: Array
+
+    def __len__(self) -> int:
+        return self.day.size
+
+    def chosen(self, which: Flags | NDArray[np.int64]) -> Calibrations:
+        """Those that are chosen, in their order."""
+        return Calibrations(*(getattr(self, name)[which] for name in self.__dataclass_fields__))
+
+    def column(self, name: str) -> Array:
+        """Values of one parameter, (n,)."""
+        return self.values[:, NAMES.index(name)]
+
+    def error(self, name: str) -> Array:
+        """Standard errors of one parameter, (n,)."""
+        return self.errors[:, NAMES.index(name)]
+
+    def numbers(self, of: Callable[[Calibrations], Texts]) -> NDArray[np.int64]:
+        """A column of texts as numbers from 0."""
+        return codes(of(self))
+
+    @property
+    def histories(self) -> NDArray[np.int64]:
+        """Number of the unit of every calibration, from 0; one serial on two kinds of device is two units."""
+        pair = (self.unit[1:] != self.unit[:-1]) | (self.device[1:] != self.device[:-1])
+        return np.concatenate([[0], np.cumsum(pair)]) if len(self) else np.zeros(0, dtype=np.int64)
+
+
+def codes(texts: NDArray[Any]) -> NDArray[np.int64]:
+    """Texts as numbers from 0, in their alphabetical order."""
+    return np.unique(texts.astype(str), return_inverse=True)[1].astype(np.int64)
+
+
+def day_of(moment: str) -> float:
+    """Days since 1970 of an ISO time; one without zone is UTC."""
+    found = datetime.fromisoformat(moment)
+    return (found if found.tzinfo else found.replace(tzinfo=UTC)).timestamp() / DAY_S
+
+
+def date_of(day: float) -> str:
+    """The date of a day, ISO, UTC."""
+    return (datetime(1970, 1, 1, tzinfo=UTC) + timedelta(days=float(day))).date().isoformat()
+
+
+def runs_of(index: Index, until: float) -> pd.DataFrame:
+    """Runs that were measured before ``until``, with their day, device and station; each capture once.
+
+    A capture counts as it was first worked on, not as it was run again.
+    """
+    runs = index.table("runs").to_pandas()
+    runs = runs[(runs["rerun_of"].astype(str) == "") & (runs["measured"].astype(str) != "")].astype({"run": str})
+    runs = runs.assign(day=[day_of(str(moment)) for moment in runs["measured"]])
+    runs = runs.sort_values(["day", "run"], kind="stable")
+    own = runs["capture"].astype(str).where(runs["capture"].astype(str) != "", runs["run"])
+    chosen = runs[~own.duplicated() & (runs["day"] < until)]
+    return chosen[["run", "day", "device", "station"]].astype({"device": str, "station": str})
+
+
+def load(index: Index, runs: pd.DataFrame) -> Calibrations:
+    """The calibrations of chosen runs."""
+    units = index.table("units").to_pandas()
+    values = index.table("parameters").to_pandas()
+    for frame in (units, values):
+        frame["run"] = frame["run"].astype(str)
+    frame = values.merge(runs, on="run").merge(units.astype({"unit": str}), on=["run", "unit"], how="left")
+    frame = frame.sort_values(["unit", "device", "day", "run"], ignore_index=True, kind="stable")
+    found = Calibrations(
+        run=frame["run"].to_numpy(object),
+        unit=frame["unit"].astype(str).to_numpy(object),
+        device=frame["device"].astype(str).to_numpy(object),
+        station=frame["station"].astype(str).to_numpy(object),
+        slot=frame["slot"].fillna(-1).to_numpy(np.int64),
+        outcome=frame["outcome"].astype(object).fillna("").to_numpy(object),
+        day=frame["day"].to_numpy(float),
+        values=frame[list(NAMES)].to_numpy(float),
+        errors=frame[[f"{name}_error" for name in NAMES]].to_numpy(float),
+    )
+    return _scale_in_ppm(found)
+
+
+def _scale_in_ppm(found: Calibrations) -> Calibrations:
+    """The scale factors as deviations from the median of their kind and axis, ppm."""
+    values, errors = np.array(found.values), np.array(found.errors)
+    for column in (k for k, name in enumerate(NAMES) if FAMILY_OF[name] == "scale"):
+        for device in np.unique(found.device.astype(str)):
+            own = found.device == device
+            finite = np.isfinite(values[own, column])
+            if finite.any():
+                nominal = float(np.median(values[own, column][finite]))
+                values[own, column] = 1e6 * (values[own, column] / nominal - 1.0)
+                errors[own, column] = 1e6 * errors[own, column] / abs(nominal)
+    return replace(found, values=values, errors=errors)

@@ -1,0 +1,281 @@
+"""Drift since the last calibration: per kind of device and parameter, per unit, and when a unit leaves its tolerance."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from pipelines.audit.parameters import FAMILIES, FAMILY_OF, NAMES
+from pipelines.audit.statistics.agreement import e_n
+from pipelines.audit.statistics.drift import (
+    Kind,
+    Standing,
+    forecast,
+    in_tolerance,
+    kind_of,
+    last_reliable,
+    leaves,
+    standing,
+)
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from numpy.typing import NDArray
+
+    from pipelines.audit.calibrations import Calibrations
+    from pipelines.audit.rules import Rules
+
+    Array = NDArray[np.float64]
+    Flags = NDArray[np.bool_]
+    Index = NDArray[np.int64]
+
+YEAR_D = 365.25
+MONTH_D = YEAR_D / 12.0
+OWN = tuple(name for name in NAMES if FAMILIES[FAMILY_OF[name]].own)
+FEWEST_PAIRS = 8
+AHEAD = np.arange(0.0, 10.0 + 1e-9, 1.0 / 24.0)  # years, in steps of half a month
+LEAST_PAIR_D = 1.0
+
+
+@dataclass(frozen=True)
+class Pairs:
+    """Neighbouring calibrations of the same unit: rows of the later and of the earlier one, and the years between."""
+
+    later: Index
+    earlier: Index
+    years: Array
+
+
+@dataclass(frozen=True)
+class KindDrift:
+    """How one parameter of one kind of device drifts, and how the last changes compare with the uncertainty of both.
+
+    beyond : share of the pairs with |E_n| > 1; out : share that moved further than the tolerance; median : of |change|
+    reliable_months : for how long a unit of the kind stays in tolerance with the target's probability; NaN without a tolerance
+    """
+
+    device: str
+    parameter: str
+    kind: Kind
+    beyond: float
+    out: float
+    median: float
+    tolerance: float
+    reliable_months: float
+
+
+@dataclass(frozen=True)
+class UnitDrift:
+    """One parameter of one unit, where it came from and where it goes; days since 1970, changes in the parameter's unit.
+
+    leaves, soonest, latest : day when it is expected to leave its tolerance and the 95 % interval of it; infinite for never
+    limit, limit_day : the product's limit of the value itself, and day (expected, soonest, latest) when it leaves that
+    reliable_day : until when it stays in tolerance with the target's probability
+    odd : distance of its slope from its kind's, in σ; calibrations : that this rests on
+    """
+
+    unit: str
+    device: str
+    parameter: str
+    day: float
+    run: str
+    change: float
+    years: float
+    e_n: float
+    slope: float
+    tolerance: float
+    leaves: float
+    soonest: float
+    latest: float
+    limit: float
+    limit_day: tuple[float, float, float]
+    reliable_day: float
+    odd: float
+    calibrations: int
+
+
+def pairs_of(all_: Calibrations, good: Flags) -> Pairs:
+    """Every good calibration with the good one before it of the same unit."""
+    rows = np.flatnonzero(good)
+    same = all_.histories[rows[1:]] == all_.histories[rows[:-1]]
+    later, earlier = rows[1:][same], rows[:-1][same]
+    return Pairs(later, earlier, (all_.day[later] - all_.day[earlier]) / YEAR_D)
+
+
+def kind_drifts(all_: Calibrations, good: Flags, rules: Rules, since: float) -> list[KindDrift]:
+    """How every parameter of every kind drifts, from all pairs; the shares are of those that end in the period."""
+    pairs, out = pairs_of(all_, good), list[KindDrift]()
+    spans = _spans(all_, pairs)
+    for device in np.unique(all_.device.astype(str)):
+        of_kind = all_.device[pairs.later] == device
+        if of_kind.sum() < FEWEST_PAIRS:
+            continue
+        for name in OWN:
+            change, known = _changes(all_, pairs, name)
+            longer, longer_known = _changes(all_, spans, name)
+            kept = of_kind & np.isfinite(change + known)
+            whole = (all_.device[spans.later] == device) & np.isfinite(longer + longer_known)
+            if kept.sum() < FEWEST_PAIRS:
+                continue
+            both = (
+                (change[kept], longer[whole]),
+                (pairs.years[kept], spans.years[whole]),
+                (known[kept], longer_known[whole]),
+            )
+            kind = kind_of(*(np.concatenate(parts) for parts in both))
+            recent = kept & (all_.day[pairs.later] >= since)
+            out.append(_kind_drift(all_, pairs, recent, device, name, kind, rules))
+    return out
+
+
+def _kind_drift(
+    all_: Calibrations, pairs: Pairs, recent: Flags, device: str, name: str, kind: Kind, rules: Rules
+) -> KindDrift:
+    tolerance = rules.tolerance_of(device, FAMILY_OF[name])
+    change, _ = _changes(all_, pairs, name)
+    numbers = _e_n(all_, pairs, name, kind)[recent]
+    sigma = float(np.nanmedian(all_.error(name)[pairs.later[recent]])) if recent.any() else 0.0
+    start = np.array([0.0])
+    fresh = np.array([sigma**2 + kind.mount_sd**2])
+    new = Standing(start, np.array([kind.mean_slope]), fresh, start, np.array([kind.slope_sd**2]), start, start)
+    mean, deviation = forecast(new, kind, AHEAD, origin=0.0)
+    months = float("nan")
+    if np.isfinite(tolerance):
+        probability = in_tolerance(mean, deviation, tolerance)
+        months = 12.0 * float(last_reliable(probability, rules.reliability_target, AHEAD)[0])
+    return KindDrift(
+        device=device,
+        parameter=name,
+        kind=kind,
+        beyond=float(np.mean(np.abs(numbers) > 1.0)) if numbers.size else 0.0,
+        out=float(np.mean(np.abs(change[recent]) > tolerance)) if recent.any() else 0.0,
+        median=float(np.median(np.abs(change[recent]))) if recent.any() else 0.0,
+        tolerance=tolerance,
+        reliable_months=months,
+    )
+
+
+def unit_drifts(
+    all_: Calibrations, good: Flags, kinds: list[KindDrift], rules: Rules, limits: Mapping[tuple[str, str], float]
+) -> dict[str, list[UnitDrift]]:
+    """Every parameter of every unit with two calibrations or more: its last change, and its forecast; by device and unit.
+
+    Parameters
+    ----------
+    limits : of the product, by device and family, in the parameter's unit
+    """
+    pairs = pairs_of(all_, good)
+    last = _last_of_each(all_.histories[pairs.later])
+    final = Pairs(pairs.later[last], pairs.earlier[last], pairs.years[last])
+    out: dict[str, list[UnitDrift]] = {}
+    for found in kinds:
+        own = np.flatnonzero(all_.device[final.later] == found.device)
+        rows = Pairs(final.later[own], final.earlier[own], final.years[own])
+        limit = limits.get((found.device, FAMILY_OF[found.parameter]), float("inf"))
+        for drift in _unit_drifts(all_, good, rows, found, rules.reliability_target, limit):
+            out.setdefault(f"{drift.device} {drift.unit}", []).append(drift)
+    return out
+
+
+def _unit_drifts(
+    all_: Calibrations, good: Flags, rows: Pairs, found: KindDrift, target: float, limit: float
+) -> list[UnitDrift]:
+    name, kind = found.parameter, found.kind
+    change, _ = _changes(all_, rows, name)
+    numbers = _e_n(all_, rows, name, kind)
+    padded = _padded(all_, good, rows, name)
+    now, counts = standing(*padded, kind), np.isfinite(padded[0]).sum(axis=1)
+    mean, deviation = forecast(now, kind, AHEAD, origin=now.last)
+    day = all_.day[rows.later]
+    until = np.full(day.size, np.inf)
+    if np.isfinite(found.tolerance):
+        until = day + YEAR_D * last_reliable(in_tolerance(mean, deviation, found.tolerance), target, AHEAD)
+    times = _leaving(mean, deviation, found.tolerance, day)
+    beyond = _leaving(mean + now.last[:, None], deviation, limit, day)
+    return [
+        UnitDrift(
+            unit=str(all_.unit[row]),
+            device=found.device,
+            parameter=name,
+            day=float(day[k]),
+            run=str(all_.run[row]),
+            change=float(change[k]),
+            years=float(rows.years[k]),
+            e_n=float(numbers[k]),
+            slope=float(now.slope[k]),
+            tolerance=found.tolerance,
+            leaves=float(times[0][k]),
+            soonest=float(times[1][k]),
+            latest=float(times[2][k]),
+            limit=limit,
+            limit_day=(float(beyond[0][k]), float(beyond[1][k]), float(beyond[2][k])),
+            reliable_day=float(until[k]),
+            odd=float(now.odd[k]),
+            calibrations=int(counts[k]),
+        )
+        for k, row in enumerate(rows.later)
+        if np.isfinite(change[k])
+    ]
+
+
+def _leaving(mean: Array, deviation: Array, bound: float, day: Array) -> tuple[Array, Array, Array]:
+    """Days when values leave ± ``bound``: expected, soonest, latest."""
+    if not np.isfinite(bound):
+        never = np.full(day.size, np.inf)
+        return never, never, never
+    expected, soonest, latest = leaves(mean, deviation, bound, AHEAD)
+    return day + YEAR_D * expected, day + YEAR_D * soonest, day + YEAR_D * latest
+
+
+def _changes(all_: Calibrations, pairs: Pairs, name: str) -> tuple[Array, Array]:
+    """Change of a parameter over every pair, and the sum of both variances."""
+    value, error = all_.column(name), all_.error(name)
+    return value[pairs.later] - value[pairs.earlier], error[pairs.later] ** 2 + error[pairs.earlier] ** 2
+
+
+def _e_n(all_: Calibrations, pairs: Pairs, name: str, kind: Kind) -> Array:
+    """E_n of every pair; what mounting adds belongs to the uncertainty of both."""
+    value = all_.column(name)
+    error = np.hypot(all_.error(name), kind.mount_sd)
+    return e_n(value[pairs.later], value[pairs.earlier], error[pairs.later], error[pairs.earlier])
+
+
+def _spans(all_: Calibrations, pairs: Pairs) -> Pairs:
+    """The last calibration of every unit with its first, where others lie between: the long times tell slope from walk."""
+    unit = all_.histories[pairs.later]
+    last = _last_of_each(unit)
+    first = np.concatenate([[0], last[:-1] + 1]) if last.size else last
+    longer = last > first
+    later, earlier = pairs.later[last[longer]], pairs.earlier[first[longer]]
+    return Pairs(later, earlier, (all_.day[later] - all_.day[earlier]) / YEAR_D)
+
+
+def _last_of_each(numbers: Index) -> Index:
+    """Places where a run of equal numbers ends."""
+    if not numbers.size:
+        return np.zeros(0, dtype=np.int64)
+    return np.flatnonzero(np.concatenate([numbers[1:] != numbers[:-1], [True]]))
+
+
+def _padded(all_: Calibrations, good: Flags, rows: Pairs, name: str) -> tuple[Array, Array, Array]:
+    """Values, errors and years of the units whose last calibrations are given, (units, most), filled up with NaN."""
+    units = all_.histories[rows.later]
+    place = np.full(int(all_.histories.max()) + 1, -1)
+    place[units] = np.arange(units.size)
+    value, error = all_.column(name), all_.error(name)
+    use = np.flatnonzero(good & (place[all_.histories] >= 0) & np.isfinite(value + error))
+    unit = place[all_.histories[use]]
+    starts = (
+        np.flatnonzero(np.concatenate([[True], unit[1:] != unit[:-1]])) if use.size else np.zeros(0, dtype=np.int64)
+    )
+    order = np.arange(use.size) - np.repeat(starts, np.diff(np.append(starts, use.size)))
+    shape = (units.size, int(order.max()) + 1 if use.size else 1)
+    filled: list[Array] = []
+    for content in (value, error, all_.day / YEAR_D):
+        target = np.full(shape, np.nan)
+        target[unit, order] = content[use]
+        filled.append(target)
+    return filled[0], filled[1], filled[2]

@@ -1,0 +1,96 @@
+"""Gauge studies in the archive: the same units seated again and again within days, on one station or on several."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from pipelines.audit.drifts import OWN
+from pipelines.audit.parameters import FAMILY_OF
+from pipelines.audit.statistics.gauge import Gauge, gauge_study
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from pipelines.audit.calibrations import Calibrations
+    from pipelines.audit.rules import Rules
+
+    Array = NDArray[np.float64]
+    Flags = NDArray[np.bool_]
+    Index = NDArray[np.int64]
+
+SIX_SIGMA = 6.0
+FEWEST_PARTS = 3
+
+
+@dataclass(frozen=True)
+class Study:
+    """A gauge study of one parameter: where and when it was made, what came out, and its share of the tolerance in %."""
+
+    device: str
+    parameter: str
+    stations: tuple[str, ...]
+    first_day: float
+    last_day: float
+    runs: tuple[str, ...]
+    gauge: Gauge
+    of_tolerance: float
+
+
+def studies(all_: Calibrations, good: Flags, rules: Rules) -> list[Study]:
+    """Every gauge study of every parameter; the units are the parts, the stations stand for appraisers."""
+    out: list[Study] = []
+    for group in _groups(all_, good, rules.gauge_days):
+        chosen = _crossed(all_, group)
+        if chosen is None:
+            continue
+        stations, rows = chosen
+        device = str(all_.device[rows[0, 0, 0]])
+        days = all_.day[rows]
+        runs = tuple(sorted({str(run) for run in all_.run[rows].ravel()}))
+        for name in OWN:
+            values = all_.column(name)[rows]
+            if np.isfinite(values).all():
+                found = gauge_study(values)
+                share = 100.0 * SIX_SIGMA * found.gauge / (2.0 * rules.tolerance_of(device, FAMILY_OF[name]))
+                out.append(Study(device, name, stations, float(days.min()), float(days.max()), runs, found, share))
+    return out
+
+
+def _groups(all_: Calibrations, good: Flags, within_days: float) -> list[dict[str, Index]]:
+    """Sets of runs on exactly the same units within some days; by run, the rows of its units in order of serial."""
+    rows = np.flatnonzero(good)
+    order = rows[np.lexsort((all_.unit[rows].astype(str), all_.run[rows].astype(str)))]
+    runs = all_.run[order].astype(str)
+    starts = np.flatnonzero(np.concatenate([[True], runs[1:] != runs[:-1]])) if order.size else np.zeros(0, dtype=int)
+    by_units: dict[tuple[str, ...], list[Index]] = {}
+    for own in np.split(order, starts[1:]) if order.size else []:
+        if own.size >= FEWEST_PARTS:
+            by_units.setdefault(tuple(all_.unit[own]), []).append(own)
+    out: list[dict[str, Index]] = []
+    for members in by_units.values():
+        members.sort(key=lambda own: (float(all_.day[own[0]]), str(all_.run[own[0]])))
+        part: list[Index] = []
+        for own in [*members, None]:
+            if part and (own is None or all_.day[own[0]] - all_.day[part[0][0]] > within_days):
+                if len(part) > 1:
+                    out.append({str(all_.run[one[0]]): one for one in part})
+                part = []
+            if own is not None:
+                part.append(own)
+    return out
+
+
+def _crossed(all_: Calibrations, group: dict[str, Index]) -> tuple[tuple[str, ...], Index] | None:
+    """Stations, and rows (parts, stations, mounts) of a study in which every station has as many mounts; None without repeats."""
+    by_station: dict[str, list[Index]] = {}
+    for rows in group.values():
+        by_station.setdefault(str(all_.station[rows[0]]), []).append(rows)
+    repeated = {station: runs for station, runs in sorted(by_station.items()) if len(runs) > 1}
+    if not repeated:
+        return None
+    mounts = min(len(runs) for runs in repeated.values())
+    stacked = np.stack([np.stack(runs[:mounts], axis=-1) for runs in repeated.values()], axis=1)
+    return tuple(repeated), stacked

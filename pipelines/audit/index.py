@@ -1,0 +1,225 @@
+"""The index: the rows that the audit needs of all runs, in few large files instead of many small ones.
+
+``index/<part>/<table>.parquet`` holds some hundred runs each. It is derived from the runs' own files and from nothing else,
+may be deleted at any time, and is brought up to date before every use: a part whose runs have changed is made again, new
+runs make new parts. So it is never a second truth.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import shutil
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import TYPE_CHECKING, NamedTuple
+
+import pyarrow as pa
+import pyarrow.parquet as pq
+
+from pipelines.archive import files
+from pipelines.archive.locks import alone
+from pipelines.archive.store import ObjectPath, address_of, place_of
+from pipelines.audit.run_rows import KEPT, SCHEMAS, TABLES, rows_of_run
+from pipelines.flows.partitions import map_partitions
+from schemas.errors import ArchiveUnusable
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Sequence
+
+    from pipelines.archive import Archive
+    from pipelines.archive.store import Place
+
+FOLDER = "index"
+RUNS_PER_PART = 500
+MOST_SMALL = 24  # parts with less than half of that, before they are put together
+WATCHED = ("run.json", *(f"{name}{end}" for name in KEPT for end in (".json", ".parquet")))
+SOURCES = ("run_rows.py", "parameters.py", "station_effects.py")
+VERSION = b"tumbleline.index"
+
+
+class Portion(NamedTuple):
+    """Work for one process: a part of the index that is to be made of these runs."""
+
+    archive: str
+    place: str
+    runs: tuple[tuple[str, str], ...]  # run and stamp
+    version: str
+
+
+@dataclass(frozen=True)
+class Index:
+    """The parts of an index that is up to date, and what had to be done for that.
+
+    made, kept : numbers of runs that were read anew, and whose rows were there
+    """
+
+    parts: tuple[Place, ...]
+    made: int
+    kept: int
+    holder: TemporaryDirectory[str] | None = None
+
+    def table(self, name: str, columns: Sequence[str] | None = None) -> pa.Table:
+        """All rows of one of :data:`TABLES`; texts as dictionaries."""
+        chosen = list(columns) if columns is not None else SCHEMAS[name].names
+        texts = [field.name for field in SCHEMAS[name] if pa.types.is_string(field.type) and field.name in chosen]
+        found = [
+            pq.read_table(_opened(part / f"{name}.parquet"), columns=chosen, read_dictionary=texts)
+            for part in self.parts
+        ]
+        if not found:
+            return pa.table({n: pa.array([], SCHEMAS[name].field(n).type) for n in chosen})
+        return pa.concat_tables(found).unify_dictionaries()
+
+    def files(self, name: str) -> list[str]:
+        """The files of one table, for those who read them themselves."""
+        return [str(part / f"{name}.parquet") for part in self.parts]
+
+
+def up_to_date(archive: Archive, dask: str | None = None, workers: int = 1) -> Index:
+    """The index of an archive with every run as it is now.
+
+    Where the archive cannot be written the index is made in a temporary folder, for this once.
+
+    Parameters
+    ----------
+    dask, workers : where parts are made, see :func:`pipelines.flows.partitions.map_partitions`
+    """
+    place = archive.root / FOLDER
+    stamps = _stamps(archive.root)
+    try:
+        with alone(place, wait=True):
+            return _refreshed(archive, place, stamps, dask, workers)
+    except ArchiveUnusable:
+        if isinstance(archive.root, Path) and os.access(archive.root, os.W_OK):
+            raise
+        holder = TemporaryDirectory(prefix="tumbleline-index-")
+        found = _refreshed(archive, Path(holder.name), stamps, dask, workers)
+        return Index(found.parts, found.made, found.kept, holder)
+
+
+def _refreshed(archive: Archive, place: Place, stamps: Mapping[str, str], dask: str | None, workers: int) -> Index:
+    version = _version()
+    parts = {part: _runs_of(part, version) for part in _folders(place)}
+    good = {part: runs for part, runs in parts.items() if runs and runs.items() <= stamps.items()}
+    good = _without_doubles(good)
+    small = [part for part, runs in good.items() if len(runs) < RUNS_PER_PART // 2]
+    if len(small) > MOST_SMALL:
+        good = {part: runs for part, runs in good.items() if part not in small}
+    there = {run for runs in good.values() for run in runs}
+    missing = sorted(stamps.keys() - there)
+    chunks = [missing[k : k + RUNS_PER_PART] for k in range(0, len(missing), RUNS_PER_PART)]
+    root = address_of(archive.root)
+    portions = [Portion(root, address_of(place), tuple((r, stamps[r]) for r in chunk), version) for chunk in chunks]
+    new = [place / name for name in map_partitions(make_part, portions, dask, workers=workers, name="audit index")]
+    for part in set(parts) - set(good) - set(new):
+        _remove(part)
+    return Index(tuple(sorted([*good, *new], key=str)), len(missing), len(there))
+
+
+def make_part(portion: Portion) -> str:
+    """Name of a part of the index, made of its runs' files and published."""
+    runs, place = place_of(portion.archive) / "runs", place_of(portion.place)
+    found = [rows_of_run(runs / run, stamp) for run, stamp in portion.runs]
+    content: dict[str, bytes] = {}
+    for name in reversed(TABLES):  # ``runs`` last: where it is, all are
+        own = [rows[name] for rows in found if name in rows]
+        table = pa.concat_tables(own) if own else SCHEMAS[name].empty_table()
+        content[f"{name}.parquet"] = _encoded(table, portion.version)
+    text = "\n".join([portion.version, *(f"{run} {stamp}" for run, stamp in portion.runs)])
+    name = hashlib.sha256(text.encode()).hexdigest()[:16]
+    files.publish_folder(place / name, content)
+    return name
+
+
+def _encoded(table: pa.Table, version: str) -> bytes:
+    sink = pa.BufferOutputStream()
+    marked = table.replace_schema_metadata({VERSION: version.encode()})
+    pq.write_table(marked, sink, compression="zstd", compression_level=1)
+    return sink.getvalue().to_pybytes()
+
+
+def _version() -> str:
+    """Hash of the code that makes the rows: an index made by other code is made again."""
+    total = hashlib.sha256()
+    for name in SOURCES:
+        total.update((Path(__file__).parent / name).read_bytes())
+    return total.hexdigest()[:16]
+
+
+def _folders(place: Place) -> list[Place]:
+    if not place.is_dir():
+        return []
+    return sorted((p for p in place.iterdir() if len(p.name) == 16 and (p / "runs.parquet").is_file()), key=str)
+
+
+def _runs_of(part: Place, version: str) -> dict[str, str]:
+    """Runs of a part with their stamps; empty where it is not of this version or cannot be read."""
+    try:
+        table = pq.read_table(_opened(part / "runs.parquet"), columns=["run", "stamp"])
+    except (OSError, pa.ArrowInvalid):
+        return {}
+    if (table.schema.metadata or {}).get(VERSION, b"").decode() != version:
+        return {}
+    return dict(zip(table.column("run").to_pylist(), table.column("stamp").to_pylist(), strict=True))
+
+
+def _without_doubles(parts: Mapping[Place, dict[str, str]]) -> dict[Place, dict[str, str]]:
+    """The parts, less those that hold a run that another holds already."""
+    seen: set[str] = set()
+    kept: dict[Place, dict[str, str]] = {}
+    for part, runs in sorted(parts.items(), key=lambda item: (-len(item[1]), str(item[0]))):
+        if not seen & runs.keys():
+            seen |= runs.keys()
+            kept[part] = runs
+    return kept
+
+
+def _opened(file: Place) -> pa.BufferReader | str:
+    return pa.BufferReader(file.read_bytes()) if isinstance(file, ObjectPath) else str(file)
+
+
+def _remove(part: Place) -> None:
+    if isinstance(part, ObjectPath):
+        part.remove_all()
+    else:
+        shutil.rmtree(part, ignore_errors=True)
+
+
+def _stamps(root: Place) -> dict[str, str]:
+    """What the files of every run look like: size and time of each that the index is made from."""
+    runs = root / "runs"
+    if isinstance(runs, ObjectPath):
+        return _stamps_of_objects(runs)
+    if not runs.is_dir():
+        return {}
+    out: dict[str, str] = {}
+    with os.scandir(runs) as folders:
+        for folder in folders:
+            marks = [_mark(f"{folder.path}/{name}") for name in WATCHED]
+            if marks[0]:  # a run without run.json has not begun
+                out[folder.name] = _short(marks)
+    return out
+
+
+def _mark(path: str) -> str:
+    try:
+        found = os.stat(path)  # noqa: PTH116 - a hundred thousand of these
+    except OSError:
+        return ""
+    return f"{found.st_size}.{found.st_mtime_ns}"
+
+
+def _stamps_of_objects(runs: ObjectPath) -> dict[str, str]:
+    marks: dict[str, dict[str, str]] = {}
+    for place in runs.walk():
+        if place.name in WATCHED:
+            size = place.stat()
+            marks.setdefault(place.parent.name, {})[place.name] = f"{size.st_size}.{size.st_mtime}"
+    return {run: _short([own.get(n, "") for n in WATCHED]) for run, own in marks.items() if "run.json" in own}
+
+
+def _short(marks: Iterable[str]) -> str:
+    return hashlib.sha256("|".join(marks).encode()).hexdigest()[:16]

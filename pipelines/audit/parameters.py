@@ -1,0 +1,114 @@
+"""The parameters that the audit follows: what the coefficients of a unit come to, in units that units share.
+
+Misalignment is split in two: what is left when the sensor is turned as a whole is the unit's own (``square``: the
+angle between two axes less 90°), the turn is that of its seat (``rotation``). Seating a unit anew moves the second, not the
+first (Geist 2017, NIST J. Res. 122.032: intrinsic parameters).
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from numpy.typing import NDArray
+
+    Array = NDArray[np.float64]
+
+AXES = ("x", "y", "z")
+
+
+class Family(NamedTuple):
+    """Parameters of one kind: their unit, and the coefficient they come from; ``own`` where they belong to the unit."""
+
+    unit: str
+    names: tuple[str, ...]
+    own: bool
+
+
+def _along(name: str) -> tuple[str, ...]:
+    return tuple(f"{name}_{axis}" for axis in AXES)
+
+
+FAMILIES: Mapping[str, Family] = {
+    "bias": Family("µg", _along("bias"), own=True),
+    "scale": Family("ppm", _along("scale"), own=True),
+    "square": Family("mrad", ("square_yz", "square_zx", "square_xy"), own=True),
+    "rotation": Family("mrad", _along("rotation"), own=False),
+    "bias_temperature": Family("µg/K", _along("bias_temperature"), own=True),
+    "scale_temperature": Family("ppm/K", _along("scale_temperature"), own=True),
+}
+NAMES: tuple[str, ...] = tuple(name for family in FAMILIES.values() for name in family.names)
+FAMILY_OF = {name: family for family, content in FAMILIES.items() for name in content.names}
+
+
+def unit_text(name: str) -> str:
+    """The unit of a parameter."""
+    return FAMILIES[FAMILY_OF[name]].unit
+
+
+_CYCLE = ((1, 2), (2, 0), (0, 1))  # the two axes that a rotation about x, y, z mixes
+
+
+def parameters_of(columns: Mapping[str, NDArray[Any]], zero: float) -> tuple[list[str], dict[str, Array]]:
+    """Units, and value and standard error of every parameter: ``bias_x``, ``bias_x_error``, …; NaN where the model has none.
+
+    ``scale`` stays in output units per g: parts per million need a nominal value, which only the population has.
+
+    Parameters
+    ----------
+    columns : of the table of coefficients, any order
+    zero : nominal output at 0 g
+    """
+    units, unit = _numbered(columns["unit"].tolist())
+    place, key = _numbered(list(zip(*(columns[name].tolist() for name in ("effect", "name", "axis")), strict=True)))
+    value, error = (np.full((len(units), len(place)), np.nan) for _ in range(2))
+    value[unit, key] = columns["value"]
+    error[unit, key] = columns["standard_error"]
+    nothing = np.full(len(units), np.nan)
+
+    def pick(effect: str, coefficient: str, axis: str) -> tuple[Array, Array]:
+        column = place.get((effect, coefficient, axis))
+        return (value[:, column], error[:, column]) if column is not None else (nothing, nothing)
+
+    scale = [pick("scale", "K1", axis) for axis in AXES]
+    out: dict[str, Array] = {}
+    for family, effect, coefficient in _SIMPLE:
+        for (s, _), axis in zip(scale, AXES, strict=True):
+            v, e = pick(effect, coefficient, axis)
+            size = np.abs(s)
+            _put(out, f"{family}_{axis}", 1e6 * (v - (zero if effect == "bias" else 0.0)) / size, 1e6 * e / size)
+    for axis, (s, e) in zip(AXES, scale, strict=True):
+        _put(out, f"scale_{axis}", s, e)
+    for number, (j, k) in enumerate(_CYCLE):
+        (a, a_error), (b, b_error) = (
+            (1e3 * v / np.abs(scale[row][0]), 1e3 * e / np.abs(scale[row][0]))
+            for row, (v, e) in (
+                (j, pick("misalignment", f"K{AXES[j]}{AXES[k]}", AXES[j])),
+                (k, pick("misalignment", f"K{AXES[k]}{AXES[j]}", AXES[k])),
+            )
+        )
+        spread = np.hypot(a_error, b_error)
+        _put(out, FAMILIES["square"].names[number], a + b, spread)
+        _put(out, FAMILIES["rotation"].names[number], 0.5 * (b - a), 0.5 * spread)
+    return [*units], out
+
+
+_SIMPLE = (
+    ("bias", "bias", "K0"),
+    ("bias_temperature", "bias_temperature", "kT"),
+    ("scale_temperature", "scale_temperature", "aT"),
+)
+
+
+def _numbered(values: list[Any]) -> tuple[dict[Any, int], NDArray[np.int64]]:
+    """Every different value with its number in order of appearance, and the number of each."""
+    numbers: dict[Any, int] = {}
+    return numbers, np.array([numbers.setdefault(value, len(numbers)) for value in values], dtype=np.int64)
+
+
+def _put(out: dict[str, Array], name: str, value: Array, error: Array) -> None:
+    out[name], out[f"{name}_error"] = value, error

@@ -1,0 +1,123 @@
+"""The audit's rules: intervals, tolerances, check standards; what the file ``default.toml`` beside this module says in full."""
+
+from __future__ import annotations
+
+import tomllib
+from fnmatch import fnmatchcase
+from importlib.resources import files
+from typing import TYPE_CHECKING, Annotated, Any, Literal
+
+from pydantic import Field, FiniteFloat, ValidationError, field_validator, model_validator
+
+from pipelines.audit.parameters import FAMILIES
+from schemas.errors import did_you_mean
+from schemas.recipe import Strict, explain, parse_toml, read_text
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+Positive = Annotated[FiniteFloat, Field(gt=0.0)]
+Months = Annotated[int, Field(ge=1, le=120)]
+
+
+class Tolerance(Strict):
+    """How far a parameter may move from its certified value, in the parameter's unit, which the file states again."""
+
+    max: Positive
+    unit: str
+
+
+class Kind(Strict):
+    """What is different for one kind of device."""
+
+    interval_months: Months | None = None
+    tolerance: dict[str, Tolerance] = Field(default_factory=dict[str, Tolerance])
+
+    @field_validator("tolerance")
+    @classmethod
+    def _known(cls, value: dict[str, Tolerance]) -> dict[str, Tolerance]:
+        return _checked(value)
+
+
+class Rules(Strict):
+    """The rules file."""
+
+    interval: Literal["fixed", "drift"]
+    reliability_target: Annotated[FiniteFloat, Field(gt=0.5, lt=1.0)]
+    interval_months: Months
+    shortest_months: Months
+    longest_months: Months
+    notice_days: Annotated[int, Field(ge=0)]
+    check_standards: list[str]
+    baseline_points: Annotated[int, Field(ge=8)]
+    gauge_days: Positive
+    ppk_least: Positive
+    gauge_most_percent: Positive
+    tolerance: dict[str, Tolerance]
+    device: dict[str, Kind] = Field(default_factory=dict[str, Kind])
+
+    @field_validator("tolerance")
+    @classmethod
+    def _known(cls, value: dict[str, Tolerance]) -> dict[str, Tolerance]:
+        return _checked(value)
+
+    @model_validator(mode="after")
+    def _ordered(self) -> Rules:
+        if self.shortest_months > self.longest_months:
+            message = (
+                f"shortest_months: {self.shortest_months} is above longest_months, {self.longest_months}; exchange them"
+            )
+            raise ValueError(message)
+        return self
+
+    def months(self, device: str) -> int:
+        """The fixed interval of a kind of device."""
+        own = self._kind(device).interval_months
+        return own if own is not None else self.interval_months
+
+    def tolerance_of(self, device: str, family: str) -> float:
+        """The tolerance of a family of parameters of a kind of device; infinite where there is none."""
+        found = self._kind(device).tolerance.get(family) or self.tolerance.get(family)
+        return found.max if found is not None else float("inf")
+
+    def is_standard(self, serial: str) -> bool:
+        """Whether a unit is one that the stations watch themselves with."""
+        return any(fnmatchcase(serial, pattern) for pattern in self.check_standards)
+
+    def _kind(self, device: str) -> Kind:
+        return next((kind for name, kind in self.device.items() if name.upper() == device.upper()), Kind())
+
+
+def load_rules(path: Path | None = None) -> Rules:
+    """The built-in rules, with what a file says instead."""
+    content = tomllib.loads((files("pipelines.audit") / "default.toml").read_text(encoding="utf-8"))
+    if path is None:
+        return Rules.model_validate(content)
+    own = parse_toml(read_text(path, "rules"), f"rules {path.name}")
+    try:
+        return Rules.model_validate(_over(content, own))
+    except ValidationError as problem:
+        raise explain(problem, f"rules {path.name}", Rules) from None
+
+
+def _over(content: dict[str, Any], own: dict[str, Any]) -> dict[str, Any]:
+    """Tables put over one another, key by key."""
+    out = dict(content)
+    for key, value in own.items():
+        both = isinstance(value, dict) and isinstance(out.get(key), dict) and set(value) != {"max", "unit"}
+        out[key] = _over(out[key], value) if both else value
+    return out
+
+
+def _checked(tolerances: dict[str, Tolerance]) -> dict[str, Tolerance]:
+    for name, tolerance in tolerances.items():
+        if name not in FAMILIES or not FAMILIES[name].own:
+            own = [family for family, content in FAMILIES.items() if content.own]
+            message = f"unknown parameter '{name}'; {did_you_mean(name, own)}"
+            raise ValueError(message)
+        if tolerance.unit != FAMILIES[name].unit:
+            message = (
+                f"tolerance.{name}: found {tolerance.unit}, the parameter is in {FAMILIES[name].unit}; give it in that"
+            )
+            raise ValueError(message)
+    return tolerances

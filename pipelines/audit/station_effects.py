@@ -1,0 +1,167 @@
+"""What the residuals of a run have in common over its units: the station's part, one effect of the catalogue after the other.
+
+Residuals of a unit hold what its own model could not take up. What is common to all units of a run is the station's doing. Each
+effect of the station is fitted to the mean residual alone, after both are freed of everything that the units' model can take
+up; so it does not matter how the run's own fit weighted its dwells.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from inertial import design, effects
+from inertial.effects import SensorEffect, StationEffect
+from inertial.errors import InertialError, MissingInput
+from inertial.state import State
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+    from numpy.typing import NDArray
+
+    Array = NDArray[np.float64]
+
+FEWEST_UNITS = 3  # below, one odd unit passes for the station
+SEEN = 0.02  # share of an effect's columns that the units' model leaves; less cannot be told from the units
+ALIKE = 0.98  # correlation of what is left of two effects, above which they are one
+MICRO = 1e6
+
+
+class StationValue(NamedTuple):
+    """One parameter of one station effect in one run: µrad for angles, in general millionths of its own unit."""
+
+    effect: str
+    name: str
+    value: float
+    error: float
+
+
+def station_values(
+    residuals: Mapping[str, NDArray[Any]], recipe: Mapping[str, Any], model: Sequence[str]
+) -> list[StationValue]:
+    """Parameters of the station's effects that a run shows; none where there are too few units, angles or dwells.
+
+    Parameters
+    ----------
+    residuals : columns of the table, ordered by unit, dwell and axis; units as numbers
+    recipe : of the run, with the poses' angles by name
+    model : effects of the run's fit
+    """
+    grid = _grid(residuals)
+    if grid is None:
+        return []
+    mean, state = grid
+    angles = {p["name"]: (p["outer_deg"], p["inner_deg"]) for p in (*recipe["poses"], *recipe.get("verification", ()))}
+    poses = np.asarray(residuals["pose"])[: mean.size : 3]
+    if not set(poses.tolist()) <= angles.keys():
+        return []
+    outer, inner = np.radians(np.array([angles[pose] for pose in poses])).T
+    known = [name for name in model if not isinstance(_effect(name), StationEffect)]
+    return _fitted(mean, replace(state, outer=outer, inner=inner, memory={}), known)
+
+
+def followed() -> list[StationEffect]:
+    """The station's effects that are followed: those without nonlinear parameters, the ones that hold others in them first."""
+    found = [e for e in effects.catalogue().values() if isinstance(e, StationEffect) and not e.nonlinear]
+    return sorted(found, key=lambda effect: (-len(effect.names()), effect.simplicity, effect.id))
+
+
+def _effect(name: str) -> object:
+    try:
+        return effects.get(name)
+    except InertialError:
+        return None  # of a model file that is not at hand
+
+
+def _grid(residuals: Mapping[str, NDArray[Any]]) -> tuple[Array, State] | None:
+    """Mean residual over the units, (n, 3) in µg, and the dwells' state; None where units have different dwells."""
+    dwell = np.asarray(residuals["dwell"])
+    units, n = np.unique(residuals["unit"]).size, np.unique(dwell).size
+    if units < FEWEST_UNITS or dwell.size != units * n * 3:
+        return None
+    shape = (units, n, 3)
+    force = np.asarray(residuals["force_g"], dtype=float).reshape(shape)[0]
+    temperature = np.asarray(residuals["unit_C"], dtype=float).reshape(shape)[:, :, 0].mean(axis=0)
+    by_unit = np.asarray(residuals["residual_ug"], dtype=float).reshape(shape)
+    known = bool(np.isfinite(temperature).all())
+    time = np.arange(n, dtype=float)
+    return by_unit.mean(axis=0), State(force=force, time=time, temperature=temperature if known else None)
+
+
+class _Seen(NamedTuple):
+    """What a plan lets see: the units' columns by axis, and by effect its own columns, freed of those, with their inverse."""
+
+    bases: list[Array]
+    effects: list[tuple[StationEffect, Array, Array]]
+    spare: int
+
+
+_seen: dict[tuple[object, ...], _Seen] = {}
+
+
+def _what_is_seen(state: State, model: Sequence[str]) -> _Seen:
+    """What a plan lets see; worked out once for all runs of a recipe whose temperatures agree within a kelvin."""
+    temperature = b"" if state.temperature is None else np.round(state.temperature).tobytes()
+    key = (tuple(model), np.round(state.force, 3).tobytes(), temperature)
+    if key not in _seen:
+        bases = _bases(state, model)
+        found: list[tuple[StationEffect, Array, Array]] = []
+        for effect in followed():
+            columns = _projected(effect, state, bases)
+            if columns is not None and not any(_alike(columns, other) for _, other, _ in found):
+                inverse = np.asarray(np.linalg.inv(columns.T @ columns), dtype=np.float64)
+                found.append((effect, columns, inverse))
+        _seen[key] = _Seen(bases, found, 3 * state.time.size - sum(base.shape[1] for base in bases))
+    return _seen[key]
+
+
+def _fitted(mean: Array, state: State, model: Sequence[str]) -> list[StationValue]:
+    seen = _what_is_seen(state, model)
+    target = np.concatenate([_without(mean[:, axis], seen.bases[axis]) for axis in range(3)])
+    out: list[StationValue] = []
+    for effect, columns, inverse in seen.effects:
+        values = inverse @ (columns.T @ target)
+        left = target - columns @ values
+        errors = np.sqrt(np.diagonal(inverse) * float(left @ left) / max(seen.spare - values.size, 1))
+        out += [
+            StationValue(effect.id, n, float(v), float(e))
+            for n, v, e in zip(effect.names(), values, errors, strict=True)
+        ]
+    return out
+
+
+def _bases(state: State, model: Sequence[str]) -> list[Array]:
+    """Orthonormal columns of the units' model on each axis, (n, p)."""
+    kept = [e for name in model if isinstance(e := _effect(name), SensorEffect)]
+    while True:
+        try:
+            columns = design.local_columns(kept, state, design.starting_values(kept, state))
+            break
+        except MissingInput as lack:  # what the residuals do not carry is not projected out
+            kept = [e for e in kept if e.id != lack.effect]
+    return [np.linalg.qr(columns[axis])[0] for axis in range(3)]
+
+
+def _without(values: Array, base: Array) -> Array:
+    return values - base @ (base.T @ values)
+
+
+def _projected(effect: StationEffect, state: State, bases: list[Array]) -> Array | None:
+    """An effect's columns (3n, q) without what the units take up; None where nothing is left or the state does not tell."""
+    try:
+        change = effect.force_change(state, **design.starting_values([effect], state).get(effect.id, {}))
+    except MissingInput:
+        return None
+    whole = np.concatenate([change[:, axis, :] for axis in range(3)])
+    left = np.concatenate([_without(change[:, axis, :], bases[axis]) for axis in range(3)])
+    singular = np.linalg.svd(left, compute_uv=False)
+    return left if singular[-1] > SEEN * np.linalg.norm(whole) else None
+
+
+def _alike(columns: Array, other: Array) -> bool:
+    """Whether some mixture of the columns is, to the eye of the residuals, one of the other's."""
+    ours, theirs = np.linalg.qr(columns)[0], np.linalg.qr(other)[0]
+    return bool(np.linalg.svd(ours.T @ theirs, compute_uv=False)[0] > ALIKE)

@@ -1,0 +1,172 @@
+"""Drift of units over the years: how a kind of device drifts, where each unit stands, and when it leaves its limits.
+
+A parameter of a unit is taken as level + slope·t + random walk. The slopes of a kind have a mean and a spread, the walk a
+variance that grows with time, and a calibration sees the level with its own uncertainty and that of mounting the unit
+again. The kind's figures come from all its units; a unit's own history then moves its slope away from the kind's
+as far as it tells something (a Kalman filter, which here is the best linear unbiased prediction).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+from scipy.optimize import nnls
+from scipy.stats import norm
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    Array = NDArray[np.float64]
+    Codes = NDArray[np.int64]
+
+ROUNDS = 4
+CLIP = 4.0  # pairs further out than so many σ tell of a unit, not of its kind
+ODD = 3.0  # a unit whose own slope is so many σ from its kind's is no longer judged by its kind
+TWO_SIDED_95 = 1.959964
+
+
+@dataclass(frozen=True)
+class Kind:
+    """How a kind of device drifts in one parameter; times in years.
+
+    mean_slope, slope_sd : per year; walk_sd : per root year; mount_sd : of one mounting, beyond the stated uncertainty
+    pairs : of calibrations, that these figures come from
+    """
+
+    mean_slope: float
+    slope_sd: float
+    walk_sd: float
+    mount_sd: float
+    pairs: int
+
+
+def kind_of(change: Array, years: Array, known: Array) -> Kind:
+    """How a kind drifts, from pairs of calibrations of the same units: moments of the changes, weighted, outliers left out.
+
+    E(Δ²) = σ₁² + σ₂² + 2·mount² + walk²·t + slope²·t², solved with no negative part. Pairs should be of different lengths.
+
+    Parameters
+    ----------
+    change, years : (n,), difference of the pair's values and the time between; known : (n,), σ₁² + σ₂²
+    """
+    if change.size == 0:
+        return Kind(0.0, 0.0, 0.0, 0.0, 0)
+    expected = known + np.median((change**2 - known).clip(0.0)) + 1e-12
+    keep, mean, parts = np.ones(change.size, dtype=bool), 0.0, np.zeros(3)
+    for _ in range(ROUNDS):
+        weight = years / expected
+        mean = float(np.sum(weight[keep] * change[keep]) / max(float(np.sum((weight * years)[keep])), 1e-300))
+        left = change - mean * years
+        keep = left**2 <= CLIP**2 * expected
+        columns = np.column_stack([np.full(years.size, 2.0), years, years**2]) / expected[:, None]
+        target = (left**2 - known) / expected
+        scale = np.sqrt(np.sum(columns[keep] ** 2, axis=0)) + 1e-300
+        parts = nnls(columns[keep] / scale, target[keep])[0] / scale
+        expected = known + 2.0 * parts[0] + parts[1] * years + parts[2] * years**2 + 1e-12
+    mount, walk, slope = np.sqrt(parts)
+    return Kind(mean, float(slope), float(walk), float(mount), int(keep.sum()))
+
+
+@dataclass(frozen=True)
+class Standing:
+    """Where every unit stands at its last calibration: level and slope per year, (units,), and their covariance.
+
+    last : the value of that calibration; odd : distance of the unit's own slope from its kind's, in σ
+    """
+
+    level: Array
+    slope: Array
+    level_var: Array
+    cross: Array
+    slope_var: Array
+    last: Array
+    odd: Array
+
+
+def standing(values: Array, errors: Array, years: Array, kind: Kind) -> Standing:
+    """Level and slope of every unit at its last calibration.
+
+    A unit whose own history gives it a slope that the kind does not have is judged by that history: the spread of slopes
+    counts for it as large as its own distance.
+
+    Parameters
+    ----------
+    values, errors, years : (units, most), in order of time and filled up with NaN; errors are standard uncertainties
+    """
+    units = values.shape[0]
+    span = np.nanmax(years, axis=1) - years[:, 0]
+    noise = np.sqrt(np.nanmean(errors**2, axis=1) + kind.mount_sd**2)
+    unknown = kind.slope_sd + 10.0 * noise / np.maximum(span, 1e-3)
+    alone = _filtered(values, errors, years, kind, unknown)
+    expected = np.sqrt(alone.slope_var + kind.slope_sd**2)
+    odd = (alone.slope - kind.mean_slope) / np.where(expected > 0.0, expected, np.inf)
+    prior = np.where(np.abs(odd) > ODD, np.abs(alone.slope - kind.mean_slope), np.full(units, kind.slope_sd))
+    return replace(_filtered(values, errors, years, kind, prior), odd=odd)
+
+
+def _filtered(values: Array, errors: Array, years: Array, kind: Kind, slope_sd: Array) -> Standing:
+    units = values.shape[0]
+    noise = errors**2 + kind.mount_sd**2
+    level, slope = values[:, 0].copy(), np.full(units, kind.mean_slope)
+    p00, p01 = noise[:, 0].copy(), np.zeros(units)
+    p11 = slope_sd**2
+    last, time = values[:, 0].copy(), years[:, 0].copy()
+    for k in range(1, values.shape[1]):
+        there = np.isfinite(values[:, k])
+        t = np.where(there, years[:, k] - time, 0.0)
+        level, p00 = level + slope * t, p00 + 2.0 * t * p01 + t**2 * p11 + kind.walk_sd**2 * t
+        p01 = p01 + t * p11
+        gain = np.where(there, 1.0, 0.0) / (p00 + np.where(there, noise[:, k], 1.0))
+        g0, g1 = gain * p00, gain * p01
+        surprise = np.where(there, values[:, k] - level, 0.0)
+        level, slope = level + g0 * surprise, slope + g1 * surprise
+        p00, p01, p11 = p00 * (1.0 - g0), p01 * (1.0 - g0), p11 - g1 * p01
+        last, time = np.where(there, values[:, k], last), np.where(there, years[:, k], time)
+    return Standing(level, slope, p00, p01, np.maximum(p11, 0.0), last, np.zeros(units))
+
+
+def forecast(now: Standing, kind: Kind, ahead: Array, *, origin: Array | float) -> tuple[Array, Array]:
+    """Expected value less ``origin`` and its standard deviation, (units, times), for times ``ahead`` (times,) in years.
+
+    The deviation is that of the prediction of the true value: what is not known of level and slope, and the walk to come.
+    """
+    t = ahead[None, :]
+    mean = (now.level - origin)[:, None] + now.slope[:, None] * t
+    var = now.level_var[:, None] + 2.0 * t * now.cross[:, None] + t**2 * now.slope_var[:, None] + kind.walk_sd**2 * t
+    return mean, np.sqrt(var)
+
+
+def in_tolerance(mean: Array, deviation: Array, tolerance: float) -> Array:
+    """Probability that a value lies within ± ``tolerance``; the arrays' shape."""
+    spread = np.maximum(deviation, 1e-300)
+    return norm.cdf((tolerance - mean) / spread) - norm.cdf((-tolerance - mean) / spread)
+
+
+def first_time(condition: NDArray[np.bool_], ahead: Array) -> Array:
+    """The first of the times (times,) at which a condition (units, times) holds; infinity where it never does."""
+    found = np.argmax(condition, axis=1)
+    return np.where(condition.any(axis=1), ahead[found], np.inf)
+
+
+def leaves(mean: Array, deviation: Array, tolerance: float, ahead: Array) -> tuple[Array, Array, Array]:
+    """When values leave ± ``tolerance``: expected time, and the 95 % interval of it, (units,) each, years ahead."""
+    reach = TWO_SIDED_95 * deviation
+    expected = first_time(np.abs(mean) > tolerance, ahead)
+    return (
+        expected,
+        first_time(np.abs(mean) + reach > tolerance, ahead),
+        first_time(np.abs(mean) - reach > tolerance, ahead),
+    )
+
+
+def last_reliable(probability: Array, target: float, ahead: Array) -> Array:
+    """The longest time for which the probability (units, times) of being in tolerance stays at the target, (units,), years.
+
+    The reliability target of an interval (NCSL RP-1, chapter 2): the interval ends where the probability falls to it.
+    """
+    bad = probability < target
+    found = np.argmax(bad, axis=1)
+    before = ahead[np.maximum(found - 1, 0)]
+    return np.where(bad.any(axis=1), np.where(found == 0, 0.0, before), ahead[-1])

@@ -1,0 +1,55 @@
+"""Values that belong to a unit and to a place at once: the parts of both, apart."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    Array = NDArray[np.float64]
+    Codes = NDArray[np.int64]
+
+ROUNDS = 60
+SETTLED = 1e-6
+
+
+def unit_and_place(values: Array, units: Codes, places: Codes) -> tuple[Array, Array]:
+    """Parts of the units and of the places, by medians in turn: single wild values move neither.
+
+    Parameters
+    ----------
+    values : (n,); units, places : (n,), numbers from 0
+
+    Returns
+    -------
+    Part of every unit, part of every place; the places' median is zero.
+    """
+    unit, place = np.zeros(int(units.max()) + 1), np.zeros(int(places.max()) + 1)
+    in_units, in_places = _groups(units), _groups(places)
+    for _ in range(ROUNDS):
+        unit = _medians(values - place[places], in_units)
+        found = _medians(values - unit[units], in_places)
+        found -= np.median(found)
+        if np.max(np.abs(found - place)) < SETTLED * (np.ptp(values) + 1e-300):
+            place = found
+            break
+        place = found
+    return unit, place
+
+
+def _groups(codes: Codes) -> tuple[Codes, Codes, Codes]:
+    """Codes, and where each group begins and how long it is."""
+    counts = np.bincount(codes)
+    return codes, np.concatenate([[0], np.cumsum(counts)[:-1]]), counts
+
+
+def _medians(values: Array, groups: tuple[Codes, Codes, Codes]) -> Array:
+    """Median of every group, zero where it is empty."""
+    codes, starts, counts = groups
+    ordered = values[np.lexsort((values, codes))]
+    low = np.minimum(starts + np.maximum(counts - 1, 0) // 2, values.size - 1)
+    high = np.minimum(starts + counts // 2, values.size - 1)
+    return np.where(counts > 0, 0.5 * (ordered[low] + ordered[high]), 0.0)

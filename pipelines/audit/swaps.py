@@ -1,0 +1,135 @@
+"""Serials that belong to another unit: calibrations that do not fit their unit's past, and whom they fit instead."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from pipelines.audit.parameters import FAMILY_OF
+from pipelines.audit.parameters import NAMES as PARAMETERS
+from pipelines.audit.statistics.fingerprints import (
+    Scale,
+    alike_below,
+    change_scale,
+    distance,
+    foreign_above,
+    nearest,
+)
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from pipelines.audit.calibrations import Calibrations
+
+    Array = NDArray[np.float64]
+    Flags = NDArray[np.bool_]
+    Index = NDArray[np.int64]
+
+FEWEST_PAIRS = 20  # of calibrations of one kind, below which its usual change is not known
+TURNS = [k for k, name in enumerate(PARAMETERS) if FAMILY_OF[name] == "rotation"]
+ROUNDS = 4
+
+
+@dataclass(frozen=True)
+class Stranger:
+    """A calibration that is not of the unit that its serial names.
+
+    row : its place among the calibrations; distance : from the unit's calibration before, in usual changes (rms)
+    looks_like : serial whose past it fits, empty where it fits none
+    exchanged : whether that serial's calibration of the same day fits this unit's past in turn
+    """
+
+    row: int
+    distance: float
+    looks_like: str
+    exchanged: bool
+
+
+def strangers(all_: Calibrations) -> list[Stranger]:
+    """The calibrations that are not of their unit, in order; each kind of device is judged by itself.
+
+    A stranger is no part of its unit's past: the next calibration is compared with the one before the stranger.
+    """
+    out: list[Stranger] = []
+    for device in np.unique(all_.device.astype(str)):
+        own = np.flatnonzero(all_.device == device)
+        values = _fingerprints(all_, own)
+        before = _before(all_.histories[own], np.ones(own.size, dtype=bool))
+        pairs = np.flatnonzero(before >= 0)
+        if pairs.size < FEWEST_PAIRS:
+            continue
+        scale = change_scale(values[pairs], values[before[pairs]])
+        if scale.count == 0:
+            continue
+        foreign = _foreign(values, all_.histories[own], scale)
+        out += _described(all_, own, values, foreign, scale)
+    return sorted(out, key=lambda stranger: stranger.row)
+
+
+def _fingerprints(all_: Calibrations, own: Index) -> Array:
+    """Parameters that belong to the unit and that all calibrations of the kind have, (n, p); the others are set to zero."""
+    values = all_.values[own].copy()
+    values[:, TURNS] = 0.0
+    values[:, ~np.isfinite(values).all(axis=0)] = 0.0
+    return values
+
+
+def _before(histories: Index, good: Flags) -> Index:
+    """For every calibration the last good one before it of the same unit; −1 where there is none."""
+    last, out, unit = -1, np.full(histories.size, -1), -1
+    for k in range(histories.size):
+        if histories[k] != unit:
+            unit, last = histories[k], -1
+        out[k] = last
+        if good[k]:
+            last = k
+    return out
+
+
+def _foreign(values: Array, histories: Index, scale: Scale) -> Flags:
+    """Which calibrations do not fit the last one before them that does."""
+    foreign = np.zeros(len(values), dtype=bool)
+    for _ in range(ROUNDS):
+        before = _before(histories, ~foreign)
+        far = np.zeros_like(foreign)
+        pairs = np.flatnonzero(before >= 0)
+        far[pairs] = distance(values[pairs], values[before[pairs]], scale) > foreign_above(scale)
+        if np.array_equal(far, foreign):
+            break
+        # of neighbours that are both far the earlier one is judged first: the later may fit once it is left out
+        first = far & ~np.concatenate([[False], far[:-1] & (histories[1:] == histories[:-1])])
+        foreign = np.where(foreign.any(), far, first)
+    return foreign
+
+
+def _described(all_: Calibrations, own: Index, values: Array, foreign: Flags, scale: Scale) -> list[Stranger]:
+    before = _before(all_.histories[own], ~foreign)
+    histories, days = all_.histories[own], all_.day[own]
+    out: list[Stranger] = []
+    for k in map(int, np.flatnonzero(foreign)):
+        other, unit = _fits(k, values, foreign, histories, days, scale)
+        back = _exchanged(k, unit, values, foreign, histories, days, before, scale) if other >= 0 else False
+        usual = float(np.sqrt(distance(values[k], values[before[k]], scale) / scale.count))
+        out.append(Stranger(int(own[k]), usual, str(all_.unit[own[other]]) if other >= 0 else "", back))
+    return out
+
+
+def _fits(k: int, values: Array, foreign: Flags, histories: Index, days: Array, scale: Scale) -> tuple[int, int]:
+    """The good earlier calibration of another unit that a stranger fits, and that unit; (−1, −1) where there is none."""
+    candidates = np.flatnonzero((days < days[k]) & ~foreign & (histories != histories[k]))
+    if not candidates.size:
+        return -1, -1
+    best, found = nearest(values[k], values[candidates], scale)
+    if found > foreign_above(scale) and found > alike_below(scale):
+        return -1, -1
+    return int(candidates[best]), int(histories[candidates[best]])
+
+
+def _exchanged(
+    k: int, unit: int, values: Array, foreign: Flags, histories: Index, days: Array, before: Index, scale: Scale
+) -> bool:
+    """Whether the other unit has a stranger of the same days that fits the past of this one."""
+    near = np.flatnonzero(foreign & (histories == unit) & (np.abs(days - days[k]) <= 1.0))
+    return any(float(distance(values[n], values[before[k]], scale)) <= foreign_above(scale) for n in near)
