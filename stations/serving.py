@@ -73,9 +73,11 @@ def serve(
     speed: float,
     stop: Event,
     ready: Callable[[str, int], None],
+    silence_s: float = 0.0,
 ) -> None:
     """Comes back when ``stop`` is set; until then the station's time goes on at ``speed`` times the wall's.
 
+    Drives and reader have watchdogs of their own: ``silence_s`` after the last request they stop; 0 never.
     ``ready`` is told host and port once they listen; a device that is spoken to in lines has the port behind. Nothing is sampled
     unless a client starts it.
     """
@@ -86,8 +88,10 @@ def serve(
     from stations.opening import make_plant  # noqa: PLC0415
     from stations.plant.line_server import LineServer  # noqa: PLC0415
     from stations.plant.server import PlantServer  # noqa: PLC0415
+    from stations.plant.silence import Silence  # noqa: PLC0415
 
     plant = make_plant(config, lot)
+    silence = Silence(plant, config.devices, silence_s)
     with ExitStack() as stack:
         server = stack.enter_context(PlantServer(plant, host, port))
         for number, device_id in enumerate(plant.speakers, server.port + 1):
@@ -97,6 +101,7 @@ def serve(
         while not stop.wait(TICK_S):
             now = clock.now()
             plant.advance(round((now - done) * speed * 1e6))
+            silence.look(now)
             done = now
 
 

@@ -32,7 +32,7 @@ def modbus_station(port: int, host: str = "127.0.0.1", **changes: dict[str, obje
 
 
 @contextmanager
-def served(lot: Lot | None = None, **simulation: object) -> Generator[int, None, None]:
+def served(lot: Lot | None = None, silence_s: float = 0.0, **simulation: object) -> Generator[int, None, None]:
     """The simulated station served while the block lasts; gives its port."""
     stop, listening, found = threading.Event(), threading.Event(), list[int]()
 
@@ -40,7 +40,7 @@ def served(lot: Lot | None = None, **simulation: object) -> Generator[int, None,
         found.append(port)
         listening.set()
 
-    how = {"host": "127.0.0.1", "port": 0, "speed": 1.0, "stop": stop, "ready": ready}
+    how = {"host": "127.0.0.1", "port": 0, "speed": 1.0, "stop": stop, "ready": ready, "silence_s": silence_s}
     thread = threading.Thread(target=serve, args=(station_of(**simulation), lot or lot_of()), kwargs=how)
     thread.start()
     try:

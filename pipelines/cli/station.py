@@ -40,6 +40,10 @@ def serve(
     device: DeviceOption = "ADXL355",
     units: UnitsOption = 8,
     seed: Annotated[int, typer.Option("--seed", min=0, help="Seed of the devices.")] = 1,
+    silence: Annotated[
+        float,
+        typer.Option("--silence", min=0.0, help="Seconds unasked after which drives and reader stop; 0 for never."),
+    ] = 30.0,
     *,
     as_json: JsonOption = False,
 ) -> None:
@@ -66,7 +70,16 @@ def serve(
             )
             console().print("stop with Ctrl-C", markup=False)
 
-    run(config, made_up(device, units, seed), host=host, port=port, speed=speed, stop=stop, ready=ready)
+    run(
+        config,
+        made_up(device, units, seed),
+        host=host,
+        port=port,
+        speed=speed,
+        stop=stop,
+        ready=ready,
+        silence_s=silence,
+    )
 
 
 @app.command()

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 from pipelines.stages.minutes import itinerary
 
 if TYPE_CHECKING:
+    from pipelines.stages.approach import Approach
     from pipelines.stages.capture import Step
     from schemas.recipe import Recipe
     from schemas.station import StationConfig
@@ -46,15 +47,20 @@ class Remaining:
     _done: set[int] = field(init=False, default_factory=set[int])
     _soaks: _Pace = field(init=False, default_factory=_Pace)
     _records: _Pace = field(init=False, default_factory=_Pace)
+    _ramp: float | None = field(init=False, default=None)
+    _lag: float | None = field(init=False, default=None)
     _since: tuple[int, float] | None = field(init=False, default=None)
 
     def __post_init__(self) -> None:
-        for stretch in itinerary(self.plan, self.config, self.recipe):
-            if stretch.kind == "soak":
-                self._soak[stretch.step.record] = stretch.seconds
-            else:
-                record = stretch.step.record
-                self._record[record] = self._record.get(record, 0.0) + stretch.seconds
+        self._planned(self.config)
+
+    def _planned(self, config: StationConfig) -> None:
+        """Plans soaks and records by a station's pace."""
+        self._soak, self._record = {}, {}
+        for stretch in itinerary(self.plan, config, self.recipe):
+            record = stretch.step.record
+            kind = self._soak if stretch.kind == "soak" else self._record
+            kind[record] = kind.get(record, 0.0) + stretch.seconds
         soaks = records = 0.0
         for step in reversed(self.plan):
             self._behind[step.record] = (soaks, records)
@@ -66,13 +72,31 @@ class Remaining:
         """Records in all."""
         return len(self.plan)
 
-    def soaked(self, step: Step, seconds: float, *, whole: bool) -> None:
-        """Learns from a soak; one that only made sure of its temperature teaches nothing."""
-        planned = self._soak.get(step.record, 0.0)
-        if whole and planned > 0.0:
-            self._soaks.add(planned, seconds)
+    def soaked(self, step: Step, seconds: float, approach: Approach | None) -> None:
+        """Learns from a soak; one that only made sure of its temperature, without an ``approach``, teaches nothing."""
+        if approach is not None and step.record in self._soak:
+            self._learn(approach)
+            self._soaks.add(self._soak[step.record], seconds)
         self._done.add(-1 - step.record)
         self._since = None
+
+    def _learn(self, approach: Approach) -> None:
+        """Plans anew with the ramp and the lag that a soak has shown, the first that showed them.
+
+        A share that is right for one soak is wrong for the next, whose way is longer or shorter: ramp and lag are not.
+        """
+        known, ramp, lag = (self._ramp, self._lag), approach.air_ramp(), approach.lag_s()
+        self._ramp, self._lag = self._ramp or ramp, self._lag or lag
+        if (self._ramp, self._lag) == known:
+            return
+        config = self.config
+        pace = config.pace.model_copy(
+            update={"ramp_K_per_min": self._ramp or config.pace.ramp_K_per_min, "lag_s": self._lag or config.pace.lag_s}
+        )
+        changed: dict[str, object] = {"pace": pace}
+        if config.simulation is not None and self._lag is not None:
+            changed["simulation"] = config.simulation.model_copy(update={"slot_lag_s": (self._lag, self._lag)})
+        self._planned(config.model_copy(update=changed))
 
     def taken(self, step: Step, seconds: float) -> None:
         """Learns from a record."""

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Self, get_args
 from pymodbus.constants import ExcCodes
 from pymodbus.exceptions import NoSuchIdException
 from pymodbus.server import ModbusTcpServer
+from pymodbus.server.base import ModbusBaseServer
 from pymodbus.simulator import DataType, SimData, SimDevice
 
 from schemas.errors import StationRefused
@@ -85,6 +86,7 @@ async def _answer(
         if fifo is None or space != "holding" or address < fifo.address:
             return ExcCodes.ILLEGAL_ADDRESS
     with plant.lock:
+        plant.heard.add(device_id)
         code = plant.answer_of(device_id)
         if code == MUTE:
             raise NoSuchIdException  # the server, told to ignore missing devices, sends nothing
@@ -125,7 +127,7 @@ class PlantServer:
         self.port = port
         self._ready = threading.Event()
         self._loop: asyncio.AbstractEventLoop | None = None
-        self._server: ModbusTcpServer | None = None
+        self._server: ModbusBaseServer | None = None
         self._thread = threading.Thread(target=self._run, name="plant-server", daemon=True)
 
     def __enter__(self) -> Self:
@@ -151,22 +153,25 @@ class PlantServer:
     async def _serve(self) -> None:
         self._loop = asyncio.get_running_loop()
         devices = [sim_device(i, bank.profile, self._plant) for i, bank in self._plant.banks.items()]
-        server = ModbusTcpServer(devices, address=(self.host, self.port), ignore_missing_devices=True)
+        server = self.make(devices)
         try:
             await server.serve_forever(background=True)
         except (RuntimeError, OSError):  # the port is taken: told by the thread that waits
             self._ready.set()
             return
-        self.port = _port(server)
+        self.port = self.listening_at(server)
         self._server = server
         self._ready.set()
         await server.serving
 
+    def make(self, devices: list[SimDevice]) -> ModbusBaseServer:
+        """The server itself; another wire overrides it."""
+        return ModbusTcpServer(devices, address=(self.host, self.port), ignore_missing_devices=True)
 
-def _port(server: ModbusTcpServer) -> int:
-    """The port that a listening server has got."""
-    transport = server.transport
-    if not isinstance(transport, asyncio.Server):
-        message = "simulated station: the server does not listen; give a free port"
-        raise StationRefused(message)
-    return int(transport.sockets[0].getsockname()[1])
+    def listening_at(self, server: ModbusBaseServer) -> int:
+        """The port that a listening server has got."""
+        transport = server.transport
+        if not isinstance(transport, asyncio.Server):
+            message = "simulated station: the server does not listen; give a free port"
+            raise StationRefused(message)
+        return int(transport.sockets[0].getsockname()[1])

@@ -128,6 +128,28 @@ def test_a_run_that_stands_still_is_taken_for_dead_and_may_not_go_on():
             assert "not been heard of" in told("watchdog_acts")["why"]
 
 
+def test_drives_and_reader_stop_by_themselves_when_run_and_watchdog_are_both_gone():
+    with served(silence_s=0.5) as port, open_devices(modbus_station(port, limits=SLOW), ()) as station:
+        outer, reader = station.table.axes["outer"], station.reader
+        reader.start(100.0)
+        outer.start(FAR)
+        assert outer.moving()
+        time.sleep(1.2)
+        stood = outer.position()
+        assert not outer.moving()
+        assert 0.0 < stood < 10.0
+        assert reader.sampling() == "stopped"
+
+
+def test_a_drive_that_is_asked_again_and_again_goes_on():
+    with served(silence_s=0.5) as port, open_devices(modbus_station(port, limits=SLOW), ()) as station:
+        outer = station.table.axes["outer"]
+        outer.start(FAR)
+        for _ in range(8):
+            time.sleep(0.1)
+            assert outer.moving()
+
+
 def test_a_holder_that_stood_still_is_refused_when_it_wakes(state):
     config = modbus_station(1)
     leases = Leases(state, new_holder("served", "a"), addresses(config), lapse_s=0.05)
