@@ -10,6 +10,7 @@ import os
 import socket
 import ssl
 import struct
+import termios
 import time
 from typing import TYPE_CHECKING, Protocol
 
@@ -166,7 +167,7 @@ class SerialWire:
             self.close()
             self._late_until = time.monotonic() + self.timeout_s
             raise
-        except (serial.SerialException, OSError) as problem:
+        except (serial.SerialException, OSError, termios.error) as problem:  # settings that the line cannot have
             self.close()
             raise Broken(_reason(problem)) from None
 
@@ -208,6 +209,9 @@ class SerialWire:
         self._heard = time.monotonic()
         if crc16(data[:-2]) != data[-2:]:
             message = f"check {data[-2:].hex()}; {crc16(data[:-2]).hex()} is needed"
+            raise Malformed(message)
+        if port.in_waiting:
+            message = f"{port.in_waiting} bytes behind an answer; silence is needed"
             raise Malformed(message)
         return data[1:-2]
 

@@ -4,29 +4,16 @@ import math
 from contextlib import contextmanager
 
 import pytest
+from other_devices import station_with
 from small_station import lot_of
 
 from schemas.errors import LinkLost, OperatorNeeded, RecipeInvalid, StationRefused, StationTimeout
-from schemas.station import load_station
 from stations.devices.adapters import AXES, CHAMBERS, axis_adapter, chamber_adapter
 from stations.opening import make_plant, serve_plant
 from stations.profile_files import load_profile, profile_names
 
 DRIVES = [name for name in profile_names() if load_profile(name).kind == "axis"]
 CONTROLLERS = [name for name in profile_names() if load_profile(name).kind == "chamber"]
-
-
-def station_with(axis: str = "oriental_az", chamber: str = "watlow_f4t"):
-    """The built-in station with these drives and this chamber."""
-    config = load_station()
-    devices = config.devices
-    link = load_profile(chamber).links[0] if load_profile(chamber).commands else "tcp"
-    changed = {
-        "outer": devices.outer.model_copy(update={"profile": axis}),
-        "inner": devices.inner.model_copy(update={"profile": axis}),
-        "chamber": devices.chamber.model_copy(update={"profile": chamber, "link": link}),
-    }
-    return config.model_copy(update={"devices": devices.model_copy(update=changed)})
 
 
 @contextmanager

@@ -4,8 +4,8 @@ import shutil
 import subprocess
 
 import pytest
+from other_devices import station_with
 from small_station import lot_of, plant_of
-from test_adapters import station_with
 
 from stations.codec import decode
 from stations.plant.server import PlantServer
