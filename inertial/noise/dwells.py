@@ -48,25 +48,27 @@ class DwellNoise:
         return 0.5 * (self.density / floor) ** 2 if floor > 0.0 else float("inf")
 
 
-def dwell_covariance(time: Array, duration: float, noise: DwellNoise, *, since: float = 0.0) -> Array:
+def dwell_covariance(
+    time: Array, duration: float, noise: DwellNoise, *, since: float = 0.0, slowest: float = 0.0
+) -> Array:
     """Covariance (n, n) of the means of dwells, g².
 
     White noise, flicker as a sum of Ornstein–Uhlenbeck processes with time constants an octave apart, each averaged over
     the dwells in closed form, and a random walk that is zero at ``since``. Flicker slower than the time from there to
-    the end is left out: for the run it is the bias itself.
+    the end, or than ``slowest``, is left out: for the run it is the bias itself. Plans of different length are compared at one value.
 
     Parameters
     ----------
     time : (n,), s, middles of the dwells
     duration : s, of each dwell
     since : s, when the devices were powered and the random walk began
+    slowest : s, least time constant that the slowest part of the flicker has
     """
     gap = np.abs(time[:, None] - time)
     covariance = np.eye(time.size) * noise.white(duration) ** 2
     if noise.instability > 0.0:
-        covariance += noise.instability**2 * flicker_of_means(
-            gap, duration, max(float(np.ptp(time)), float(time.max()) - since)
-        )
+        longest = max(float(np.ptp(time)), float(time.max()) - since, slowest)
+        covariance += noise.instability**2 * flicker_of_means(gap, duration, longest)
     if noise.walk > 0.0:
         elapsed = time - since
         walk = np.minimum(elapsed[:, None], elapsed)

@@ -1,0 +1,176 @@
+"""Exchange of poses until a plan determines a model best for the time it takes: D-, A- and worst-coefficient criteria.
+
+A plan is a row of slots in time, each filled by one of some candidates (poses). The dwells' noise is correlated in time, so
+what a pose is worth depends on when it is measured. With the weight W = C⁻¹ of the means, g = (W·H)ᵢ and δ the change of row i,
+the normal matrix M = HᵀWH becomes M + δgᵀ + gδᵀ + Wᵢᵢ·δδᵀ, so that all candidates of a slot are tried at once.
+
+Source: V. V. Fedorov, Theory of Optimal Experiments (1972), ch. 3 (exchange); R. K. Meyer and C. J. Nachtsheim, "The
+coordinate-exchange algorithm", Technometrics 37 (1995) 60; correlated errors: U. N. Brimkulov, G. K. Krug and V. L. Savanov
+(1986).
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+Choice = NDArray[np.intp]
+Criterion = Literal["D", "A", "worst"]
+
+_SHARPNESS = 12.0
+"""Power of the mean that stands for the worst coefficient: high enough for the worst to rule, smooth enough to go downhill."""
+
+_OTHERS = 0.1
+"""Share of the other coefficients beside the worst."""
+
+_RIDGE = 1e-9
+"""Share of its mean eigenvalue added to a normal matrix, so that a poor plan has a value too."""
+
+_GAIN = 1e-4
+"""Relative gain below which an exchange is not worth it."""
+
+_PASS_GAIN = 1e-3
+"""Gain of a whole pass below which the plan stays as it is."""
+
+_PASSES = 12
+
+
+@dataclass(frozen=True)
+class Slots:
+    """Slots of a plan, and what may stand in them.
+
+    rows : (n, c, 3, p), design rows of every candidate in every slot, in units of the errors wanted: error · column
+    weight : (n, n), inverse of the covariance of the dwell means, 1/g²
+    travel : (c, c), s from one candidate to another
+    seconds : of station time without travel
+    group : (n,), number of the soak: poses change places within one
+    fixed : (n,), slots that stay as they are
+    """
+
+    rows: Array
+    weight: Array
+    travel: Array
+    seconds: float
+    group: Choice
+    fixed: NDArray[np.bool_]
+
+    def matrix(self, choice: Choice) -> Array:
+        """Normal matrices (3, p, p) of a plan; the inverse's diagonal are variances over those wanted."""
+        h = np.swapaxes(self.rows[np.arange(choice.size), choice], 0, 1)
+        return np.swapaxes(h, -1, -2) @ (self.weight @ h)
+
+    def duration(self, choice: Choice) -> float:
+        """Station time, s."""
+        return self.seconds + float(np.sum(self.travel[choice[:-1], choice[1:]]))
+
+
+def ratios(matrix: Array) -> Array:
+    """Errors over those wanted, (..., 3, p), of normal matrices (..., 3, p, p)."""
+    return np.sqrt(np.diagonal(_inverse(matrix), axis1=-2, axis2=-1))
+
+
+def _inverse(matrix: Array) -> Array:
+    p = matrix.shape[-1]
+    ridge = _RIDGE * np.trace(matrix, axis1=-2, axis2=-1)[..., None, None] / p
+    return np.asarray(np.linalg.inv(matrix + ridge * np.eye(p)), dtype=np.float64)
+
+
+def _d(matrix: Array) -> Array:
+    """Log of the geometric mean of the variances, over the ellipsoid's axes."""
+    p = matrix.shape[-1]
+    return -np.linalg.slogdet(matrix)[1].sum(axis=-1) / (3.0 * p)
+
+
+def _a(matrix: Array) -> Array:
+    """Log of the mean variance over that wanted."""
+    return np.log(np.mean(ratios(matrix) ** 2, axis=(-2, -1)))
+
+
+def _worst(matrix: Array) -> Array:
+    """Log of the largest variance over that wanted, smoothed; and a little of the others', which may gain beside it."""
+    square = np.log(np.maximum(ratios(matrix) ** 2, 1e-300))
+    top = square.max(axis=(-2, -1))
+    smooth = np.log(np.mean(np.exp(_SHARPNESS * (square - top[..., None, None])), axis=(-2, -1))) / _SHARPNESS
+    return top + smooth + _OTHERS * square.mean(axis=(-2, -1))
+
+
+CRITERIA: dict[Criterion, Callable[[Array], Array]] = {"D": _d, "A": _a, "worst": _worst}
+
+
+def exchanged(slots: Slots, choice: Choice, criterion: Criterion = "worst") -> Choice:
+    """A plan (n,) from which no exchange of one pose, and no swap of two within a soak, gains information per station time.
+
+    Parameters
+    ----------
+    choice : (n,), the plan to begin with
+    criterion : what is to become small: "D" the volume of the errors' ellipsoid, "A" their mean square over those wanted,
+        "worst" the largest of them
+    """
+    value = CRITERIA[criterion]
+    best = choice.copy()
+    for _ in range(_PASSES):
+        before = _cost(slots, best, value)
+        for slot in np.flatnonzero(~slots.fixed):
+            best = _replaced(slots, best, int(slot), value)
+        for slot in np.flatnonzero(~slots.fixed):
+            best = _swapped(slots, best, int(slot), value)
+        if before - _cost(slots, best, value) < _PASS_GAIN:
+            break
+    return best
+
+
+def _cost(slots: Slots, choice: Choice, value: Callable[[Array], Array]) -> float:
+    """Log of variance times station time: halving either is worth the same."""
+    return float(value(slots.matrix(choice))) + float(np.log(slots.duration(choice)))
+
+
+def _replaced(slots: Slots, choice: Choice, slot: int, value: Callable[[Array], Array]) -> Choice:
+    """The plan with the best candidate in one slot."""
+    h = slots.rows[np.arange(choice.size), choice]
+    matrix = slots.matrix(choice)
+    g = np.einsum("k,kap->ap", slots.weight[slot], h)
+    delta = slots.rows[slot] - h[slot]
+    cross = delta[..., :, None] * g[..., None, :]
+    tried = matrix + cross + np.swapaxes(cross, -1, -2)
+    tried += slots.weight[slot, slot] * delta[..., :, None] * delta[..., None, :]
+    seconds = slots.duration(choice) + _detours(slots, choice, slot)
+    cost = value(tried) + np.log(seconds)
+    found = choice.copy()
+    if cost[choice[slot]] - cost.min() > _GAIN / choice.size:
+        found[slot] = int(np.argmin(cost))
+    return found
+
+
+def _detours(slots: Slots, choice: Choice, slot: int) -> Array:
+    """Change of travel (c,) in s for every candidate in a slot."""
+    total = np.zeros(len(slots.travel))
+    if slot > 0:
+        total += slots.travel[choice[slot - 1]]
+    if slot + 1 < choice.size:
+        total += slots.travel[:, choice[slot + 1]]
+    return total - total[choice[slot]]
+
+
+def _swapped(slots: Slots, choice: Choice, slot: int, value: Callable[[Array], Array]) -> Choice:
+    """The plan with one slot's pose in the best place of its soak, for that one's pose."""
+    others = np.flatnonzero((slots.group == slots.group[slot]) & ~slots.fixed & (choice != choice[slot]))
+    if not others.size:
+        return choice
+    plans = np.tile(choice, (others.size, 1))
+    plans[np.arange(others.size), others] = choice[slot]
+    plans[:, slot] = choice[others]
+    h = slots.rows[np.arange(choice.size), choice]
+    pair = np.stack([np.full(others.size, slot), others], axis=1)
+    delta = slots.rows[pair, np.take_along_axis(plans, pair, axis=1)] - h[pair]
+    g = np.einsum("bik,kap->biap", slots.weight[pair], h)
+    inside = slots.weight[pair[:, :, None], pair[:, None, :]]
+    cross = np.einsum("biap,biaq->bapq", delta, g)
+    tried = slots.matrix(choice) + cross + np.swapaxes(cross, -1, -2)
+    tried += np.einsum("biap,bij,bjaq->bapq", delta, inside, delta)
+    seconds = slots.seconds + slots.travel[plans[:, :-1], plans[:, 1:]].sum(axis=1)
+    cost = value(tried) + np.log(seconds)
+    best = int(np.argmin(cost))
+    return plans[best] if _cost(slots, choice, value) - cost[best] > _GAIN / choice.size else choice
