@@ -98,8 +98,9 @@ class Runner:
         parameters = {"capture": self.job.capture_id}
         about = {"inputs": inputs, "parameters": parameters, "code": ""}
         key = stage_key("capture", inputs, parameters, "")
-        if not self.run.has(("readings", "history"), key):
-            self.run.save("capture", key, captured_tables(records), about)
+        with alone(self.run.path, wait=True):
+            if not self.run.has(("readings", "history"), key):
+                self.run.save("capture", key, captured_tables(records), about)
         return was_there
 
     def _compute(self, stage: Stage) -> bool:

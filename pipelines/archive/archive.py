@@ -14,13 +14,14 @@ import re
 from datetime import UTC, datetime
 from hashlib import sha256
 from importlib.metadata import version
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from pipelines.archive import chain, files
 from pipelines.archive.keys import digest, libraries
 from pipelines.archive.listing import stages_of
 from pipelines.archive.records import COMPLETE, PARTS, Records
-from pipelines.archive.signatures import ENTRY
+from pipelines.archive.signatures import ENTRY, key_place
 from pipelines.archive.store import address_of, place_of
 from schemas.errors import ArchiveUnusable, WrongUse, did_you_mean
 from schemas.version import refuse_newer
@@ -207,6 +208,7 @@ class Archive:
 
     def prepare(self) -> None:
         """Make sure that the folder is an archive that can be written; refuse a folder of something else."""
+        self._refuse_key_within()
         mark = self.root / "archive.json"
         if mark.is_file():
             self._refuse_other_format(files.read_json(mark))
@@ -282,6 +284,15 @@ class Archive:
         """Names of the runs, in the order of the alphabet; among them may be one that is just being begun."""
         folder = self.root / "runs"
         return sorted(place.name for place in folder.iterdir()) if folder.is_dir() else []
+
+    def _refuse_key_within(self) -> None:
+        """Refuse a signing key that lies in the archive: whoever edits the one could use the other."""
+        key = key_place()
+        if key is not None and isinstance(self.root, Path) and key.resolve().is_relative_to(self.root.resolve()):
+            message = (
+                f"archive: signing key {key} lies in archive {self.root}, one outside is needed; move it elsewhere"
+            )
+            raise ArchiveUnusable(message)
 
     def _refuse_other_format(self, mark: Mapping[str, Any]) -> None:
         if mark.get("format") != FORMAT:

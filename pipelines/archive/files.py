@@ -6,6 +6,7 @@ is atomic by itself. A reader sees the whole file or none. Equal tables give equ
 
 from __future__ import annotations
 
+import fcntl
 import hashlib
 import json
 import os
@@ -228,11 +229,12 @@ def drop(folder: Place) -> None:
 
 
 def sweep(folder: Place) -> None:
-    """Remove what a killed writer left under temporary names; only for folders with one writer."""
-    if not isinstance(folder, ObjectPath) and folder.is_dir():  # an object store has no temporary names
-        with writing(folder):
-            for left in folder.glob(f"{TEMPORARY}*"):
-                shutil.rmtree(left) if left.is_dir() else left.unlink()
+    """Remove what a killed writer left under temporary names, unless somebody writes into the folder now."""
+    if isinstance(folder, ObjectPath) or not folder.is_dir():  # an object store has no temporary names
+        return
+    with writing(folder), writers_of(folder, fcntl.LOCK_EX | fcntl.LOCK_NB) as mine:
+        for left in folder.glob(f"{TEMPORARY}*") if mine else ():
+            shutil.rmtree(left) if left.is_dir() else left.unlink()
 
 
 @contextmanager
@@ -240,13 +242,36 @@ def _aside(folder: Path) -> Generator[Path, None, None]:
     """A name in a folder under which something is written before it is published; nothing is left of it."""
     folder.mkdir(parents=True, exist_ok=True)
     aside = folder / f"{TEMPORARY}{uuid.uuid4().hex}"
+    with writers_of(folder, fcntl.LOCK_SH):
+        try:
+            yield aside
+        finally:
+            if aside.is_dir():
+                shutil.rmtree(aside, ignore_errors=True)
+            else:
+                aside.unlink(missing_ok=True)
+
+
+@contextmanager
+def writers_of(folder: Path, mode: int) -> Generator[bool, None, None]:
+    """A block known to a folder's other writers: they share it, and who cleans up has it alone.
+
+    The system ends it when a process dies. Yields whether it was given; a shared one is not waited for where there are no locks.
+
+    Parameters
+    ----------
+    mode : ``fcntl.LOCK_SH``, or ``fcntl.LOCK_EX | fcntl.LOCK_NB``.
+    """
+    handle = os.open(folder, os.O_RDONLY)
     try:
-        yield aside
+        try:
+            fcntl.flock(handle, mode)
+            given = True
+        except OSError:  # held by a writer, or a file system without locks
+            given = False
+        yield given
     finally:
-        if aside.is_dir():
-            shutil.rmtree(aside, ignore_errors=True)
-        else:
-            aside.unlink(missing_ok=True)
+        os.close(handle)
 
 
 def _write_durably(path: Path, data: bytes) -> None:

@@ -114,6 +114,11 @@ def make_key(place: Path) -> Ed25519PublicKey:
     return key.public_key()
 
 
+def private_key(place: Path) -> Ed25519PrivateKey:
+    """The private key in a file."""
+    return _private(str(place))[0]
+
+
 def _canonical(content: Mapping[str, Any]) -> bytes:
     rest = {name: value for name, value in content.items() if name != ENTRY}
     return json.dumps(rest, sort_keys=True, ensure_ascii=False, separators=(",", ":")).encode()

@@ -33,6 +33,8 @@ COMMANDS: dict[str, tuple[str, str]] = {
     "diff": ("diff", "Tell what differs between two runs, by how much, and because of what."),
     "whatif": ("whatif", "Tell what a model would make of the archive's lots, before it is released."),
     "release": ("release", "Make a model the line's from a date, or list the releases."),
+    "audit": ("audit", "Audit the archive: what drifts, what is due, which station moved, how the population stands."),
+    "query": ("query", "Ask the archive in SQL."),
     "compare": ("compare", "Judge a model on dwells, and on fresh ones."),
     "diagnose": ("diagnose", "Say whether a model is adequate, where it fails, and which effect is missing."),
     "investigate": ("investigate", "Measure a lot, and then only what tells apart what its model may lack."),
@@ -41,6 +43,7 @@ COMMANDS: dict[str, tuple[str, str]] = {
     "plan": ("plan", "Say what a recipe can and cannot see, before it is measured."),
     "report": ("report", "Say where a run's report is; make it where it is missing."),
     "export": ("export", "Write coefficients for firmware and autopilots."),
+    "archive": ("archive", "Look after the archive: the key that signs, what killed writers left."),
     "station": ("station", "See, check, serve and describe stations."),
 }
 

@@ -26,6 +26,7 @@ def make_report(run: Run) -> bool:
     inputs, code = {name: run.manifest(name)["sha256"] for name in INPUTS}, code_hash(MODULES)
     key = stage_key("report", inputs, {}, code)
     if run.has_report(key):
+        run.seal()  # a writer that was killed may have left it out
         return True
     run.save_report(key, render(run), {"inputs": inputs, "parameters": {}, "code": code})
     return False

@@ -1,0 +1,86 @@
+"""``tumbleline archive``: the key that signs, and what killed writers left."""
+
+from __future__ import annotations
+
+from dataclasses import asdict
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from pipelines.cli.options import ArchiveOption, JsonOption, console, print_json
+
+app = typer.Typer(
+    help="Look after the archive.", no_args_is_help=True, add_completion=False, pretty_exceptions_enable=False
+)
+
+
+@app.command()
+def clean(
+    archive: ArchiveOption = None,
+    *,
+    only_look: Annotated[
+        bool, typer.Option("--dry-run", help="Say what would be taken away, and take nothing.")
+    ] = False,
+    as_json: JsonOption = False,
+) -> None:
+    """Take away what killed writers left, and name in the chain what they left out; never what is being written now."""
+    from pipelines.archive import Archive
+    from pipelines.archive.cleaning import clean as cleaned
+
+    store = Archive(archive)
+    store.refuse_none()
+    done = cleaned(store, only_look=only_look)
+    if as_json:
+        print_json({"archive": str(store.root), "only_looked": only_look, **asdict(done)})
+        return
+    out = console()
+    for place in done.removed:
+        out.print(f"{'left' if only_look else 'removed'}  {place}", markup=False, soft_wrap=True)
+    for place in dict.fromkeys(done.busy):
+        out.print(f"in use   {place}", markup=False, soft_wrap=True)
+    for run in done.sealed:
+        out.print(f"sealed   {run}", markup=False, soft_wrap=True)
+    word = "found" if only_look else "removed"
+    out.print(f"{len(done.removed)} left by killed writers {word} ({done.bytes} bytes)")
+    if done.anchored:
+        out.print(f"{done.anchored} calibrations put into the chain")
+
+
+@app.command()
+def key(
+    output: Annotated[
+        Path | None,
+        typer.Option(
+            "--output", metavar="FILE", help="The private key's file; in the user's configuration by default."
+        ),
+    ] = None,
+    *,
+    public: Annotated[
+        bool, typer.Option("--public", help="Show the public key of the one that is there; make none.")
+    ] = False,
+    as_json: JsonOption = False,
+) -> None:
+    """Make the key that signs manifests, and show its public half; it lies outside the archive."""
+    from pipelines.archive import signatures
+    from schemas.errors import WrongUse
+
+    place = output or signatures.default_key_place()
+    if public:
+        place = output or signatures.key_place()
+        if place is None:
+            message = "archive key: there is no key yet, one is needed; make it with 'tumbleline archive key'"
+            raise WrongUse(message)
+        made = signatures.private_key(place).public_key()
+    else:
+        made = signatures.make_key(place)
+    hexadecimal = made.public_bytes_raw().hex()
+    if as_json:
+        print_json({"name": signatures.name_of(made), "public": hexadecimal, "private_file": str(place)})
+        return
+    out = console()
+    out.print(f"key      {signatures.name_of(made)}", markup=False)
+    out.print(f"public   {hexadecimal}", markup=False, soft_wrap=True)
+    out.print(f"private  {place}", markup=False, soft_wrap=True)
+    if output is not None and not public:
+        out.print(f"sign with it by TUMBLELINE_SIGNING_KEY={place}", markup=False, soft_wrap=True)

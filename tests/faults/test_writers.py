@@ -1,0 +1,212 @@
+"""Several writers at once, and killed ones: nothing is lost, nobody reads half of anything, debris is taken away."""
+
+import os
+import signal
+import subprocess
+import sys
+import threading
+import time
+from pathlib import Path
+
+import pytest
+from capture_double import CaptureDouble, PulledPlug, small_job, small_run
+from ledger_events import event
+from typer.testing import CliRunner
+
+from pipelines.archive import Archive, chain, files
+from pipelines.archive.cleaning import clean
+from pipelines.archive.locks import alone
+from pipelines.chain import ORDER
+from pipelines.cli import app
+from pipelines.runner import Runner
+from pipelines.trace import Ledger
+from pipelines.trace.checks import verify
+from schemas.errors import ArchiveUnusable
+
+TESTS = Path(__file__).resolve().parents[1]
+WRITERS = 8
+MANIFESTS = ("runs/*/*.json", "captures/*/[0-9]*/record.json", "calibrations/*/*/[0-9]*.json", "chain/*/[0-9]*.json")
+
+WRITER = """
+import sys
+from pathlib import Path
+sys.path[:0] = [{tests!r}, {root!r}]
+from capture_double import CaptureDouble, small_job
+from pipelines.archive import Archive
+from pipelines.chain import ORDER
+from pipelines.runner import Runner
+from pipelines.trace import Ledger
+
+folder, archive, number = Path(sys.argv[1]), Archive(sys.argv[2]), int(sys.argv[3])
+folder.mkdir()
+for seed in (number, 99):  # a lot of its own, then the one that all of them work on
+    job = small_job(folder, ("seed = 5", f"seed = {{seed}}"), ('"A1", "A2", "A3"', f'"S{{seed}}", "T{{seed}}"'))
+    runner = Runner(job, archive, measure=CaptureDouble())
+    for stage in ORDER[:-1]:
+        runner.stage(stage)
+    runner.run.seal()
+    Ledger(archive).certify(runner.run, start=f"2026-01-{{number:02d}}", until="2099-01-01", supersede=True)
+"""
+
+FLOOD = """
+import sys
+sys.path[:0] = [{tests!r}, {root!r}]
+from pathlib import Path
+from pipelines.archive import files
+folder, data, n = Path(sys.argv[1]), b"x" * 2_000_000, 0
+print("ready", flush=True)
+while True:
+    files.publish(folder / f"{{n % 7}}.bin", data)
+    files.publish_folder(folder / f"record-{{n}}", {{"a": data[:1000], "b": data[:1000]}})
+    n += 1
+"""
+
+
+def script(text: str) -> str:
+    return text.format(tests=str(TESTS), root=str(TESTS.parent))
+
+
+def start(text: str, *arguments: object) -> subprocess.Popen[str]:
+    command = [sys.executable, "-c", script(text), *map(str, arguments)]
+    environment = {**os.environ, "OMP_NUM_THREADS": "1", "TUMBLELINE_SIGNING_KEY": ""}
+    return subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env=environment)
+
+
+@pytest.mark.slow
+def test_eight_writers_at_once_lose_nothing_and_nobody_reads_half(tmp_path: Path) -> None:
+    """Eight processes: each a lot and its certificates of its own, and all of them one more lot, at the same time."""
+    root = tmp_path / "archive"
+    Archive(root).prepare()
+    job = small_job(tmp_path, ("seed = 5", "seed = 99"), ('"A1", "A2", "A3"', '"S99", "T99"'))
+    shared = Archive(root).capture(job.capture_id)
+    CaptureDouble()(job, shared, lambda *_: None)
+    shared.complete()
+    writers = [start(WRITER, tmp_path / f"w{n}", root, n) for n in range(1, WRITERS + 1)]
+    halves, looks, over = list[str](), 0, threading.Event()
+
+    def look() -> None:
+        nonlocal looks
+        while not over.is_set():
+            for path in root.glob("runs/*/*.parquet"):
+                try:
+                    files.read_table(path, path.stem)
+                except ArchiveUnusable as problem:
+                    halves.append(str(problem))
+                looks += 1
+            for pattern in MANIFESTS:
+                for path in root.glob(pattern):
+                    files.read_json(path)
+            time.sleep(0.02)
+
+    reader = threading.Thread(target=look)
+    reader.start()
+    errors = [writer.communicate(timeout=240)[1] for writer in writers]
+    over.set()
+    reader.join()
+    assert [writer.returncode for writer in writers] == [0] * WRITERS, errors
+    assert halves == []
+    assert looks > 0
+    archive = Archive(root)
+    assert len(archive.runs()) == WRITERS + 1
+    ledger = Ledger(archive)
+    for n in range(1, WRITERS + 1):
+        assert ledger.valid_at(f"S{n}", "2030-01-01") is not None
+    events = ledger.events("S99")
+    assert [e.sequence for e in events] == list(range(1, WRITERS + 1))
+    assert {e.start for e in events} == {f"2026-01-{n:02d}" for n in range(1, WRITERS + 1)}
+    report = verify(archive, keys={})
+    assert report.checked.findings == []
+    assert chain.last_number(root) >= 3 * WRITERS
+    assert not list(root.rglob(f"{files.TEMPORARY}*"))
+
+
+@pytest.mark.slow
+def test_a_writer_killed_in_a_publish_leaves_only_what_clean_takes_away(tmp_path: Path) -> None:
+    root = tmp_path / "archive"
+    Archive(root).prepare()
+    folder = root / "runs" / "r-1"
+    folder.mkdir(parents=True)
+    left: list[Path] = []
+    for _ in range(20):
+        writer = start(FLOOD, folder)
+        assert writer.stdout is not None
+        assert writer.stdout.readline() == "ready\n"
+        end = time.monotonic() + 20.0
+        while not list(folder.glob(f"{files.TEMPORARY}*")) and time.monotonic() < end:
+            pass
+        writer.send_signal(signal.SIGKILL)
+        writer.communicate()
+        left = list(root.rglob(f"{files.TEMPORARY}*"))
+        if left:
+            break
+    assert left, "no kill met a publish"
+    assert {path.stat().st_size for path in folder.glob("*.bin")} <= {2_000_000}
+    assert all(len(list(path.iterdir())) == 2 for path in folder.glob("record-*"))
+    looked = clean(Archive(root), only_look=True)
+    assert sorted(looked.removed) == sorted(map(str, left))
+    assert list(root.rglob(f"{files.TEMPORARY}*"))
+    done = clean(Archive(root))
+    assert sorted(done.removed) == sorted(map(str, left))
+    assert not list(root.rglob(f"{files.TEMPORARY}*"))
+
+
+def test_clean_takes_nothing_that_is_being_written_now(tmp_path: Path) -> None:
+    Archive(tmp_path).prepare()
+    folder = tmp_path / "chain" / "000000"
+    folder.mkdir(parents=True)
+    with files._aside(folder) as aside:
+        aside.write_bytes(b"half")
+        done = clean(Archive(tmp_path))
+        assert (done.removed, done.busy) == ([], [str(folder)])
+        assert aside.read_bytes() == b"half"
+    (folder / f"{files.TEMPORARY}dead").write_bytes(b"half")
+    assert clean(Archive(tmp_path)).removed == [str(folder / f"{files.TEMPORARY}dead")]
+
+
+def test_clean_leaves_a_capture_alone_that_is_being_measured(tmp_path: Path) -> None:
+    Archive(tmp_path).prepare()
+    capture = tmp_path / "captures" / "c"
+    with alone(capture):
+        (capture / f"{files.TEMPORARY}ahead-00003").mkdir()
+        assert clean(Archive(tmp_path)).removed == []
+    assert clean(Archive(tmp_path)).removed == [str(capture / f"{files.TEMPORARY}ahead-00003")]
+
+
+def test_clean_finds_what_a_killed_writer_left_out_of_the_chain(tmp_path: Path) -> None:
+    run = small_run(tmp_path)
+    list(Runner(small_job(tmp_path), run.archive, measure=CaptureDouble(stop_after=0)).all())
+    (run.path / "sealed.json").unlink()
+    Ledger(run.archive).add(event())
+    done = clean(run.archive)
+    assert (done.sealed, done.anchored) == ([run.id], 1)
+    again = clean(run.archive)
+    assert (again.sealed, again.anchored) == ([], 0)
+
+
+def test_a_run_that_is_finished_again_is_sealed(tmp_path: Path) -> None:
+    job, archive = small_job(tmp_path), Archive(tmp_path / "archive")
+    list(Runner(job, archive, measure=CaptureDouble()).all())
+    mark = archive.run("latest").path / "sealed.json"
+    mark.unlink()
+    runner = Runner(job, archive, measure=CaptureDouble(stop_after=0))
+    assert all(done.reused for done in runner.all())
+    assert mark.is_file()
+
+
+def test_the_command_says_what_it_took_away(tmp_path: Path) -> None:
+    Archive(tmp_path).prepare()
+    (tmp_path / f"{files.TEMPORARY}dead").write_bytes(b"12345")
+    told = CliRunner().invoke(app, ["archive", "clean", "--dry-run", "--archive", str(tmp_path)])
+    assert "1 left by killed writers found (5 bytes)" in told.stdout
+    told = CliRunner().invoke(app, ["archive", "clean", "--archive", str(tmp_path)])
+    assert "1 left by killed writers removed (5 bytes)" in told.stdout
+    assert told.exit_code == 0
+
+
+def test_a_capture_cut_off_leaves_nothing_that_hinders_the_next(tmp_path: Path) -> None:
+    archive, job = Archive(tmp_path / "archive"), small_job(tmp_path)
+    with pytest.raises(PulledPlug):
+        list(Runner(job, archive, measure=CaptureDouble(stop_after=3)).all())
+    assert clean(archive).removed == []
+    runner = Runner(job, archive, measure=CaptureDouble())
+    assert [runner.stage(name).reused for name in ORDER[:-1]] == [False] * (len(ORDER) - 1)
