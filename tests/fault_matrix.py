@@ -1,0 +1,281 @@
+"""What becomes of a capture under each fault: the cases, how one is tried, and how its outcome is told.
+
+The truth is the plant's: every mean that a run would calibrate with is held against what the unit must have said in the pose and
+at the temperature that the plant really had. A mean that is off is bad data, whatever the station believed.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+from small_station import QUIET, MemorySink, lot_of, quiet_progress
+
+from inertial import poses
+from pipelines.stages.capture import capture, steps
+from pipelines.stages.reduce import reduce
+from pipelines.stages.validate import validate
+from schemas.errors import StationError
+from schemas.event import MemoryLog
+from schemas.fault import parse_fault
+from schemas.recipe import Pose, Recipe
+from schemas.station import StationConfig, load_station
+from stations.opening import make_plant, serve_plant
+from stations.plant.device import Devices
+from stations.plant.faults.catalogue import kinds
+from stations.plant.plant import Plant
+
+UNITS = 3
+FAR_UG = 100.0  # a mean this far from the truth is bad data; quiet devices in a sound station stay below 10 µg
+RECOVERED, UNIT, RUN = "recovered", "unit refused", "run refused"
+
+
+@dataclass(frozen=True)
+class Case:
+    """A fault, and what must come of it. ``says`` is part of what the operator is told."""
+
+    fault: str
+    outcome: str
+    says: str = ""
+    spoilt: bool = False
+    temperatures: tuple[float, ...] = (25.0, 45.0)
+
+    @property
+    def kind(self) -> str:
+        return parse_fault(self.fault).kind
+
+
+@dataclass
+class Tried:
+    """What came of a case."""
+
+    outcome: str
+    told: str
+    status: int
+    refused: list[str]
+    records: int
+    wanted: int
+    spoilt: list[str] = field(default_factory=list)
+    bad: list[str] = field(default_factory=list)
+
+
+def recipe_of(temperatures: tuple[float, ...]) -> Recipe:
+    plan = [Pose(name=f"p{i}", outer_deg=o, inner_deg=n) for i, (o, n) in enumerate(poses.plan("six").tolist())]
+    return Recipe(
+        name="matrix",
+        device="ADXL355",
+        local_gravity_m_s2=9.80665,
+        temperatures_C=list(temperatures),
+        poses=plan,
+        verification=[Pose(name="v0", outer_deg=70.0, inner_deg=-30.0)],
+        static_pose=Pose(name="up", outer_deg=0.0, inner_deg=0.0),
+        dwell_s=2.0,
+        rate_hz=100.0,
+        soak_min_s=300.0,
+        allow_short_soak=True,
+    )
+
+
+def station_under(fault: str) -> StationConfig:
+    """The built-in station with quiet devices, short patience and one fault."""
+    config = load_station()
+    assert config.simulation is not None
+    quiet = config.simulation.model_copy(
+        update={"preset_overrides": QUIET, "faults": [parse_fault(fault)] if fault else [], "slot_gradient_K": 0.02}
+    )
+    patience = config.link.model_copy(update={"timeout_s": 0.15, "read_attempts": 2})
+    soak = config.soak.model_copy(update={"limit_s": 3600.0})
+    rules = config.suspenders.model_copy(update={"limit_s": 600.0, "attempts": 3})
+    return config.model_copy(update={"simulation": quiet, "link": patience, "soak": soak, "suspenders": rules})
+
+
+def tried(case: Case) -> Tried:
+    """A capture under the fault, its data judged, and every mean held against the plant's truth."""
+    config, lot, recipe = station_under(case.fault), lot_of(UNITS), recipe_of(case.temperatures)
+    sink, events, plant = MemorySink(), MemoryLog(), make_plant(station_under(case.fault), lot_of(UNITS))
+    told, status = "", 0
+    with serve_plant(config, lot, plant) as station:
+        try:
+            capture(station, recipe, lot, sink, progress=quiet_progress, events=events)
+        except StationError as problem:
+            told, status = str(problem), problem.exit_status
+    wanted = len(steps(recipe))
+    spoilt = [event.reason for event in events.noted() if event.kind in {"spoilt", "suspended"}]
+    if not sink.records:
+        return Tried(RUN, told, status, [], 0, wanted, spoilt)
+    verdicts = validate([sink.records[n][0] for n in sorted(sink.records)], sink.all(1), lot.units)
+    refused = verdicts.loc[verdicts["refused"], "unit"].tolist()
+    if not told and refused:
+        told = verdicts.loc[verdicts["refused"], "reason"].iloc[0]
+    outcome = RUN if status else UNIT if refused else RECOVERED
+    bad = list(far_from_the_truth(plant, sink, verdicts, recipe))
+    return Tried(outcome, told, status, refused, len(sink.records), wanted, spoilt, bad)
+
+
+def far_from_the_truth(plant: Plant, sink: MemorySink, verdicts: pd.DataFrame, recipe: Recipe) -> Iterator[str]:
+    """Means of accepted units that are not what the unit must have said; the truth is the plant's, not the station's."""
+    samples = [sink.records[n][0] for n in sorted(sink.records)]
+    dwells = reduce(samples, sink.all(1), verdicts, recipe.local_gravity_m_s2)
+    by_serial = {truth.serial: truth for truth in (plant.truth(unit.serial) for unit in lot_of(UNITS).units)}
+    for row in dwells.itertuples():
+        truth = by_serial[row.unit]
+        device = Devices(plant.preset, [truth])
+        force = (truth.slot_rotation @ np.array([row.force_x, row.force_y, row.force_z]))[None, None, :]
+        should = device.output(force, np.array([[row.unit_C]]))[0, 0]
+        found = np.array([row.out_x, row.out_y, row.out_z]) / plant.preset.scale
+        off = 1e6 * float(np.abs(found - should).max())
+        if off > FAR_UG:
+            yield f"{row.unit} {row.pose}: {off:.0f} µg"
+
+
+WITHIN, MOVING, SOAKING, LATE = (
+    437.5,
+    443.0,
+    900.0,
+    1500.0,
+)  # s: in the third dwell, in the move behind it, in the second soak
+CASES: tuple[Case, ...] = (
+    # the wire
+    Case(f"time_out:at_s={WITHIN}", RECOVERED),
+    Case(f"time_out:at_s={WITHIN}:frames=500", RUN, "no answer to"),
+    Case(f"time_out:at_s={MOVING}", RECOVERED),
+    Case(f"delay:at_s={WITHIN}:frames=5:delay_s=0.05", RECOVERED),
+    Case(f"reset:at_s={WITHIN}", RECOVERED),
+    Case(f"reset:at_s={WITHIN}:frames=500", RUN, "check power, network and port"),
+    Case(f"half_open:at_s={WITHIN}", RECOVERED),
+    Case(f"late_reply:at_s={WITHIN}", RECOVERED),
+    Case(f"other_transaction:at_s={WITHIN}", RECOVERED),
+    Case(f"truncated:at_s={WITHIN}", RECOVERED),
+    Case(f"byte_garbage:at_s={WITHIN}", RECOVERED),
+    Case(f"byte_garbage:at_s={MOVING}:frames=200", RUN, "check gateway and cable"),
+    # what devices answer
+    Case(f"silent:at_s={WITHIN}:serial=U001", UNIT, "slot 1: no answer"),
+    Case(f"silent:at_s={WITHIN}:device=reader:for_s=15", RECOVERED, spoilt=True),
+    Case(f"silent:at_s={WITHIN}:device=chamber", RUN, "chamber"),
+    Case(f"mute:at_s={WITHIN}:serial=U001", UNIT, "slot 1: no answer"),
+    Case(f"mute:at_s={WITHIN}:device=reader:for_s=15", RECOVERED, spoilt=True),
+    Case(f"mute:at_s={SOAKING}:device=chamber", RUN, "no answer to 'read chamber"),
+    Case(f"exception_code:at_s={WITHIN}:serial=U001:code=6", UNIT, "slot 1: implausible answer"),
+    Case(f"exception_code:at_s={WITHIN}:device=reader", RUN, "exception 4 (device failure)"),
+    Case(f"exception_code:at_s={MOVING}:device=outer:code=2", RUN, "exception 2"),
+    Case(f"exceptions_off:at_s={WITHIN}:serial=U001", UNIT, "slot 1: implausible answer"),
+    Case(f"exceptions_off:at_s={WITHIN}:device=outer", RUN, "outer axis: stands at"),
+    Case(f"exceptions_off:at_s={WITHIN}:device=chamber", RUN, "check the controller's panel"),
+    Case(f"exceptions_off:at_s={WITHIN}:device=reader", RUN, "0 samples of 200", spoilt=True),
+    Case(f"partial_write:at_s={WITHIN}:device=outer", RUN, "direct_data"),
+    Case(f"partial_write:at_s={WITHIN}:device=chamber", RUN, "write chamber set_point"),
+    Case(f"swapped_words:at_s={WITHIN}:device=outer", RUN, "outer axis"),
+    Case(f"swapped_words:at_s={WITHIN}:device=chamber", RUN, "chamber"),
+    Case(f"swapped_words:at_s={WITHIN}:device=reader", RUN, "check supply, sensors, word order"),
+    Case(f"swapped_words:at_s={WITHIN}:serial=U001", UNIT, "slot 1: implausible answer"),
+    Case("swapped_words:serial=U001", UNIT, "slot 1: implausible answer"),
+    Case(f"garbage:at_s={WITHIN}:device=inner", RUN, "inner axis"),
+    Case(f"garbage:at_s={WITHIN}:device=chamber", RUN, "chamber"),
+    Case(f"garbage:at_s={WITHIN}:device=reader", RUN, "reader"),
+    Case(f"garbage:at_s={WITHIN}:serial=U001", UNIT, "slot 1: implausible answer"),
+    # the table
+    Case(f"stuck_encoder:at_s={WITHIN}:device=outer", RUN, "outer axis: stands at"),
+    Case(f"stuck_encoder:at_s={MOVING}:device=outer", RUN, "outer axis: stands at"),
+    Case(f"backlash:at_s={WITHIN}:device=outer", RUN, "check zero and gears"),
+    Case("backlash:device=inner", RUN, "check zero and gears"),
+    Case(f"table_stall:at_s={MOVING}:device=outer", RUN, "standing is needed"),
+    Case(f"table_stall:at_s={MOVING}:device=outer:for_s=20", RECOVERED),
+    Case(f"lost_home:at_s={WITHIN}:device=outer", RUN, "home the axis"),
+    Case(f"lost_home:at_s={WITHIN}:device=inner:admitted=0", RUN, "its zero is lost"),
+    Case(f"lost_home:at_s={MOVING}:device=outer:admitted=0", RUN, "outer axis: stands at"),
+    # the chamber
+    Case(f"chamber_unsettled:at_s={WITHIN}", RUN, "soak: a device at"),
+    Case("chamber_overshoot", RECOVERED),
+    Case(f"chamber_power:at_s={SOAKING}", RUN, "soak: a device at"),
+    Case(f"chamber_power:at_s={SOAKING}:for_s=300", RECOVERED),
+    Case(f"frozen_temperature:at_s={WITHIN}:serial=U001", UNIT, "slot 1: does not settle at 45"),
+    Case(f"frozen_temperature:at_s={WITHIN}:device=reader", RUN, "soak: a device at"),
+    Case(f"frozen_temperature:at_s={WITHIN}:device=chamber", RUN, "the chamber's air is at", spoilt=True),
+    # the devices under test and their reader
+    Case(f"dead:at_s={WITHIN}:serial=U001", UNIT, "constant output"),
+    Case("swapped_slots:serial=U001", RUN, "'U002' sits there, 'U001' is needed"),
+    Case(f"swapped_slots:at_s={WITHIN}:serial=U001", RUN, "'U001' does not sit there any more"),
+    Case(f"fifo_overflow:at_s={WITHIN}:serial=U001", RECOVERED, spoilt=True),
+    Case(f"dropped_samples:at_s={WITHIN}", RECOVERED, spoilt=True),
+    Case(f"dropped_samples:at_s={WITHIN}:numbered=0", RECOVERED, spoilt=True),
+    Case(f"supply_sag:at_s={WITHIN}:serial=U001", UNIT, "supply out of tolerance", spoilt=True),
+    Case(f"supply_sag:at_s={WITHIN}:device=reader:for_s=60", RECOVERED, spoilt=True),
+    # around the station
+    Case(f"clock_jump:at_s={WITHIN}", RECOVERED, spoilt=True),
+    Case(f"clock_jump:at_s={WITHIN}:step_s=-30", RECOVERED, spoilt=True),
+    Case(f"clock_jump:at_s={SOAKING}:step_s=3000", RECOVERED, spoilt=True),
+    Case(f"door:at_s={WITHIN}:for_s=100", RECOVERED, spoilt=True),
+    Case(f"door:at_s={WITHIN}", RUN, "the chamber's door is open", spoilt=True),
+    Case(f"vibration:at_s={WITHIN}:for_s=30", RECOVERED, spoilt=True),
+    Case(f"vibration:at_s={WITHIN}", RUN, "vibration", spoilt=True),
+    Case(f"emergency_stop:at_s={WITHIN}", RUN, "the emergency stop is pressed"),
+    Case(f"emergency_stop:at_s={MOVING}:for_s=2000", RUN, "the emergency stop is pressed"),
+)
+
+
+PAGE = Path(__file__).resolve().parents[1] / "docs" / "reference" / "faults.md"
+HEAD = """\
+# Faults, and what becomes of them
+
+Written by `python tests/fault_matrix.py` from what the tests find; the tests hold every row against what they find again. A fault
+is given to a simulated station in its file or in a recipe (`faults = [{ kind = "door", at_s = 437.5, for_s = 100 }]`), on the
+command line (`tumbleline run --fault door:at_s=437.5:for_s=100`), or by a test. Each row is a capture of three units at two
+temperatures; the fault comes within the third dwell (437.5 s), in the move behind it (443 s), in the second soak (900 s), or is
+there from the beginning.
+
+- **recovered**: the run came to its end, and every mean of every unit lies within 100 µg of what the plant knows to be true. Where
+  *measured again* stands, dwells were spoilt, thrown away, and measured again, with the reason in the run's journal
+  (`tumbleline show RUN events`).
+- **unit refused**: the run came to its end; the unit that is concerned gets no coefficient, no grade and no certificate, the
+  others are true.
+- **run refused**: the run ended with exit status 3 and this message; what was finished before is kept, and the same command goes
+  on behind it.
+
+"""
+
+
+def row(case: Case, found: Tried) -> str:
+    """The line of a case in the page."""
+    fault = parse_fault(case.fault)
+    figures = ", ".join(f"{name} {value:g}" for name, value in fault.figures.items())
+    who = "a unit" if fault.serial else fault.device or "the station"
+    when = "from the beginning" if fault.at_s == 0.0 else f"{fault.at_s:g} s"
+    how_long = "" if fault.for_s is None else f", for {fault.for_s:g} s"
+    again = " (measured again)" if found.spoilt and found.outcome == RECOVERED else ""
+    told = f"…{case.says}…" if case.says else ""
+    return f"| `{fault.kind}` | {who} | {when}{how_long} | {figures} | {found.outcome}{again} | {told} |"
+
+
+def page(rows: list[str]) -> str:
+    """The whole page."""
+    named = [f"| `{name}` | {(kind.__doc__ or '').splitlines()[0]} |" for name, kind in kinds().items()]
+    parts = [
+        HEAD + "## The matrix\n",
+        "| fault | whose | when | figures | outcome | what the operator is told |",
+        "|---|---|---|---|---|---|",
+        *rows,
+        "",
+        HOST,
+        "## The kinds\n",
+        "| kind | what it is |",
+        "|---|---|",
+        *named,
+        "",
+    ]
+    return "\n".join(parts)
+
+
+HOST = """\
+## The host
+
+| fault | outcome | test |
+|---|---|---|
+| disk full, at any write | refused with the archive's message and exit status 2; with space again the same command goes on | `test_full_disk` |
+| killed (SIGKILL) at every stage boundary | the same command ends in the same bytes; no finished dwell is measured twice | `test_killed` |
+| killed at 50 random times of the capture | as above, bit for bit | `test_killed` |
+"""
+
+
+if __name__ == "__main__":
+    PAGE.write_text(page([row(case, tried(case)) for case in CASES]), encoding="utf-8")

@@ -1,0 +1,47 @@
+"""Every fault ends well: recovered, a unit refused, or the run refused by name; never a calibration on bad data."""
+
+import pytest
+from fault_matrix import CASES, PAGE, RECOVERED, RUN, UNIT, Case, page, row, tried
+
+from schemas.errors import STATION
+from stations.plant.faults.catalogue import figures, kinds
+
+
+@pytest.mark.parametrize("case", CASES, ids=lambda case: case.fault)
+def test_a_fault_ends_as_the_matrix_says(case: Case) -> None:
+    found = tried(case)
+    assert (found.outcome, found.told) == (case.outcome, found.told)
+    assert case.says in found.told
+    if case.outcome == RUN:
+        assert found.status == STATION
+        assert found.told.count(";") >= 1, "what was found, what is needed; what to do"
+        assert found.records < found.wanted
+    else:
+        assert found.status == 0
+        assert found.records == found.wanted
+        assert not found.bad, found.bad
+    assert found.refused == (["U001"] if case.outcome == UNIT else [])
+    if case.spoilt:
+        assert found.spoilt, "spoilt dwells are measured again, with the reason in the journal"
+    assert row(case, found) in PAGE.read_text(encoding="utf-8"), "write the page again: python tests/fault_matrix.py"
+
+
+def test_every_kind_is_in_the_matrix_and_the_page_is_of_these_cases() -> None:
+    assert {case.kind for case in CASES} == set(kinds())
+    text = PAGE.read_text(encoding="utf-8")
+    rows = [line for line in text.splitlines() if line.startswith("| `") and line.count("|") == 7]
+    assert len(rows) == len(CASES)
+    assert text == page(rows), "write the page again: python tests/fault_matrix.py"
+
+
+def test_a_sound_station_is_true_to_the_last_dwell() -> None:
+    found = tried(Case("vibration:rms_g=0", RECOVERED))
+    assert (found.outcome, found.bad, found.spoilt) == (RECOVERED, [], [])
+
+
+@pytest.mark.parametrize("name", kinds())
+def test_every_kind_says_what_it_is_and_whom_it_may_mean(name: str) -> None:
+    kind = kinds()[name]
+    assert kind.__module__.rpartition(".")[2] == name, "one kind, one file, of the same name"
+    assert (kind.__doc__ or "").strip().endswith(".")
+    assert all(isinstance(value, float) for value in figures(kind).values())
