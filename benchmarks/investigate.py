@@ -48,25 +48,46 @@ class Scene:
     repeats: int = 1
     temperatures: tuple[float, ...] = (25.0,)
     settle_s: float = 2.0
+    soak_s: float = 900.0
+    one_order: bool = False
 
 
+LOOP = (25.0, 60.0, -10.0, 20.0)
+UP = (0.0, 20.0, 40.0, 60.0)
 SCENES = (
     Scene("cubic on 26", "cubic_transfer", ("third_order",), {"hardening": 60e-6}, "twenty_six", 2),
     Scene("cubic on 18", "cubic_transfer", ("third_order",), {"hardening": 90e-6}, "eighteen", 2),
     Scene("cubic on 24 even", "cubic_transfer", ("third_order",), {"hardening": 25e-6}, "fibonacci24", 2),
-    Scene("pendulum on faces and edges", "pendulous_mass", ("cross_coupling",), {"compliance": 30e-6}, "eighteen", 2),
-    Scene("harmonic on 12 edges", "encoder_harmonic", ("encoder_harmonic",), {"size": 50e-6}, "twelve", 3),
-    Scene("harmonic on 18", "encoder_harmonic", ("encoder_harmonic",), {"size": 50e-6}, "eighteen", 2),
-    Scene("level on 12 edges", "level_error", ("level_error",), {"about_x": 0.0, "about_y": -60e-6}, "twelve", 3),
-    Scene("creep with one wait", "creep", ("creep_after_move",), {"size": 50e-6, "tau": 30.0}, "eighteen", 2),
-    Scene("warm-up seen late", "warm_up", ("warm_up",), {"size": 200e-6, "tau": 2500.0}, "eighteen", 2),
+    Scene("cubic at 4 temperatures", "cubic_transfer", ("third_order",), {"hardening": 90e-6}, "eighteen", 1, LOOP),
+    Scene("pendulum on faces", "pendulous_mass", ("cross_coupling",), {"compliance": 40e-6}, "six", 6),
+    Scene("harmonic on faces", "encoder_harmonic", ("encoder_harmonic",), {"size": 50e-6}, "six", 6),
+    Scene("level on faces", "level_error", ("level_error",), {"about_x": 0.0, "about_y": -60e-6}, "six", 6),
     Scene(
-        "hysteresis with three soaks", "hysteresis_play", ("thermal_hysteresis",), {"gain": 8e-6, "width": 10.0},
-        "nine", 1, (25.0, 60.0, -10.0, 20.0),
+        "creep in one order", "creep", ("creep_after_move",), {"size": 60e-6, "tau": 30.0}, "eighteen", 3, one_order=True
+    ),
+    Scene("creep on faces", "creep", ("creep_after_move",), {"size": 60e-6, "tau": 30.0}, "six", 6, one_order=True),
+    Scene("warm-up seen late", "warm_up", ("warm_up",), {"size": 250e-6, "tau": 3000.0}, "eighteen", 8),
+    Scene("late step", "step_change", ("step_change",), {"size": 40e-6, "at": 1950.0}, "eighteen", 4),
+    Scene(
+        "hysteresis with 4 soaks", "hysteresis_play", ("thermal_hysteresis",), {"gain": 8e-6, "width": 10.0},
+        "nine", 1, LOOP,
     ),
     Scene(
-        "vibration with three soaks", "vibration_rectification", ("vibration_rectification",), {"coefficient": 2.5e4},
-        "nine", 1, (25.0, 60.0, -10.0, 20.0),
+        "hysteresis one way", "hysteresis_play", ("thermal_hysteresis",), {"gain": 8e-6, "width": 12.0}, "nine", 1, UP
+    ),
+    Scene(
+        "vibration with 4 soaks", "vibration_rectification", ("vibration_rectification",), {"coefficient": 2.5e4},
+        "nine", 1, LOOP,
+    ),
+    Scene(
+        "vibration one way", "vibration_rectification", ("vibration_rectification",), {"coefficient": 2.5e4},
+        "nine", 1, UP,
+    ),
+    Scene("warm-up one way", "warm_up", ("warm_up",), {"size": 200e-6, "tau": 3600.0}, "nine", 1, UP),
+    Scene("step one way", "step_change", ("step_change",), {"size": 60e-6, "at": 4000.0}, "nine", 1, UP),
+    Scene(
+        "lag after short soaks", "element_lag", ("thermal_lag",), {"tempco": 60e-6, "tau": 250.0}, "nine", 1, UP,
+        soak_s=300.0,
     ),
 )  # fmt: skip
 
@@ -101,7 +122,9 @@ def job_of(scene: Scene, seed: int, units: int) -> Any:
     from schemas.station import Hidden, load_station
 
     rng = np.random.default_rng([seed, 7])
-    angles = np.concatenate([rng.permutation(poses.plan(scene.plan)) for _ in range(scene.repeats)])
+    order = rng.permutation(len(poses.plan(scene.plan)))
+    turns = [order if scene.one_order else rng.permutation(order) for _ in range(scene.repeats)]
+    angles = poses.plan(scene.plan)[np.concatenate(turns)]
     varied = len(scene.temperatures) > 1
     plain = load_recipe()
     changes = {
@@ -113,6 +136,8 @@ def job_of(scene: Scene, seed: int, units: int) -> Any:
         "verification": [],
         "temperatures_C": list(scene.temperatures),
         "settle_s": scene.settle_s,
+        "soak_min_s": scene.soak_s,
+        "allow_short_soak": True,
         "dwell_s": 8.0,
         "rate_hz": 25.0,
         "static_record_s": 60.0,

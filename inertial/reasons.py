@@ -27,6 +27,7 @@ ENOUGH = 0.05
 
 _PLAIN = ("bias", "scale", "misalignment")
 _VANISHED = 1e-6
+_BETTER = 1.5
 _ABSORBED = 0.05
 _ERROR = 1e-5
 
@@ -99,6 +100,27 @@ def cause(state: State, effect_id: str, base: Sequence[str], *, axis: int | None
     found = " and ".join(c.found(one) for c in changes)
     does = does if len(changes) == 1 else does.replace("makes", "together make", 1)
     return Cause(found, does, result, " and ".join(c.cure(one) for c in changes))
+
+
+def likeness(state: State, one: str, other: str, base: Sequence[str]) -> str:
+    """What in a plan makes one effect look like another beside a model, in words; empty where no feature of the plan does."""
+    state, held = _one(state), [*base, other]
+    try:
+        now = _left(state, one, held, None)
+        if now <= planning.SEEN:
+            hidden = cause(state, one, held)
+            return "" if hidden is None else f"{hidden.found} {hidden.does}".strip()
+        effect = catalogue.get(one)
+        answers = drivers_of(state, effect) | drivers_of(state, catalogue.get(other))
+    except MissingInput:
+        return ""
+    there = [c for c in CHANGES if c.driver in answers and c.found(state)]
+    better = [(c, _left(c.made(state), one, held, None)) for c in there]
+    best = next((c for c, v in better if v > _BETTER * now), None)
+    if best is None:
+        return ""
+    place, column, _ = _column(state, effect, None)
+    return f"{best.found(state)} leaves {100.0 * now:.0f} % of {signature(effect, place, column)} beside {other}"
 
 
 def _one(state: State) -> State:
@@ -222,6 +244,7 @@ def _hiding(state: State, effect_id: str, base: Sequence[str], axis: int | None,
 
 def drivers_of(state: State, effect: AnyEffect) -> set[Driver]:
     """What an effect answers to: quantities whose change changes its column, and the order of the dwells."""
+    state = _one(state)
     values = design.starting_values([effect], state).get(effect.id, {})
 
     def columns(of: State) -> Array:

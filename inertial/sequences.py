@@ -186,7 +186,7 @@ def standing(state: State) -> Step | None:
     if state.outer is None or state.inner is None:
         return None
     air = state.chamber if state.chamber is not None else state.temperature
-    last = T_REFERENCE if air is None else float(np.mean(air[..., -1]))
+    last = T_REFERENCE if air is None else round(float(np.mean(air[..., -1])), 1)
     return Step(float(np.mean(state.outer[..., -1])), float(np.mean(state.inner[..., -1])), last)
 
 

@@ -23,6 +23,7 @@ _DETOUR = np.radians(20.0)
 _EXCURSION_K = 25.0
 _MINOR_K = 8.0
 _VARIED_K = 5.0
+_NEARLY_K = 1.0
 
 
 @dataclass(frozen=True)
@@ -42,7 +43,10 @@ class Reach:
     def allows(self, step: Step) -> bool:
         """Whether a step lies within the bounds."""
         inside = self.outer[0] <= step.outer <= self.outer[1] and self.inner[0] <= step.inner <= self.inner[1]
-        return inside and (self.temperature is None or self.temperature[0] <= step.temperature <= self.temperature[1])
+        if self.temperature is None:
+            return inside
+        low, high = self.temperature
+        return inside and low - _NEARLY_K <= step.temperature <= high + _NEARLY_K
 
 
 @dataclass(frozen=True)
@@ -62,7 +66,9 @@ def reach_of(state: State) -> Reach:
     settle = 2.0 if state.since_move is None else float(np.clip(np.median(state.since_move), 0.0, 60.0))
     if state.temperature is None or float(np.ptp(state.temperature)) < _VARIED_K:
         return Reach(settle=settle)
-    return Reach(settle=settle, temperature=(float(np.min(state.temperature)), float(np.max(state.temperature))))
+    return Reach(
+        settle=settle, temperature=(round(float(np.min(state.temperature))), round(float(np.max(state.temperature))))
+    )
 
 
 def pose_grid(reach: Reach, temperature: float) -> list[Step]:
@@ -75,7 +81,7 @@ def pose_grid(reach: Reach, temperature: float) -> list[Step]:
     angles = np.radians(np.concatenate([poses.fibonacci(48), *named, *rings]))
     other = np.stack([-angles[:, 0], np.where(angles[:, 1] > 0.0, angles[:, 1] - np.pi, angles[:, 1] + np.pi)], axis=1)
     found = [Step(float(o), float(i), temperature, reach.settle) for o, i in np.concatenate([angles, other])]
-    return [s for s in found if reach.allows(replace(s, temperature=temperature))]
+    return [s for s in found if reach.allows(s)]
 
 
 def _ring(axis: int, level: float) -> Array:
@@ -103,7 +109,7 @@ def present(state: State, pace: Pace) -> float:
     """Temperature at which the chamber stands, °C."""
     there = pace.start or standing(state)
     if there is not None:
-        return round(there.temperature, 1)
+        return there.temperature
     return T_REFERENCE if state.temperature is None else round(float(np.mean(state.temperature[..., -1])), 1)
 
 

@@ -94,7 +94,7 @@ def separations(rivals: Rivals, steps: Sequence[Step] = (), pace: Pace | None = 
     left = np.zeros((count, count))
     for column, wrong in enumerate(rivals.terms):
         model = Model(problem, [*rivals.rest, wrong])
-        left[:, column] = _left(model, rotated, rivals.share)
+        left[:, column] = left_of(model, rotated, rivals.share)
     np.fill_diagonal(left, 0.0)
     return left * rivals.weight / rivals.variance
 
@@ -104,7 +104,7 @@ def smallest(left: Array) -> Array:
     return np.minimum(left, left.T)
 
 
-def _left(model: Model, targets: Array, share: float) -> Array:
+def left_of(model: Model, targets: Array, share: float) -> Array:
     """Whitened sums of squares (r,) that a model leaves of some series (blocks, n, r)."""
     space: Space = model.at(share)
     free = space.project(targets / space.spread[..., None])

@@ -14,7 +14,7 @@ from pipelines.inquiry.words import why
 from pipelines.job import Job
 from pipelines.runner import Runner
 from pipelines.stages.criticise import document, examined
-from pipelines.stages.next_measurement import proposals
+from pipelines.stages.next_measurement import Proposed, proposed
 from schemas.limits import Limits
 from schemas.recipe import Lot, Recipe
 from schemas.station import StationConfig
@@ -23,7 +23,6 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from inertial.criticism.diagnosis import Diagnosis
-    from inertial.criticism.proposals import Proposal
     from inertial.sequences import Step
     from pipelines.archive import Archive, Records, Run
     from pipelines.progress import Progress
@@ -49,7 +48,7 @@ class Finding:
     told: dict[str, Any]
     found: Measured
     diagnosis: Diagnosis | None
-    proposed: tuple[Proposal, ...]
+    following: Proposed
 
     @property
     def ambiguous(self) -> list[list[str]]:
@@ -110,12 +109,10 @@ class Inquiry:
         around = circumstances(self.base, self.jobs[-1], self.budget - self.spent)
         with threadpool_limits(1):
             found, faults, diagnosis = examined(dwells, history, self.effects)
-            proposed = [] if diagnosis is None else proposals(diagnosis, around)
-            told = document(found, faults, diagnosis, proposed)
+            following = Proposed() if diagnosis is None else proposed(diagnosis, around)
+            told = document(found, faults, diagnosis, following)
         told.update(_named(found, self.effects, diagnosis))
-        return Finding(
-            self.lineage, self.effects, told, found, diagnosis, tuple(p for _, p in proposed if p is not None)
-        )
+        return Finding(self.lineage, self.effects, told, found, diagnosis, following)
 
     def next(self, finding: Finding) -> Move | Verdict:
         """What to measure next, or why nothing."""
@@ -134,10 +131,9 @@ class Inquiry:
         if diagnosis is None:
             return Verdict("blocked", "every unit has a data fault")
         left = self.budget - self.spent
-        free = finding.proposed
+        free = finding.following.found
         if not free:
-            costly = proposals(diagnosis, circumstances(self.base, self.jobs[-1], float("inf")))
-            wanted = [p for _, p in costly if p is not None]
+            wanted = proposed(diagnosis, circumstances(self.base, self.jobs[-1], float("inf"))).found
             if not wanted:
                 return Verdict("nothing_parts", f"nothing that this station does parts {_classes(finding)}")
             needed = sum(p.minutes for p in wanted)

@@ -7,8 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from inertial import frames
-from inertial.errors import InertialError
-from inertial.reasons import cause
+from inertial.reasons import likeness
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -28,7 +27,7 @@ def why(state: State, base: Sequence[str], found: Proposal) -> str:
     state : the dwells so far
     base : ids of the model beside the rivals
     """
-    first, second = found.pairs[0]
+    first, second = found.pair
     rivals = " and ".join([", ".join(found.ids[:-1]), found.ids[-1]])
     hidden = _hidden(state, base, first, second)
     parted = f"χ² between {first} and its nearest rival goes from {found.before:.1f} to {found.after:.0f}"
@@ -37,13 +36,8 @@ def why(state: State, base: Sequence[str], found: Proposal) -> str:
 
 def _hidden(state: State, base: Sequence[str], first: str, second: str) -> str:
     """What in the plan makes one rival look like the other."""
-    try:
-        reason = cause(state, first, [*base, second])
-    except InertialError:
-        reason = None
-    if reason is None:
-        return f"in what was measured {first} and {second} differ by less than the noise"
-    return f"{reason.found} {reason.does}".strip() if reason.found else reason.does
+    told = likeness(state, first, second, base)
+    return told or f"in what was measured {first} and {second} differ by less than the noise"
 
 
 def what(found: Proposal) -> str:

@@ -14,7 +14,7 @@ from inertial.errors import InertialError
 from pipelines.stages.compare import compare
 from pipelines.stages.condense import condense
 from pipelines.stages.measured import Measured, lot_of, measured
-from pipelines.stages.next_measurement import next_measurements, proposals
+from pipelines.stages.next_measurement import proposed
 from schemas.errors import DataRejected
 
 if TYPE_CHECKING:
@@ -81,13 +81,13 @@ def examined(
 
 
 def document(
-    found: Measured, faults: list[Fault], diagnosis: Diagnosis | None, proposed: Proposed | None = None
+    found: Measured, faults: list[Fault], diagnosis: Diagnosis | None, following: Proposed | None = None
 ) -> dict[str, Any]:
     """The document of a diagnosis; where every unit has a data fault, nothing is said of physics.
 
     Parameters
     ----------
-    proposed : what to measure next; by what the run itself shows of its station where None
+    following : what to measure next; by what the run itself shows of its station where None
     """
     blocked = [_fault(found, f) for f in faults]
     if diagnosis is None:
@@ -137,7 +137,7 @@ def document(
             "p_value": _probability(diagnosis.unexplained.log_p),
         },
         "unseen": list(diagnosis.unseen),
-        "next_measurements": next_measurements(proposals(diagnosis) if proposed is None else proposed),
+        "next_measurements": (proposed(diagnosis) if following is None else following).rows(),
     }
 
 

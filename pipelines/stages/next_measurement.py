@@ -2,18 +2,16 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from inertial.criticism.classes import EffectClass
-from inertial.criticism.proposals import Circumstances, Proposal, proposal
+from inertial.criticism.proposals import Circumstances, Proposal, proposal, sighting
 from inertial.errors import MissingInput
 
-Proposed = list[tuple[EffectClass, Proposal | None]]
-"""Classes of more than one effect, each with what parts it; None where nothing does."""
-
 if TYPE_CHECKING:
+    from inertial.criticism.classes import EffectClass
     from inertial.criticism.diagnosis import Diagnosis
     from inertial.sequences import Step
 
@@ -21,29 +19,54 @@ BREAKER_POSE = (0.0, 0.0, 25.0)
 """Where a row says a breaker in words: any pose is as good, the words count."""
 
 
-def next_measurements(proposed: Proposed) -> list[dict[str, Any]]:
-    """Rows for every class that these data do not tell apart, in the order in which they are to be measured."""
-    rows: list[dict[str, Any]] = []
-    for group, found in proposed:
-        rows += [_breaker(group)] if found is None else rows_of(found)
-    return rows
+@dataclass(frozen=True)
+class Proposed:
+    """What to measure next, in order: for every class of more than one effect what parts it, then what shows the unseen.
+
+    parting : classes, each with None where no steps of the station part it
+    showing : None where nothing that was not seen matters, or the station cannot show it
+    """
+
+    parting: tuple[tuple[EffectClass, Proposal | None], ...] = ()
+    showing: Proposal | None = None
+
+    @property
+    def found(self) -> tuple[Proposal, ...]:
+        """What parts classes."""
+        return tuple(p for _, p in self.parting if p is not None)
+
+    def rows(self) -> list[dict[str, Any]]:
+        """All of it as rows, in the order in which it is to be measured."""
+        rows: list[dict[str, Any]] = []
+        for group, wanted in self.parting:
+            rows += [_breaker(group)] if wanted is None else rows_of(wanted)
+        return rows if self.showing is None else [*rows, *rows_of(self.showing)]
 
 
-def proposals(diagnosis: Diagnosis, around: Circumstances | None = None) -> Proposed:
-    """For every class of more than one effect what parts it, measured after what parts those before it."""
-    found: Proposed = []
+def proposed(diagnosis: Diagnosis, around: Circumstances | None = None) -> Proposed:
+    """What to measure after a diagnosis, each part after those before it.
+
+    Parameters
+    ----------
+    around : what the station can do; what the run itself shows of it where None
+    """
+    parting: list[tuple[EffectClass, Proposal | None]] = []
     already: list[Step] = []
     for named in diagnosis.named:
-        if len(named.effects.members) < 2:
-            continue
-        try:
-            wanted = proposal(diagnosis.final, named.effects, around, already)
-        except MissingInput:
-            wanted = None
-        if wanted is not None:
-            already += wanted.steps
-        found.append((named.effects, wanted))
-    return found
+        if len(named.effects.members) > 1:
+            wanted = _parted(diagnosis, named.effects, around, already)
+            already += wanted.steps if wanted is not None else ()
+            parting.append((named.effects, wanted))
+    return Proposed(tuple(parting), sighting(diagnosis.final, diagnosis.unseen, around, already))
+
+
+def _parted(
+    diagnosis: Diagnosis, group: EffectClass, around: Circumstances | None, already: list[Step]
+) -> Proposal | None:
+    try:
+        return proposal(diagnosis.final, group, around, already)
+    except MissingInput:
+        return None
 
 
 def _breaker(group: EffectClass) -> dict[str, Any]:
@@ -57,12 +80,13 @@ def _breaker(group: EffectClass) -> dict[str, Any]:
 def rows_of(found: Proposal) -> list[dict[str, Any]]:
     """Rows of one proposal: equal steps in a row are one, with their number."""
     rows: list[dict[str, Any]] = []
-    for step, pair in zip(found.steps, found.pairs, strict=True):
+    about = " | ".join(found.pair) or f"not seen so far: {', '.join(found.ids)}"
+    for step in found.steps:
         row = {
             "outer_deg": _degrees(step.outer),
             "inner_deg": _degrees(step.inner),
             "chamber_C": round(step.temperature, 2),
-            "why": " | ".join(pair),
+            "why": about,
             "wait_s": round(step.wait, 1),
             "soaked": step.soaked,
         }

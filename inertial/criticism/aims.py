@@ -1,0 +1,221 @@
+"""What a next measurement is for: to part rivals, or to let effects show that were not seen."""
+
+from collections.abc import Sequence
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from inertial.criticism.classes import TOLD_APART
+from inertial.criticism.heldout import Fitting
+from inertial.criticism.model import Model, Term
+from inertial.criticism.penalty import cost_of, freedom
+from inertial.criticism.problem import Lot, Problem
+from inertial.criticism.separation import Rivals, left_of, predictions, separations, smallest, widened
+from inertial.sequences import Pace, Step
+
+Array = NDArray[np.float64]
+
+UNLUCKY = 1.65
+"""Standard deviations of bad luck that the measurement must stand."""
+
+MARGIN = 1.5
+"""Rivals are refitted with other nonlinear parameters afterwards: that costs separation."""
+
+LEAST_WEIGHT = 0.02
+
+_SHOWN = 36.0
+"""Chi-square, a coefficient, at which an effect of typical size counts as seen: six standard errors."""
+
+
+class Aim(Protocol):
+    """What measurements are wanted for; ``least`` is the share of all that is wanted that a further course must bring."""
+
+    least: float
+
+    @property
+    def lot(self) -> Lot:
+        """A few units of what was measured."""
+        ...
+
+    @property
+    def terms(self) -> tuple[Term, ...]:
+        """The effects that it is about."""
+        ...
+
+    def worth(self, steps: Sequence[Step], pace: Pace) -> float:
+        """Share, 0 … 1, of all that is wanted that is there after these steps."""
+        ...
+
+    def picks(self, held: Sequence[Step], grid: Sequence[Step], pace: Pace, count: int) -> list[Step]:
+        """Steps of a grid, each the best beside those before it."""
+        ...
+
+    def told(self, already: Sequence[Step], steps: Sequence[Step], pace: Pace) -> tuple[float, float, tuple[str, ...]]:
+        """What ``steps`` change, taken after ``already``: the figure before and after, and the ids that it is about."""
+        ...
+
+
+class Parting:
+    """Rivals parted: of each truth, by how likely it is, every other one must leave enough, and none counts beyond need."""
+
+    least = 0.03
+
+    def __init__(self, rivals: Rivals, scores: Array) -> None:
+        self.rivals = rivals
+        self.weight = np.maximum(np.exp(-0.5 * scores), LEAST_WEIGHT)
+        self.needed = _needed(rivals)
+
+    @property
+    def lot(self) -> Lot:
+        """A few units of what was measured."""
+        return self.rivals.lot
+
+    @property
+    def terms(self) -> tuple[Term, ...]:
+        """The rivals."""
+        return self.rivals.terms
+
+    def worth(self, steps: Sequence[Step], pace: Pace) -> float:
+        """Share of the separations wanted that is there after these steps."""
+        left = separations(self.rivals, steps, pace)
+        off = ~np.eye(len(left), dtype=bool)
+        share = np.minimum(left / self.needed, 1.0) * off
+        return float(np.sum(self.weight[:, None] * share) / np.sum(self.weight[:, None] * off))
+
+    def picks(self, held: Sequence[Step], grid: Sequence[Step], pace: Pace, count: int) -> list[Step]:
+        """Steps at which the rivals differ most once those before are fitted."""
+        rivals = self.rivals
+        problem = widened(rivals, [*held, *grid], pace)
+        truths = predictions(rivals, problem)
+        fits = [Fitting(problem, [*rivals.rest, wrong]) for wrong in rivals.terms]
+        n = problem.n - len(grid)
+        error = _error(problem)[:, n:, None]
+
+        def apart(train: NDArray[np.bool_]) -> Array:
+            total = np.zeros(len(grid))
+            for column, fit in enumerate(fits):
+                left = fit.left(truths, train)[:, n:] / error
+                gained = np.sum(left**2, axis=0) * rivals.weight / rivals.variance  # (grid, truths)
+                gained[:, column] = 0.0
+                total += np.minimum(gained / self.needed[:, column], 1.0) @ self.weight
+            return total
+
+        return _greedy(grid, n, count, apart)
+
+    def told(self, already: Sequence[Step], steps: Sequence[Step], pace: Pace) -> tuple[float, float, tuple[str, ...]]:
+        """Chi-square between the best rival and its nearest, before and after; the best and the one it is parted from most."""
+        before = smallest(separations(self.rivals, already, pace))
+        after = smallest(separations(self.rivals, [*already, *steps], pace))
+        gained = np.minimum((after - before)[0, 1:], self.needed[0, 1:])
+        names = self.rivals.ids
+        return float(before[0, 1:].min()), float(after[0, 1:].min()), (names[0], names[1 + int(np.argmax(gained))])
+
+
+class Sighting:
+    """Effects that were not seen made to show: each coefficient, at the effect's typical size, by six standard errors."""
+
+    least = 0.1
+
+    def __init__(self, rivals: Rivals, terms: Sequence[Term]) -> None:
+        self.rivals, self._terms = rivals, tuple(terms)
+
+    @property
+    def terms(self) -> tuple[Term, ...]:
+        """The effects that were not seen."""
+        return self._terms
+
+    @property
+    def lot(self) -> Lot:
+        """A few units of what was measured."""
+        return self.rivals.lot
+
+    def worth(self, steps: Sequence[Step], pace: Pace) -> float:
+        """Mean share over the effects of the chi-square wanted."""
+        return float(np.mean(np.minimum(self.shown(steps, pace) / _SHOWN, 1.0)))
+
+    def shown(self, steps: Sequence[Step], pace: Pace) -> Array:
+        """Chi-square a coefficient that each effect of typical size would leave, (effects,)."""
+        rivals = self.rivals
+        problem = widened(rivals, steps, pace) if steps else Problem(rivals.lot, steep=rivals.steep)
+        columns, sizes = _typical(problem, self.terms)
+        left = left_of(Model(problem, rivals.rest), problem.basis.rotate(columns), rivals.share)
+        per_column = left * rivals.weight / rivals.variance / problem.blocks
+        return np.array([float(np.mean(part)) for part in np.split(per_column, np.cumsum(sizes)[:-1])])
+
+    def picks(self, held: Sequence[Step], grid: Sequence[Step], pace: Pace, count: int) -> list[Step]:
+        """Steps at which what the model leaves of the effects is largest."""
+        rivals = self.rivals
+        problem = widened(rivals, [*held, *grid], pace)
+        columns, _ = _typical(problem, self.terms)
+        fit = Fitting(problem, rivals.rest)
+        n = problem.n - len(grid)
+        error = _error(problem)[:, n:, None]
+
+        def shown(train: NDArray[np.bool_]) -> Array:
+            left = fit.left(columns, train)[:, n:] / error
+            gained = np.sum(left**2, axis=0) * rivals.weight / rivals.variance / problem.blocks
+            return np.sum(np.minimum(gained / _SHOWN, 1.0), axis=1)
+
+        return _greedy(grid, n, count, shown)
+
+    def told(self, already: Sequence[Step], steps: Sequence[Step], pace: Pace) -> tuple[float, float, tuple[str, ...]]:
+        """Chi-square a coefficient of the effect that shows least of those that will, before and after; those that will."""
+        before, after = self.shown(already, pace), self.shown([*already, *steps], pace)
+        will = after >= max(1.0, 0.5 * min(_SHOWN, float(np.max(after))))
+        names = tuple(t.effect.id for t, there in zip(self.terms, will, strict=True) if there)
+        return float(before[will].min()), float(after[will].min()), names
+
+
+def _typical(problem: Problem, terms: Sequence[Term]) -> tuple[Array, list[int]]:
+    """Columns of some effects at their typical size, (blocks, n, all), g, and how many each has.
+
+    The size is the geometric mean of what has been seen, at the largest excursion of the column.
+    """
+    found: list[Array] = []
+    for term in terms:
+        columns = problem.columns(term.effect, term.keywords)[..., : term.first]
+        largest = np.max(np.abs(columns), axis=(0, 1))
+        low, high = term.effect.typical_ug
+        size = 1e-6 * float(np.sqrt(max(low, 1e-3) * high))
+        found.append(columns * np.where(largest > 0.0, size / np.where(largest > 0.0, largest, 1.0), 0.0))
+    return np.concatenate(found, axis=-1), [f.shape[-1] for f in found]
+
+
+def _greedy(grid: Sequence[Step], n: int, count: int, score: "Score") -> list[Step]:
+    """The steps of a grid that score best one after the other; ``n`` dwells before them are there already."""
+    train = np.arange(n + len(grid)) < n
+    chosen: list[Step] = []
+    for _ in range(min(count, len(grid))):
+        apart = score(train)
+        apart[train[n:]] = -1.0
+        place = int(np.argmax(apart))
+        train[n + place] = True
+        chosen.append(grid[place])
+    return chosen
+
+
+class Score(Protocol):
+    """What each step of a grid is worth once some dwells are there."""
+
+    def __call__(self, train: NDArray[np.bool_]) -> Array:
+        """One figure a step."""
+        ...
+
+
+def _error(problem: Problem) -> Array:
+    return np.where(np.isfinite(problem.error), problem.error, np.inf)
+
+
+def _needed(rivals: Rivals) -> Array:
+    """Chi-square (r, r) that must lie between a truth (row) and a wrong rival (column) for the class to drop the wrong one.
+
+    The difference found scatters by twice the root of its own size about it; a simpler rival has its penalty in its favour.
+    """
+    costs = np.array([_cost(t, c) for t, c in zip(rivals.terms, rivals.predicted, strict=True)])
+    least = np.maximum(TOLD_APART + costs[:, None] - costs[None, :], TOLD_APART)
+    return MARGIN * (UNLUCKY + np.sqrt(UNLUCKY**2 + least)) ** 2
+
+
+def _cost(term: Term, coefficients: Array) -> float:
+    return cost_of(int(coefficients.size), int(coefficients.shape[-1]), freedom(term))
