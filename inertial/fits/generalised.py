@@ -12,6 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import solve_triangular
 
+from inertial.fits.restricted import Restricted
+
 Array = NDArray[np.float64]
 
 _STEP = 10.0
@@ -119,32 +121,35 @@ class Series:
         deviance = dof * np.log(max(variance, 1e-300)) + 2.0 * blocks * np.sum(np.log(np.diagonal(root))) + logdet
         return variance, float(deviance)
 
+    def deviances(self, first: Array, second: Array) -> Array:
+        """Restricted deviance on a grid, (k, l), for shares (k,) of the first kernel and (l,) of the second."""
+        if self._s.shape[-1]:
+            grid = [self.solve(pair).deviance for pair in product(first.tolist(), second.tolist())]
+            return np.reshape(grid, (len(first), len(second)))
+        h = np.broadcast_to(self._h, (*self._z.shape, self._h.shape[-1]))
+        return Restricted(h[self.sound], self._z[self.sound], self.white, self.kernels).on_grid(first, second)
+
     def best_shares(self) -> tuple[float, float]:
         """Shares of flicker and walk: their mean over the restricted likelihood; zero where the lot shows no wander.
 
         A slow drift within one record may be either, and the likelihood is flat between the two: its peak jumps from one
         answer to the other, its mean does not.
         """
-        coarse = {pair: self._deviance(pair) for pair in product(_SHARES, repeat=2)}
-        lowest = min(coarse.values())
-        if coarse[0.0, 0.0] - lowest < _CHARGE:
+        shares = np.array(_SHARES)
+        coarse = self.deviances(shares, shares)
+        if coarse[0, 0] - coarse.min() < _CHARGE:
             return 0.0, 0.0
-        likely = np.array([pair for pair, deviance in coarse.items() if deviance - lowest < _FAR])
-        flicker, walk = (_around(likely[:, k]) for k in range(2))
-        pairs = np.array(list(product(flicker**2, walk**2)))
-        deviance = np.array([self._deviance(pair) for pair in pairs.tolist()])
-        near = pairs[deviance - deviance.min() < _FAR]
-        flicker, walk = (_between(near[:, k]) for k in range(2))
-        pairs = np.array(list(product(flicker**2, walk**2)))
-        deviance = np.array([self._deviance(pair) for pair in pairs.tolist()])
+        rows, columns = np.nonzero(coarse - coarse.min() < _FAR)
+        flicker, walk = (_around(shares[found]) for found in (rows, columns))
+        deviance = self.deviances(flicker**2, walk**2)
+        rows, columns = np.nonzero(deviance - deviance.min() < _FAR)
+        flicker, walk = _between(flicker[rows] ** 2), _between(walk[columns] ** 2)
+        deviance = self.deviances(flicker**2, walk**2)
         # half of the belief beforehand is that a kind of wander is not there at all
-        belief = np.prod(np.where(pairs > 0.0, 1.0, _FINE - 1.0), axis=1)
+        belief = np.outer(*(np.where(one > 0.0, 1.0, _FINE - 1.0) for one in (flicker, walk)))
         weight = belief * np.exp(-0.5 * (deviance - deviance.min()))
-        mean = (weight @ pairs) / weight.sum()
-        return float(mean[0]), float(mean[1])
-
-    def _deviance(self, shares: Sequence[float]) -> float:
-        return self.solve(shares).deviance
+        weight = weight / weight.sum()
+        return float(weight.sum(axis=1) @ flicker**2), float(weight.sum(axis=0) @ walk**2)
 
 
 def _around(shares: Array) -> Array:
