@@ -314,10 +314,36 @@ def check(name: str, frame: pd.DataFrame, *, where: str = "") -> pd.DataFrame:
     _refuse_missing_columns(table, frame, source)
     _refuse_not_finite(table, frame, source)
     _refuse_twice(table, frame, source)
+    if _plainly_right(table, frame):
+        return frame
     try:
         return table.schema.validate(frame)
     except SchemaError as problem:
         raise DataRejected(_explain(problem, frame, source)) from None
+
+
+def _plainly_right(table: Table, frame: pd.DataFrame) -> bool:
+    """Whether every column has its type and passes its checks; what does not is left to the schema, which says why not."""
+    return all(_column_right(column, frame[name]) for name, column in table.columns.items())
+
+
+def _column_right(column: pa.Column, values: pd.Series) -> bool:
+    kind = str(column.dtype).split("[", maxsplit=1)[0].replace("string", "str")
+    if str(values.dtype) != kind or (not column.nullable and bool(values.isna().any())):
+        return False
+    return all(_passes(check, values) for check in column.checks or [])
+
+
+def _passes(check: pa.Check, values: pd.Series) -> bool:
+    """Whether values pass a check of one of the kinds that tables here have; any other is left to the schema."""
+    figures = check.statistics
+    if check.name == "greater_than_or_equal_to":
+        return bool((values.dropna() >= figures["min_value"]).all())
+    if check.name == "isin":
+        return set(values.unique()) <= set(figures["allowed_values"])
+    if check.name == "str_length" and figures == {"min_value": 1, "max_value": None, "exact_value": None}:
+        return not bool((values == "").any())
+    return False
 
 
 def _refuse_missing_columns(table: Table, frame: pd.DataFrame, source: str) -> None:
