@@ -162,7 +162,7 @@ CASES: tuple[Case, ...] = (
     Case(f"exceptions_off:at_s={WITHIN}:serial=U001", UNIT, "slot 1: implausible answer"),
     Case(f"exceptions_off:at_s={WITHIN}:device=outer", RUN, "outer axis: stands at"),
     Case(f"exceptions_off:at_s={WITHIN}:device=chamber", RUN, "check the controller's panel"),
-    Case(f"exceptions_off:at_s={WITHIN}:device=reader", RUN, "0 samples of 200", spoilt=True),
+    Case(f"exceptions_off:at_s={WITHIN}:device=reader", RUN, "sampling is running, stopped is needed"),
     Case(f"partial_write:at_s={WITHIN}:device=outer", RUN, "direct_data"),
     Case(f"partial_write:at_s={WITHIN}:device=chamber", RUN, "write chamber set_point"),
     Case(f"swapped_words:at_s={WITHIN}:device=outer", RUN, "outer axis"),
@@ -224,8 +224,8 @@ command line (`tumbleline run --fault door:at_s=437.5:for_s=100`), or by a test.
 temperatures; the fault comes within the third dwell (437.5 s), in the move behind it (443 s), in the second soak (900 s), or is
 there from the beginning.
 
-- **recovered**: the run came to its end, and every mean of every unit lies within 100 µg of what the plant knows to be true. Where
-  *measured again* stands, dwells were spoilt, thrown away, and measured again, with the reason in the run's journal
+- **recovered**: the run came to its end, and every mean of every unit lies within 100 µg of what the plant knows to be true.
+  Where *measured again* stands, dwells were spoilt, thrown away, and measured again, with the reason in the run's journal
   (`tumbleline show RUN events`).
 - **unit refused**: the run came to its end; the unit that is concerned gets no coefficient, no grade and no certificate, the
   others are true.
@@ -271,8 +271,8 @@ HOST = """\
 
 | fault | outcome | test |
 |---|---|---|
-| disk full, at any write | refused with the archive's message and exit status 2; with space again the same command goes on | `test_full_disk` |
-| killed (SIGKILL) at every stage boundary | the same command ends in the same bytes; no finished dwell is measured twice | `test_killed` |
+| disk full, at any write | refused by name with exit status 2; with space the same command goes on | `test_full_disk` |
+| killed (SIGKILL) at every stage boundary | the same command ends in the same bytes; no dwell is measured twice | `test_killed` |
 | killed at 50 random times of the capture | as above, bit for bit | `test_killed` |
 """
 

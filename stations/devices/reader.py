@@ -62,7 +62,7 @@ class Reader:
         self.check(rate_hz)
         registers = self._registers
         if registers.text("sampling") != "stopped":
-            registers.write("sampling", "stopped")
+            self.stop()
         if abs(registers.number("rate") - rate_hz) > RATE_HZ:
             registers.write("rate", rate_hz)
             found = registers.number("rate")
@@ -71,13 +71,21 @@ class Reader:
                     f"{registers.name}: samples at {found:g} Hz, {rate_hz:g} Hz is needed; choose a rate it can keep"
                 )
                 raise StationRefused(message)
-        registers.write("sampling", "running")
+        self._sample("running")
         for slot in self.slots.values():
             slot.begin()
 
     def stop(self) -> None:
         """Stops sampling; the samples stay in the slots' memories."""
-        self._registers.write("sampling", "stopped")
+        self._sample("stopped")
+
+    def _sample(self, wanted: str) -> None:
+        """Starts or stops, and makes sure that the reader has."""
+        self._registers.write("sampling", wanted)
+        found = self._registers.text("sampling")
+        if found != wanted:
+            message = f"{self._registers.name}: sampling is {found}, {wanted} is needed; restart the reader"
+            raise StationRefused(message)
 
     def sampling(self) -> str:
         """Whether samples are taken: ``running`` or ``stopped``."""
