@@ -1,63 +1,266 @@
-"""``tumbleline plan``: what a recipe can and cannot see, before it is measured."""
+"""``tumbleline plan``: what a recipe can and cannot see and what it costs, before it is measured; and cheaper recipes."""
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
+from typer.core import TyperGroup
 
-from pipelines.cli.options import JsonOption, console, print_json, print_table, short
+from pipelines.cli.options import JsonOption, ModelOption, console, print_json, print_table, short
 
 if TYPE_CHECKING:
+    from typer._click import Context
+
+    from inertial.noise.dwells import DwellNoise
+    from pipelines.stages.plan import Planned
     from schemas.recipe import Recipe
 
+RECIPE = "recipe"
+MICRO = 1e-6
 
+
+class _RecipeFirst(TyperGroup):
+    """Subcommands by name; anything else that comes first is a recipe."""
+
+    def parse_args(self, ctx: Context, args: list[str]) -> list[str]:
+        """The arguments, with the name of the command that is meant where none is given."""
+        if not args or args[0] not in {*self.commands, "--help", "-h"}:
+            args = [RECIPE, *args]
+        return super().parse_args(ctx, args)
+
+
+app = typer.Typer(
+    cls=_RecipeFirst,
+    help="Say what a recipe can and cannot see and what it costs ('plan RECIPE'), or write a cheaper one ('plan optimise').",
+    add_completion=False,
+    pretty_exceptions_enable=False,
+    context_settings={"help_option_names": ["-h", "--help"]},
+)
+
+DeviceOption = Annotated[
+    str, typer.Option("--device", metavar="PRESET", help="Preset whose noise is meant; the recipe's device by default.")
+]
+StationOption = Annotated[
+    Path | None,
+    typer.Option("--station", metavar="FILE", help="The station; the built-in simulated one by default."),
+]
+NoiseOption = Annotated[
+    float | None,
+    typer.Option("--noise", min=0.0, help="White noise of the device, µg/√Hz; its preset's by default."),
+]
+WanderOption = Annotated[
+    float | None,
+    typer.Option(
+        "--wander",
+        min=0.0,
+        help="Flicker: flat part of the Allan deviation, µg, without random walk; the preset's flicker and walk by default.",
+    ),
+]
+EffectsOption = Annotated[
+    str, typer.Option("--effects", metavar="a,b,c", help="The model as a list of effects; the recipe's by default.")
+]
+PageOption = Annotated[
+    Path | None, typer.Option("--page", metavar="FILE.html", help="Also write a page with pictures there.")
+]
+
+
+@app.command(RECIPE)
 def command(
     recipe: Annotated[
         str, typer.Argument(metavar="[RECIPE]", help="A recipe file or a built-in recipe.")
     ] = "production",
-    noise: Annotated[
-        float | None,
-        typer.Option("--noise", min=0.0, help="White noise of the device, µg/√Hz; its preset's by default."),
-    ] = None,
-    wander: Annotated[
-        float, typer.Option("--wander", min=0.0, help="Wander of a dwell's mean from dwell to dwell, µg.")
-    ] = 0.0,
+    device: DeviceOption = "",
+    station: StationOption = None,
+    effects: EffectsOption = "",
+    model: ModelOption = None,
+    noise: NoiseOption = None,
+    wander: WanderOption = None,
+    page: PageOption = None,
     *,
     as_json: JsonOption = False,
 ) -> None:
-    """Say for every effect whether a recipe can see it, how well, what it is mistaken for, and what to add."""
-    from pipelines.planned import refuse_unidentified
-    from pipelines.recipes import load_recipe
-    from pipelines.stages.plan import plan
+    """Say for every effect whether a recipe can see it, how well, what it is mistaken for, and what to add.
 
-    found = load_recipe(recipe)
-    refuse_unidentified(found)
-    document = plan(found, _density(found) if noise is None else noise, wander)
+    With the minutes of station time and the error to be expected of every coefficient of the recipe's model.
+    """
+    from pipelines.stages.plan import plan, planned
+    from schemas.station import load_station
+
+    found = with_model(recipe, effects, model)
+    config = load_station(station)
+    course = planned(found, config, noise_of(found, device or found.device, noise, wander))
+    document = plan(course)
+    if page is not None:
+        _write(page, document, course)
+        document["page"] = str(page)
     if as_json:
         print_json(document)
     else:
         _print(document)
 
 
-def _density(recipe: Recipe) -> float:
-    """White noise of the recipe's device, µg/√Hz."""
+@app.command()
+def optimise(
+    recipe: Annotated[
+        str,
+        typer.Argument(metavar="[RECIPE]", help="What the new recipe begins from: device, rate, soak, range, limits."),
+    ] = "production",
+    output: Annotated[
+        Path | None,
+        typer.Option("--output", "-o", metavar="FILE.toml", help="Where to write it; NAME-optimal.toml here."),
+    ] = None,
+    device: DeviceOption = "",
+    station: StationOption = None,
+    effects: EffectsOption = "",
+    model: ModelOption = None,
+    see: Annotated[
+        str,
+        typer.Option(
+            "--see", metavar="a,b,c", help="Effects that must be seen besides; those of the textbook plan by default."
+        ),
+    ] = "",
+    wanted: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--wanted", metavar="EFFECT=µg", help="Largest error (1σ) of an effect's coefficients; may be repeated."
+        ),
+    ] = None,
+    factor: Annotated[
+        float, typer.Option("--factor", min=0.01, help="Errors wanted over those of the textbook plan.")
+    ] = 1.0,
+    temperatures: Annotated[
+        str, typer.Option("--temperatures", metavar="a,b,c", help="Temperatures to meet, °C; the recipe's by default.")
+    ] = "",
+    poses: Annotated[
+        str,
+        typer.Option("--poses", metavar="PLAN", help="Named plan to choose poses from; spread directions by default."),
+    ] = "",
+    criterion: Annotated[
+        str, typer.Option("--criterion", help="worst (coefficient), A (mean variance) or D (volume).")
+    ] = "worst",
+    noise: NoiseOption = None,
+    wander: WanderOption = None,
+    page: PageOption = None,
+    *,
+    as_json: JsonOption = False,
+) -> None:
+    """Write the cheapest recipe that knows every coefficient as well as is wanted.
+
+    By default: as well as the textbook plan does (24 orthogonal poses at nine soaks up and down, 15 min each, dwells of 10 s)
+    over the same temperatures, and blind to no effect that it sees.
+    """
+    from pipelines.cli.optimal import Asked, found, print_optimum, written
+    from schemas.station import load_station
+
+    base = with_model(recipe, effects, model)
+    asked = Asked(see, tuple(wanted or ()), factor, temperatures, poses, criterion)
+    optimum, document = found(base, load_station(station), noise_of(base, device or base.device, noise, wander), asked)
+    target = output or Path(f"{optimum.planned.recipe.name}.toml")
+    document["file"] = str(target)
+    _save(target, written(optimum, target, Path(recipe).parent))
+    if page is not None:
+        _write(page, document["plan"], optimum.planned)
+        document["page"] = str(page)
+    if as_json:
+        print_json(document)
+    else:
+        print_optimum(document)
+
+
+def _save(path: Path, text: str) -> None:
+    """Writes a file; a folder that is not there, or may not be written to, is wrong use."""
+    from schemas.errors import WrongUse
+
+    try:
+        path.write_text(text, encoding="utf-8")
+    except OSError as problem:
+        message = f"plan: {path} cannot be written ({problem.strerror}); give a file in a folder that is there"
+        raise WrongUse(message) from None
+
+
+def with_model(recipe: str, effects: str, model: Path | None) -> Recipe:
+    """The recipe, with another model where one is given."""
+    from pipelines.models import chosen_effects
+    from pipelines.recipes import load_recipe
+
+    found, chosen = load_recipe(recipe), chosen_effects(effects, model, "plan")
+    return found.model_copy(update={"effects": list(chosen)}) if chosen else found
+
+
+def noise_of(recipe: Recipe, device: str, density: float | None, wander: float | None) -> DwellNoise:
+    """Noise of a preset, with the figures that are given in place of its own."""
+    from inertial.noise.dwells import DwellNoise
+    from inertial.noise.terms import FLICKER_FLOOR
     from stations.plant.preset import load_preset
 
-    return load_preset(recipe.device).noise_density_ug
+    if density is not None and wander is not None:
+        return DwellNoise(density * MICRO, wander * MICRO / FLICKER_FLOOR)
+    preset = load_preset(device or recipe.device)
+    white = preset.noise_density_ug if density is None else density
+    if wander is not None:
+        return DwellNoise(white * MICRO, wander * MICRO / FLICKER_FLOOR)
+    return DwellNoise(white * MICRO, preset.bias_instability_ug * MICRO, preset.rate_random_walk_ug * MICRO)
+
+
+def _write(page: Path, document: dict[str, Any], course: Planned) -> None:
+    """Writes the page."""
+    from pipelines.report.plan import render_plan
+
+    _save(page, render_plan(document, course))
 
 
 def _print(document: dict[str, Any]) -> None:
-    minutes = document["minutes"]
-    error = document["dwell_error_ug"]["together"]
-    console().print(
-        f"[bold]{document['recipe']}[/bold]: {document['poses']} poses × {len(document['temperatures_C'])} temperatures, "
-        f"{minutes['total']:.0f} min of station time (soaks {minutes['soaks']:.0f} min, moves {minutes['moves']:.0f} min, "
-        f"dwells {minutes['dwells']:.0f} min, static record {minutes['static_record']:.0f} min); "
-        f"error of a dwell {short(error)} µg"
+    minutes, error = document["minutes"], document["dwell_error_ug"]
+    out = console()
+    out.print(
+        f"[bold]{document['recipe']}[/bold] with {document['device']} on station {document['station']}: "
+        f"{document['dwells']} dwells in {document['poses']} poses at {len(document['temperatures_C'])} soaks"
     )
+    parts = " + ".join(f"{name.replace('_', ' ')} {minutes[name]:.0f}" for name in minutes if name != "total")
+    out.print(f"{minutes['total']:.0f} min of station time: {parts}")
+    out.print(
+        f"error of a dwell {short(error['together'])} µg: white {short(error['white'])}, wander {short(error['wander'])}"
+        f"{_longer(document['dwell_s'])}"
+    )
+    print_table(["coefficient", "error 1σ: x", "y", "z", "unit"], _coefficient_lines(document["coefficients"]))
     seen = [row for row in document["effects"] if row["seen"]]
-    lines = [[r["effect"], short(r["left"]), short(r["floor_ug"]), ", ".join(r["alias"]) or "–"] for r in seen]
-    print_table(["seen", "left v", "floor 3σ, µg", "not told from"], lines)
+    lines = [
+        [r["effect"], short(r["left"]), short(r["variance_inflation"]), short(r["floor_ug"]), _aliases(r)] for r in seen
+    ]
+    print_table(["seen", "left v", "1/v²", "floor 3σ, µg", "not told from (= exactly)"], lines)
     blind = [row for row in document["effects"] if not row["seen"]]
-    print_table(["not seen", "add"], [[r["effect"], r["breaker"]] for r in blind])
+    print_table(["not seen", "why, and what to add"], [[r["effect"], r["why"] or r["breaker"]] for r in blind])
+    if "page" in document:
+        out.print(f"page: {document['page']}")
+
+
+def _longer(dwell: dict[str, float]) -> str:
+    """What longer dwells would bring, in words; nothing where there is no wander."""
+    import math
+
+    balanced = dwell["white_as_large_as_wander"]
+    if not math.isfinite(balanced):
+        return ""
+    if balanced < dwell["planned"]:
+        return "; longer dwells would gain little"
+    return f"; longer dwells would gain, up to {short(balanced, 2)} s"
+
+
+def _coefficient_lines(rows: list[dict[str, Any]]) -> list[list[str]]:
+    """One line per coefficient, its three axes side by side; of the station's parameters there is one value."""
+    lines: dict[tuple[str, int], list[str]] = {}
+    count: dict[tuple[str, str], int] = {}
+    for row in rows:
+        place = count.get((row["effect"], row["axis"]), 0)
+        count[row["effect"], row["axis"]] = place + 1
+        key = (row["effect"], place if row["axis"] != "*" else 100 + place)
+        line = lines.setdefault(key, [row["effect"] if place == 0 else "", "", "", "", row["unit"]])
+        line[1 + max(0, "xyz".find(row["axis"]))] = short(row["uncertainty_ug"])
+    return list(lines.values())
+
+
+def _aliases(row: dict[str, Any]) -> str:
+    exact = set(row["alias_exact"])
+    return ", ".join(f"= {name}" if name in exact else name for name in row["alias"]) or "–"

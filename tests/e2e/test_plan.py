@@ -1,12 +1,15 @@
 """`tumbleline plan` from the command line: what other programs read, and what it refuses."""
 
 import json
+import re
+from pathlib import Path
 
 import pytest
 from typer.testing import CliRunner
 
 from inertial.errors import NotIdentified
 from pipelines.cli import app
+from schemas.errors import WrongUse
 
 RECIPE = """
 name = "faces"
@@ -51,3 +54,72 @@ def test_plan_refuses_a_model_that_the_recipe_cannot_determine(faces):
     done = CliRunner().invoke(app, ["plan", str(faces)])
     assert isinstance(done.exception, NotIdentified)
     assert "third_order" in str(done.exception)
+
+
+def test_plan_says_what_hides_an_effect_in_the_users_words(faces):
+    rows = {
+        r["effect"]: r for r in json.loads(CliRunner().invoke(app, ["plan", str(faces), "--json"]).stdout)["effects"]
+    }
+    assert "β in 90° steps" in rows["cross_coupling"]["why"]
+    assert "add poses at β = 45°" in rows["cross_coupling"]["why"]
+    assert rows["second_order"]["why"] == ""
+
+
+def test_plan_refuses_an_invisible_model_with_what_is_missing(faces):
+    faces.write_text(RECIPE.replace('"misalignment"]', '"misalignment", "cross_coupling"]'), encoding="utf-8")
+    done = CliRunner().invoke(app, ["plan", str(faces)])
+    assert isinstance(done.exception, NotIdentified)
+    assert "cross_coupling cannot be identified: β in 90° steps makes" in str(done.exception)
+    assert "add poses at β = 45°" in str(done.exception)
+
+
+def test_plan_tells_the_error_to_be_expected_of_every_coefficient(faces):
+    document = json.loads(
+        CliRunner().invoke(app, ["plan", str(faces), "--json", "--noise", "25", "--wander", "0"]).stdout
+    )
+    rows = {(r["effect"], r["axis"]): r for r in document["coefficients"] if r["effect"] != "misalignment"}
+    white = document["dwell_error_ug"]["white"]
+    assert white == pytest.approx(25.0 / 20.0**0.5)
+    # six faces: the bias from six dwells, the scale from the two along the axis
+    assert rows["bias", "x"]["uncertainty_ug"] == pytest.approx(white / 6.0**0.5, rel=1e-6)
+    assert rows["scale", "z"]["uncertainty_ug"] == pytest.approx(white / 2.0**0.5, rel=1e-6)
+    assert rows["scale", "z"]["unit"] == "µg/g"
+
+
+def test_wander_of_the_device_counts_beside_its_white_noise(faces):
+    quiet, restless = (
+        json.loads(CliRunner().invoke(app, ["plan", str(faces), "--json", "--device", name]).stdout)
+        for name in ("qa700", "adxl355")
+    )
+    assert restless["dwell_error_ug"]["wander"] == pytest.approx(0.664 * 300.0, rel=0.01)
+    assert restless["dwell_error_ug"]["together"] > 5.0 * quiet["dwell_error_ug"]["together"]
+    floors = [{r["effect"]: r["floor_ug"] for r in d["effects"]}["second_order"] for d in (quiet, restless)]
+    assert floors[1] > 5.0 * floors[0]
+
+
+def test_a_slow_station_needs_more_minutes(faces, tmp_path):
+    text = (Path(__file__).parents[2] / "deploy/stations/simulated.toml").read_text(encoding="utf-8")
+    slow = tmp_path / "slow.toml"
+    slow.write_text(text.replace("speed_deg_s = 30.0", "speed_deg_s = 3.0"), encoding="utf-8")
+    usual, slower = (
+        json.loads(CliRunner().invoke(app, ["plan", str(faces), "--json", *more]).stdout)["minutes"]
+        for more in ((), ("--station", str(slow)))
+    )
+    assert slower["moves"] > 3.0 * usual["moves"]
+    assert slower["soaks"] == usual["soaks"]
+
+
+def test_the_page_of_a_plan_opens_without_a_network(faces, tmp_path):
+    page = tmp_path / "plan.html"
+    done = CliRunner().invoke(app, ["plan", str(faces), "--page", str(page)])
+    assert done.exit_code == 0
+    text = page.read_text(encoding="utf-8")
+    assert text.count("<svg") == 4
+    assert not re.search(r"(src|href)=.http", text)
+    assert "β in 90° steps" in text
+
+
+def test_a_page_in_a_folder_that_is_not_there_is_one_message(faces, tmp_path):
+    done = CliRunner().invoke(app, ["plan", str(faces), "--page", str(tmp_path / "none" / "plan.html")])
+    assert isinstance(done.exception, WrongUse)
+    assert "cannot be written" in str(done.exception)

@@ -1,0 +1,54 @@
+"""The page of a plan: one HTML file that opens without a network."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from pipelines.report.numbers import plain
+from pipelines.report.plan_plots import alias_plot, sight_plot, sphere_plot, temperature_plot
+from pipelines.report.templates import template
+
+if TYPE_CHECKING:
+    from pipelines.stages.plan import Planned
+
+MICRO = 1e6
+
+
+def render_plan(document: dict[str, Any], course: Planned) -> str:
+    """The page as one HTML text that needs no other file.
+
+    Parameters
+    ----------
+    document : of :func:`pipelines.stages.plan.plan`
+    course : the recipe as the station will go through it
+    """
+    return template("plan.html").render(
+        document=document,
+        recipe=course.recipe,
+        number=plain,
+        coefficients=_coefficients(document["coefficients"]),
+        seen=[row for row in document["effects"] if row["seen"]],
+        unseen=[row for row in document["effects"] if not row["seen"]],
+        sphere=sphere_plot(course),
+        temperature=temperature_plot(course),
+        aliases=alias_plot(course),
+        sights=sight_plot(document["effects"]),
+    )
+
+
+def _coefficients(rows: list[dict[str, Any]]) -> list[dict[str, Any]]:
+    """One line per coefficient, its axes side by side."""
+    lines: dict[tuple[str, int, bool], dict[str, Any]] = {}
+    count: dict[tuple[str, str], int] = {}
+    for row in rows:
+        place = count.get((row["effect"], row["axis"]), 0)
+        count[row["effect"], row["axis"]] = place + 1
+        shared = row["axis"] == "*"
+        line = lines.setdefault(
+            (row["effect"], place, shared), {"effect": row["effect"], "unit": row["unit"], "cells": {}, "names": []}
+        )
+        line["names"].append(row["name"])
+        line["cells"]["x" if shared else row["axis"]] = plain(row["uncertainty_ug"])
+    for line in lines.values():
+        line["names"] = ", ".join(dict.fromkeys(line["names"]))
+    return list(lines.values())
