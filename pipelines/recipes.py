@@ -95,7 +95,7 @@ def lot_of(
         raise WrongUse(message)
     bad = [serial for serial in named if not serial or not set(serial) <= _SERIAL or not serial[0].isalnum()]
     if bad:
-        message = f"lot: serial '{bad[0]}' is not usable, letters, digits and . _ + - are needed; correct it"
+        message = f"lot: serial {bad[0]!r} is not usable, letters, digits and . _ + - are needed; correct it"
         raise WrongUse(message)
     twice = sorted({serial for serial in named if named.count(serial) > 1})
     if twice:

@@ -252,6 +252,7 @@ class Archive:
 
     def run(self, name: str) -> Run:
         """The run of this id, of this unambiguous beginning, or ``latest``."""
+        self._refuse_newer_format()
         if PLAIN.fullmatch(name) and (self.root / "runs" / name / START).is_file():
             return Run(self, name)
         if name == "latest" and (infos := self.runs()):
@@ -282,8 +283,14 @@ class Archive:
 
     def run_ids(self) -> list[str]:
         """Names of the runs, in the order of the alphabet; among them may be one that is just being begun."""
+        self._refuse_newer_format()
         folder = self.root / "runs"
         return sorted(place.name for place in folder.iterdir()) if folder.is_dir() else []
+
+    def _refuse_newer_format(self) -> None:
+        mark = self.root / "archive.json"
+        if mark.is_file():
+            self._refuse_other_format(files.read_json(mark))
 
     def _refuse_key_within(self) -> None:
         """Refuse a signing key that lies in the archive: whoever edits the one could use the other."""

@@ -12,6 +12,7 @@ from pipelines.archive import Archive
 from pipelines.importers import files
 from schemas import tables
 from schemas.errors import DataRejected, WrongUse, did_you_mean
+from schemas.serials import refuse_unprintable
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -136,6 +137,7 @@ def _texts(frame: pd.DataFrame, column: str, where: str) -> list[str]:
     if "" in names:
         message = f"{where}: row {names.index('')}, column {column}: empty, a name is needed; fill it in"
         raise DataRejected(message)
+    refuse_unprintable(dict.fromkeys(names), where)
     return names
 
 

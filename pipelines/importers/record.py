@@ -12,6 +12,7 @@ from inertial import static_intervals
 from pipelines.importers import exchange
 from pipelines.importers.mapping import FACES, MEANINGS, OUTPUT_UNITS, STANDARD_GRAVITY, TIME_UNITS, Mapping
 from schemas.errors import DataRejected, WrongUse, did_you_mean
+from schemas.serials import refuse_unprintable
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -131,10 +132,13 @@ def _refuse_other_unit(output: NDArray[np.float64], out_unit: str, where: str) -
 
 def _serials(columns: dict[str, pd.Series], mapping: Mapping, where: str) -> list[str]:
     if "unit" in columns:
-        return [str(value) for value in columns["unit"].tolist()]
+        serials = [str(value) for value in columns["unit"].tolist()]
+        refuse_unprintable(dict.fromkeys(serials), where)
+        return serials
     if not mapping.unit:
         message = f"{where}: whose record is it? no unit is mapped, a serial number is needed; give --unit SN"
         raise WrongUse(message)
+    refuse_unprintable([mapping.unit], where)
     return [mapping.unit] * len(columns["x"])
 
 

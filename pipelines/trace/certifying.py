@@ -9,6 +9,7 @@ from pipelines.archive import files
 from pipelines.rows import rows_of
 from pipelines.trace.days import day_of, months_after, today
 from pipelines.trace.events import Event
+from pipelines.trace.refusals import refuse_overdue, refuse_two_at_once
 from schemas.errors import WrongUse, did_you_mean
 
 if TYPE_CHECKING:
@@ -68,6 +69,8 @@ def certify(
         raise WrongUse(message)
     proposals, result = _proposals(run, units, first, last, reason)
     for proposal in proposals:
+        refuse_two_at_once(ledger, run, proposal.serial)
+    for proposal in proposals:
         event, was_there = ledger.add(proposal, supersede=supersede)
         (result.there if was_there else result.written).append(event)
     ledger.anchor(result.written)
@@ -77,6 +80,7 @@ def certify(
 def _proposals(run: Run, units: Sequence[str], first: str, last: str, reason: str) -> tuple[list[Event], Certified]:
     """What is to be certified, and what is not with the reason; a named unit that may not be is refused."""
     grades = {str(row["unit"]): row for row in rows_of(_grades(run))}
+    refuse_overdue(run)
     about, result = run.about, Certified()
     evidence = tuple(sorted((name, files.sha256(run.path / f"{name}.json")) for name in EVIDENCE))
     shared: dict[str, Any] = {

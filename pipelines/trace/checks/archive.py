@@ -12,7 +12,7 @@ from pipelines.archive import Archive, Run
 from pipelines.archive.signatures import GOOD, UNKNOWN, UNSIGNED
 from pipelines.archive.store import ObjectPath
 from pipelines.trace.checks.calibrations import check_shard
-from pipelines.trace.checks.captures import check_capture
+from pipelines.trace.checks.captures import check_capture, check_strangers
 from pipelines.trace.checks.chain import check_chain
 from pipelines.trace.checks.findings import SIGNATURE, Checked
 from pipelines.trace.checks.runs import check_run
@@ -104,6 +104,8 @@ def verify(
         for done, part in enumerate(pool.map(lambda task: task(), tasks), 1):
             total.add(part)
             progress(done, len(tasks))
+    for folder in () if runs else ("", "runs", "captures", *(f"captures/{path.name}" for path in captures)):
+        check_strangers(archive.root / folder if folder else archive.root, set(), total)
     last = check_chain(archive.root, total, only={run.id for run in chosen} if runs else None, head=head)
     if demanded:
         _demand(total)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from pipelines.archive.records import COMPLETE
-from pipelines.trace.checks.findings import EDITED, MISSING, Checked
+from pipelines.trace.checks.findings import EDITED, FOREIGN, MISSING, Checked
 
 if TYPE_CHECKING:
     from pipelines.archive.store import Place
@@ -20,13 +20,24 @@ def check_capture(path: Place, checked: Checked, schema: int) -> Checked:
         found = checked.manifest(folder / "record.json", schema)
         if found is None:
             continue
-        for name, wanted in sorted(found[0].get("content", {}).items()):
+        content = found[0].get("content", {})
+        for name, wanted in sorted(content.items()):
             checked.table(folder / name, str(wanted))
+        check_strangers(folder, {*content, "record.json"}, checked)
         records.append((*found, folder))
     records.sort(key=lambda one: one[0].get("order", 0))
     _check_order(records, checked)
     _check_end(path, records, checked, schema)
     return checked
+
+
+def check_strangers(folder: Place, known: set[str], checked: Checked) -> None:
+    """Tables in a folder that nothing of the archive put there."""
+    for place in sorted(folder.iterdir(), key=lambda one: one.name) if folder.is_dir() else ():
+        if place.suffix == ".parquet" and place.name not in known and place.is_file():
+            checked.wrong(
+                FOREIGN, place, "was put there by somebody: take it out; import foreign files with 'tumbleline import'"
+            )
 
 
 def _check_order(records: list[tuple[dict[str, Any], str, Place]], checked: Checked) -> None:

@@ -20,7 +20,7 @@ def check_chain(root: Place, checked: Checked, *, only: set[str] | None = None, 
     only : runs whose sealed files are looked at; all where None.
     head : hash of an entry that was noted elsewhere; it must be there.
     """
-    before, seen, sealed = "", set[str](), dict[str, str]()
+    before, seen, sealed, latest = "", set[str](), dict[str, str](), ""
     for number, place in chain.entries(root):
         found = checked.manifest(place, 1)
         if found is None:
@@ -32,7 +32,12 @@ def check_chain(root: Place, checked: Checked, *, only: set[str] | None = None, 
             checked.wrong(EDITED, earlier, f"is not the entry that number {number} followed")
         if only is None or content.get("run") in only:
             sealed |= _files(content)
-        before = own
+        when = str(content.get("when", ""))
+        if when < latest:
+            checked.remarks.append(
+                f"entry {number} of the chain says {when}, one before it {latest}: a clock went backwards"
+            )
+        before, latest = own, max(when, latest)
         seen.add(own)
     if head and head not in seen:
         checked.wrong(
