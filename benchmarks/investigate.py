@@ -26,7 +26,10 @@ ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT))
 
 PLAIN = ("bias", "scale", "misalignment")
-THERMAL = (*PLAIN, "bias_temperature", "bias_temperature_quadratic", "scale_temperature")
+THERMAL = (
+    *PLAIN, "bias_temperature", "bias_temperature_quadratic", "scale_temperature", "scale_temperature_quadratic",
+    "misalignment_temperature",
+)  # fmt: skip
 QUIET = {
     "noise_density_ug": 8.0, "bias_instability_ug": 1.5, "rate_random_walk_ug": 0.003, "linearity_pct_fs": 0.0,
 }  # fmt: skip
@@ -50,6 +53,7 @@ class Scene:
     settle_s: float = 2.0
     soak_s: float = 900.0
     one_order: bool = False
+    unseen: bool = False
 
 
 LOOP = (25.0, 60.0, -10.0, 20.0)
@@ -59,7 +63,7 @@ SCENES = (
     Scene("cubic on 18", "cubic_transfer", ("third_order",), {"hardening": 90e-6}, "eighteen", 2),
     Scene("cubic on 24 even", "cubic_transfer", ("third_order",), {"hardening": 25e-6}, "fibonacci24", 2),
     Scene("cubic at 4 temperatures", "cubic_transfer", ("third_order",), {"hardening": 90e-6}, "eighteen", 1, LOOP),
-    Scene("pendulum on faces", "pendulous_mass", ("cross_coupling",), {"compliance": 40e-6}, "six", 6),
+    Scene("pendulum on faces", "pendulous_mass", ("cross_coupling",), {"compliance": 40e-6}, "six", 6, unseen=True),
     Scene("harmonic on faces", "encoder_harmonic", ("encoder_harmonic",), {"size": 50e-6}, "six", 6),
     Scene("level on faces", "level_error", ("level_error",), {"about_x": 0.0, "about_y": -60e-6}, "six", 6),
     Scene(
@@ -118,8 +122,8 @@ def job_of(scene: Scene, seed: int, units: int) -> Any:
     from inertial import poses
     from pipelines.job import Job
     from pipelines.recipes import load_limits, load_recipe
-    from schemas.recipe import Lot, Pose, Recipe, Unit
-    from schemas.station import Hidden, load_station
+    from schemas.recipe import Lot, Recipe, Unit
+    from schemas.station import Hidden, Simulation, load_station
 
     rng = np.random.default_rng([seed, 7])
     order = rng.permutation(len(poses.plan(scene.plan)))
@@ -149,8 +153,9 @@ def job_of(scene: Scene, seed: int, units: int) -> Any:
     station = load_station()
     hidden = [Hidden(kind=scene.kind, figures=scene.figures)]
     overrides = QUIET if varied else QUIET | STEADY
-    made = station.simulation.model_copy(update={"seed": seed, "hidden": hidden, "preset_overrides": overrides})
-    del Pose
+    made = (station.simulation or Simulation()).model_copy(
+        update={"seed": seed, "hidden": hidden, "preset_overrides": overrides}
+    )
     return Job(recipe, load_limits(recipe), lot, station.model_copy(update={"simulation": made}))
 
 
@@ -165,7 +170,7 @@ def one(task: tuple[str, int, int, float]) -> Outcome:
     begin = time.perf_counter()
     with tempfile.TemporaryDirectory() as folder:
         job = job_of(scene, seed, units)
-        terms = Terms(job.recipe.effects, None if share <= 0.0 else share)
+        terms = Terms(job.recipe.effects, None if share <= 0.0 else share, scene.unseen)
         document = play(job, Archive(folder), terms, Table(looked=looks.append, stage=quickly))
     return outcome(scene, seed, looks, document, time.perf_counter() - begin)
 

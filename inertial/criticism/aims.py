@@ -24,6 +24,9 @@ MARGIN = 1.5
 
 LEAST_WEIGHT = 0.02
 
+MORE = 3.0
+"""Factor by which the separation of rivals that are still not told apart must rise."""
+
 _SHOWN = 36.0
 """Chi-square, a coefficient, at which an effect of typical size counts as seen: six standard errors."""
 
@@ -64,7 +67,8 @@ class Parting:
     def __init__(self, rivals: Rivals, scores: Array) -> None:
         self.rivals = rivals
         self.weight = np.maximum(np.exp(-0.5 * scores), LEAST_WEIGHT)
-        self.needed = _needed(rivals)
+        # what is there already has not been enough, whatever was expected of it: more is wanted than that
+        self.needed = np.maximum(_needed(rivals), MORE * separations(rivals))
 
     @property
     def lot(self) -> Lot:

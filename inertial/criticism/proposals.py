@@ -135,6 +135,16 @@ def _term(model: Model, name: str) -> Term | None:
     return Term(effect, tuple(grid[len(grid) // 2].items()))
 
 
+@dataclass(frozen=True)
+class _Offer:
+    """A course with what is there after it, the station time until then, and what it brings per minute."""
+
+    course: Course
+    worth: float
+    minutes: float
+    rate: float
+
+
 class _Search:
     """The choice of courses for one aim."""
 
@@ -147,31 +157,47 @@ class _Search:
         self.rated = any("rate" in drivers_of(self.state, t.effect) for t in aim.terms)
 
     def best(self) -> Proposal | None:
-        """Courses one after the other, each the best beside those before it, until all is there or nothing more helps."""
+        """Courses one after the other, each the best beside those before it, until all is there or nothing more helps.
+
+        One course that brings all of it by itself takes their place where they take more time, or do not get there.
+        """
         chosen: list[Course] = []
         now = self.aim.worth(self.already, self.pace)
-        for _ in range(_ROUNDS):
-            found = self._next(chosen, now) if now <= 1.0 - self.aim.least else None
-            if found is None:
+        whole: _Offer | None = None
+        for turn in range(_ROUNDS):
+            if now > 1.0 - self.aim.least:
                 break
-            course, now = found
-            chosen.append(course)
+            offers = self._weighed(chosen, now)
+            if turn == 0:
+                whole = min(
+                    (o for o in offers if o.worth > 1.0 - self.aim.least), key=lambda o: o.minutes, default=None
+                )
+            if not offers:
+                break
+            best = max(offers, key=lambda o: o.rate)
+            now = best.worth
+            chosen.append(best.course)
+        if whole is not None and (now <= 1.0 - self.aim.least or self._minutes(chosen) > whole.minutes):
+            chosen, now = [whole.course], whole.worth
         return self._told(chosen, now) if chosen else None
 
-    def _next(self, chosen: Sequence[Course], now: float) -> tuple[Course, float] | None:
-        """The course that brings most per minute beside those chosen."""
+    def _minutes(self, chosen: Sequence[Course]) -> float:
+        return self.around.cost(self.aim, [*self.already, *(s for c in chosen for s in c.steps)])
+
+    def _weighed(self, chosen: Sequence[Course], now: float) -> list["_Offer"]:
+        """Courses that help beside those chosen, and that the budget allows."""
         held = [*self.already, *(s for c in chosen for s in c.steps)]
         spent = self.around.cost(self.aim, held)
-        best: tuple[float, Course, float] | None = None
+        found: list[_Offer] = []
         for course in self._offers(held):
             minutes = self.around.cost(self.aim, [*held, *course.steps])
             if minutes > self.around.budget:
                 continue
             worth = self.aim.worth([*held, *course.steps], self.pace)
-            rate = (worth - now) / (minutes - spent + 1.0)  # a minute goes by for the follow-up itself
-            if worth - now >= self.aim.least and (best is None or rate > best[0]):
-                best = rate, course, worth
-        return None if best is None else (best[1], best[2])
+            if worth - now >= self.aim.least:
+                rate = (worth - now) / (minutes - spent + 1.0)  # a minute goes by for the follow-up itself
+                found.append(_Offer(course, worth, minutes, rate))
+        return found
 
     def _offers(self, held: Sequence[Step]) -> list[Course]:
         """Every course that is worth a look."""

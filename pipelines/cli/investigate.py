@@ -59,6 +59,9 @@ def command(
             help="Spend the budget without asking; or ask, at the terminal or through a paused flow run.",
         ),
     ] = None,
+    unseen: Annotated[
+        bool, typer.Option("--unseen", help="Measure for effects, too, that the plan could not see.")
+    ] = False,
     direct: Annotated[bool, typer.Option("--direct", help="Work without the orchestrator.")] = False,
     as_json: JsonOption = False,
 ) -> None:
@@ -77,7 +80,7 @@ def command(
 
     seating = read_seating(units)
     request = Request(recipe, station, seating.units, seating.slots, seed, repeat)
-    terms = Terms(tuple(chosen_effects(effects, None, "investigate") or ()), budget)
+    terms = Terms(tuple(chosen_effects(effects, None, "investigate") or ()), budget, unseen)
     here = attended() and not as_json
     paused = yes is False and not here and not direct
     document = _inquired(request, Archive(archive), terms, _consent(yes=yes, here=here), direct=direct, paused=paused)

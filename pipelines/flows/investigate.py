@@ -74,6 +74,7 @@ def investigate(  # noqa: PLR0913 - a flow's parameters are its form on the serv
     *,
     effects: list[str] | None = None,
     budget_min: float | None = None,
+    unseen: bool = False,
     ask: bool = False,
 ) -> dict[str, Any]:
     """Measure a lot, and then only what tells apart what may be missing in its model; the document of the inquiry.
@@ -87,7 +88,7 @@ def investigate(  # noqa: PLR0913 - a flow's parameters are its form on the serv
     table = _tables[-1] if _tables else Table()
     approve = Asked(Paused()) if ask else (table.approve if _tables else always)
     at = Table(_stage, approve, table.progress, table.told, table.looked)
-    return play(job, Archive(archive), Terms(tuple(effects or ()), budget_min), at)
+    return play(job, Archive(archive), Terms(tuple(effects or ()), budget_min, unseen), at)
 
 
 def investigate_locally(request: Request, archive: Archive, terms: Terms, table: Table, *, ask: bool) -> dict[str, Any]:
@@ -104,6 +105,7 @@ def investigate_locally(request: Request, archive: Archive, terms: Terms, table:
                 archive=archive.address,
                 effects=list(terms.effects),
                 budget_min=terms.budget,
+                unseen=terms.unseen,
                 ask=ask,
             )
         settle_history(name, len(ORDER))

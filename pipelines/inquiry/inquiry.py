@@ -10,11 +10,11 @@ from threadpoolctl import threadpool_limits
 from pipelines.archive import code_hash, files, stage_key
 from pipelines.inquiry.followup import circumstances, follow_up
 from pipelines.inquiry.lineage import Lineage
-from pipelines.inquiry.words import why
+from pipelines.inquiry.words import shows, why
 from pipelines.job import Job
 from pipelines.runner import Runner
 from pipelines.stages.criticise import document, examined
-from pipelines.stages.next_measurement import Proposed, proposed
+from pipelines.stages.next_measurement import Proposed, proposed, rows_of
 from schemas.limits import Limits
 from schemas.recipe import Lot, Recipe
 from schemas.station import StationConfig
@@ -23,7 +23,9 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from inertial.criticism.diagnosis import Diagnosis
+    from inertial.criticism.proposals import Proposal
     from inertial.sequences import Step
+    from inertial.state import State
     from pipelines.archive import Archive, Records, Run
     from pipelines.progress import Progress
     from pipelines.stages.measured import Measured
@@ -34,6 +36,7 @@ EXTRA = 0.3
 """Share of the first run's station time that follow-ups may take where no budget is given."""
 
 MOST_ROUNDS = 6
+SETTLED = frozenset({"adequate", "told_apart"})
 FOLLOW_UP = ("capture", "validate", "reduce")
 TABLE_OF_CODE = ("inertial", "pipelines.stages.criticise", "pipelines.stages.measured")
 FILE = "inquiry.json"
@@ -49,6 +52,14 @@ class Finding:
     found: Measured
     diagnosis: Diagnosis | None
     following: Proposed
+
+    @property
+    def state(self) -> State:
+        """The dwells that physics was looked for in."""
+        if self.diagnosis is None:
+            message = "an inquiry in which every unit has a data fault has no state"
+            raise LookupError(message)
+        return self.diagnosis.problem.lot.state
 
     @property
     def ambiguous(self) -> list[list[str]]:
@@ -84,6 +95,7 @@ class Inquiry:
 
     effects : the model that is judged; the recipe's where empty
     budget : station minutes for follow-ups
+    unseen : whether effects that the plan could not see are measured for, too, once nothing is ambiguous
     """
 
     archive: Archive
@@ -91,6 +103,7 @@ class Inquiry:
     lineage: Lineage
     effects: tuple[str, ...]
     budget: float
+    unseen: bool = False
     rounds: list[dict[str, Any]] = field(default_factory=list[dict[str, Any]])
 
     @property
@@ -120,7 +133,10 @@ class Inquiry:
         if begun is not None:
             return begun
         ended = _ended(finding)
+        showing = finding.following.showing
         if ended is not None:
+            if self.unseen and showing is not None and ended.end in SETTLED and len(self.lineage.runs) <= MOST_ROUNDS:
+                return self._move((showing,), (shows(finding.state, self.effects, showing),))
             return ended
         if len(self.lineage.runs) > MOST_ROUNDS:
             return Verdict("nothing_parts", f"{MOST_ROUNDS} follow-ups have not told {_classes(finding)} apart")
@@ -142,21 +158,27 @@ class Inquiry:
                 f"are left; give --budget {self.spent + needed:.0f}"
             )
             return Verdict("budget", text)
-        base = [e for e in self.effects if all(e not in p.ids for p in free)]
-        reasons = tuple(why(diagnosis.problem.lot.state, base, p) for p in free)
-        steps: list[Step] = [s for p in free for s in p.steps]
+        return self._move(free, tuple(why(finding.state, self.effects, p) for p in free))
+
+    def _move(self, wanted: Sequence[Proposal], reasons: tuple[str, ...]) -> Move:
+        """Proposals as a measurement of the station."""
+        steps: list[Step] = [s for p in wanted for s in p.steps]
         job = follow_up(steps, self.base, self.jobs[-1], self.lineage.ids, "; ".join(reasons))
         recipe = job.recipe.model_copy(update={"effects": list(self.effects)})
         job = Job(recipe, job.limits, job.lot, job.station, parents=job.parents)
-        return Move(job, tuple(finding.told["next_measurements"]), reasons, sum(p.minutes for p in free))
+        rows = tuple(row for p in wanted for row in rows_of(p))
+        return Move(job, rows, reasons, sum(p.minutes for p in wanted))
 
     def _begun(self) -> Move | None:
         """A follow-up of this lineage that was begun before: it was approved then, and goes on."""
         for info in reversed(self.archive.runs()):
-            about = self.archive.run(info.id).about
+            run = self.archive.run(info.id)
+            about = run.about
             mine = about.get("parents") == list(self.lineage.ids)
             if mine and about["recipe"]["effects"] == list(self.effects):
-                return Move(_job_of(about), (), (str(about["recipe"]["description"]),), 0.0, begun=True)
+                told = files.read_json(run.path / FILE)["round"] if (run.path / FILE).is_file() else {}
+                rows, reasons = told.get("next_measurements", ()), told.get("why", [about["recipe"]["description"]])
+                return Move(_job_of(about), tuple(rows), tuple(reasons), told.get("planned_minutes", 0.0), begun=True)
         return None
 
     def runner(self, move: Move, progress: Progress) -> Runner:
@@ -219,11 +241,13 @@ class Inquiry:
         }
 
 
-def begin(archive: Archive, job: Job, run: Run, effects: Sequence[str], budget: float | None) -> Inquiry:
+def begin(
+    archive: Archive, job: Job, run: Run, effects: Sequence[str], budget: float | None, *, unseen: bool = False
+) -> Inquiry:
     """The inquiry of a run that was measured: with the budget given, or a share of the station time that it took."""
     lineage = Lineage((run,))
     allowed = EXTRA * lineage.minutes()[0] if budget is None else budget
-    return Inquiry(archive, [job], lineage, tuple(effects or job.recipe.effects), allowed)
+    return Inquiry(archive, [job], lineage, tuple(effects or job.recipe.effects), allowed, unseen)
 
 
 def _going_on(before: Records) -> Any:

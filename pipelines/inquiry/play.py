@@ -53,10 +53,14 @@ def directly(name: str, runner: Runner) -> Done:
 
 @dataclass(frozen=True)
 class Terms:
-    """What an inquiry is given: the model to judge (the recipe's where empty), and station minutes for follow-ups."""
+    """What an inquiry is given: the model to judge (the recipe's where empty), and station minutes for follow-ups.
+
+    ``unseen``: effects that the plan could not see are measured for, too.
+    """
 
     effects: Sequence[str] = ()
     budget: float | None = None
+    unseen: bool = False
 
 
 @dataclass(frozen=True)
@@ -79,7 +83,7 @@ def play(job: Job, archive: Archive, terms: Terms, table: Table) -> dict[str, An
     runner = Runner(job, archive, table.progress)
     for name in ORDER:
         table.told(table.stage(name, runner))
-    inquiry = begin(archive, job, runner.run, terms.effects, terms.budget)
+    inquiry = begin(archive, job, runner.run, terms.effects, terms.budget, unseen=terms.unseen)
     while True:
         finding = inquiry.look()
         inquiry.keep(finding)

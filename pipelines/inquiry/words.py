@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from inertial import frames
-from inertial.reasons import likeness
+from inertial.reasons import likeness, reason
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -32,6 +32,13 @@ def why(state: State, base: Sequence[str], found: Proposal) -> str:
     hidden = _hidden(state, base, first, second)
     parted = f"χ² between {first} and its nearest rival goes from {found.before:.1f} to {found.after:.0f}"
     return f"{rivals} fit alike: {hidden}. {what(found)} parts them ({parted}; {found.minutes:.1f} min)"
+
+
+def shows(state: State, base: Sequence[str], found: Proposal) -> str:
+    """One sentence: why effects were not seen so far, and what is measured to see them."""
+    hidden = dict.fromkeys(r.split("; ")[0] for name in found.ids if (r := reason(state, name, base)))
+    least = f"χ² of a coefficient of typical size: {found.before:.1f}, then {found.after:.0f} at least"
+    return f"{'; '.join(hidden)}. {what(found)} shows {', '.join(found.ids)} ({least}; {found.minutes:.1f} min)"
 
 
 def _hidden(state: State, base: Sequence[str], first: str, second: str) -> str:
