@@ -215,17 +215,18 @@ def _standards(audit: Audit) -> Iterator[Finding]:
 
 
 def _gauges(audit: Audit) -> Iterator[Finding]:
-    for study in audit.studies:
-        if np.isfinite(study.of_tolerance) and study.of_tolerance > audit.rules.gauge_most_percent:
-            text = unit_text(study.parameter)
-            message = (
-                f"{study.device} {study.parameter}: the gauge takes {study.of_tolerance:.0f} % of the tolerance "
-                f"({study.gauge.gauge:.3g} {text}; seating {study.gauge.repeatability:.3g}, between stations "
-                f"{study.gauge.reproducibility:.3g}), {audit.rules.gauge_most_percent:g} % is the most allowed; "
-                "measure longer, or widen the tolerance"
-            )
-            evidence = {"percent_of_tolerance": study.of_tolerance, "runs": list(study.runs)}
-            yield Finding("station", "gauge", study.device, message, (), evidence)
+    """Gauge studies that take too much of the tolerance, one finding a study."""
+    most = audit.rules.gauge_most_percent
+    bad = [s for s in audit.studies if np.isfinite(s.of_tolerance) and s.of_tolerance > most]
+    for runs in dict.fromkeys(study.runs for study in bad):
+        own = sorted((study for study in bad if study.runs == runs), key=lambda study: -study.of_tolerance)
+        shares = ", ".join(f"{study.parameter} {study.of_tolerance:.0f} %" for study in own)
+        message = (
+            f"{own[0].device}: seating a unit again takes more of the tolerance than the {most:g} % allowed: {shares} "
+            f"(study of {date_of(own[0].first_day)}, {len(runs)} runs); measure longer, or widen the tolerance"
+        )
+        evidence = {"runs": list(runs), "percent_of_tolerance": {study.parameter: study.of_tolerance for study in own}}
+        yield Finding("station", "gauge", own[0].device, message, (), evidence)
 
 
 def _overdue(audit: Audit) -> Iterator[Finding]:

@@ -13,8 +13,9 @@ import shutil
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from tempfile import TemporaryDirectory
+from tempfile import mkdtemp
 from typing import TYPE_CHECKING, NamedTuple
+from weakref import finalize
 
 import pyarrow as pa
 import pyarrow.parquet as pq
@@ -49,6 +50,14 @@ class Portion(NamedTuple):
     version: str
 
 
+class _Fleeting:
+    """A temporary folder that goes with whoever holds it."""
+
+    def __init__(self) -> None:
+        self.path = Path(mkdtemp(prefix="tumbleline-index-"))
+        finalize(self, shutil.rmtree, self.path, ignore_errors=True)
+
+
 @dataclass(frozen=True)
 class Index:
     """The parts of an index that is up to date, and what had to be done for that.
@@ -59,7 +68,7 @@ class Index:
     parts: tuple[Place, ...]
     made: int
     kept: int
-    holder: TemporaryDirectory[str] | None = None
+    holder: _Fleeting | None = None
 
     def table(self, name: str, columns: Sequence[str] | None = None) -> pa.Table:
         """All rows of one of :data:`TABLES`; texts as dictionaries."""
@@ -89,14 +98,16 @@ def up_to_date(archive: Archive, dask: str | None = None, workers: int = 1) -> I
     """
     place = archive.root / FOLDER
     stamps = _stamps(archive.root)
+    if not stamps:  # an address with a slip of the pen is not made into a folder
+        return Index((), 0, 0)
     try:
         with alone(place, wait=True):
             return _refreshed(archive, place, stamps, dask, workers)
     except ArchiveUnusable:
         if isinstance(archive.root, Path) and os.access(archive.root, os.W_OK):
             raise
-        holder = TemporaryDirectory(prefix="tumbleline-index-")
-        found = _refreshed(archive, Path(holder.name), stamps, dask, workers)
+        holder = _Fleeting()
+        found = _refreshed(archive, holder.path, stamps, dask, workers)
         return Index(found.parts, found.made, found.kept, holder)
 
 

@@ -9,12 +9,12 @@ import numpy as np
 
 from pipelines.audit.calibrations import codes, date_of
 from pipelines.audit.drifts import OWN
-from pipelines.audit.parameters import NAMES
 from pipelines.audit.statistics.capability import Index as Capability
 from pipelines.audit.statistics.capability import cpk, fraction_interval, sigma_within
 from pipelines.audit.statistics.comparison import Comparison, compare, holm, outlier_limit, robust_z
 
 if TYPE_CHECKING:
+    import pandas as pd
     from numpy.typing import NDArray
 
     from pipelines.audit.calibrations import Calibrations
@@ -27,7 +27,6 @@ if TYPE_CHECKING:
 
 FEWEST = 20
 FEWEST_OF_LOT = 3
-COLUMNS = tuple(NAMES.index(name) for name in OWN)
 
 
 @dataclass(frozen=True)
@@ -126,13 +125,14 @@ def figures_of(index: Index, all_: Calibrations, chosen: Flags) -> Figures:
     )
 
 
-def _numbers_in(column: object, known: NDArray[np.str_]) -> Numbers:
+def _numbers_in(column: pd.Series, known: NDArray[np.str_]) -> Numbers:
     """Place of every text of a categorical column in the sorted texts that are known; −1 where it is not."""
-    categories = np.asarray(column.cat.categories, dtype=str)  # pyright: ignore[reportAttributeAccessIssue]
+    column = column.astype("category")
+    categories = np.asarray(column.cat.categories, dtype=str)
     place = np.searchsorted(known, categories)
     there = place < known.size
     there[there] = known[place[there]] == categories[there]
-    return np.where(there, place, -1)[np.asarray(column.cat.codes)]  # pyright: ignore[reportAttributeAccessIssue]
+    return np.where(there, place, -1)[np.asarray(column.cat.codes)]
 
 
 def abilities(all_: Calibrations, figures: Figures) -> tuple[list[Ability], list[Difference]]:
@@ -199,7 +199,7 @@ def odd_ones(all_: Calibrations, chosen: Flags) -> list[Odd]:
     out: list[Odd] = []
     for device in np.unique(all_.device.astype(str)):
         rows = np.flatnonzero(chosen & first & (all_.device == device))
-        values = all_.values[rows][:, COLUMNS]
+        values = np.stack([all_.column(name)[rows] for name in OWN], axis=1)
         usable = np.isfinite(values).any(axis=0)
         if rows.size < FEWEST or not usable.any():
             continue
@@ -213,7 +213,7 @@ def _odd_units(all_: Calibrations, device: str, rows: Numbers, values: Array, od
     worst = np.argmax(np.abs(z), axis=1)
     size = np.abs(z[np.arange(rows.size), worst])
     found: list[Odd] = []
-    for k in np.flatnonzero(size > outlier_limit(z.size)):
+    for k in np.flatnonzero(size > outlier_limit(z.size, rows.size)):
         row, column = rows[k], worst[k]
         if str(all_.run[row]) not in odd_lots:
             found.append(
@@ -234,7 +234,7 @@ def _odd_lots(all_: Calibrations, device: str, rows: Numbers, values: Array) -> 
     worst = np.argmax(np.abs(z), axis=1)
     size = np.abs(z[np.arange(large.size), worst])
     out: list[Odd] = []
-    for k in np.flatnonzero(size > outlier_limit(z.size)):
+    for k in np.flatnonzero(size > outlier_limit(z.size, large.size)):
         run, column = str(runs[large[k]]), worst[k]
         row = rows[np.flatnonzero(lot == large[k])[0]]
         out.append(

@@ -10,6 +10,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from pipelines.plain import plain
+
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
@@ -70,21 +72,6 @@ def error_console() -> Console:
 def print_json(document: Any) -> None:
     """One JSON document on standard output; numbers that JSON does not know become null."""
     sys.stdout.write(json.dumps(plain(document), ensure_ascii=False, indent=1, allow_nan=False) + "\n")
-
-
-def plain(value: Any) -> Any:
-    """A value made of what JSON knows."""
-    if isinstance(value, dict):
-        return {str(key): plain(item) for key, item in value.items()}
-    if isinstance(value, list | tuple):
-        return [plain(item) for item in value]
-    if hasattr(value, "item") and not isinstance(value, str):
-        value = value.item()
-    if isinstance(value, float) and not math.isfinite(value):
-        return None
-    if isinstance(value, str | int | float | bool) or value is None:
-        return value
-    return str(value)
 
 
 def rows(table: pd.DataFrame) -> list[dict[str, Any]]:

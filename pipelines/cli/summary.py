@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from pipelines.cli.options import STYLES, console, plain, print_table, short
+from pipelines.cli.options import STYLES, console, print_table, short
+from pipelines.plain import plain
 from pipelines.rows import rows_of
 from schemas.errors import DONE, PART_FAILED
 

@@ -76,7 +76,7 @@ def test_a_deployment_started_by_hand_appears_in_the_archive(tmp_path: Path) -> 
         schedules = python(
             environment, "-m", "prefect", "deployment", "schedule", "ls", "calibrate_lot/production-line"
         )
-    assert names == ["calibrate_lot/production-line", "calibrate_lot/on-demand"]
+    assert names == ["calibrate_lot/production-line", "calibrate_lot/on-demand", "audit_archive/weekly-audit"]
     assert "0 6 * * 1-5" in schedules
     [info] = Archive(archive).runs()
     assert info.finished

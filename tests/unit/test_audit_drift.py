@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from pipelines.audit.statistics.change_points import change_points, noise_of
+from pipelines.audit.statistics.comparison import outlier_limit, robust_z
 from pipelines.audit.statistics.drift import forecast, in_tolerance, kind_of, last_reliable, leaves, standing
 from pipelines.audit.statistics.fingerprints import (
     alike_below,
@@ -147,3 +148,13 @@ def test_units_and_places_are_taken_apart(rng):
     values[7] += 50.0
     _, found = unit_and_place(values, units, places)
     assert found == pytest.approx(place - np.median(place), abs=0.06)
+
+
+def test_no_value_of_a_small_population_stands_out_by_chance(rng):
+    wrong = 0
+    for _ in range(300):
+        values = rng.standard_normal((40, 10))
+        wrong += bool(np.any(np.abs(robust_z(values)) > outlier_limit(values.size, 40)))
+    assert wrong <= 12
+    values[3, 5] = 30.0
+    assert np.argwhere(np.abs(robust_z(values)) > outlier_limit(values.size, 40)).tolist() == [[3, 5]]

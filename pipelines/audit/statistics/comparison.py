@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.stats import chi2, norm, rankdata
 from scipy.stats import f as f_distribution
+from scipy.stats import t as student
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -17,6 +18,7 @@ if TYPE_CHECKING:
     Flags = NDArray[np.bool_]
 
 TO_SIGMA = 1.4826
+MAD_EFFICIENCY = 0.37  # Rousseeuw and Croux 1993, J. Am. Stat. Assoc. 88, 1273
 
 
 @dataclass(frozen=True)
@@ -81,6 +83,13 @@ def robust_z(values: Array) -> Array:
     return (values - middle) / np.where(spread > 0.0, spread, np.inf)
 
 
-def outlier_limit(n: int, level: float = 0.01) -> float:
-    """|z| that none of n normal values exceeds but with probability ``level``."""
-    return float(norm.isf(0.5 * level / max(n, 1)))
+def outlier_limit(n: int, known_from: int | None = None, level: float = 0.01) -> float:
+    """|z| that none of n normal values exceeds but with probability ``level``.
+
+    Parameters
+    ----------
+    known_from : number of values that centre and σ come from by median and MAD; without end where None. σ is then known as from
+        0.37 times as many values by their standard deviation, the efficiency of the MAD, and z is Student's
+    """
+    tail = 0.5 * level / max(n, 1)
+    return float(norm.isf(tail) if known_from is None else student.isf(tail, max(MAD_EFFICIENCY * known_from, 1.0)))

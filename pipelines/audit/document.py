@@ -1,0 +1,200 @@
+"""The audit as one JSON document."""
+
+from __future__ import annotations
+
+from dataclasses import asdict
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from pipelines.audit.calibrations import date_of
+from pipelines.audit.findings import WHO, Finding
+from pipelines.audit.parameters import unit_text
+from pipelines.audit.statistics.control_charts import RULES
+
+if TYPE_CHECKING:
+    from pipelines.audit.audit import Audit
+    from pipelines.audit.drifts import UnitDrift
+    from pipelines.audit.stations_over_time import Chart, Series
+
+MOST_UNITS = 200  # histories in the document; every one is in a finding or can be asked for by its serial
+SCHEMA = 1
+
+
+def document(audit: Audit, found: list[Finding], archive: str) -> dict[str, Any]:
+    """Everything that the audit found, findings first; dates are ISO and UTC."""
+    return {
+        "schema": SCHEMA,
+        "archive": archive,
+        "since": date_of(audit.scope.since),
+        "until": date_of(audit.scope.until),
+        "device": audit.scope.device,
+        "station": audit.scope.station,
+        "counts": counts(audit),
+        "findings": [{**asdict(finding), "whose": WHO[finding.who]} for finding in found],
+        "due": _due(audit),
+        "drift": {"kinds": _kinds(audit), "units": [_unit(d) for d in furthest(audit, MOST_UNITS)]},
+        "stations": [_series(series) for series in (*audit.stations, *audit.slots)],
+        "slots": list(audit.slot_means),
+        "charts": [_chart(chart) for chart in audit.charts],
+        "population": {
+            "yield": [asdict(share) for share in audit.yields],
+            "capability": [asdict(able) for able in audit.abilities],
+            "differences": [asdict(one) for one in audit.differences],
+            "odd": [{**asdict(odd), "date": date_of(odd.day)} for odd in audit.odd],
+        },
+        "gauge": [_study(study) for study in audit.studies],
+        "rules": audit.rules.model_dump(mode="json"),
+    }
+
+
+def counts(audit: Audit) -> dict[str, int]:
+    """How much was looked at."""
+    own = audit.all
+    return {
+        "calibrations": len(own),
+        "in_period": int(audit.period.sum()),
+        "units": int(own.histories[-1]) + 1 if len(own) else 0,
+        "runs": int(np.unique(own.run.astype(str)).size),
+        "stations": int(np.unique(own.station.astype(str)).size),
+        "unreadable_runs": len(audit.problems),
+    }
+
+
+def furthest(audit: Audit, most: int) -> list[UnitDrift]:
+    """Parameters of units whose last change was in the period, the largest |E_n| first; each unit once."""
+    worst = [max(drifts, key=lambda d: abs(d.e_n)) for drifts in audit.units.values()]
+    recent = [drift for drift in worst if drift.day >= audit.scope.since]
+    return sorted(recent, key=lambda d: (-abs(d.e_n), d.unit))[:most]
+
+
+def date_or_none(day: float) -> str | None:
+    """A date; None for never."""
+    return date_of(day) if np.isfinite(day) else None
+
+
+def _due(audit: Audit) -> dict[str, Any]:
+    own, until = audit.due, audit.scope.until
+    late = np.flatnonzero(own.day < until)
+    soon = np.flatnonzero((own.day >= until) & (own.day < until + audit.rules.notice_days))
+
+    def listed(which: Any) -> list[dict[str, Any]]:
+        return [
+            {
+                "unit": str(audit.all.unit[row]), "device": str(audit.all.device[row]),
+                "last": date_of(float(audit.all.day[row])), "due": date_of(float(own.day[k])), "run": str(audit.all.run[row]),
+                "months": float(own.months[k]), "because": str(own.because[k]),
+            }
+            for k, row in zip(which, own.row[which], strict=True)
+        ]  # fmt: skip
+
+    return {"interval": audit.rules.interval, "units": own.row.size, "overdue": listed(late), "soon": listed(soon)}
+
+
+def _kinds(audit: Audit) -> list[dict[str, Any]]:
+    return [
+        {
+            "device": kind.device,
+            "parameter": kind.parameter,
+            "unit_text": unit_text(kind.parameter),
+            "pairs": kind.kind.pairs,
+            "slope_mean_per_year": kind.kind.mean_slope,
+            "slope_sd_per_year": kind.kind.slope_sd,
+            "walk_sd_per_root_year": kind.kind.walk_sd,
+            "seating_sd": kind.kind.mount_sd,
+            "median_change": kind.median,
+            "share_beyond_uncertainty": kind.beyond,
+            "share_beyond_tolerance": kind.out,
+            "tolerance": kind.tolerance,
+            "reliable_months": kind.reliable_months,
+        }
+        for kind in audit.kinds
+    ]
+
+
+def _unit(drift: UnitDrift) -> dict[str, Any]:
+    days = ("leaves", "soonest", "latest", "reliable_day")
+    plain = {k: v for k, v in asdict(drift).items() if k not in {*days, "day", "limit_day"}}
+    dates = {name.removesuffix("_day"): date_or_none(getattr(drift, name)) for name in days}
+    leaves_limit = [date_or_none(day) for day in drift.limit_day]
+    return {
+        **plain,
+        "unit_text": unit_text(drift.parameter),
+        "date": date_of(drift.day),
+        **dates,
+        "leaves_limit": leaves_limit,
+    }
+
+
+def _series(series: Series) -> dict[str, Any]:
+    return {
+        "station": series.station,
+        "where": series.where,
+        "parameter": series.parameter,
+        "unit_text": series.unit_text,
+        "n": int(series.value.size),
+        "mean": float(np.mean(series.value)),
+        "noise": series.noise,
+        "weeks": weekly(series),
+        "changes": [
+            {
+                "date": date_of(series.day[c.first]),
+                "earliest": date_of(series.day[max(c.low - 1, 0)]),
+                "latest": date_of(series.day[min(c.high, series.day.size - 1)]),
+                "first_run": str(series.run[c.first]),
+                "shift": c.shift,
+                "standard_error": c.error,
+                "p_value": c.p_value,
+            }
+            for c in series.changes
+        ],
+    }
+
+
+def weekly(series: Series) -> list[dict[str, Any]]:
+    """Means of the weeks: their Monday, number of values, mean."""
+    week = np.floor((series.day - 4.0) / 7.0).astype(int)  # 1970-01-05 was a Monday
+    numbers, place = np.unique(week, return_inverse=True)
+    n = np.bincount(place)
+    mean = np.bincount(place, series.value) / n
+    return [
+        {"week": date_of(7.0 * w + 4.0), "n": int(c), "mean": float(m)}
+        for w, c, m in zip(numbers, n, mean, strict=True)
+    ]
+
+
+def _chart(chart: Chart) -> dict[str, Any]:
+    hit = np.flatnonzero(chart.rules.any(axis=0) | chart.outside)
+    return {
+        "station": chart.station,
+        "standard": chart.standard,
+        "parameter": chart.parameter,
+        "unit_text": chart.unit_text,
+        "n": int(chart.value.size),
+        "centre": chart.chart.centre,
+        "sigma": chart.chart.sigma,
+        "alarms": chart.alarms,
+        "expected_by_chance": chart.expected,
+        "p_value": chart.p_value,
+        "in_control": chart.in_control,
+        "signals": [
+            {
+                "date": date_of(chart.day[k]),
+                "run": str(chart.run[k]),
+                "value": float(chart.value[k]),
+                "rules": [RULES[r] for r in np.flatnonzero(chart.rules[:, k])],
+                "ewma": bool(chart.outside[k]),
+            }
+            for k in hit
+        ],
+    }
+
+
+def _study(study: Any) -> dict[str, Any]:
+    gauge = study.gauge
+    return {
+        "device": study.device, "parameter": study.parameter, "unit_text": unit_text(study.parameter),
+        "stations": list(study.stations), "first": date_of(study.first_day), "last": date_of(study.last_day),
+        "runs": list(study.runs), "percent_of_tolerance": study.of_tolerance, "percent_of_total": gauge.percent,
+        "categories": gauge.categories, "gauge": gauge.gauge, **asdict(gauge),
+    }  # fmt: skip

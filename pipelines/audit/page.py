@@ -1,0 +1,124 @@
+"""The audit as one page that opens without a network."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from pipelines.audit.calibrations import date_of
+from pipelines.audit.document import counts, furthest
+from pipelines.audit.findings import WHO
+from pipelines.audit.parameters import unit_text
+from pipelines.audit.pictures import chart_plot, drift_plot, due_plot, series_plot, yield_plot
+from pipelines.report.diagnosis import chance
+from pipelines.report.numbers import plain
+from pipelines.report.templates import template
+
+if TYPE_CHECKING:
+    from pipelines.audit.audit import Audit
+    from pipelines.audit.drifts import UnitDrift
+    from pipelines.audit.findings import Finding
+    from pipelines.audit.stations_over_time import Chart, Series
+
+MOST_SERIES, MOST_CHARTS, MOST_HISTORIES, MOST_ROWS, MOST_OF_KIND = 8, 4, 4, 25, 40
+
+
+def render(audit: Audit, found: list[Finding], archive: str) -> str:
+    """The report as one HTML text that needs no other file."""
+    months = [share for share in audit.yields if share.of == "month"]
+    series, charts, drifts = _telling_series(audit), _telling_charts(audit), _telling_drifts(audit)
+    return template("audit.html").render(
+        archive=archive,
+        since=date_of(audit.scope.since) if audit.scope.since > _BEGINNING else "",
+        until=date_of(audit.scope.until - 1.0),
+        scope=", ".join(part for part in (audit.scope.device, audit.scope.station) if part),
+        counts=counts(audit),
+        groups=_groups(found),
+        total=len(found),
+        passed=next((share for share in audit.yields if share.of == "all"), None),
+        overdue=int(np.count_nonzero(audit.due.day < audit.scope.until)),
+        rules=audit.rules,
+        series_svg=series_plot(series) if series else "",
+        charts_svg=chart_plot(charts) if charts else "",
+        chart_count=len(audit.charts),
+        yield_svg=yield_plot(months) if len(months) > 1 else "",
+        due_svg=due_plot(audit) if audit.due.row.size else "",
+        drift_svg=drift_plot(audit, drifts) if drifts else "",
+        shares=[share for share in audit.yields if share.of in {"device", "station"}],
+        kinds=audit.kinds,
+        furthest=furthest(audit, MOST_ROWS),
+        abilities=audit.abilities,
+        differences=[one for one in audit.differences if one.p < 0.05],
+        compared=len(audit.differences),
+        studies=audit.studies,
+        slots=audit.slot_means,
+        odd=audit.odd[:MOST_ROWS],
+        unit_text=unit_text,
+        number=plain,
+        signed=_signed,
+        chance=chance,
+        date=_date,
+        percent=_percent,
+    )
+
+
+SAME_EVENT_D = 14.0
+_BEGINNING = -700000.0  # days before any calibration
+
+
+def _groups(found: list[Finding]) -> list[dict[str, Any]]:
+    """Findings by who must act, the first of a kind shown and the rest counted."""
+    out: list[dict[str, Any]] = []
+    for who, words in WHO.items():
+        own = [finding for finding in found if finding.who == who]
+        shown: list[Finding] = []
+        more: dict[str, int] = {}
+        for finding in own:
+            if sum(one.kind == finding.kind for one in shown) < MOST_OF_KIND:
+                shown.append(finding)
+            else:
+                more[finding.kind] = more.get(finding.kind, 0) + 1
+        if own:
+            out.append({"who": words, "findings": shown, "more": more, "count": len(own)})
+    return out
+
+
+def _telling_series(audit: Audit) -> list[Series]:
+    """The series whose level changed, the plainest first and each event once; where none did the stations' levels."""
+    moved = [one for one in (*audit.stations, *audit.slots) if one.changes]
+    told: list[tuple[str, bool, float]] = []
+    kept: list[Series] = []
+    for one in sorted(moved, key=lambda s: -max(abs(c.shift) / c.error for c in s.changes)):
+        plainest = max(one.changes, key=lambda c: abs(c.shift) / c.error)
+        event = (one.station, one.where.startswith("slot"), float(one.day[plainest.first]))
+        if not any(event[:2] == known[:2] and abs(event[2] - known[2]) < SAME_EVENT_D for known in told):
+            told.append(event)
+            kept.append(one)
+    if kept:
+        return kept[:MOST_SERIES]
+    return [one for one in audit.stations if one.where == "level_error"][:MOST_SERIES]
+
+
+def _telling_charts(audit: Audit) -> list[Chart]:
+    return sorted(audit.charts, key=lambda chart: (chart.p_value, chart.station, chart.parameter))[:MOST_CHARTS]
+
+
+def _telling_drifts(audit: Audit) -> list[UnitDrift]:
+    """The histories least like their kind."""
+    worst = [max(drifts, key=lambda d: abs(d.odd)) for drifts in audit.units.values()]
+    several = [drift for drift in worst if drift.calibrations > 2]
+    return sorted(several, key=lambda d: (-abs(d.odd), d.unit))[:MOST_HISTORIES]
+
+
+def _date(day: float) -> str:
+    return date_of(day) if np.isfinite(day) else "–"
+
+
+def _percent(share: float) -> str:
+    return f"{plain(100.0 * share)} %"
+
+
+def _signed(value: float) -> str:
+    text = plain(value)
+    return text if text.startswith("−") or not text else f"+{text}"

@@ -1,0 +1,150 @@
+"""``tumbleline audit``: what drifts, what is due, which station moved, how the population stands."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from pipelines.cli.options import ArchiveOption, JsonOption, console, error_console, print_json, short
+from schemas.errors import DONE, PART_FAILED, WrongUse
+
+if TYPE_CHECKING:
+    from pipelines.audit.audit import Audit, Scope
+    from pipelines.audit.findings import Finding
+
+SHOWN = 12  # findings of one kind
+
+
+def command(
+    archive: ArchiveOption = None,
+    since: Annotated[
+        str,
+        typer.Option("--since", metavar="DATE", help="Changes, signals and figures from this day on; all by default."),
+    ] = "",
+    until: Annotated[
+        str, typer.Option("--until", metavar="DATE", help="As it was known at the end of this day; today by default.")
+    ] = "",
+    device: Annotated[str, typer.Option("--device", metavar="KIND", help="Only units of this kind.")] = "",
+    station: Annotated[str, typer.Option("--station", metavar="NAME", help="Only what this station measured.")] = "",
+    rules: Annotated[
+        Path | None,
+        typer.Option(
+            "--rules", metavar="FILE", help="Intervals, tolerances, check standards; built-in ones by default."
+        ),
+    ] = None,
+    page: Annotated[
+        Path | None,
+        typer.Option("--page", metavar="FILE.html", help="Write the report as one page that opens without a network."),
+    ] = None,
+    dask: Annotated[str, typer.Option("--dask", metavar="ADDRESS|local", help="Read runs on Dask workers.")] = "",
+    workers: Annotated[
+        int | None, typer.Option("--workers", min=1, help="Processes that read runs; as many as cores by default.")
+    ] = None,
+    *,
+    as_json: JsonOption = False,
+) -> None:
+    """Audit the archive: re-calibrations due, drift, stations, check standards, population; leaves 1 where there is a finding."""
+    from pipelines.archive import Archive
+    from pipelines.audit.audit import audit
+    from pipelines.audit.document import document
+    from pipelines.audit.findings import findings
+    from pipelines.audit.rules import load_rules
+    from pipelines.flows.partitions import processors
+
+    store, scope = Archive(archive), scope_of(since, until, device, station)
+    found = audit(store, load_rules(rules), scope, dask=dask or None, workers=workers or processors())
+    _refuse_nothing(found, str(store.root))
+    told = findings(found)
+    if page is not None:
+        _write_page(page, found, told, str(store.root))
+    if as_json:
+        print_json(document(found, told, str(store.root)))
+    else:
+        _show(found, told, page)
+    raise typer.Exit(PART_FAILED if told else DONE)
+
+
+def scope_of(since: str, until: str, device: str, station: str) -> Scope:
+    """What is looked at, from dates as texts; ``until`` holds its whole day."""
+    from pipelines.audit.audit import Scope
+    from pipelines.audit.calibrations import day_of
+    from pipelines.trace.days import FIRST, today
+    from pipelines.trace.days import day_of as checked
+
+    first = day_of(checked(since or FIRST, "--since"))
+    last = day_of(checked(until or today(), "--until")) + 1.0
+    if first >= last:
+        message = f"audit: --since {since} is after --until {until or today()}, a period is needed; exchange the two"
+        raise WrongUse(message)
+    return Scope(first, last, device, station)
+
+
+def _refuse_nothing(found: Audit, root: str) -> None:
+    """Refuse an audit of nothing: a name that is not there, or an archive without calibrations before the day."""
+    import numpy as np
+
+    from schemas.errors import did_you_mean
+
+    for option, name, there in (
+        ("--device", found.scope.device.upper(), found.all.device),
+        ("--station", found.scope.station, found.all.station),
+    ):
+        if name and len(found.all) and name not in there:
+            known = [str(one) for one in np.unique(there.astype(str))]
+            message = f"audit: {option} '{name}' has no calibration in {root}; {did_you_mean(name, known)}"
+            raise WrongUse(message)
+    if not len(found.all) and not found.problems:
+        message = f"audit: {root} has no calibration in this time, one at least is needed; make a run, or give another --until"
+        raise WrongUse(message)
+
+
+def _write_page(page: Path, found: Audit, told: list[Finding], root: str) -> None:
+    from pipelines.archive.files import ELSEWHERE, publish
+    from pipelines.audit.page import render
+
+    publish(page, render(found, told, root).encode(), "audit", ELSEWHERE)
+
+
+def _show(found: Audit, told: list[Finding], page: Path | None) -> None:
+    from pipelines.audit.calibrations import date_of
+    from pipelines.audit.document import counts
+    from pipelines.audit.findings import WHO
+
+    out, number = console(), counts(found)
+    period = f"{date_of(found.scope.since)} to {date_of(found.scope.until - 1)}" if found.scope.since > _BEGINNING else (
+        f"all until {date_of(found.scope.until - 1)}"
+    )  # fmt: skip
+    out.print(
+        f"{number['calibrations']} calibrations of {number['units']} units in {number['runs']} runs on {number['stations']} "
+        f"stations; {period}", markup=False, soft_wrap=True,
+    )  # fmt: skip
+    _show_yield(found)
+    for who, words in WHO.items():
+        own = [finding for finding in told if finding.who == who]
+        if own:
+            out.print(f"\n[bold]{words}[/]", soft_wrap=True)
+        for kind in dict.fromkeys(finding.kind for finding in own):
+            _show_kind([finding for finding in own if finding.kind == kind])
+    if not told:
+        out.print("nothing needs doing")
+    if page is not None:
+        error_console().print(f"page    {page}", markup=False, soft_wrap=True)
+
+
+_BEGINNING = -700000.0  # days before any calibration
+
+
+def _show_kind(own: list[Finding]) -> None:
+    for finding in own[:SHOWN]:
+        console().print(f"  · {finding.message}", markup=False, soft_wrap=True)
+    if len(own) > SHOWN:
+        console().print(f"  · … {len(own) - SHOWN} more of this kind; --json and --page tell all", style="dim")
+
+
+def _show_yield(found: Audit) -> None:
+    shares: list[Any] = [share for share in found.yields if share.of in {"all", "station"}]
+    parts = [f"{share.name} {short(100.0 * share.interval.value)} %" for share in shares if share.total]
+    if parts:
+        console().print(f"yield   {', '.join(parts)}", markup=False, soft_wrap=True)

@@ -1,0 +1,63 @@
+"""``tumbleline query``: the archive asked in SQL."""
+
+from __future__ import annotations
+
+import csv
+import sys
+from typing import Annotated
+
+import typer
+
+from pipelines.cli.options import ArchiveOption, JsonOption, console, print_json, print_table, short
+from schemas.errors import WrongUse
+
+MANY = 100
+
+
+def command(
+    sql: Annotated[str, typer.Argument(metavar="SQL", help="One SELECT, for instance 'SELECT count(*) FROM units'.")],
+    archive: ArchiveOption = None,
+    *,
+    as_json: JsonOption = False,
+    as_csv: Annotated[bool, typer.Option("--csv", help="Print comma-separated values and nothing else.")] = False,
+    compact: Annotated[
+        bool,
+        typer.Option(
+            "--index/--no-index", help="Read coefficients and figures from the index, or from every run's own file."
+        ),
+    ] = True,
+) -> None:
+    """Ask the archive in SQL: DuckDB over its Parquet files, read only.
+
+    Views: runs, units, parameters, station, coefficients, figures, calibrations, and every table of the runs (dwells, residuals,
+    grades, verification, noise, …) with the column run in front.
+    """
+    from pipelines.archive import Archive
+    from pipelines.audit.sql import ask
+
+    if as_json and as_csv:
+        message = "query: --json and --csv are both given, one is needed; leave one out"
+        raise WrongUse(message)
+    answer = ask(Archive(archive), sql, compact=compact)
+    if as_json:
+        print_json(
+            {
+                "columns": list(answer.columns),
+                "rows": [dict(zip(answer.columns, row, strict=True)) for row in answer.rows],
+            }
+        )
+        return
+    if as_csv:
+        writer = csv.writer(sys.stdout, lineterminator="\n")
+        writer.writerow(answer.columns)
+        writer.writerows(answer.rows)
+        return
+    print_table(list(answer.columns), [[_cell(value) for value in row] for row in answer.rows[:MANY]])
+    if len(answer.rows) > MANY:
+        console().print(f"{len(answer.rows) - MANY} more rows; --json or --csv prints all of them", markup=False)
+
+
+def _cell(value: object) -> str:
+    if value is None:
+        return ""
+    return short(value, 5) if isinstance(value, float) else str(value)

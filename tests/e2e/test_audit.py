@@ -1,0 +1,248 @@
+"""The audit and the questions in SQL, from the command line, on a generated archive whose hidden events are known."""
+
+import json
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[2]
+sys.path.insert(0, str(ROOT))
+
+from benchmarks.generated_archive import write_archive
+from pipelines.archive import Archive
+from pipelines.audit.audit import Scope, audit
+from pipelines.audit.calibrations import date_of, day_of
+from pipelines.audit.document import document
+from pipelines.audit.findings import findings
+from pipelines.audit.index import up_to_date
+from pipelines.audit.rules import load_rules
+from pipelines.audit.sql import ask
+from pipelines.cli import main
+from pipelines.plain import plain
+from schemas.errors import RecipeInvalid, WrongUse
+
+UNTIL = "2022-01-31"
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("factory") / "archive"
+    write_archive(folder, 24, years=1.0, seed=5, workers=1)
+    return folder
+
+
+@pytest.fixture
+def typed(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]):
+    monkeypatch.setenv("COLUMNS", "120")
+
+    def run(*words: str) -> tuple[int, str, str]:
+        monkeypatch.setattr(sys, "argv", ["tumbleline", *words])
+        with pytest.raises(SystemExit) as left:
+            main()
+        captured = capsys.readouterr()
+        return int(left.value.code or 0), captured.out, captured.err
+
+    return run
+
+
+def told(folder: Path) -> str:
+    """The whole document of an audit, as text."""
+    found = audit(Archive(folder), load_rules(), Scope(day_of("2021-01-01"), day_of(UNTIL)))
+    return json.dumps(plain(document(found, findings(found), "archive")), sort_keys=True)
+
+
+def test_the_command_tells_findings_by_who_must_act_and_leaves_one(made, typed, tmp_path):
+    page = tmp_path / "audit.html"
+    status, out, err = typed(
+        "audit", "--archive", str(made), "--until", UNTIL, "--page", str(page), "--json", "--workers", "1"
+    )
+    document = json.loads(out)
+    assert status == 1
+    assert err == ""
+    assert document["counts"]["runs"] == 24
+    order = [finding["who"] for finding in document["findings"]]
+    assert order == sorted(order, key=["quality", "station", "line", "product", "archive"].index)
+    assert document["due"]["units"] > 100
+    text = page.read_text(encoding="utf-8")
+    assert "<svg" in text
+    assert "http://" not in text.replace("http://www.w3.org", "").replace("http://purl.org", "").replace(
+        "http://creativecommons.org", ""
+    )
+    status, shown, _ = typed("audit", "--archive", str(made), "--until", UNTIL, "--workers", "1")
+    assert status == 1
+    assert document["findings"][0]["message"] in shown.replace("\n", " ")
+
+
+def test_the_index_is_no_second_truth(made):
+    first = told(made)
+    shutil.rmtree(made / "index")
+    assert told(made) == first
+    assert told(made) == first  # and from an index that is there
+
+
+def test_only_changed_runs_are_read_again_and_a_changed_byte_leaves_out_its_run(made, tmp_path):
+    copy = tmp_path / "archive"
+    shutil.copytree(made, copy)
+    first = up_to_date(Archive(copy))
+    assert (first.made + first.kept, first.table("runs").num_rows) == (24, 24)
+    assert up_to_date(Archive(copy)).made == 0
+    run = sorted(path.name for path in (copy / "runs").iterdir())[3]
+    table = copy / "runs" / run / "figures.parquet"
+    table.write_bytes(table.read_bytes()[:-1] + b"x")
+    found = audit(Archive(copy), load_rules(), Scope(day_of("2021-01-01"), day_of(UNTIL)))
+    assert [name for name, _ in found.problems] == [run]
+    assert [f.subject for f in findings(found) if f.who == "archive"] == [run]
+    assert run not in set(found.all.run)
+    shutil.rmtree(copy / "runs" / run)
+    again = up_to_date(Archive(copy))
+    assert run not in again.table("runs").column("run").to_pylist()
+    assert again.table("runs").num_rows == 23
+
+
+def test_parts_have_the_same_bytes_whoever_makes_them(made, tmp_path):
+    one, two = tmp_path / "one", tmp_path / "two"
+    for folder, workers in ((one, 1), (two, 2)):
+        shutil.copytree(made, folder, ignore=shutil.ignore_patterns("index"), copy_function=shutil.copy2)
+        up_to_date(Archive(folder), workers=workers)
+    files = sorted(path.relative_to(one) for path in (one / "index").rglob("*.parquet"))
+    assert files
+    assert [path for path in files if (one / path).read_bytes() != (two / path).read_bytes()] == []
+
+
+def test_an_archive_that_cannot_be_written_is_audited_too(made, tmp_path, monkeypatch):
+    from pipelines.audit import index
+    from schemas.errors import ArchiveUnusable
+
+    def refuse(*_args: object, **_more: object):
+        message = "archive: read-only"
+        raise ArchiveUnusable(message)
+
+    monkeypatch.setattr(index, "alone", refuse)
+    monkeypatch.setattr(index.os, "access", lambda *_: False)
+    assert index.up_to_date(Archive(made)).table("runs").num_rows == 24
+
+
+def test_a_re_run_of_a_capture_is_not_a_second_calibration(made, tmp_path):
+    copy = tmp_path / "archive"
+    shutil.copytree(made, copy)
+    run = min((copy / "runs").iterdir())
+    again = copy / "runs" / f"{run.name}x"
+    shutil.copytree(run, again)
+    about = json.loads((again / "run.json").read_text())
+    (again / "run.json").write_text(
+        json.dumps({**about, "rerun_of": run.name, "measured": about["when"], "when": "2026-01-01T00:00:00+00:00"})
+    )
+    assert told(copy) == told(made)
+
+
+def test_questions_in_sql_see_the_same_from_index_and_files(made):
+    question = "SELECT run, unit, axis, effect, name, value FROM coefficients ORDER BY ALL"
+    archive = Archive(made)
+    assert ask(archive, question).rows == ask(archive, question, compact=False).rows
+    counted = ask(archive, "SELECT count(*), count(DISTINCT run) FROM dwells").rows[0]
+    assert counted == (sum(len(archive.run(info.id).table("dwells")) for info in archive.runs()), 24)
+
+
+@pytest.mark.parametrize(
+    ("question", "words"),
+    [
+        ("SELECT * FROM grade", "did you mean grades?"),
+        ("SELEC 1", "syntax error"),
+        ("DROP TABLE runs", "found drop, one SELECT is needed"),
+        ("SELECT 1; SELECT 2", "one question at a time"),
+        ("COPY (SELECT 1) TO 'x.csv'", "found copy"),
+        ("SELECT * FROM read_text('../secret')", "disabled by configuration"),
+        ("SELECT nothing FROM runs", "nothing"),
+        ("", "no statement"),
+    ],
+)
+def test_a_question_that_cannot_be_answered_is_refused_clearly(made, question, words):
+    with pytest.raises(WrongUse, match=r"^query: ") as refused:
+        ask(Archive(made), question)
+    assert words in str(refused.value)
+
+
+def test_the_query_command_prints_a_table_json_and_csv(made, typed):
+    question = "SELECT station, count(*) AS n FROM runs GROUP BY station ORDER BY station"
+    status, out, _ = typed("query", question, "--archive", str(made), "--json")
+    assert (status, json.loads(out)["rows"][0]) == (0, {"station": "line-1", "n": 6})
+    assert typed("query", question, "--archive", str(made), "--csv")[1].splitlines()[:2] == ["station,n", "line-1,6"]
+    assert "line-1" in typed("query", question, "--archive", str(made))[1]
+    assert typed("query", question, "--archive", str(made), "--csv", "--json")[0] == 2
+
+
+def test_what_cannot_be_audited_is_refused(made, typed, tmp_path):
+    status, _, err = typed("audit", "--archive", str(made), "--device", "ADXL335")
+    assert (status, "did you mean ADXL355?" in err) == (2, True)
+    status, _, err = typed("audit", "--archive", str(made), "--since", "2024-01-01", "--until", "2023-01-01")
+    assert (status, "a period is needed" in err) == (2, True)
+    status, _, err = typed("audit", "--archive", str(tmp_path / "none"))
+    assert (status, "has no calibration" in err) == (2, True)
+
+
+def test_rules_say_what_is_wrong_with_them(tmp_path):
+    file = tmp_path / "rules.toml"
+    for text, words in (
+        ("interval_month = 3", "did you mean interval_months"),
+        ('[tolerance]\nbias = { max = 3.0, unit = "mg" }', "is in µg"),
+        ('[device.X.tolerance]\nbia = { max = 3.0, unit = "µg" }', "did you mean bias"),
+        ("shortest_months = 30", "above longest_months"),
+    ):
+        file.write_text(text, encoding="utf-8")
+        with pytest.raises(RecipeInvalid, match=words):
+            load_rules(file)
+    file.write_text(
+        '[device.adxl355]\ninterval_months = 6\n[device.adxl355.tolerance]\nbias = { max = 7.0, unit = "µg" }'
+    )
+    rules = load_rules(file)
+    assert (rules.months("ADXL355"), rules.months("QA700")) == (6, 12)
+    assert (rules.tolerance_of("ADXL355", "bias"), rules.tolerance_of("SF1500", "bias")) == (7.0, 800.0)
+
+
+@pytest.mark.slow
+def test_every_hidden_event_of_some_years_is_found(tmp_path):
+    folder = tmp_path / "archive"
+    truth = write_archive(folder, 500, years=5.0, seed=2, workers=2)
+    found = audit(Archive(folder), load_rules(), Scope(day_of("2021-01-01"), day_of("2026-01-04")))
+    by_kind: dict[str, list] = {}
+    for finding in findings(found):
+        by_kind.setdefault(finding.kind, []).append(finding)
+    assert {f.subject for f in by_kind["exchanged"]} == set(truth["swap"]["units"])
+    assert {f.evidence["run"] for f in by_kind["exchanged"]} == {truth["swap"]["run"]}
+    assert [f.subject for f in by_kind["drifts"]] == [truth["drifting"]["unit"]]
+    [moved] = by_kind["station_moved"]
+    assert (moved.evidence["station"], moved.evidence["parameter"]) == (truth["level"]["station"], "level_2")
+    assert moved.evidence["earliest"] <= truth["level"]["date"][:10] <= moved.evidence["latest"]
+    assert moved.evidence["shift_urad"] == pytest.approx(300.0, abs=20.0)
+    level_day = day_of(truth["level"]["date"])
+    since = (found.all.station == "line-2") & (found.all.day >= level_day) & found.product
+    assert set(moved.units) == {str(unit) for unit in found.all.unit[since]}
+    [knocked] = by_kind["slot_moved"]
+    assert knocked.evidence["where"] == f"slot {truth['slot']['slot']}"
+    assert knocked.evidence["earliest"] <= truth["slot"]["date"][:10] <= knocked.evidence["latest"]
+    assert [f.subject for f in by_kind["odd_lot"]] == [truth["bad_lot"]["run"]]
+    assert {study.first_day for study in found.studies} != set()
+    assert "standard" not in by_kind  # the check standards of this factory stand still
+    assert "foreign" not in by_kind
+    assert date_of(found.scope.until) == "2026-01-04"
+
+
+@pytest.mark.slow
+def test_an_audit_on_dask_workers_is_the_same(made, tmp_path):
+    copy = tmp_path / "archive"
+    shutil.copytree(made, copy, ignore=shutil.ignore_patterns("index"))
+    command = [sys.executable, "-m", "pipelines.cli", "audit", "--archive", str(copy), "--until", UNTIL, "--json"]
+    done = subprocess.run(
+        [*command, "--dask", "local"], cwd=ROOT, capture_output=True, text=True, timeout=240, check=False
+    )
+    assert done.returncode == 1, done.stderr
+    parts = {path.name: path.read_bytes() for path in (copy / "index").rglob("*.parquet")}
+    shutil.rmtree(copy / "index")
+    here = subprocess.run(
+        [*command, "--workers", "1"], cwd=ROOT, capture_output=True, text=True, timeout=240, check=False
+    )
+    assert here.stdout == done.stdout
+    assert {path.name: path.read_bytes() for path in (copy / "index").rglob("*.parquet")} == parts
