@@ -23,7 +23,7 @@ from pipelines.job import Request
 from pipelines.operator import Attendance
 from pipelines.progress import silent
 from pipelines.runner import Done, Runner
-from schemas.errors import LinkLost, StationTimeout
+from schemas.errors import LinkLost, NotReached, StationTimeout
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Generator
@@ -57,6 +57,8 @@ def _worth_repeating(task_: Any, task_run: Any, state: Any) -> bool:
     del task_, task_run
     try:
         state.result()
+    except NotReached:  # hours have gone by already
+        return False
     except (LinkLost, StationTimeout):
         return True
     except Exception:  # noqa: BLE001 - whatever else went wrong would go wrong again
