@@ -27,9 +27,9 @@ def coefficients_of(run: Run, calibration: Calibration) -> list[dict[str, Any]]:
                 "another); restore it from a copy"
             )
             raise ArchiveUnusable(message)
-        table = pq.ParquetFile(pa.BufferReader(data)).read()  # read_table imports pandas: a third of the whole answer's time
+        table = pq.ParquetFile(pa.BufferReader(data)).read()  # read_table imports pandas
     except (OSError, pa.ArrowInvalid) as problem:
         message = f"calibrations: {place} cannot be read ({first_line(problem)}); restore it from a copy"
         raise ArchiveUnusable(message) from None
-    units = table.column("unit").to_pylist()
-    return table.take([row for row, unit in enumerate(units) if unit == calibration.serial]).to_pylist()
+    # table.take would make an array of the row numbers, and pyarrow asks pandas whether they are a series
+    return [row for row in table.to_pylist() if row["unit"] == calibration.serial]
