@@ -1,0 +1,43 @@
+"""The ledger of a generated archive: every calibration that passed is certified for a year, the next one takes its place."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from pipelines.archive import Archive, files
+from pipelines.trace.days import months_after
+from pipelines.trace.events import Event
+from pipelines.trace.ledger import Ledger
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Iterator, Mapping
+    from pathlib import Path
+
+VALID_MONTHS = 12
+
+
+def write_ledger(folder: Path, calibrations: Iterable[tuple[str, str, str, str, str]]) -> int:
+    """Number of the events written.
+
+    Parameters
+    ----------
+    calibrations : serial, device, run, station and day, in order of day for each serial
+    """
+    known = list(calibrations)
+    runs = Archive(folder).root / "runs"
+    hashes = {run: files.read_json(runs / run / "coefficients.json")["sha256"] for run in {one[2] for one in known}}
+    return Ledger(Archive(folder)).write_bulk(_events(known, hashes))
+
+
+def _events(calibrations: Iterable[tuple[str, str, str, str, str]], hashes: Mapping[str, str]) -> Iterator[Event]:
+    held: dict[str, tuple[int, str]] = {}
+    for serial, device, run, station, day in calibrations:
+        sequence, until = held.get(serial, (0, ""))
+        ends = (sequence,) if day < until else ()
+        held[serial] = (sequence + 1, months_after(day, VALID_MONTHS))
+        yield Event(
+            serial=serial, sequence=sequence + 1, action="supersede" if ends else "certify", device=device, run=run,
+            start=day, until=held[serial][1], grade="consumer", station=station, recipe="line",
+            coefficients=hashes[run], ends=ends, who="generator", where="generated",
+            when=f"{day}T12:00:00.000+00:00", reason="", previous="",
+        )  # fmt: skip
