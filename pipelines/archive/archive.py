@@ -217,6 +217,7 @@ class Archive:
                 probe.write_bytes(b"")
                 probe.unlink()
             return
+        files.sweep(self.root)  # a first command that was killed leaves a name of ours, not files of others
         if self.root.is_dir() and any(self.root.iterdir()):
             message = f"archive: {self.root} holds other files and no archive; give an empty or new folder"
             raise ArchiveUnusable(message)
@@ -276,9 +277,9 @@ class Archive:
 
     def runs(self) -> list[RunInfo]:
         """Every run, the one started first first."""
-        from pipelines.archive.listing import info_of
+        from pipelines.archive.noted import infos_of
 
-        infos = [info for run_id in self.run_ids() if (info := info_of(Run(self, run_id))) is not None]
+        infos = infos_of(self.root, [Run(self, run_id) for run_id in self.run_ids()])
         return sorted(infos, key=lambda info: (info.started, info.id))
 
     def run_ids(self) -> list[str]:
