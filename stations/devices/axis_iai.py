@@ -11,15 +11,15 @@ class NumericAxis(TableAxis):
     """A ROBO Cylinder controller."""
 
     needs: ClassVar[tuple[str, ...]] = (
-        "serial_mode", "servo_on", "pause", "alarm_reset", "status", "extended_status", "alarm", "motion", "target",
+        "serial_mode", "servo_on", "pause", "alarm_reset", "state", "motion", "target",
         "feedback_position",
     )  # fmt: skip
 
     def state(self) -> DriveState:
-        """Both status registers; the alarm's code where there is one."""
-        registers = self._registers
-        flags, more = registers.flags("status"), registers.flags("extended_status")
-        alarm = f"drive alarm 0x{int(registers.number('alarm')):02X}" if flags["alarm"] else ""
+        """Both status registers, of one instant; the alarm's code where there is one."""
+        registers, found = self._registers, self._registers.read_group("state")
+        flags, more = (registers.flags_in(name, found[name]) for name in ("status", "extended_status"))
+        alarm = f"drive alarm 0x{int(float(str(found['alarm']))):02X}" if flags["alarm"] else ""
         if flags["emergency_stop"]:
             alarm = "emergency stop at the drive"
         ready = flags["ready"] and flags["servo_on"] and not flags["paused"]

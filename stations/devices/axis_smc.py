@@ -11,18 +11,17 @@ class StepDataAxis(TableAxis):
     """A LECP6 with a rotary table."""
 
     needs: ClassVar[tuple[str, ...]] = (
-        "serial_mode", "servo_on", "reset", "busy", "servo_ready", "homed", "in_position", "alarm", "emergency_stop",
-        "step_data", "start", "feedback_position",
+        "serial_mode", "servo_on", "reset", "state", "step_data", "start", "feedback_position",
     )  # fmt: skip
 
     def state(self) -> DriveState:
-        """Discrete inputs by their names; a move is over when BUSY is off and INP on."""
-        registers = self._registers
-        alarm = "drive alarm" if registers.text("alarm") != "none" else ""
-        if registers.text("emergency_stop") != "released":
+        """Discrete inputs, of one instant; a move is over when BUSY is off and INP on."""
+        found = self._registers.names_in("state")
+        alarm = "drive alarm" if found["alarm"] != "none" else ""
+        if found["emergency_stop"] != "released":
             alarm = "emergency stop at the drive"
-        on = {name: registers.text(name) == "on" for name in ("busy", "servo_ready", "homed", "in_position")}
-        return DriveState(on["servo_ready"], on["homed"], on["busy"], on["in_position"] and not on["busy"], alarm)
+        busy, there = found["busy"] == "on", found["in_position"] == "on"
+        return DriveState(found["servo_ready"] == "on", found["homed"] == "on", busy, there and not busy, alarm)
 
     def prepare(self) -> None:
         """Orders from this line instead of the plug, and the servo on."""

@@ -64,8 +64,19 @@ class Registers:
 
     def flags(self, name: str) -> dict[str, bool]:
         """The named bits of a register."""
-        value = int(self.number(name))
-        return {flag: bool(value >> bit & 1) for flag, bit in self.profile.register(name).bits.items()}
+        return self.flags_in(name, self.number(name))
+
+    def flags_in(self, name: str, value: Value) -> dict[str, bool]:
+        """The named bits in the value that a register had, as a group of them gave it."""
+        if not isinstance(value, int | float):
+            message = f"{self.name}: {name} is {value!r}, a number is needed; check profile {self.profile.name}"
+            raise StationRefused(message)
+        return {flag: bool(int(value) >> bit & 1) for flag, bit in self.profile.register(name).bits.items()}
+
+    def names_in(self, group: str) -> dict[str, str]:
+        """Names of the enumerated values of a group, of one instant."""
+        found = self.read_group(group)
+        return {n: named(self.profile.register(n), v) for n, v in found.items() if isinstance(v, int | float)}
 
     def step(self, name: str) -> float:
         """The smallest change that a register can hold; zero for a float."""
@@ -96,8 +107,12 @@ class Registers:
         self._link.write(self._device_id, registers[0].address, words, what, registers[0].space)
 
     def set_group(self, group: str, values: Mapping[str, Value]) -> None:
-        """Writes registers that start nothing in one request, once, and refuses to go on unless all read back as written."""
-        self.write_group(group, values)
+        """Writes registers that start nothing in one request, once; reading them back decides, also of a lost answer."""
+        lost: StationTimeout | LinkLost | None = None
+        try:
+            self.write_group(group, values)
+        except (StationTimeout, LinkLost) as problem:
+            lost = problem
         found = self.read_group(group)
         for name, value in values.items():
             register = self._scaled(name)
@@ -106,7 +121,7 @@ class Registers:
                     f"{self.name}: {name} is {found[name]} {register.unit} after {value} was written; nothing was started; "
                     "check the device"
                 )
-                raise StationRefused(message)
+                raise lost or StationRefused(message)
 
     def set(self, name: str, value: Value) -> None:
         """Writes a register that keeps what it is given, once, and reads it back; where the answer was lost, that decides."""

@@ -86,6 +86,8 @@ def _step_data(plant: Plant, axis: Axis, profile: Profile) -> Bank:
         "servo_ready": lambda: kept["servo_on"],
         "homed": lambda: int(axis.homed),
         "in_position": lambda: int(axis.in_position(plant.now)),
+        "area": lambda: 0,
+        "work_area": lambda: 0,
         "emergency_stop": lambda: int(not plant.emergency_stop),
         "alarm": lambda: 1,
         "feedback_position": lambda: axis.encoder(plant.now),
@@ -131,8 +133,9 @@ def _numeric(plant: Plant, axis: Axis, profile: Profile) -> Bank:
         **{name: own(kept, name) for name in kept},
         **{name: own(coils, name) for name in coils},
         "feedback_position": lambda: axis.encoder(plant.now),
-        "alarm": lambda: 0,
+        **{name: lambda: 0 for name in ("alarm", "inputs", "outputs")},
         "status": status,
+        "status_2": lambda: 1 << profile.register("status_2").bits["enabled"],
         "extended_status": more,
     }
     return Bank(profile, sources, command)

@@ -6,6 +6,7 @@ client under test is the production one.
 
 from __future__ import annotations
 
+import select
 import socket
 import struct
 import threading
@@ -30,6 +31,8 @@ TROUBLES: tuple[Trouble, ...] = (
 HEADER = 7  # MBAP: transaction, protocol, length, unit
 WORDS_AT = HEADER + 2  # where the registers of a reply to function 3 or 4 begin
 END_S = 5.0
+LOOK_S = 0.1  # how soon a way notices that the other one has broken the connection off
+CHUNK = 4096
 
 
 @dataclass(frozen=True)
@@ -202,8 +205,11 @@ class _Connection:
         buffer = b""
         while True:
             try:
-                data = source.recv(4096)
-            except OSError:
+                ready, _, _ = select.select([source], [], [], LOOK_S)
+                if not ready and not self._broken:
+                    continue
+                data = source.recv(CHUNK) if ready else b""
+            except (OSError, ValueError):  # closed from the other side, or from here
                 data = b""
             if not data:
                 break
