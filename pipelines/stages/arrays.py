@@ -54,7 +54,7 @@ def lot_arrays(dwells: pd.DataFrame, history: pd.DataFrame | None = None) -> Lot
         A unit lacks a dwell that others have, or units differ in the unit of their output.
     """
     ordered = dwells.sort_values(["unit", "dwell"])
-    units = tuple(dict.fromkeys(ordered["unit"].astype(str)))
+    units = tuple(str(unit) for unit in ordered["unit"].unique())
     numbers = np.unique(ordered["dwell"].to_numpy())
     if not units or len(ordered) != len(units) * len(numbers):
         message = (
@@ -62,7 +62,7 @@ def lot_arrays(dwells: pd.DataFrame, history: pd.DataFrame | None = None) -> Lot
             "remove the units that lack some, or measure them again"
         )
         raise DataRejected(message)
-    out_units = sorted(set(ordered["out_unit"]))
+    out_units = sorted(ordered["out_unit"].unique())
     if len(out_units) != 1:
         message = f"dwells: outputs in {' and '.join(out_units)}, one lot has one unit; split the lot by device"
         raise DataRejected(message)
@@ -90,9 +90,10 @@ def _standard_error(ordered: pd.DataFrame, units: int) -> NDArray[np.float64]:
 
 def _state(ordered: pd.DataFrame, units: tuple[str, ...], history: pd.DataFrame | None) -> State:
     def optional(column: str) -> NDArray[np.float64] | None:
-        if column not in ordered.columns or ordered[column].isna().any():
+        if column not in ordered.columns:
             return None
-        return _grid(ordered, [column], len(units))[..., 0]
+        values = ordered[column].to_numpy(dtype=float).reshape(len(units), -1)
+        return None if np.isnan(values).any() else values
 
     outer, inner = optional("outer_deg"), optional("inner_deg")
     slot = optional("slot")

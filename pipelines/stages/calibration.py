@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -41,12 +42,12 @@ class Calibration:
     nonlinear: dict[str, dict[str, Any]]
     shared: NDArray[np.float64]
 
-    @property
+    @cached_property
     def names(self) -> tuple[tuple[tuple[str, str], ...], ...]:
         """Per axis, (effect id, coefficient) of the p columns."""
         return column_names(self.effects)
 
-    @property
+    @cached_property
     def response(self) -> NDArray[np.float64]:
         """The matrix K of each unit, (units, 3, 3), output per g."""
         return response_matrix(self.coefficients, self.names)
@@ -138,14 +139,14 @@ def covariance_rows(units: Sequence[str], covariance: NDArray[np.float64]) -> pd
 
 def read_calibration(coefficients: pd.DataFrame, covariance: pd.DataFrame) -> Calibration:
     """The calibration that :func:`coefficient_rows` and :func:`covariance_rows` wrote."""
-    units = tuple(dict.fromkeys(coefficients["unit"].astype(str)))
-    model = tuple(dict.fromkeys(coefficients["effect"].astype(str)))
+    texts = {column: coefficients[column].to_numpy(dtype=object) for column in ("unit", "effect", "name")}
+    units, model = (tuple(dict.fromkeys(texts[column].tolist())) for column in ("unit", "effect"))
     names = column_names(model)
     p = len(names[0])
     linear = {pair for axis in names for pair in axis}
-    pairs = zip(coefficients["effect"].astype(str), coefficients["name"].astype(str), strict=True)
+    pairs = zip(texts["effect"].tolist(), texts["name"].tolist(), strict=True)
     is_linear = np.array([pair in linear for pair in pairs], dtype=bool)
-    own = coefficients[(coefficients["axis"] != ALL_AXES) & is_linear]
+    own = coefficients["value"].to_numpy()[(coefficients["axis"].to_numpy(dtype=object) != ALL_AXES) & is_linear]
     if len(own) != len(units) * 3 * p:
         message = f"coefficients: {len(own)} rows, the model needs {len(units) * 3 * p}; run the fit again"
         raise DataRejected(message)
@@ -154,16 +155,16 @@ def read_calibration(coefficients: pd.DataFrame, covariance: pd.DataFrame) -> Ca
     values = covariance["value"].to_numpy().reshape(len(units), 3, -1)
     matrix[:, :, row, column] = values
     matrix[:, :, column, row] = values
-    common = coefficients[(coefficients["unit"] == units[0]) & ~is_linear]
+    common = coefficients[(texts["unit"] == units[0]) & ~is_linear]
     shared, nonlinear = _read_shared(common, model)
-    return Calibration(units, model, own["value"].to_numpy().reshape(len(units), 3, p), matrix, nonlinear, shared)
+    return Calibration(units, model, own.reshape(len(units), 3, p), matrix, nonlinear, shared)
 
 
 def _read_shared(common: pd.DataFrame, model: Sequence[str]) -> tuple[NDArray[np.float64], dict[str, dict[str, Any]]]:
     """Parameters of the station, and nonlinear parameters: a tuple where they are one per axis."""
     shared: list[float] = []
     nonlinear: dict[str, dict[str, Any]] = {}
-    for name in model:
+    for name in model if len(common) else ():
         effect = effects.get(name)
         station = effect.names() if isinstance(effect, StationEffect) else ()
         for row in common[common["effect"] == name].itertuples():

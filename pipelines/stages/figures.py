@@ -73,9 +73,9 @@ def _rms(name: str, errors: NDArray[np.float64]) -> Figure:
 
 def _largest(name: str, rows: pd.DataFrame, uncertainty: str) -> Figure:
     """The error that comes closest to any limit under a guard band of twice its uncertainty, as a magnitude."""
-    reach = rows["error_ug"].abs() + GUARD * rows[uncertainty]
-    worst = rows.iloc[int(np.argmax(reach.to_numpy()))]
-    return Figure(name, abs(float(worst["error_ug"])), float(worst[uncertainty]))
+    errors, spread = rows["error_ug"].to_numpy(), rows[uncertainty].to_numpy()
+    worst = int(np.argmax(np.abs(errors) + GUARD * spread))
+    return Figure(name, abs(float(errors[worst])), float(spread[worst]))
 
 
 def _verification(rows: pd.DataFrame) -> Iterator[Figure]:
@@ -86,7 +86,7 @@ def _verification(rows: pd.DataFrame) -> Iterator[Figure]:
     """
     yield _largest("verification_dwell_ug", rows, "reading_ug")
     quantile = float(norm.isf(0.5 * ALARM / len(rows)))
-    allowed = (rows["error_ug"].abs() / (quantile * rows["uncertainty_ug"])).max()
+    allowed = np.max(np.abs(rows["error_ug"].to_numpy()) / (quantile * rows["uncertainty_ug"].to_numpy()))
     yield Figure("verification_ratio", float(allowed), 0.0)
     by_axis = [_rms("bias_error_ug", rows[f"error_{axis}_ug"].to_numpy()) for axis in AXES]
     yield max(by_axis, key=lambda figure: figure.value)

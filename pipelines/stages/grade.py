@@ -15,6 +15,8 @@ from schemas.errors import RecipeInvalid
 from schemas.limits import FIGURES, GRADE_FIGURE, GRADES, Decision, Limits, decide, describe_rule, grade_of
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from schemas.recipe import Recipe
 
 NO_GRADE = "none"
@@ -59,6 +61,9 @@ def grade(evidence: Evidence, limits: Limits, zero_g: float = 0.0) -> dict[str, 
     rule = describe_rule(limits)
     calibrated = set(evidence.coefficients["unit"].astype(str))
     calibration = read_calibration(evidence.coefficients, evidence.covariance) if calibrated else None
+    shown = [
+        _by_unit(t) for t in (evidence.residuals, evidence.verification, evidence.verification_poses, evidence.noise)
+    ]
     figure_rows: list[dict[str, object]] = []
     grade_rows: list[dict[str, object]] = []
     for verdict in evidence.verdicts.to_dict("records"):
@@ -66,8 +71,7 @@ def grade(evidence: Evidence, limits: Limits, zero_g: float = 0.0) -> dict[str, 
         if verdict["refused"] or calibration is None:
             grade_rows.append(_grade_row(verdict, "refused", NO_GRADE, str(verdict["reason"])))
             continue
-        shown = (evidence.residuals, evidence.verification, evidence.verification_poses, evidence.noise)
-        own = UnitTables(*(_of(table, unit) for table in shown))
+        own = UnitTables(*(table(unit) for table in shown))
         figures = list(figures_of(unit, calibration, own, zero_g))
         decisions = [decide(limits, f.name, f.value, f.uncertainty) for f in figures if f.name in limits.figures]
         figure_rows += [_figure_row(unit, figure, decisions) for figure in figures]
@@ -79,8 +83,15 @@ def grade(evidence: Evidence, limits: Limits, zero_g: float = 0.0) -> dict[str, 
     }
 
 
-def _of(table: pd.DataFrame, unit: str) -> pd.DataFrame:
-    return table[table["unit"] == unit]
+def _by_unit(table: pd.DataFrame) -> Callable[[str], pd.DataFrame]:
+    """The rows of a unit in a table, in their order; none for a unit that is not there."""
+    units = table["unit"].to_numpy(dtype=object)
+    turns = np.flatnonzero(units[1:] != units[:-1]) + 1
+    starts, ends = [0, *turns.tolist()], [*turns.tolist(), len(units)]
+    places = {units[start]: slice(start, end) for start, end in zip(starts, ends, strict=True)} if len(units) else {}
+    if len(places) != len(starts):  # the rows of a unit do not stand together
+        return lambda unit: table[units == unit]
+    return lambda unit: table.iloc[places.get(unit, slice(0, 0))]
 
 
 def _decided(verdict: dict, figures: list[Figure], decisions: list[Decision], limits: Limits) -> dict[str, object]:
