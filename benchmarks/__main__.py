@@ -17,6 +17,7 @@ BENCHMARKS: tuple[tuple[str, tuple[str, ...], tuple[str, ...]], ...] = (
     ("fits.py", ("--units", "200", "--rounds", "3"), ()),
     ("allan.py", ("--channels", "6", "--minutes", "10"), ()),
     ("recovery.py", ("--units", "50"), ("--units", "200")),
+    ("throughput.py", ("--rounds", "5"), ("--rounds", "25")),
     ("blind.py", ("--runs", "40"), ("--runs", "400", "--method", "tumbleline", "--method", "bic", "--method", "bonferroni",
                                     "--method", "stlsq", "--method", "lasso")),
 )  # fmt: skip
