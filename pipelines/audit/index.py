@@ -42,11 +42,15 @@ VERSION = b"tumbleline.index"
 
 
 class Portion(NamedTuple):
-    """Work for one process: a part of the index that is to be made of these runs."""
+    """Work for one process: a part of the index that is to be made of these runs.
+
+    archive : its address; place : folder of the index where it is not the archive's own, else empty
+    runs : with their stamps; version : of the code that makes the rows
+    """
 
     archive: str
     place: str
-    runs: tuple[tuple[str, str], ...]  # run and stamp
+    runs: tuple[tuple[str, str], ...]
     version: str
 
 
@@ -123,7 +127,8 @@ def _refreshed(archive: Archive, place: Place, stamps: Mapping[str, str], dask: 
     missing = sorted(stamps.keys() - there)
     chunks = [missing[k : k + RUNS_PER_PART] for k in range(0, len(missing), RUNS_PER_PART)]
     root = address_of(archive.root)
-    portions = [Portion(root, address_of(place), tuple((r, stamps[r]) for r in chunk), version) for chunk in chunks]
+    own = "" if place == archive.root / FOLDER else str(place)
+    portions = [Portion(root, own, tuple((r, stamps[r]) for r in chunk), version) for chunk in chunks]
     new = [place / name for name in map_partitions(make_part, portions, dask, workers=workers, name="audit index")]
     for part in set(parts) - set(good) - set(new):
         _remove(part)
@@ -132,7 +137,8 @@ def _refreshed(archive: Archive, place: Place, stamps: Mapping[str, str], dask: 
 
 def make_part(portion: Portion) -> str:
     """Name of a part of the index, made of its runs' files and published."""
-    runs, place = place_of(portion.archive) / "runs", place_of(portion.place)
+    root = place_of(portion.archive)
+    runs, place = root / "runs", Path(portion.place) if portion.place else root / FOLDER
     found = [rows_of_run(runs / run, stamp) for run, stamp in portion.runs]
     content: dict[str, bytes] = {}
     for name in reversed(TABLES):  # ``runs`` last: where it is, all are
@@ -224,11 +230,13 @@ def _mark(path: str) -> str:
 
 
 def _stamps_of_objects(runs: ObjectPath) -> dict[str, str]:
+    from pyarrow.fs import FileSelector, FileType
+
     marks: dict[str, dict[str, str]] = {}
-    for place in runs.walk():
-        if place.name in WATCHED:
-            size = place.stat()
-            marks.setdefault(place.parent.name, {})[place.name] = f"{size.st_size}.{size.st_mtime}"
+    for info in runs.system.get_file_info(FileSelector(runs.key, allow_not_found=True, recursive=True)):
+        run, _, name = info.path.rpartition("/")
+        if info.type == FileType.File and name in WATCHED:
+            marks.setdefault(run.rpartition("/")[2], {})[name] = f"{info.size}.{info.mtime_ns}"
     return {run: _short([own.get(n, "") for n in WATCHED]) for run, own in marks.items() if "run.json" in own}
 
 

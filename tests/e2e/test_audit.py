@@ -11,7 +11,10 @@ import pytest
 ROOT = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT))
 
+from s3_server import CREDENTIALS, s3_bucket
+
 from benchmarks.generated_archive import write_archive
+from benchmarks.generated_ledger import write_ledger
 from pipelines.archive import Archive
 from pipelines.audit.audit import Scope, audit
 from pipelines.audit.calibrations import date_of, day_of
@@ -246,3 +249,48 @@ def test_an_audit_on_dask_workers_is_the_same(made, tmp_path):
     )
     assert here.stdout == done.stdout
     assert {path.name: path.read_bytes() for path in (copy / "index").rglob("*.parquet")} == parts
+
+
+@pytest.mark.slow
+def test_an_archive_in_an_object_store_gives_the_same_audit_and_answers(made, monkeypatch):
+    for name, value in CREDENTIALS.items():
+        monkeypatch.setenv(name, value)
+    with s3_bucket() as query:
+        store = Archive(f"s3://factory/archive?{query}")
+        for path in made.rglob("*"):
+            name = path.relative_to(made)
+            if path.is_file() and name.parts[0] != "index":
+                place = store.root
+                for part in name.parts:
+                    place = place / part
+                place.write_bytes(path.read_bytes())
+        scope = Scope(day_of("2021-01-01"), day_of(UNTIL))
+        found = audit(store, load_rules(), scope)
+        assert json.dumps(plain(document(found, findings(found), "archive")), sort_keys=True) == told(made)
+        assert up_to_date(store).made == 0
+        for question in (
+            "SELECT run, unit, bias_x FROM parameters ORDER BY ALL",
+            "SELECT run, unit, outcome FROM grades ORDER BY ALL",
+        ):
+            assert ask(store, question).rows == ask(Archive(made), question).rows
+
+
+def test_validity_is_looked_up_without_a_table_library(made, tmp_path):
+    copy = tmp_path / "archive"
+    shutil.copytree(made, copy)
+    archive = Archive(copy)
+    info = archive.runs()[0]
+    unit = info.units[0]
+    write_ledger(copy, [(unit, info.device, info.id, "line-1", info.started[:10])])
+    code = (
+        "import sys; from pipelines.cli import main; sys.argv = ['tumbleline', *sys.argv[1:]]\n"
+        "try:\n    main()\nexcept SystemExit as left:\n    print(left.code or 0, 'pandas' in sys.modules, file=sys.stderr)"
+    )
+    words = ["show", unit, "--at", info.started[:10], "--archive", str(copy), "--json"]
+    done = subprocess.run([sys.executable, "-c", code, *words], cwd=ROOT, capture_output=True, text=True, check=False)
+    assert done.stderr.split() == ["0", "False"]
+    shown = json.loads(done.stdout)
+    assert shown["calibration"]["run"] == info.id
+    rows = archive.run(info.id).table("coefficients")
+    own = rows[rows["unit"] == unit]
+    assert [row["value"] for row in shown["calibration"]["coefficients"]] == pytest.approx(own["value"].tolist())
