@@ -22,7 +22,7 @@ Kind = Literal["axis", "chamber", "reader", "slot"]
 Carrier = Literal["tcp", "rtu", "tls", "ascii"]
 Adapter = Literal[
     "oriental_az", "smc_lec", "iai_numeric",
-    "watlow_f4t", "watlow_f4", "binder", "eurotherm_3200", "espec_p300",
+    "set_point", "watlow_f4t", "watlow_f4", "binder", "eurotherm_3200", "espec_p300",
     "tumbleline_reader", "tumbleline_slot",
 ]  # fmt: skip
 

@@ -8,7 +8,14 @@ from schemas.errors import RecipeInvalid, did_you_mean
 from stations.devices.axis_az import DirectDataAxis
 from stations.devices.axis_iai import NumericAxis
 from stations.devices.axis_smc import StepDataAxis
-from stations.devices.chambers import BinderChamber, EurothermChamber, F4Chamber, F4TChamber, P300Chamber
+from stations.devices.chambers import (
+    BinderChamber,
+    EurothermChamber,
+    F4Chamber,
+    F4TChamber,
+    P300Chamber,
+    SetPointChamber,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -25,6 +32,7 @@ AXES: dict[str, type[TableAxis]] = {
     "iai_numeric": NumericAxis,
 }
 CHAMBERS: dict[str, type[ThermalChamber]] = {
+    "set_point": SetPointChamber,
     "watlow_f4t": F4TChamber,
     "watlow_f4": F4Chamber,
     "binder": BinderChamber,

@@ -18,6 +18,18 @@ def _refuse_program(name: str, state: str) -> None:
         raise OperatorNeeded(message)
 
 
+class SetPointChamber(ThermalChamber):
+    """A controller that keeps its set point and has nothing else to say; with ``actual_mode`` it must be ``automatic``."""
+
+    def mode(self) -> str:
+        """The actual mode, the mode that was set, or automatic where the controller tells none."""
+        told = next((name for name in ("actual_mode", "mode") if self._values.has(name)), "")
+        return self._values.text(told) if told else AUTOMATIC
+
+    def require_ready(self) -> None:
+        """Nothing: there is nothing that such a controller could tell."""
+
+
 class F4TChamber(ThermalChamber):
     """Watlow F4T: floats, a mode of its own, programs, alarms."""
 

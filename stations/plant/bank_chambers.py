@@ -79,6 +79,11 @@ def _f4t(chamber: Chamber, profile: Profile) -> tuple[Sources, Callable[[dict[st
     return sources, command
 
 
+def _plain(chamber: Chamber, _profile: Profile) -> tuple[Sources, Callable[[dict[str, Value]], None]]:
+    """A controller with a set point and nothing else."""
+    return {}, _set_by(chamber, "set_point")
+
+
 def _f4(chamber: Chamber, _profile: Profile) -> tuple[Sources, Callable[[dict[str, Value]], None]]:
     """Watlow F4: whole numbers with one decimal, a static set point."""
     sources: Sources = {
@@ -147,4 +152,10 @@ def _set_by(chamber: Chamber, name: str) -> Callable[[dict[str, Value]], None]:
     return command
 
 
-_BY_ADAPTER = {"watlow_f4t": _f4t, "watlow_f4": _f4, "binder": _binder, "eurotherm_3200": _eurotherm}
+_BY_ADAPTER = {
+    "set_point": _plain,
+    "watlow_f4t": _f4t,
+    "watlow_f4": _f4,
+    "binder": _binder,
+    "eurotherm_3200": _eurotherm,
+}

@@ -1,12 +1,16 @@
 """The station's guides say what is so."""
 
 import re
+import tomllib
 from pathlib import Path
 
 from schemas.profile import parse_profile
+from schemas.station import Device
+from stations.devices.adapters import AXES, CHAMBERS, chamber_adapter
 from stations.plant.hidden import HIDDEN
 from stations.plant.preset import load_preset
 from stations.plant.sampler import Sampler
+from stations.profile_docs import PAGE, page
 
 DOCS = Path(__file__).resolve().parents[2] / "docs"
 GUIDE = (DOCS / "how-to" / "add-a-device.md").read_text(encoding="utf-8")
@@ -17,6 +21,27 @@ def test_profile_of_the_guide_is_a_profile():
     text = re.findall(r"```toml\n(.*?)```", GUIDE, re.DOTALL)[0]
     profile = parse_profile(text, "guide")
     assert [register.name for register in profile.registers] == ["temperature", "set_point"]
+
+    assert chamber_adapter(profile) is CHAMBERS["set_point"]
+
+
+def test_the_guide_names_every_adapter_with_what_it_needs():
+    for adapters in (AXES, CHAMBERS):
+        for name, adapter in adapters.items():
+            (row,) = [line for line in GUIDE.splitlines() if f"| `{name}` |" in line]
+            needed = re.findall(r"`(\w+)`", row.split("|")[3].split(";")[0])
+            assert set(needed) == set(adapter.needs), name
+
+
+def test_links_of_the_guide_are_those_of_a_station():
+    found = re.findall(r"```toml\n(\[devices.*?)```", GUIDE, re.DOTALL)
+    links = [Device.model_validate(next(iter(tomllib.loads(text)["devices"].values()))) for text in found]
+    assert [device.link for device in links] == ["rtu", "tls"]
+    assert not any(device.missing() for device in links)
+
+
+def test_the_reference_of_devices_is_what_the_profiles_say():
+    assert PAGE.read_text(encoding="utf-8") == page(), "write it anew: python -m stations.profile_docs"
 
 
 def test_every_hidden_effect_is_told_of():
