@@ -69,9 +69,16 @@ def map_partitions(
 
 
 def in_one_thread(function: Callable[[Part], Result], part: Part) -> Result:
-    """What the function makes of one partition, on one BLAS thread."""
-    with threadpool_limits(1):
-        return function(part)
+    """What the function makes of one partition, on one thread of BLAS and of Arrow."""
+    import pyarrow as pa
+
+    before = pa.cpu_count()
+    pa.set_cpu_count(1)
+    try:
+        with threadpool_limits(1):
+            return function(part)
+    finally:
+        pa.set_cpu_count(before)
 
 
 def processors() -> int:

@@ -11,6 +11,7 @@ from threadpoolctl import threadpool_limits
 from pipelines.archive import Archive, Run, files, stage_key
 from pipelines.archive.locks import alone
 from pipelines.chain import RECORDS
+from pipelines.rerun.remembering import Remembering
 from pipelines.rerun.steps import RAW, plan_of
 from schemas.errors import DataRejected
 
@@ -49,7 +50,7 @@ def again(archive: Archive, run_id: str, wanted: Wanted, *, report: bool = False
     plan = plan_of(old, wanted)
     raw = raw_samples(old)
     because = changes(old, plan, raw=raw)
-    new = _opened(archive, old, plan, because) if because else old
+    new = Remembering(archive, _opened(archive, old, plan, because).id if because else old.id)
     with threadpool_limits(1), alone(new.path, wait=True):
         files.sweep(new.path)
         work = _Work(old, new, raw=raw)

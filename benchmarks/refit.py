@@ -1,0 +1,153 @@
+"""An archive through another model: re-fit and re-grade of 10 000 units × 72 dwells: `python benchmarks/refit.py`.
+
+An archive of lots of ten units is generated (see generated_archive.py), then run again with today's code by two worker
+processes of one BLAS thread each, once in memory only (as `tumbleline whatif` does), once with everything written (`tumbleline
+rerun`). Beside it, in the same processes on the same files: the time of reading the tables that a fit needs and of the bare
+solve, one weighted batch fit a lot. Memory is the largest of the parent and its workers together. `--units` may be
+repeated: the cost by the number of units.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import resource
+import shutil
+import subprocess
+import sys
+import tempfile
+import threading
+import time
+from pathlib import Path
+from typing import Self
+
+for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
+    os.environ.setdefault(name, "1")
+ROOT = Path(__file__).resolve().parents[1]
+sys.path.insert(0, str(ROOT))
+
+import numpy as np  # noqa: E402
+
+from inertial.fits.linear import fit_lot  # noqa: E402
+from pipelines.archive import Archive, Run  # noqa: E402
+from pipelines.flows.partitions import map_partitions  # noqa: E402
+from pipelines.rerun.judged import judged  # noqa: E402
+from pipelines.rerun.partition import Part, parts, run_again  # noqa: E402
+from pipelines.rerun.wanted import Wanted, wanted  # noqa: E402
+from pipelines.stages.arrays import lot_arrays  # noqa: E402
+
+PER_LOT = 10
+MB = 1024.0
+POLL_S = 0.2
+EFFECTS = (
+    *("bias", "scale", "misalignment", "bias_temperature", "bias_temperature_quadratic"),
+    *("scale_temperature", "scale_temperature_quadratic"),
+)
+
+
+def bare(part: Part) -> int:
+    """Read what a fit needs of every lot of a portion, and solve it once; how many units."""
+    archive, units = Archive(part.archive), 0
+    for run_id in part.runs:
+        run = Run(archive, run_id)
+        dwells, history = run.table("dwells"), run.table("history")
+        for name in ("verdicts", "noise"):
+            run.table(name)
+        lot = lot_arrays(dwells, history)
+        error = np.where(lot.of_kind("dwell")[:, None], lot.standard_error, np.inf)
+        fit_lot(EFFECTS, lot.state, lot.output, error)
+        units += len(lot.units)
+    return units
+
+
+class Memory:
+    """The largest resident memory of this process and its children together, MB, watched while a block runs."""
+
+    def __enter__(self) -> Self:
+        self.most, self._stop = 0.0, threading.Event()
+        self._thread = threading.Thread(target=self._watch, daemon=True)
+        self._thread.start()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._stop.set()
+        self._thread.join()
+
+    def _watch(self) -> None:
+        while not self._stop.wait(POLL_S):
+            self.most = max(self.most, sum(_resident(pid) for pid in _family(os.getpid())))
+
+
+def _family(pid: int) -> list[int]:
+    """A process and all below it."""
+    try:
+        children = Path(f"/proc/{pid}/task/{pid}/children").read_text(encoding="ascii").split()
+    except OSError:
+        return []
+    return [pid, *(one for child in children for one in _family(int(child)))]
+
+
+def _resident(pid: int) -> float:
+    """Resident memory of a process, MB; pages that it shares with others count for each."""
+    try:
+        pages = int(Path(f"/proc/{pid}/statm").read_text(encoding="ascii").split()[1])
+    except (OSError, IndexError):
+        return 0.0
+    return pages * resource.getpagesize() / MB / MB
+
+
+def used() -> float:
+    """Seconds of processor time of this process and of its children that ended."""
+    own, children = (resource.getrusage(who) for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN))
+    return own.ru_utime + own.ru_stime + children.ru_utime + children.ru_stime
+
+
+def timed(what: str, function: object, archive: Archive, change: Wanted, workers: int) -> tuple[float, float]:
+    """Seconds by the clock and of processor time for all runs; prints them."""
+    runs = archive.run_ids()
+    with Memory() as memory:
+        start, before = time.perf_counter(), used()
+        done = map_partitions(function, parts(archive, runs, change, workers), workers=workers)  # type: ignore[arg-type]
+        seconds, cpu = time.perf_counter() - start, used() - before
+    failed = [one.error for portion in done if isinstance(portion, list) for one in portion if one.error]
+    if failed:
+        sys.exit(f"refit: {what}: {len(failed)} runs failed: {failed[0]}")
+    per_lot = 1e3 * seconds / len(runs)
+    print(f"{what:<34} {seconds:7.1f} s   {cpu:7.1f} s processor   {per_lot:6.1f} ms a lot   {memory.most:6.0f} MB")
+    return seconds, cpu
+
+
+def measured(units: int, workers: int, folder: Path) -> None:
+    """All three ways on an archive of so many units."""
+    place = folder / f"{units}"
+    generate = [
+        sys.executable,
+        str(ROOT / "benchmarks" / "generated_archive.py"),
+        str(place),
+        "--lots",
+        str(units // PER_LOT),
+    ]
+    subprocess.run(generate, check=True, stdout=subprocess.DEVNULL)
+    archive, change = Archive(place), wanted(",".join(EFFECTS))
+    print(f"{units} units in {units // PER_LOT} lots × 72 dwells of the fit, {workers} processes of one thread")
+    read, read_cpu = timed("reading and the bare solve", bare, archive, Wanted(), workers)
+    memory, memory_cpu = timed("re-fit and re-grade in memory", judged, archive, change, workers)
+    whole, whole_cpu = timed("re-fit and re-grade, all written", run_again, archive, change, workers)
+    for what, seconds, cpu in (("in memory", memory, memory_cpu), ("all written", whole, whole_cpu)):
+        print(f"  ratio {what}: {seconds / read:.1f} by the clock, {cpu / read_cpu:.1f} of processor time")
+    shutil.rmtree(place)
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--units", type=int, action="append", help="units in the archive; 10000 by default")
+    parser.add_argument("--workers", type=int, default=2)
+    options = parser.parse_args()
+    with tempfile.TemporaryDirectory(prefix="tumbleline-refit-") as folder:
+        for units in options.units or [10000]:
+            measured(units, options.workers, Path(folder))
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
