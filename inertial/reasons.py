@@ -123,6 +123,12 @@ def likeness(state: State, one: str, other: str, base: Sequence[str]) -> str:
     return f"{best.found(state)} leaves {100.0 * now:.0f} % of {signature(effect, place, column)} beside {other}"
 
 
+def hiding(state: State, drivers: set[Driver]) -> str:
+    """The first feature of a plan that keeps one of these quantities from varying; empty where none does."""
+    one = _one(state)
+    return next((found for c in CHANGES if c.driver in drivers and (found := c.found(one))), "")
+
+
 def _one(state: State) -> State:
     """The first unit of a lot."""
     while state.batch:

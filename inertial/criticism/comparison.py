@@ -45,7 +45,9 @@ def estimate(model: Model) -> Estimate:
         target = _free(unit, inverse, y[..., None])[..., 0]
         flat = free.reshape(-1, z.shape[-1])
         shared = np.linalg.lstsq(flat, target.reshape(-1), rcond=1e-9)[0].astype(np.float64)
-        shared_error = np.sqrt(variance * np.diag(np.linalg.pinv(flat.T @ flat, rcond=1e-12)))
+        # columns that are nearly one leave diagonals a rounding below zero
+        inverted = np.diag(np.linalg.pinv(flat.T @ flat, rcond=1e-12))
+        shared_error = np.sqrt(variance * np.maximum(inverted, 0.0))
         y = y - z @ shared
     right = np.einsum("bnp,bn->bp", unit, y)
     scaled = np.einsum("bpr,br->bp", inverse, right)

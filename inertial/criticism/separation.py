@@ -19,6 +19,9 @@ from inertial.sequences import Pace, Step, extended
 
 Array = NDArray[np.float64]
 
+_STEP = 1.6
+"""Factor by which the nonlinear parameters of a rival may move when it is fitted to what is measured next."""
+
 _FEW = 3
 """Units that stand for the lot: all go through the same steps."""
 
@@ -93,10 +96,22 @@ def separations(rivals: Rivals, steps: Sequence[Step] = (), pace: Pace | None = 
     count = len(rivals.terms)
     left = np.zeros((count, count))
     for column, wrong in enumerate(rivals.terms):
-        model = Model(problem, [*rivals.rest, wrong])
-        left[:, column] = left_of(model, rotated, rivals.share)
+        near = [left_of(Model(problem, [*rivals.rest, t]), rotated, rivals.share) for t in _neighbours(problem, wrong)]
+        left[:, column] = np.min(near, axis=0)
     np.fill_diagonal(left, 0.0)
     return left * rivals.weight / rivals.variance
+
+
+def _neighbours(problem: Problem, term: Term) -> list[Term]:
+    """A rival as it was fitted, and with each nonlinear parameter a step to both sides: it will be fitted again."""
+    found = [term]
+    for parameter in term.effect.parameters(problem.lot.state):
+        if parameter.choices or isinstance(value := term.keywords[parameter.name], tuple):
+            continue
+        for factor in (1.0 / _STEP, _STEP):
+            moved = float(np.clip(value * factor, parameter.low, parameter.high))
+            found.append(Term(term.effect, tuple({**term.keywords, parameter.name: moved}.items()), term.first))
+    return found
 
 
 def smallest(left: Array) -> Array:

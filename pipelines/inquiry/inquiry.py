@@ -15,9 +15,7 @@ from pipelines.job import Job
 from pipelines.runner import Runner
 from pipelines.stages.criticise import document, examined
 from pipelines.stages.next_measurement import Proposed, proposed, rows_of
-from schemas.limits import Limits
-from schemas.recipe import Lot, Recipe
-from schemas.station import StationConfig
+from schemas.recipe import Recipe
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -178,8 +176,16 @@ class Inquiry:
             if mine and about["recipe"]["effects"] == list(self.effects):
                 told = files.read_json(run.path / FILE)["round"] if (run.path / FILE).is_file() else {}
                 rows, reasons = told.get("next_measurements", ()), told.get("why", [about["recipe"]["description"]])
-                return Move(_job_of(about), tuple(rows), tuple(reasons), told.get("planned_minutes", 0.0), begun=True)
+                return Move(
+                    self._again(about), tuple(rows), tuple(reasons), told.get("planned_minutes", 0.0), begun=True
+                )
         return None
+
+    def _again(self, about: dict[str, Any]) -> Job:
+        """The job of a follow-up that was begun: the station and lot are the first run's, as they are here."""
+        recipe = Recipe.model_validate(about["recipe"])
+        base = self.base
+        return Job(recipe, base.limits, base.lot, base.station, about["capture"], tuple(about["parents"]))
 
     def runner(self, move: Move, progress: Progress) -> Runner:
         """The runner of a follow-up: its station goes on from where the newest run left it."""
@@ -265,17 +271,6 @@ def _going_on(before: Records) -> Any:
     return measure
 
 
-def _job_of(about: dict[str, Any]) -> Job:
-    return Job(
-        Recipe.model_validate(about["recipe"]),
-        Limits.model_validate(about["limits"]),
-        Lot.model_validate(about["lot"]),
-        StationConfig.model_validate(about["station"]),
-        captured=about["capture"],
-        parents=tuple(about["parents"]),
-    )
-
-
 def _ended(finding: Finding) -> Verdict | None:
     told = finding.told
     if finding.diagnosis is None:
@@ -296,10 +291,18 @@ def _classes(finding: Finding) -> str:
 def _named(found: Measured, effects: Sequence[str], diagnosis: Diagnosis | None) -> dict[str, Any]:
     """What reports and people need beside the fixed keys."""
     from inertial import effects as catalogue
+    from inertial.reasons import reason
 
     unseen = diagnosis.unseen if diagnosis is not None else ()
     breakers = {name: catalogue.get(name).breaker for name in unseen}
-    return {"effects": list(effects), "units": list(found.units), "breakers": breakers, "offer": None}
+    reasons = {} if diagnosis is None else {n: reason(diagnosis.problem.lot.state, n, effects) for n in unseen}
+    return {
+        "effects": list(effects),
+        "units": list(found.units),
+        "breakers": breakers,
+        "reasons": reasons,
+        "offer": None,
+    }
 
 
 def plain_rows(told: dict[str, Any]) -> dict[str, Any]:

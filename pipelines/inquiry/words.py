@@ -7,7 +7,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from inertial import frames
-from inertial.reasons import likeness, reason
+from inertial.changes import Driver
+from inertial.criticism.menus import Kind
+from inertial.reasons import hiding, likeness, reason
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -17,6 +19,16 @@ if TYPE_CHECKING:
     from inertial.state import State
 
 DRAWN_OUT_S = 5.0
+VARIED: dict[Kind, tuple[Driver, ...]] = {
+    "poses": ("force",),
+    "soaks": ("temperature",),
+    "waits": ("since_move",),
+    "approach": ("order",),
+    "excursion": ("temperature",),
+    "ramp": ("rate", "temperature"),
+    "later": ("time", "since_power"),
+}
+"""What the steps of a kind vary: features of the plan that keep that as it is have hidden the difference."""
 
 
 def why(state: State, base: Sequence[str], found: Proposal) -> str:
@@ -29,7 +41,7 @@ def why(state: State, base: Sequence[str], found: Proposal) -> str:
     """
     first, second = found.pair
     rivals = " and ".join([", ".join(found.ids[:-1]), found.ids[-1]])
-    hidden = _hidden(state, base, first, second)
+    hidden = _hidden(state, base, found.kinds, first, second)
     parted = f"χ² between {first} and its nearest rival goes from {found.before:.1f} to {found.after:.0f}"
     return f"{rivals} fit alike: {hidden}. {what(found)} parts them ({parted}; {found.minutes:.1f} min)"
 
@@ -41,10 +53,13 @@ def shows(state: State, base: Sequence[str], found: Proposal) -> str:
     return f"{'; '.join(hidden)}. {what(found)} shows {', '.join(found.ids)} ({least}; {found.minutes:.1f} min)"
 
 
-def _hidden(state: State, base: Sequence[str], first: str, second: str) -> str:
+def _hidden(state: State, base: Sequence[str], kinds: Sequence[Kind], first: str, second: str) -> str:
     """What in the plan makes one rival look like the other."""
     told = likeness(state, first, second, base)
-    return told or f"in what was measured {first} and {second} differ by less than the noise"
+    if told:
+        return told
+    feature = hiding(state, {d for kind in kinds for d in VARIED[kind]})
+    return f"with {feature or 'what was measured'} {first} and {second} differ by less than the noise"
 
 
 def what(found: Proposal) -> str:

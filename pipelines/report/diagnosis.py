@@ -38,7 +38,9 @@ def render_diagnosis(document: dict[str, Any], found: Measured, diagnosis: Diagn
         document=document,
         units=len(found.units),
         classes=[_class(group, document) for group in document["classes"]],
-        unseen=[(name, document["breakers"][name]) for name in document["unseen"]],
+        unseen=[
+            (name, document.get("reasons", {}).get(name) or document["breakers"][name]) for name in document["unseen"]
+        ],
         pictures=None if diagnosis is None else _pictures(diagnosis, sound),
         ladder=[] if diagnosis is None else _ladder(diagnosis),
         number=plain,
