@@ -14,10 +14,14 @@ HERE = Path(__file__).resolve().parent
 # benchmark, arguments of the short form, arguments of the published form
 BENCHMARKS: tuple[tuple[str, tuple[str, ...], tuple[str, ...]], ...] = (
     ("main_job.py", ("--way", "direct"), ()),
+    ("station.py", ("--short", "--only", "lots", "--only", "soaks", "--only", "noise"), ()),
     ("fits.py", ("--units", "200", "--rounds", "3"), ()),
     ("allan.py", ("--channels", "6", "--minutes", "10"), ()),
     ("recovery.py", ("--units", "50"), ("--units", "200")),
     ("throughput.py", ("--rounds", "5"), ("--rounds", "25")),
+    ("plans.py", ("--units", "50", "--device", "adxl355"), ()),
+    ("archive.py", ("--lots", "50", "--lots", "200"), ("--lots", "100", "--lots", "1000", "--lots", "10000")),
+    ("investigate.py", ("--scene", "cubic on 18", "--scene", "pendulum on faces"), ("--seeds", "3", "--first", "31")),
     ("blind.py", ("--runs", "40"), ("--runs", "400", "--method", "tumbleline", "--method", "bic", "--method", "bonferroni",
                                     "--method", "stlsq", "--method", "lasso")),
 )  # fmt: skip

@@ -38,6 +38,7 @@ class Records:
         """Clear away what a killed writer left; only the one process that captures may call this."""
         files.sweep(self.path)
         files.sweep(self.path / "state")
+        files.sweep(self.path / "events")
 
     def is_complete(self) -> bool:
         """Whether capture came to its end."""

@@ -1,77 +1,136 @@
-"""A process killed with SIGKILL, at points all over a run: the same command goes on and ends with the same bytes."""
+"""A process killed with SIGKILL anywhere: the same command goes on, measures nothing twice, and ends with the same bytes."""
 
+import os
 import signal
 import subprocess
 import sys
-import time
 from pathlib import Path
 
+import numpy as np
 import pytest
-from capture_double import recipe_file
+from capture_double import PulledPlug, recipe_file, small_job
 
+from pipelines.archive import Archive
+from pipelines.chain import ORDER
+from pipelines.runner import Runner
+from stations.plant.clock import PlantClock
+
+ROOT = Path(__file__).resolve().parents[2]
 PATIENCE_S = 120.0
 RESULTS = ("readings", "history", "verdicts", "dwells", "coefficients", "covariance", "residuals", "verification")
 MORE_RESULTS = ("allan", "noise", "figures", "grades")
+TIMES, CHAINS = 50, 5
 
 
-def start(folder: Path) -> subprocess.Popen[bytes]:
-    command = [
-        sys.executable,
-        "-m",
-        "pipelines.cli",
-        "run",
-        recipe_file(folder),
-        "--direct",
-        "--archive",
-        str(folder / "archive"),
-    ]
-    return subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+def run(folder: Path, *how: str) -> int:
+    """Status of a run that may kill itself."""
+    environment = {**os.environ, "PYTHONPATH": os.pathsep.join((str(ROOT), str(ROOT / "tests")))}
+    command = [sys.executable, str(Path(__file__).with_name("dying.py")), str(folder / "small.toml")]
+    return subprocess.run(
+        [*command, str(folder / "archive"), *how], env=environment, timeout=PATIENCE_S, check=False
+    ).returncode
 
 
-def kill_when(process: subprocess.Popen[bytes], folder: Path, pattern: str, count: int) -> None:
-    """Kill the process as soon as so many files of a pattern are there."""
-    end = time.monotonic() + PATIENCE_S
-    while len(list(folder.glob(pattern))) < count:
-        assert process.poll() is None, "the run was over before it could be killed"
-        assert time.monotonic() < end
-        time.sleep(0.005)
-    process.send_signal(signal.SIGKILL)
-    assert process.wait() == -signal.SIGKILL
+def records(folder: Path) -> dict[str, tuple[int, int]]:
+    """What tells a stored record from one that was measured again: its file and when it was written."""
+    found = {path: path.stat() for path in (folder / "archive").glob("captures/*/[0-9]*/samples.parquet")}
+    return {path.parent.name: (stat.st_ino, stat.st_mtime_ns) for path, stat in found.items()}
+
+
+def killed(folder: Path, how: str) -> None:
+    """A run killed as it is told; what was finished before is as it was."""
+    before = records(folder)
+    assert run(folder, how) == -signal.SIGKILL, how
+    after = records(folder)
+    assert {name: after[name] for name in before} == before, "a finished dwell was measured again"
 
 
 def finish(folder: Path) -> dict[str, bytes]:
-    assert start(folder).wait(PATIENCE_S) in (0, 1)
-    [run] = (folder / "archive" / "runs").iterdir()
-    return {name: (run / f"{name}.parquet").read_bytes() for name in (*RESULTS, *MORE_RESULTS)}
+    """The bytes of every result, with nothing left lying about."""
+    before = records(folder)
+    assert run(folder) == 0
+    assert {name: records(folder)[name] for name in before} == before
+    assert not list(folder.glob("archive/**/.tmp-*"))
+    [found] = (folder / "archive" / "runs").iterdir()
+    return {name: (found / f"{name}.parquet").read_bytes() for name in (*RESULTS, *MORE_RESULTS)}
 
 
 @pytest.fixture(scope="module")
 def undisturbed(tmp_path_factory: pytest.TempPathFactory) -> dict[str, bytes]:
-    return finish(tmp_path_factory.mktemp("undisturbed"))
+    folder = tmp_path_factory.mktemp("undisturbed")
+    recipe_file(folder)
+    return finish(folder)
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    ("pattern", "count"),
-    [
-        ("archive/archive.json", 1),
-        ("archive/captures/*/[0-9]*/record.json", 1),
-        ("archive/captures/*/[0-9]*/record.json", 12),
-        ("archive/captures/*/complete.json", 1),
-        ("archive/runs/*/coefficients.parquet", 1),
-        ("archive/runs/*/figures.parquet", 1),
-    ],
-)
-def test_a_killed_run_goes_on_and_gives_the_same_bytes(
-    tmp_path: Path, undisturbed: dict[str, bytes], pattern: str, count: int
+@pytest.mark.timeout(900)
+def test_a_run_killed_at_every_stage_boundary_ends_in_the_same_bytes(
+    tmp_path: Path, undisturbed: dict[str, bytes]
 ) -> None:
-    kill_when(start(tmp_path), tmp_path, pattern, count)
+    recipe_file(tmp_path)
+    for stage in ORDER:
+        killed(tmp_path, f"stage:{stage}")
     assert finish(tmp_path) == undisturbed
-    assert not list(tmp_path.glob("archive/**/.tmp-*"))
 
 
 @pytest.mark.slow
-def test_a_run_killed_again_and_again_comes_to_its_end(tmp_path: Path, undisturbed: dict[str, bytes]) -> None:
-    for records in (2, 5, 11, 17):
-        kill_when(start(tmp_path), tmp_path, "archive/captures/*/[0-9]*/record.json", records)
+@pytest.mark.timeout(900)
+@pytest.mark.parametrize("chain", range(CHAINS))
+def test_a_run_killed_at_random_times_ends_in_the_same_bytes(
+    tmp_path: Path, undisturbed: dict[str, bytes], chain: int
+) -> None:
+    recipe_file(tmp_path)
+    length = station_seconds(undisturbed, tmp_path)
+    times = np.sort(np.random.default_rng([2026, chain]).uniform(1.0, length, TIMES // CHAINS))
+    for time in times:
+        killed(tmp_path, f"plant:{time:.6f}")
     assert finish(tmp_path) == undisturbed
+
+
+def station_seconds(results: dict[str, bytes], folder: Path) -> float:
+    """How long the undisturbed capture took, in the station's time."""
+    import pandas as pd
+
+    (folder / "readings.parquet").write_bytes(results["readings"])
+    last = pd.read_parquet(folder / "readings.parquet").iloc[-1]
+    return float(last["start_s"] + last["duration_s"])
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(900)
+def test_a_run_killed_between_writing_a_file_and_publishing_it_ends_in_the_same_bytes(
+    tmp_path: Path, undisturbed: dict[str, bytes]
+) -> None:
+    recipe_file(tmp_path)
+    for number in (1, 2, 3, 7, 30, 12, 9, 20, 41, 5, 17, 26):
+        killed(tmp_path, f"file:{number}")
+    assert finish(tmp_path) == undisturbed
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_a_plug_pulled_at_random_times_loses_no_finished_dwell(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, seed: int
+) -> None:
+    whole = Runner(small_job(tmp_path), Archive(tmp_path / "whole"))
+    whole.stage("capture")
+    sleep, ends = PlantClock.sleep, [0.0]
+
+    def fatal(clock: PlantClock, span: float) -> None:
+        sleep(clock, span)
+        if clock.now() > ends[0]:
+            raise PulledPlug
+
+    pulled = Archive(tmp_path / "pulled")
+    for end in np.sort(np.random.default_rng(seed).uniform(1.0, 2900.0, 3)):
+        ends[0] = float(end)
+        monkeypatch.setattr(PlantClock, "sleep", fatal)
+        with pytest.raises(PulledPlug):
+            Runner(small_job(tmp_path), pulled).stage("capture")
+        monkeypatch.setattr(PlantClock, "sleep", sleep)
+    again = Runner(small_job(tmp_path), pulled)
+    again.stage("capture")
+    for name in ("readings", "history"):
+        path = f"{name}.parquet"
+        assert (again.run.path / path).read_bytes() == (whole.run.path / path).read_bytes()
+    kept = [list(archive.capture(whole.job.capture_id).samples()) for archive in (pulled, Archive(tmp_path / "whole"))]
+    assert all(left.equals(right) for left, right in zip(*kept, strict=True))
