@@ -14,6 +14,7 @@ from pipelines.cli.station_status import status
 from pipelines.cli.station_watch import watch
 
 if TYPE_CHECKING:
+    from schemas.profile import Profile
     from stations.serving import Served
 
 app = typer.Typer(
@@ -96,15 +97,33 @@ def profiles(
         if as_json:
             print_json(profile.model_dump(mode="json"))
             return
-        lines = [[r.name, str(r.address), r.type, r.access, r.unit, r.manual] for r in profile.registers]
-        print_table(["register", "address", "type", "access", "unit", "manual"], lines, title=profile.model)
+        if profile.commands:
+            lines = [[c.name, c.ask, c.tell, c.unit, c.disputed] for c in profile.commands]
+            print_table(["value", "asked by", "set by", "unit", "disputed"], lines, title=profile.model)
+            return
+        lines = [[r.name, r.space, str(r.address), r.type, r.access, r.unit, r.manual] for r in profile.registers]
+        print_table(["register", "space", "address", "type", "access", "unit", "manual"], lines, title=profile.model)
+        _print_disputed(profile)
         return
     found = [load_profile(one) for one in profile_names()]
     if as_json:
-        print_json({"profiles": [p.model_dump(mode="json", exclude={"registers", "groups", "fifo"}) for p in found]})
+        print_json(
+            {
+                "profiles": [
+                    p.model_dump(mode="json", exclude={"registers", "commands", "groups", "fifo"}) for p in found
+                ]
+            }
+        )
         return
-    lines = [[p.name, p.kind, f"{p.maker} {p.model}", "yes" if p.verified else "no"] for p in found]
-    print_table(["profile", "kind", "device", "held against hardware"], lines)
+    lines = [[p.name, p.kind, f"{p.maker} {p.model}", " ".join(p.links), "yes" if p.verified else "no"] for p in found]
+    print_table(["profile", "kind", "device", "links", "held against hardware"], lines)
+
+
+def _print_disputed(profile: Profile) -> None:
+    """What sources disagree about, a line each."""
+    for register in profile.registers:
+        if register.disputed:
+            typer.echo(f"disputed  {register.name}: {register.disputed}")
 
 
 def _where(device: Served) -> dict[str, object]:

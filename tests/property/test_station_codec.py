@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from schemas.profile import Register
 from stations.codec import BITS, NotEncodable, decode, encode, pack_samples, unpack_samples
 
-ORDERS = st.sampled_from(["high_first", "low_first"])
+ORDERS = st.sampled_from(["high_first", "low_first", "high_first_swapped", "low_first_swapped"])
 RANGES = {
     "uint16": (0, 2**16 - 1),
     "int16": (-(2**15), 2**15 - 1),
@@ -70,6 +70,24 @@ def test_packed_samples_come_back_with_their_numbers(packing, first, data):
 def test_word_order_is_what_it_says():
     assert encode(register("float32"), "high_first", 1.0) == [0x3F80, 0]
     assert encode(register("float32"), "low_first", 1.0) == [0, 0x3F80]
+    assert encode(register("float32"), "high_first_swapped", 1.0) == [0x803F, 0]
+    assert encode(register("float32"), "low_first_swapped", 1.0) == [0, 0x803F]
+
+
+def test_bits_are_bits():
+    coils = register("bit", space="coil", count=3)
+    assert encode(coils, "high_first", [1.0, 0.0, 1.0]) == [1, 0, 1]
+    assert decode(coils, "high_first", [1, 0, 1]) == [1, 0, 1]
+    with pytest.raises(NotEncodable):
+        encode(register("bit", space="coil"), "high_first", 2)
+
+
+@given(st.integers(0, 3), st.integers(-700, 1800))
+def test_decimals_of_a_controller_shift_its_values(decimals, tenths):
+    value = round(tenths / 10.0, decimals)
+    scaled = register("int32").with_decimals(decimals)
+    found = decode(scaled, "high_first", encode(scaled, "high_first", value))
+    assert found == pytest.approx(value, abs=1e-9)
 
 
 @pytest.mark.parametrize(

@@ -1,0 +1,91 @@
+"""A device that is spoken to in lines, when it is slow, says nothing, says too much, or hangs up."""
+
+import socket
+import threading
+import time
+from contextlib import contextmanager, suppress
+
+import pytest
+
+from schemas.errors import LinkLost, StationRefused, StationTimeout
+from stations.links.lines import LineLink
+
+
+@contextmanager
+def speaker(*answers: bytes | None):
+    """A device that gives these answers in turn, a connection after the other; None hangs up. Gives address and what it heard."""
+    listener, heard, left = socket.create_server(("127.0.0.1", 0)), [], list(answers)
+
+    def serve():
+        with suppress(OSError):
+            while True:
+                connection, _ = listener.accept()
+                with connection, suppress(OSError):
+                    while data := connection.recv(256):
+                        heard.append(data)
+                        answer = left.pop(0) if left else b""
+                        if answer is None:
+                            break
+                        connection.sendall(answer)
+
+    thread = threading.Thread(target=serve, daemon=True)
+    thread.start()
+    try:
+        yield listener.getsockname(), heard
+    finally:
+        listener.shutdown(socket.SHUT_RDWR)
+        listener.close()
+        thread.join(5.0)
+
+
+@contextmanager
+def linked(*answers: bytes | None, attempts: int = 2):
+    with speaker(*answers) as (address, heard):
+        link = LineLink(*address, timeout_s=0.2, read_attempts=attempts)
+        try:
+            yield link, heard
+        finally:
+            link.close()
+
+
+def test_questions_are_put_again_after_silence_and_orders_are_not():
+    with linked(b"", b"23.0,23.0,180.0,-70.0\r\n") as (link, heard):
+        assert link.ask("TEMP?", "air") == "23.0,23.0,180.0,-70.0"
+        assert heard == [b"TEMP?\r\n"] * 2
+    with linked(b"") as (link, heard):
+        with pytest.raises(StationTimeout, match=r"no answer to set point 'TEMP, S25.0' in 0\.2 s"):
+            link.tell("TEMP, S25.0", "set point")
+        assert heard == [b"TEMP, S25.0\r\n"]
+
+
+def test_refusals_are_told_by_name():
+    with linked(b"NA:DATA OUT OF RANGE\r\n") as (link, _), pytest.raises(StationRefused, match="NA:DATA OUT OF RANGE"):
+        link.tell("TEMP, S999.0", "set point")
+
+
+@pytest.mark.parametrize("answer", [None, b"23.0\r\n40.0\r\n", b"\xff\xfe\r\n", b"x" * 3000])
+def test_what_is_not_one_line_is_no_answer(answer):
+    with linked(answer, attempts=1) as (link, _), pytest.raises(LinkLost, match="connection lost at air 'TEMP\\?'"):
+        link.ask("TEMP?", "air")
+
+
+def test_an_answer_without_an_end_costs_one_time_out():
+    with linked(b"23.", attempts=1) as (link, _):
+        begun = time.monotonic()
+        with pytest.raises(StationTimeout):
+            link.ask("TEMP?", "air")
+        assert time.monotonic() - begun < 1.0
+
+
+def test_a_late_answer_never_meets_the_next_question():
+    with linked(b"", b"25.0\r\n", attempts=1) as (link, _):
+        with pytest.raises(StationTimeout):
+            link.ask("TEMP?", "air")
+        assert link.ask("MODE?", "mode") == "25.0"  # on a connection of its own
+
+
+def test_nobody_there_is_told():
+    with socket.create_server(("127.0.0.1", 0)) as free:
+        port = free.getsockname()[1]
+    with pytest.raises(LinkLost, match="connection lost"):
+        LineLink("127.0.0.1", port, timeout_s=0.2, read_attempts=1).ask("TEMP?", "air")
