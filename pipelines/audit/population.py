@@ -12,6 +12,7 @@ from pipelines.audit.drifts import OWN
 from pipelines.audit.statistics.capability import Index as Capability
 from pipelines.audit.statistics.capability import cpk, fraction_interval, sigma_within
 from pipelines.audit.statistics.comparison import Comparison, compare, holm, outlier_limit, robust_z
+from pipelines.audit.statistics.two_way import group_medians
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -229,7 +230,8 @@ def _odd_lots(all_: Calibrations, device: str, rows: Numbers, values: Array) -> 
     large = np.flatnonzero(counts >= FEWEST_OF_LOT)
     if large.size < FEWEST:
         return []
-    means = np.stack([np.bincount(lot, values[:, c]) / counts for c in range(values.shape[1])], axis=1)[large]
+    # medians: one wild unit is told as a unit, not as its lot
+    means = np.stack([group_medians(values[:, c], lot) for c in range(values.shape[1])], axis=1)[large]
     z = np.nan_to_num(robust_z(means) * np.sqrt(counts[large] / np.median(counts[large]))[:, None])
     worst = np.argmax(np.abs(z), axis=1)
     size = np.abs(z[np.arange(large.size), worst])

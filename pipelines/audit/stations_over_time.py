@@ -117,7 +117,7 @@ class Chart:
     """A control chart of one parameter of one check standard on one station, in order of time, (n,) each.
 
     rules : (4, n), by Western Electric rule; outside : where the EWMA is beyond its limits
-    alarms : number of signals, those that follow one another counted once; expected : of a station in control
+    alarms : number of signals of the rules and of averages outside; expected : of a station in control
     p_value : of as many alarms by chance
     """
 

@@ -55,8 +55,11 @@ def signals(values: Array, chart: Baseline) -> tuple[Flags, Ewma]:
 
 
 def alarms(rules: Flags, moving: Flags, counted: Flags) -> int:
-    """Number of alarms among the points that count: signals that follow one another without a gap are one."""
-    return sum(int(np.count_nonzero(np.diff(np.r_[0, flags & counted]) == 1)) for flags in (rules.any(axis=0), moving))
+    """Number of alarms among the points that count: signals of the rules, and points whose moving average is outside.
+
+    A level that stays moved goes on giving alarms, so their number tells it from single ones.
+    """
+    return int(np.count_nonzero(rules.any(axis=0) & counted) + np.count_nonzero(moving & counted))
 
 
 @cache

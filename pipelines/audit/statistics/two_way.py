@@ -40,6 +40,11 @@ def unit_and_place(values: Array, units: Codes, places: Codes) -> tuple[Array, A
     return unit, place
 
 
+def group_medians(values: Array, codes: Codes) -> Array:
+    """Median of every group, (groups,), zero where it is empty; values (n,), codes (n,) from 0."""
+    return _medians(values, _groups(codes))
+
+
 def _groups(codes: Codes) -> tuple[Codes, Codes, Codes]:
     """Codes, and where each group begins and how long it is."""
     counts = np.bincount(codes)
