@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from typing import TYPE_CHECKING, Annotated
 
 import typer
@@ -16,6 +17,8 @@ from pipelines.cli.station_watch import watch
 if TYPE_CHECKING:
     from schemas.profile import Profile
     from stations.serving import Served
+
+SHORT = {"read": "r", "write": "w", "read_write": "rw"}
 
 app = typer.Typer(
     help="See, check, serve and describe stations.",
@@ -101,7 +104,9 @@ def profiles(
             lines = [[c.name, c.ask, c.tell, c.unit, c.disputed] for c in profile.commands]
             print_table(["value", "asked by", "set by", "unit", "disputed"], lines, title=profile.model)
             return
-        lines = [[r.name, r.space, str(r.address), r.type, r.access, r.unit, r.manual] for r in profile.registers]
+        lines = [
+            [r.name, r.space, str(r.address), r.type, SHORT[r.access], r.unit, r.manual] for r in profile.registers
+        ]
         print_table(["register", "space", "address", "type", "access", "unit", "manual"], lines, title=profile.model)
         _print_disputed(profile)
         return
@@ -115,8 +120,16 @@ def profiles(
             }
         )
         return
-    lines = [[p.name, p.kind, f"{p.maker} {p.model}", " ".join(p.links), "yes" if p.verified else "no"] for p in found]
-    print_table(["profile", "kind", "device", "links", "held against hardware"], lines)
+    lines = [
+        [p.name, p.kind, f"{p.maker} {_first_words(p.model)}", " ".join(p.links), "yes" if p.verified else "no"]
+        for p in found
+    ]
+    print_table(["profile", "kind", "device", "links", "verified"], lines)
+
+
+def _first_words(model: str) -> str:
+    """What a model is, without how it must be set up."""
+    return re.split(r"[,:;(]| with | behind ", model)[0].strip()
 
 
 def _print_disputed(profile: Profile) -> None:
