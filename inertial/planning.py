@@ -142,12 +142,22 @@ def _remainder(effect: AnyEffect, state: State, span: Array) -> _Remainder | Non
     try:
         for values in _values(effect, state):
             columns = _columns(effect, state, values)
-            after = columns - span @ (np.swapaxes(span, -1, -2) @ columns)
-            found = _measured(columns, after)
+            found = _measured(columns, _after(span, columns, _start(effect, state, values)))
             best = found if best is None else _better(best, found)
     except MissingInput:
         return None
     return best
+
+
+def _after(span: Array, columns: Array, start: Array) -> Array:
+    """What the base model leaves of columns (3, n, p), and besides it the unknown state of a memory at the start (3, n, k)."""
+    left = columns - span @ (np.swapaxes(span, -1, -2) @ columns)
+    if not start.shape[-1]:
+        return left
+    begin = start - span @ (np.swapaxes(span, -1, -2) @ start)
+    u, s, _ = np.linalg.svd(begin, full_matrices=False)
+    u = u * (s > 1e-9)[..., None, :]
+    return left - u @ (np.swapaxes(u, -1, -2) @ left)
 
 
 def _better(one: _Remainder, other: _Remainder) -> _Remainder:
@@ -170,6 +180,14 @@ def _values(effect: AnyEffect, state: State) -> list[Mapping[str, float]]:
     from inertial.criticism.problem import grid_of  # noqa: PLC0415  # criticism stands above planning elsewhere
 
     return list(grid_of(effect, state))
+
+
+def _start(effect: AnyEffect, state: State, values: Mapping[str, float]) -> Array:
+    """What the state of a memory before the first dwell would add, (3, n, k): nobody knows it, so it is no information."""
+    if isinstance(effect, SensorEffect):
+        axes = [effect.start_columns(state, axis, **values) for axis in range(3)]
+        return np.stack([np.broadcast_to(c, (*state.time.shape, c.shape[-1])) for c in axes])
+    return np.moveaxis(effect.start_change(state, **values), -2, 0)
 
 
 def _columns(effect: AnyEffect, state: State, values: Mapping[str, float]) -> Array:
