@@ -6,7 +6,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field, model_validator
 
-from schemas.profile import Carrier
+from schemas.profile import Carrier, WordOrder
 from schemas.recipe import Strict
 
 SERIAL = ("serial", "baud", "parity", "stop_bits")
@@ -18,10 +18,12 @@ class Carried(Strict):
 
     ``link`` is ``tcp``, ``tls``, ``ascii`` (lines over TCP), each to host and port, or ``rtu`` on the line ``serial``. With
     ``tls`` the device's certificate must be signed by the authority in ``ca_file`` and bear ``server_name``, or the host's name;
-    ``certificate_file`` and ``key_file`` are shown to the device where it asks for them.
+    ``certificate_file`` and ``key_file`` are shown to the device where it asks for them. ``word_order`` is that of a device
+    which is set to another than its profile's.
     """
 
     profile: str
+    word_order: WordOrder | None = None
     link: Carrier = "tcp"
     host: str = ""
     port: Annotated[int, Field(ge=0, le=65535)] = 502

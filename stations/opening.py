@@ -16,7 +16,7 @@ from stations.devices.registers import Registers
 from stations.devices.slot import Slot
 from stations.devices.table import TiltTable
 from stations.links.making import Links
-from stations.profile_files import load_profile
+from stations.profile_files import profile_of
 from stations.safety.guarded import PARTING_S, guarded
 from stations.safety.safe_state import safe_steps
 from stations.station import Station, nobody_else
@@ -140,12 +140,12 @@ def _assemble(config: StationConfig, slots: Sequence[int], links: Links, clock: 
 
 
 def _registers(name: str, place: str, device: Device, links: Links) -> Registers:
-    return Registers(name, links.registers(place), device.device_id, load_profile(device.profile))
+    return Registers(name, links.registers(place), device.device_id, profile_of(device))
 
 
 def _chamber(device: Device, links: Links, limits: Limits) -> ThermalChamber:
     """The chamber by its controller's family, on registers or on lines."""
-    profile = load_profile(device.profile)
+    profile = profile_of(device)
     adapter = chamber_adapter(profile)
     spoken = device.link == "ascii"
     values = (
@@ -185,4 +185,4 @@ def tighter(bounds: tuple[float, float], profile: Profile, name: str) -> tuple[f
 
 def _slot_registers(config: StationConfig, links: Links, slot: int) -> Registers:
     where = config.devices.slots
-    return Registers(f"slot {slot}", links.registers("slots"), where.device_id + slot, load_profile(where.profile))
+    return Registers(f"slot {slot}", links.registers("slots"), where.device_id + slot, profile_of(where))

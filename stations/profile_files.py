@@ -4,15 +4,28 @@ from __future__ import annotations
 
 from functools import cache
 from importlib.resources import files
+from typing import TYPE_CHECKING
 
 from schemas.errors import RecipeInvalid, did_you_mean
 from schemas.profile import Profile, parse_profile
+
+if TYPE_CHECKING:
+    from schemas.carrier import Carried
 
 
 def profile_names() -> list[str]:
     """Names of the profiles, sorted."""
     folder = files("stations").joinpath("profiles")
     return sorted(item.name.removesuffix(".toml") for item in folder.iterdir() if item.name.endswith(".toml"))
+
+
+def profile_of(device: Carried) -> Profile:
+    """The profile of a station's device, in the word order that the device is set to."""
+    profile = load_profile(device.profile)
+    if device.word_order is None:
+        return profile
+    kept = [register.model_copy(update={"word_order": None}) for register in profile.registers]
+    return profile.model_copy(update={"word_order": device.word_order, "registers": kept})
 
 
 @cache

@@ -11,7 +11,7 @@ from stations.codec import named
 from stations.devices.commands import Commands
 from stations.devices.registers import Registers
 from stations.links.making import Links
-from stations.profile_files import load_profile
+from stations.profile_files import profile_of
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -140,7 +140,7 @@ def _look(config: StationConfig, links: Links) -> Iterator[Reading]:
 
 def _values(links: Links, device: Served) -> Iterator[Reading]:
     """What one device tells; after the first question that it leaves unanswered the others are not asked."""
-    profile = load_profile(device.profile)
+    profile = profile_of(getattr(links.config.devices, device.place))
     if profile.commands:
         commands = Commands(device.name, links.lines(device.place), profile)
         for number, command in enumerate(profile.commands):

@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING
 
 from stations.codec import NotEncodable, Value
 from stations.plant.bank import Bank, Busy, number
-from stations.profile_files import load_profile
 
 if TYPE_CHECKING:
     from schemas.profile import Profile
@@ -18,9 +17,8 @@ GO = 0x0100
 ABSOLUTE = 1
 
 
-def axis_bank(plant: Plant, axis: Axis, name: str) -> Bank:
+def axis_bank(plant: Plant, axis: Axis, profile: Profile) -> Bank:
     """The registers of the drive behind a profile."""
-    profile = load_profile(name)
     return _BY_ADAPTER[profile.adapter](plant, axis, profile)
 
 

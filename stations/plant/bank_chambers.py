@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING
 
 from stations.codec import NotEncodable, Value, named
 from stations.plant.bank import Bank, number
-from stations.profile_files import load_profile
 
 if TYPE_CHECKING:
     from schemas.profile import Profile
@@ -19,9 +18,8 @@ FREE = (-100.0, 250.0)  # where a profile gives no limits
 HUMIDITY = 40.0
 
 
-def chamber_bank(plant: Plant, name: str) -> Bank:
+def chamber_bank(plant: Plant, profile: Profile) -> Bank:
     """The registers of the controller behind a profile."""
-    profile = load_profile(name)
     chamber = plant.fixture.chamber
     own, command = _BY_ADAPTER[profile.adapter](chamber, profile)
     point = profile.register("set_point")

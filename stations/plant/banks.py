@@ -9,9 +9,10 @@ from stations.plant.bank import Bank, Busy, number
 from stations.plant.bank_axes import axis_bank
 from stations.plant.bank_chambers import chamber_bank
 from stations.plant.bank_lines import P300
-from stations.profile_files import load_profile
+from stations.profile_files import profile_of
 
 if TYPE_CHECKING:
+    from schemas.profile import Profile
     from schemas.station import Devices
     from stations.plant.plant import Plant
 
@@ -21,25 +22,25 @@ UNITS = {"V": "volt", "LSB": "lsb"}
 def build_banks(plant: Plant, devices: Devices) -> dict[int, Bank]:
     """A bank for every device id of the station."""
     banks = {
-        devices.outer.device_id: axis_bank(plant, plant.outer, devices.outer.profile),
-        devices.inner.device_id: axis_bank(plant, plant.inner, devices.inner.profile),
-        devices.reader.device_id: _reader(plant, devices.reader.profile, devices.slots.count),
+        devices.outer.device_id: axis_bank(plant, plant.outer, profile_of(devices.outer)),
+        devices.inner.device_id: axis_bank(plant, plant.inner, profile_of(devices.inner)),
+        devices.reader.device_id: _reader(plant, profile_of(devices.reader), devices.slots.count),
     }
-    if load_profile(devices.chamber.profile).registers:
-        banks[devices.chamber.device_id] = chamber_bank(plant, devices.chamber.profile)
+    if (chamber := profile_of(devices.chamber)).registers:
+        banks[devices.chamber.device_id] = chamber_bank(plant, chamber)
     for unit, slot in enumerate(plant.slots):
-        banks[devices.slots.device_id + slot] = _slot(plant, unit, devices.slots.profile)
+        banks[devices.slots.device_id + slot] = _slot(plant, unit, profile_of(devices.slots))
     return banks
 
 
 def build_speakers(plant: Plant, devices: Devices) -> dict[int, P300]:
     """What answers in lines of text, by device id."""
-    profile = load_profile(devices.chamber.profile)
+    profile = profile_of(devices.chamber)
     return {devices.chamber.device_id: P300(plant, profile)} if profile.commands else {}
 
 
-def _reader(plant: Plant, name: str, slots: int) -> Bank:
-    profile, sampler = load_profile(name), plant.sampler
+def _reader(plant: Plant, profile: Profile, slots: int) -> Bank:
+    sampler = plant.sampler
 
     def command(values: dict[str, Value]) -> None:
         if "rate" in values:
@@ -67,8 +68,8 @@ def _reader(plant: Plant, name: str, slots: int) -> Bank:
     return Bank(profile, sources, command)
 
 
-def _slot(plant: Plant, unit: int, name: str) -> Bank:
-    profile, sampler, preset = load_profile(name), plant.sampler, plant.preset
+def _slot(plant: Plant, unit: int, profile: Profile) -> Bank:
+    sampler, preset = plant.sampler, plant.preset
     bits = profile.register("flags").bits
 
     def flags() -> Value:

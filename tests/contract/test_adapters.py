@@ -12,6 +12,7 @@ from stations.devices.adapters import AXES, CHAMBERS, axis_adapter, chamber_adap
 from stations.opening import make_plant, serve_plant
 from stations.profile_files import load_profile, profile_names
 
+STATION_ERRORS = (StationRefused, OperatorNeeded, StationTimeout)
 DRIVES = [name for name in profile_names() if load_profile(name).kind == "axis"]
 CONTROLLERS = [name for name in profile_names() if load_profile(name).kind == "chamber"]
 
@@ -272,6 +273,33 @@ def test_an_order_whose_answer_is_lost_is_read_back_and_not_given_again(name, lo
         station.table.move(60.0, 5.0)
         assert plant.outer._moves == before + 1
         assert [address for _, address, _ in lossy.written].count(start[name]) == 1
+
+
+ORDERS = ["high_first", "low_first", "high_first_swapped", "low_first_swapped"]
+
+
+def with_order(config, order):
+    devices = config.devices
+    turned = {name: getattr(devices, name).model_copy(update={"word_order": order}) for name in ("outer", "inner")}
+    return config.model_copy(update={"devices": devices.model_copy(update=turned)})
+
+
+@pytest.mark.parametrize("order", ORDERS)
+def test_a_drive_may_be_set_to_any_of_four_word_orders(order):
+    config, lot = with_order(station_with(), order), lot_of(1)
+    plant = make_plant(config, lot)
+    with serve_plant(config, lot, plant) as station:
+        station.table.move(70.0, -30.0)
+    assert plant.outer.move.target == pytest.approx(70.0)
+
+
+@pytest.mark.parametrize("order", ORDERS[1:])
+def test_a_drive_set_to_another_word_order_than_the_file_says_does_not_move(order):
+    lot = lot_of(1)
+    plant = make_plant(station_with(), lot)
+    with serve_plant(with_order(station_with(), order), lot, plant) as station, pytest.raises(STATION_ERRORS):
+        station.table.move(70.0, -30.0)
+    assert plant.outer.move.target == 0.0
 
 
 def test_a_profile_without_what_its_adapter_needs_is_refused_by_name():
