@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterable
     from pathlib import Path
 
-    from schemas.recipe import Pose, Recipe
+    from schemas.recipe import Pose, Recipe, SoakPart
 
 WIDTH = 100
 PLAIN = (
@@ -48,19 +48,36 @@ def recipe_text(recipe: Recipe, remarks: Iterable[str] = ()) -> str:
             lines.append(f"{key} = {_value(value)}")
     lines += ["", *_listed("effects", [json.dumps(effect) for effect in recipe.effects])]
     lines += ["", "# outer, inner in degrees; numbers below count from 1", *_listed("poses", _angles(recipe.poses))]
-    if recipe.verification:
-        lines += _listed("verification", _angles(recipe.verification))
+    once, times = _repeated(recipe.verification)
+    if once:
+        lines += _listed("verification", _angles(once))
+    if times > 1:
+        lines.append(f"verification_repeats = {times}")
     if recipe.static_record_s > 0.0:
         lines += _listed("static_pose", [str(recipe.static_pose.outer_deg), str(recipe.static_pose.inner_deg)])
     if not recipe.soaks:
         lines += _listed("temperatures_C", [str(t) for t in recipe.temperatures_C])
     for part in recipe.soaks:
-        lines += ["", "[[soaks]]", f"temperature_C = {part.temperature_C}"]
-        for key in ("poses", "verification"):
-            numbers = getattr(part, key)
-            if numbers is not None:
-                lines += _listed(key, [str(k) for k in numbers])
+        lines += _soak_lines(part)
     return "\n".join(lines) + "\n"
+
+
+def _soak_lines(part: SoakPart) -> list[str]:
+    """The table of one soak."""
+    lines = ["", "[[soaks]]", f"temperature_C = {part.temperature_C}"]
+    for key in ("poses", "verification", "waits_s"):
+        numbers = getattr(part, key)
+        if numbers is not None:
+            lines += _listed(key, [str(k) for k in numbers])
+    return lines if part.settled else [*lines, "settled = false"]
+
+
+def _repeated(poses: list[Pose]) -> tuple[list[Pose], int]:
+    """The poses gone through once, and how often they are."""
+    names = [pose.name for pose in poses]
+    times = names.count(names[0]) if names else 1
+    once = poses[: len(poses) // times]
+    return (once, times) if poses == once * times else (poses, 1)
 
 
 def limits_from(limits: str, home: Path, folder: Path) -> str:

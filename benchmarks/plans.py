@@ -1,0 +1,203 @@
+"""Optimal recipes against the textbook plan: `python benchmarks/plans.py --units 200`.
+
+Both recipes are gone through by 200 units drawn from the plant's own physics (transfer, temperature, flicker, random walk,
+converter), at the times at which the station gets to each dwell; dwells are averaged and fitted as the chain does it. What
+is compared are the RMS errors (estimate − truth) of every coefficient, and the minutes of station time. The registers and the
+chamber are left out: a test holds the planned minutes against the simulated station's own clock.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import sys
+import time
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+os.environ.setdefault("OMP_NUM_THREADS", "1")
+ROOT = Path(__file__).resolve().parents[1]
+sys.path.insert(0, str(ROOT))
+
+import numpy as np  # noqa: E402
+
+from inertial.fits.wander import fit_lot_with_wander  # noqa: E402
+from inertial.frames import force_from_angles  # noqa: E402
+from inertial.noise.dwells import DwellNoise  # noqa: E402
+from inertial.state import State  # noqa: E402
+from pipelines.models import STARTING_MODEL  # noqa: E402
+from pipelines.recipes import load_recipe  # noqa: E402
+from pipelines.stages.minutes import spent  # noqa: E402
+from pipelines.stages.optimise import Wish, candidates, optimise, seen_by, textbook  # noqa: E402
+from pipelines.stages.plan import Planned, identified, planned  # noqa: E402
+from schemas.station import load_station  # noqa: E402
+from stations.plant.device import Devices, Truth, draw_truth, rotation, stream  # noqa: E402
+from stations.plant.noise import Noise  # noqa: E402
+from stations.plant.preset import Preset, load_preset  # noqa: E402
+
+Array = np.ndarray
+Names = tuple[tuple[tuple[str, str], ...], ...]
+CHUNK = 25
+
+
+@dataclass(frozen=True)
+class Course:
+    """Dwells of a recipe in order: angles in degrees, temperature in °C, begin and duration in s."""
+
+    outer: Array
+    inner: Array
+    heat: Array
+    start: Array
+    duration: float
+    rate: float
+
+
+def course_of(planned: Planned) -> Course:
+    """The dwells of the fit among what a station does."""
+    dwells = [s for s in planned.stretches if s.kind == "dwell"]
+    return Course(
+        outer=np.array([s.step.pose.outer_deg for s in dwells]),
+        inner=np.array([s.step.pose.inner_deg for s in dwells]),
+        heat=np.array([s.step.temperature for s in dwells]),
+        start=np.array([s.start for s in dwells]),
+        duration=planned.recipe.dwell_s,
+        rate=planned.recipe.rate_hz,
+    )
+
+
+def truths_of(preset: Preset, units: int, seed: int) -> list[Truth]:
+    """Units whose physics is exactly what the model holds: a comparison of plans, not of models.
+
+    In the physics the tempco of the scale acts on what misalignment lets in, too. So every second unit is aligned and has one,
+    the others are misaligned and have none: every coefficient is away from zero in half of the units.
+    """
+    none, found = np.zeros(3), []
+    for k in range(units):
+        serial = f"R{k:04d}"
+        seat = rotation(1e-3 * stream(seed, serial, "slot").standard_normal(3))
+        truth = draw_truth(preset, serial, seed, slot_rotation=seat, supply_ratio=1.0, output_scale=preset.scale)
+        truth = replace(truth, cubic=none, bias_tempco_quadratic=none, scale_tempco_quadratic=none)
+        aligned = {"misalignment": np.eye(3), "slot_rotation": np.eye(3)}
+        found.append(replace(truth, **(aligned if k % 2 else {"scale_tempco": none})))
+    return found
+
+
+def measured(course: Course, preset: Preset, truths: list[Truth], seed: int) -> tuple[State, Array, Array]:
+    """State, means and their white errors (units, n, 3) in g, of units that go through a course."""
+    parts = [_chunk(course, preset, truths[k : k + CHUNK], seed) for k in range(0, len(truths), CHUNK)]
+    mean, sd = (np.concatenate([part[k] for part in parts]) / preset.scale for k in (0, 1))
+    lsb = preset.lsb / preset.scale
+    n = round(course.rate * course.duration)
+    error = np.sqrt(sd**2 / n + np.where(sd < lsb, lsb**2 / 12.0, 0.0))
+    force = force_from_angles(np.radians(course.outer), np.radians(course.inner))
+    return State(force=force, time=course.start + course.duration / 2.0, temperature=course.heat), mean, error
+
+
+def _chunk(course: Course, preset: Preset, truths: list[Truth], seed: int) -> tuple[Array, Array]:
+    devices = Devices(preset, truths)
+    noise = Noise(preset, [stream(seed, t.serial, "noise") for t in truths])
+    n, before, means, sds = round(course.rate * course.duration), 0.0, [], []
+    lsb = float(np.float32(preset.lsb))
+    force = force_from_angles(np.radians(course.outer), np.radians(course.inner))
+    for f, heat, start in zip(force, course.heat, course.start, strict=True):
+        turned = np.stack([t.slot_rotation @ f for t in truths])[None]
+        clean = devices.output(turned, np.full((1, len(truths)), heat))
+        noise.jump(start - before)
+        counts = devices.counts(clean + noise.sample(n, course.rate)) * lsb
+        before = start + course.duration
+        means.append(counts.mean(axis=0) - preset.zero_level)
+        sds.append(counts.std(axis=0, ddof=1))
+    return np.stack(means, axis=1), np.stack(sds, axis=1)
+
+
+def truth_of(truths: list[Truth], names: Names) -> Array:
+    """True coefficients (units, 3, p) of the standard thermal model in g, for forces in the fixture's frame."""
+    out = np.zeros((len(truths), 3, len(names[0])))
+    for u, truth in enumerate(truths):
+        matrix = truth.matrix
+        for axis in range(3):
+            across = iter(((axis + 1) % 3, (axis + 2) % 3))
+            for c, (effect, _) in enumerate(names[axis]):
+                out[u, axis, c] = {
+                    "bias": lambda a=axis, t=truth: t.bias_g[a],
+                    "scale": lambda a=axis, m=matrix: m[a, a],
+                    "misalignment": lambda a=axis, m=matrix, it=across: m[a, next(it)],
+                    "bias_temperature": lambda a=axis, t=truth: t.bias_tempco[a],
+                    "scale_temperature": lambda a=axis, m=matrix, t=truth: m[a, a] * t.scale_tempco[a],
+                }[effect]()
+    return out
+
+
+def compared(name: str, options: argparse.Namespace) -> None:
+    """Prints one device's figures."""
+    preset = load_preset(name)
+    noise = DwellNoise(
+        1e-6 * preset.noise_density_ug, 1e-6 * preset.bias_instability_ug, 1e-6 * preset.rate_random_walk_ug
+    )
+    base = load_recipe().model_copy(
+        update={"device": name, "effects": list(STARTING_MODEL), "static_record_s": 0.0, "name": name.lower()}
+    )
+    levels = tuple(float(part) for part in options.temperatures.split(","))
+    station = load_station()
+    against = planned(textbook(base, levels), station, noise)
+    wanted = identified(against).errors * options.factor
+    if options.bias_factor != 1.0:
+        wanted[:, 0] *= options.bias_factor
+    begun = time.perf_counter()
+    wish = Wish(wanted, seen_by(against, levels), levels, candidates(station))
+    best = optimise(base, against, wish, lambda _: None)
+    took = time.perf_counter() - begun
+    recipe = best.planned.recipe
+    heat = ", ".join(f"{t:g}" for t in recipe.temperatures_C)
+    print(
+        f"{name}: soaks at {heat} °C, {best.planned.state.time.size} dwells of {recipe.dwell_s:g} s in {len(recipe.poses)} poses "
+        f"and {len(recipe.verification)} for verification; found in {took:.0f} s"
+    )
+    for title, course in (("textbook", against), ("optimal", best.planned)):
+        parts = spent(course.stretches).document()
+        spread = ", ".join(f"{part} {parts[part]:.0f}" for part in ("soaks", "moves", "dwells"))
+        print(f"  {title:<9}{parts['total']:6.0f} min: {spread}")
+    print(f"  station time {100.0 * best.share:.1f} %; errors expected at most {best.worst:.3f} of those wanted")
+    names, before = squared_errors(against, preset, options)
+    _, after = squared_errors(best.planned, preset, options)
+    table(names, before, after, best.expected.errors / identified(against).errors)
+
+
+def squared_errors(course: Planned, preset: Preset, options: argparse.Namespace) -> tuple[Names, Array]:
+    """Names, and squared errors (units, 3, p) in g, of fits to what units measured that were drawn from the plant's physics."""
+    truths = truths_of(preset, options.units, options.seed)
+    state, mean, error = measured(course_of(course), preset, truths, options.seed)
+    found = fit_lot_with_wander(course.recipe.effects, state, mean, error).fit
+    return found.names, (found.coefficients - truth_of(truths, found.names)) ** 2
+
+
+def table(names: Names, before: Array, after: Array, expected: Array) -> None:
+    """Prints RMS errors by effect, over units and axes, with the 95 % interval of their ratio, and the ratio expected."""
+    print(f"  {'RMS error, µg':<24}{'textbook':>10}{'optimal':>10}{'ratio':>8}{'95 % interval':>18}{'expected':>10}")
+    worse: list[str] = []
+    for effect in dict.fromkeys(name for name, _ in names[0]):
+        columns = [c for c, (name, _) in enumerate(names[0]) if name == effect]
+        a, b = (1e6 * float(np.sqrt(np.mean(x[..., columns]))) for x in (before, after))
+        spread = float(np.exp(1.96 / np.sqrt(before[..., columns].size)))  # of the ratio of two independent RMS values
+        worse += [effect] if b / a > spread else []
+        said = float(np.sqrt(np.mean(expected[:, columns] ** 2)))
+        print(f"  {effect:<24}{a:10.3g}{b:10.3g}{b / a:8.3f}{b / a / spread:10.3f} …{b / a * spread:6.3f}{said:10.3f}")
+    print(f"  worse than the textbook plan beyond chance: {', '.join(worse) or 'none'}")
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--units", type=int, default=200)
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--device", action="append", help="preset; adxl355 and analogue by default")
+    parser.add_argument("--temperatures", default="-10,25,60")
+    parser.add_argument("--factor", type=float, default=1.0, help="errors wanted over those of the textbook plan")
+    parser.add_argument("--bias-factor", type=float, default=1.0, help="besides, of the bias alone")
+    options = parser.parse_args()
+    print(f"python benchmarks/plans.py --units {options.units} --seed {options.seed} --factor {options.factor:g}")
+    for name in options.device or ("adxl355", "analogue"):
+        compared(name, options)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,148 @@
+"""`tumbleline plan optimise`: the recipe it writes is usable, cheaper, and as good as it says."""
+
+import json
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from inertial.frames import force_from_angles
+from pipelines.cli import app
+from pipelines.recipe_text import limits_from, recipe_text
+from pipelines.recipes import load_recipe, sample_names
+from pipelines.stages.capture import steps
+from pipelines.stages.minutes import minutes
+from pipelines.stages.optimise import apart
+from pipelines.stages.soak_orders import orders, soak_seconds
+from schemas.errors import RecipeInvalid, WrongUse
+from schemas.station import load_station
+
+THERMAL = "bias,scale,misalignment,bias_temperature,scale_temperature"
+
+
+def asked(folder, *options):
+    target = folder / "found.toml"
+    base = ["plan", "optimise", "--device", "analogue", "--effects", THERMAL, "-o", str(target), "--json"]
+    return CliRunner().invoke(app, [*base, *options]), target
+
+
+@pytest.fixture(scope="module")
+def found(tmp_path_factory):
+    """The cheapest recipe with errors up to four times the textbook plan's: little to search."""
+    done, target = asked(tmp_path_factory.mktemp("optimal"), "--factor", "4")
+    assert done.exit_code == 0, done.exception
+    return json.loads(done.stdout), target
+
+
+def test_the_recipe_that_is_written_is_what_was_told(found):
+    document, target = found
+    recipe = load_recipe(str(target))
+    told = json.loads(CliRunner().invoke(app, ["plan", str(target), "--device", "analogue", "--json"]).stdout)
+    assert told["minutes"] == document["minutes"]
+    assert told["dwells"] == document["dwells"]
+    assert recipe.temperatures_C == document["temperatures_C"]
+    planned = minutes(steps(recipe), load_station(), recipe)
+    assert planned.total == pytest.approx(document["minutes"]["total"], abs=0.05)
+
+
+def test_every_coefficient_is_as_good_as_wanted_in_less_time(found):
+    document, _ = found
+    assert all(row["uncertainty_ug"] <= row["wanted_ug"] for row in document["coefficients"])
+    assert len(document["coefficients"]) == 18
+    assert document["share"] < 0.6
+
+
+def test_soaks_come_back_and_begin_and_end_with_one_reference_pose(found):
+    recipe = load_recipe(str(found[1]))
+    assert len(set(recipe.temperatures_C)) < len(recipe.temperatures_C)
+    ends = {pose.name for k in range(len(recipe.soaks)) for pose in (recipe.poses_at(k)[0], recipe.poses_at(k)[-1])}
+    assert len(ends) == 1
+
+
+def test_ageing_and_hysteresis_stay_visible_and_more_physics_than_on_faces(found):
+    seen = {row["effect"]: row for row in found[0]["plan"]["effects"]}
+    for effect in ("aging_linear", "thermal_hysteresis", "cross_coupling", "third_order"):
+        assert seen[effect]["left"] > 0.1, effect
+    assert "cross_coupling" in found[0]["seen_besides"]
+
+
+def test_verification_poses_are_kept_apart_from_those_of_the_fit(found):
+    recipe = load_recipe(str(found[1]))
+    fit, check = (
+        force_from_angles(*np.radians([(p.outer_deg, p.inner_deg) for p in poses]).T)
+        for poses in (recipe.poses, recipe.verification)
+    )
+    assert len(check) == 6
+    assert np.degrees(np.arccos(np.max(check @ fit.T))) > 8.0
+    assert sum(len(recipe.verification_at(k)) for k in range(len(recipe.soaks))) == 6
+
+
+def test_poses_for_verification_are_far_from_one_another():
+    recipe = load_recipe()
+    found = apart(np.array([[0.0, 0.0], [180.0, 0.0]]), recipe.verification)
+    force = force_from_angles(*np.radians([(p.outer_deg, p.inner_deg) for p in found]).T)
+    cosines = force @ force.T - 2.0 * np.eye(len(force))
+    assert np.degrees(np.arccos(cosines.max())) > 40.0
+
+
+def test_orders_of_soaks_meet_all_levels_turn_round_and_come_back():
+    station = load_station()
+    for order in orders((-10.0, 25.0, 60.0), station, 900.0):
+        turns = np.diff(order)
+        assert set(order) == {-10.0, 25.0, 60.0}
+        assert len(order) > 3
+        assert turns.min() < 0.0 < turns.max()
+    seconds = [soak_seconds(order, station, 900.0) for order in orders((0.0, 50.0), station, 900.0)]
+    assert seconds == sorted(seconds)
+    assert orders((25.0,), station, 900.0) == [(25.0,)]
+
+
+@pytest.mark.parametrize("name", sample_names())
+def test_a_recipe_written_as_text_reads_as_itself(name, tmp_path):
+    recipe = load_recipe(name)
+    path = tmp_path / "again.toml"
+    path.write_text(recipe_text(recipe, ["a remark"]), encoding="utf-8")
+    again = load_recipe(str(path))
+    unnamed = {"model_name", "model_version"}
+    assert again.model_dump(exclude=unnamed) == recipe.model_dump(exclude=unnamed)
+
+
+def test_limits_beside_the_first_recipe_are_found_from_the_new_ones_folder(tmp_path):
+    home, folder = tmp_path / "recipes", tmp_path / "new"
+    home.mkdir()
+    (home / "mine.limits.toml").write_text("", encoding="utf-8")
+    assert limits_from("mine.limits.toml", home, folder) == "../recipes/mine.limits.toml"
+    assert limits_from("consumer", home, folder) == "consumer"
+
+
+@pytest.mark.parametrize(
+    ("options", "kind", "said"),
+    [
+        (("--criterion", "worts"), WrongUse, "did you mean worst"),
+        (("--poses", "twelv"), WrongUse, "did you mean twelve"),
+        (("--temperatures", "cold,warm"), WrongUse, "write -10,25,60"),
+        (("--wanted", "bais=50"), WrongUse, "did you mean bias"),
+        (("--wanted", "bias=-3"), WrongUse, "positive error"),
+        (("--see", "third_ordre"), RecipeInvalid, "third_order"),
+    ],
+)
+def test_what_cannot_be_asked_is_told_in_one_message(options, kind, said, tmp_path):
+    done, target = asked(tmp_path, *options)
+    assert isinstance(done.exception, kind)
+    assert said in str(done.exception)
+    assert not target.exists()
+
+
+@pytest.mark.slow
+def test_errors_that_no_recipe_reaches_are_refused_with_the_nearest(tmp_path):
+    done, _ = asked(tmp_path, "--wanted", "bias=0.01")
+    assert isinstance(done.exception, RecipeInvalid)
+    assert "times those" in str(done.exception)
+
+
+@pytest.mark.slow
+def test_the_textbook_plan_is_matched_in_six_tenths_of_its_time(tmp_path):
+    done, _ = asked(tmp_path)
+    document = json.loads(done.stdout)
+    assert document["share"] <= 0.60
+    assert document["worst"] <= 1.0
