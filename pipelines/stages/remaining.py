@@ -118,8 +118,9 @@ class Remaining:
         return left + max(0.0, under_way - (now - self._since[1]))
 
     def text(self, step: Step, now: float) -> str:
-        """The same for people."""
-        return f"{duration_text(self.seconds(step, now))} left"
+        """The same for people; the time of a simulated station is not theirs."""
+        whose = " of the station's time" if self.config.kind == "simulated" else ""
+        return f"{duration_text(self.seconds(step, now))}{whose} left"
 
 
 def duration_text(seconds: float) -> str:

@@ -11,7 +11,7 @@ from pipelines.stages.remaining import Remaining, duration_text
 from schemas.recipe import Pose
 from stations.opening import open_station
 
-LEFT = re.compile(r"(?:(\d+) h )?(?:(\d+) min|(\d+) s) left$")
+LEFT = re.compile(r"(?:(\d+) h )?(?:(\d+) min|(\d+) s) of the station's time left$")
 
 
 def told_and_true(recipe, config, lot=None):
@@ -93,3 +93,11 @@ def test_far_moves_count_for_more():
 )
 def test_durations_are_told_in_words(seconds, text):
     assert duration_text(seconds) == text
+
+
+def test_only_a_simulated_station_has_a_time_of_its_own():
+    recipe = short_recipe()
+    plan = steps(recipe)
+    real = station_of().model_copy(update={"kind": "modbus", "simulation": None})
+    assert Remaining(plan, station_of(), recipe).text(plan[0], 0.0).endswith(" of the station's time left")
+    assert re.fullmatch(r"\d+ min left", Remaining(plan, real, recipe).text(plan[0], 0.0))
