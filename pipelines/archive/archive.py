@@ -12,6 +12,7 @@ import os
 import platform
 import re
 from datetime import UTC, datetime
+from functools import cache
 from hashlib import sha256
 from importlib.metadata import version
 from pathlib import Path
@@ -93,7 +94,7 @@ class Run:
                 tables.check(name, frame, where=f"{stage} → {name}"),
                 tables.VERSION,
             )
-            files.publish(self.path / f"{name}.parquet", data)
+            self._put(f"{name}.parquet", data)
             content = {
                 "stage": stage,
                 "key": key,
@@ -101,7 +102,7 @@ class Run:
                 "rows": len(frame),
             }
             manifest = {**by, **content, **about, "schema": tables.VERSION, "manifests": follows}
-            files.publish(self.path / f"{name}.json", files.manifest_bytes(manifest))
+            self._put(f"{name}.json", files.manifest_bytes(manifest))
 
     def adopt(self, other: Run, names: tuple[str, ...]) -> None:
         """Take tables over from another run of the same archive, byte for byte, with who made them, when and with what."""
@@ -114,11 +115,11 @@ class Run:
                     "copy before the run is run again"
                 )
                 raise ArchiveUnusable(message)
-            files.publish(self.path / f"{name}.parquet", data)
+            self._put(f"{name}.parquet", data)
             follows = self._manifests(manifest.get("inputs", {}))
             kept = {key: value for key, value in manifest.items() if key != ENTRY}  # what is told anew is signed anew
             content = {**kept, "taken_from": manifest.get("taken_from", other.id), "manifests": follows}
-            files.publish(self.path / f"{name}.json", files.manifest_bytes(content))
+            self._put(f"{name}.json", files.manifest_bytes(content))
 
     def save_report(self, key: str, html: str, about: Mapping[str, Any]) -> None:
         """Publish the report for people with its manifest."""
@@ -173,10 +174,20 @@ class Run:
 
     def _manifests(self, inputs: Mapping[str, str]) -> dict[str, str]:
         """Hashes of the manifests of a stage's inputs, and of what the run was started with: each names those before it."""
-        places = {name: self.path / f"{name}.json" for name in ("run", *inputs)}
-        if self.records is not None:
-            places["records"] = self.records.path / COMPLETE
-        return {name: files.sha256(place) for name, place in sorted(places.items()) if place.is_file()}
+        found = {name: self._hash_of(f"{name}.json") for name in ("run", *inputs)}
+        records = self.records
+        if records is not None and (records.path / COMPLETE).is_file():
+            found["records"] = files.sha256(records.path / COMPLETE)
+        return {name: value for name, value in sorted(found.items()) if value}
+
+    def _put(self, name: str, data: bytes) -> None:
+        """Publish a file of the run."""
+        files.publish(self.path / name, data)
+
+    def _hash_of(self, name: str) -> str:
+        """Hash of a file of the run; empty where it is not there."""
+        place = self.path / name
+        return files.sha256(place) if place.is_file() else ""
 
     def _is_made_by(self, name: str, key: str) -> bool:
         path = self.path / f"{name}.parquet"
@@ -311,12 +322,18 @@ class Archive:
             raise ArchiveUnusable(message)
 
 
+@cache
+def _software() -> dict[str, str]:
+    """Versions of the product and of what runs it; reading them takes a look into the installation."""
+    return {"tumbleline": version("tumbleline"), "python": platform.python_version()}
+
+
 def provenance() -> dict[str, Any]:
     """Who, where, when and with which libraries: kept beside results, never inside them nor in keys."""
     return {
         "who": getpass.getuser(),
         "where": platform.node(),
         "when": datetime.now(UTC).isoformat(timespec="milliseconds"),
-        "software": {"tumbleline": version("tumbleline"), "python": platform.python_version()},
+        "software": _software(),
         "libraries": libraries(),
     }

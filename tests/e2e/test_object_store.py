@@ -57,8 +57,7 @@ def ask(address: str, *arguments: str) -> dict:
 
 
 def test_a_run_there_has_the_same_bytes_as_one_in_a_folder(address: str, local: Run) -> None:
-    run = Archive(address).run("latest")
-    assert run.id == local.id
+    run = Archive(address).run(local.id)
     assert set(run.tables()) == set(local.tables())
     for name in local.tables():
         assert (run.path / f"{name}.parquet").read_bytes() == (local.path / f"{name}.parquet").read_bytes()
@@ -70,22 +69,58 @@ def test_nothing_is_done_twice_there(address: str, tmp_path: Path) -> None:
 
 
 def test_the_commands_work_on_an_address(address: str, local: Run) -> None:
-    assert [run["id"] for run in ask(address, "list")["runs"]] == [local.id]
-    shown = ask(address, "show", "latest")
+    assert ask(address, "list")["runs"][0]["id"] == local.id
+    shown = ask(address, "show", local.id)
     assert {unit["outcome"] for unit in shown["units"]} == {"pass"}
     assert shown["report"].startswith("s3://factory/main/runs/small-")
-    assert ask(address, "show", "latest", "grades")["rows"]
-    refit = ask(address, "fit", "latest", "--effects", "bias,scale,bias_temperature,misalignment,scale_temperature")
+    assert ask(address, "show", local.id, "grades")["rows"]
+    refit = ask(address, "fit", local.id, "--effects", "bias,scale,bias_temperature,misalignment,scale_temperature")
     assert refit["run"] != local.id
-    (Archive(address).root / "runs" / refit["run"]).remove_all()
 
 
-def test_calibrations_are_certified_and_found_there(address: str) -> None:
-    ask(address, "certify", "latest", "--from", "2026-01-01", "--until", "2099-01-01")
+def test_calibrations_are_certified_and_found_there(address: str, local: Run) -> None:
+    ask(address, "certify", local.id, "--from", "2026-01-01", "--until", "2099-01-01")
     assert ask(address, "show", "A2", "--at", "2030-01-01")["calibration"]["certificate"] == "A2/1"
     ask(address, "revoke", "A2", "--reason", "lost")
     assert [e.action for e in Ledger(Archive(address)).events("A2")] == ["certify", "revoke"]
     assert {one.serial for one in Ledger(Archive(address)).all()} == {"A1", "A2", "A3"}
+
+
+def test_a_rerun_a_verification_and_a_lineage_work_there(address: str, local: Run) -> None:
+    before = len(Archive(address).runs())
+    ask(
+        address,
+        "rerun",
+        local.id,
+        "--effects",
+        "bias,scale,misalignment,bias_temperature,scale_temperature,third_order",
+    )
+    assert len(Archive(address).runs()) == before + 1
+    report = ask(address, "verify")
+    assert (report["whole"], report["findings"], report["runs"]) == (True, [], before + 1)
+    assert report["rows"] > 0
+    found = ask(address, "lineage", local.id)
+    assert {step["name"] for step in found["steps"]} >= {"capture", "fit", "grade"}
+
+
+def test_a_changed_object_and_a_missing_one_are_found(query: str, tmp_path: Path) -> None:
+    store = Archive(f"s3://factory/spoilt?{query}")
+    list(Runner(small_job(tmp_path), store, measure=CaptureDouble()).all())
+    path = store.run("latest").path
+    (path / "noise.parquet").write_bytes((path / "noise.parquet").read_bytes()[:-5] + b"spoil")
+    (path / "wander.parquet").unlink()
+    found = {(f["kind"], f["path"].rpartition("/")[2]) for f in ask(store.address, "verify")["findings"]}
+    assert found == {("changed", "noise.parquet"), ("missing", "wander.parquet")}
+
+
+def test_clean_takes_away_claims_of_dead_processes_there(query: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    store = Archive(f"s3://factory/dead?{query}")
+    store.prepare()
+    (store.root / "captures" / "c" / "claim-dead").write_bytes(b"")
+    (store.root / "captures" / "d" / "claim-alive").write_bytes(b"")
+    monkeypatch.setattr("pipelines.archive.cleaning.LEASE_S", -1.0)  # as if they had not been renewed for long
+    assert len(ask(store.address, "archive", "clean")["removed"]) == 2
+    assert ask(store.address, "archive", "clean")["removed"] == []
 
 
 def test_eight_writers_of_one_unit_lose_nothing(query: str) -> None:

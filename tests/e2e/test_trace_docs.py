@@ -1,0 +1,55 @@
+"""The guide to tracing a certificate: its commands run in the order in which they stand there, and say what is printed there."""
+
+import re
+import shlex
+from pathlib import Path
+
+import pytest
+from capture_double import CaptureDouble, small_job
+from typer.testing import CliRunner
+
+from pipelines.archive import Archive
+from pipelines.archive.signatures import VARIABLE
+from pipelines.cli import app
+from pipelines.runner import Runner
+
+ROOT = Path(__file__).resolve().parents[2]
+GUIDE = (ROOT / "docs" / "how-to" / "trace-a-certificate.md").read_text(encoding="utf-8")
+EXAMPLES = [block.partition("\n") for block in re.findall(r"```console\n\$ (.*?)```", GUIDE, flags=re.DOTALL)]
+INDENTED = re.findall(r"^    (tumbleline .*)$", GUIDE, flags=re.MULTILINE)
+
+
+def words_of(text: str) -> str:
+    """The text with every run of blanks and of table lines as one blank."""
+    return " ".join(re.sub(r"[─\s]+", " ", text).split())
+
+
+def test_the_guide_tells_what_its_commands_print(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv(VARIABLE, "")
+    monkeypatch.setenv("COLUMNS", "200")
+    monkeypatch.setenv("TUMBLELINE_ARCHIVE", "archive")
+    runner = Runner(small_job(tmp_path), Archive("archive"), measure=CaptureDouble())
+    list(runner.all())
+    (tmp_path / "sent-by-mail.parquet").write_bytes((runner.run.path / "grades.parquet").read_bytes())
+    assert len(EXAMPLES) == 8
+    for command, _, printed in EXAMPLES:
+        done = CliRunner().invoke(app, shlex.split(command)[1:])
+        assert done.exit_code == (1 if "no calibration holds" in printed else 0), (command, done.output, done.exception)
+        wanted = re.escape(words_of(printed)).replace("…", ".*?")
+        assert re.match(wanted, words_of(done.stdout)), (command, done.stdout)
+    for command in INDENTED:
+        done = CliRunner().invoke(app, shlex.split(command)[1:])
+        assert done.exit_code == 0, (command, done.exception)
+        assert "raw samples" in done.stdout
+
+
+def test_the_reference_names_every_place_and_key_of_an_archive(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv(VARIABLE, "")
+    page = (ROOT / "docs" / "reference" / "archive.md").read_text(encoding="utf-8")
+    runner = Runner(small_job(tmp_path), Archive(tmp_path / "archive"), measure=CaptureDouble())
+    list(runner.all())
+    keys = runner.run.manifest("coefficients").keys() | {"signature", "taken_from"}
+    assert {key for key in keys if f"`{key}`" not in page} == set()
+    top = {path.name for path in (tmp_path / "archive").iterdir() if path.is_dir()}
+    assert {name for name in top if f"`{name}/" not in page} == set()

@@ -1,0 +1,74 @@
+"""The list of an archive with many runs: read once, true whenever a run changes."""
+
+import json
+import os
+import time
+from pathlib import Path
+
+import pytest
+
+from pipelines.archive import Archive, Run, RunInfo, listing, noted
+
+LOTS = 40
+
+
+@pytest.fixture
+def archive(tmp_path: Path) -> Archive:
+    """An archive of runs that were begun long ago, one of them finished."""
+    store = Archive(tmp_path / "archive")
+    for n in range(LOTS):
+        about = {"recipe": {"name": "line"}, "lot": {"device": "ADXL355", "units": [{"serial": f"S{n}", "slot": 0}]}}
+        run = store.open_run("line", about, n)
+    (run.path / "report.html").write_text("")
+    for path in (tmp_path / "archive" / "runs").iterdir():
+        long_ago(path)
+    return store
+
+
+def long_ago(folder: Path, seconds: float = 100.0) -> None:
+    os.utime(folder, (time.time() - seconds, time.time() - seconds))
+
+
+def test_the_list_is_the_same_when_it_is_read_again_without_reading_the_runs(
+    archive: Archive, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    first = archive.runs()
+    assert len(first) == LOTS
+    monkeypatch.setattr(noted, "info_of", lambda run: pytest.fail(f"{run.id} was read again"))
+    assert archive.runs() == first
+
+
+def test_a_run_that_was_written_to_is_read_again(archive: Archive) -> None:
+    archive.runs()
+    begun = next(info for info in archive.runs() if not info.finished)
+    (Run(archive, begun.id).path / "report.html").write_text("")
+    assert next(info for info in archive.runs() if info.id == begun.id).finished
+
+
+def test_what_was_written_a_moment_ago_is_not_noted(archive: Archive) -> None:
+    run = archive.open_run("line", {"lot": {"units": []}}, "new")
+    archive.runs()
+    noted_ids = json.loads((archive.root / "index" / "list.json").read_text())["runs"]
+    assert len(noted_ids) == LOTS
+    assert run.id not in noted_ids
+
+
+def test_a_run_that_is_gone_is_not_listed_and_a_spoilt_note_does_no_harm(archive: Archive) -> None:
+    first = archive.runs()
+    (archive.root / "runs" / first[0].id / "run.json").unlink()
+    (archive.root / "runs" / first[0].id).rmdir()
+    assert len(archive.runs()) == LOTS - 1
+    (archive.root / "index" / "list.json").write_text("{half")
+    assert len(archive.runs()) == LOTS - 1
+
+
+def test_a_sealed_run_tells_its_stages_from_one_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    from capture_double import small_run
+
+    run = small_run(tmp_path)
+    run.seal()
+    wanted = listing.stages_of(run)
+    monkeypatch.setattr(listing, "stages_of", lambda *_: pytest.fail("manifests were read"))
+    info = listing.info_of(run)
+    assert isinstance(info, RunInfo)
+    assert list(info.stages) == wanted
