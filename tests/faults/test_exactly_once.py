@@ -98,8 +98,8 @@ def test_nothing_moves_twice_under_a_bad_network(drive):
 @pytest.mark.slow
 @pytest.mark.timeout(1800)
 @pytest.mark.parametrize("drive", sorted(DRIVES))
-def test_nothing_moves_twice_in_a_thousand_runs(drive, record_property):
+def test_nothing_moves_twice_in_a_thousand_runs(drive):
     runs = DRIVES[drive] * 10
-    tries, spoilt = run_many(drive, runs, seed=11)
-    assert tries > runs  # the trouble was real: some runs had to be tried again
-    record_property("told", f"{drive}: {runs} runs, {tries} tries, {spoilt} frames spoilt, none moved twice")
+    tries, spoilt = run_many(drive, runs, seed=11)  # refuses any run in which an axis was not moved exactly once
+    assert tries > runs  # the trouble was real: runs had to be tried again
+    assert spoilt > 2 * runs
