@@ -27,7 +27,8 @@ def coefficients_of(run: Run, calibration: Calibration) -> list[dict[str, Any]]:
                 "another); restore it from a copy"
             )
             raise ArchiveUnusable(message)
-        table = pq.ParquetFile(pa.BufferReader(data)).read()  # read_table imports pandas
+        # read_table imports pandas; and a pool of threads that is still starting when so short a process ends aborts it
+        table = pq.ParquetFile(pa.BufferReader(data), pre_buffer=False).read(use_threads=False)
     except (OSError, pa.ArrowInvalid) as problem:
         message = f"calibrations: {place} cannot be read ({first_line(problem)}); restore it from a copy"
         raise ArchiveUnusable(message) from None
