@@ -359,7 +359,9 @@ def _refuse_not_finite(table: Table, frame: pd.DataFrame, source: str) -> None:
     for column in table.finite:
         if column not in rows.columns:
             continue
-        values = np.asarray(pd.to_numeric(rows[column], errors="coerce"), dtype=float)
+        own = rows[column]
+        plain = own.dtype == np.float64  # the rest is turned into numbers first, which takes longer than the look
+        values = own.to_numpy() if plain else np.asarray(pd.to_numeric(own, errors="coerce"), dtype=float)
         bad = np.flatnonzero(~np.isfinite(values))
         if bad.size:
             index = rows.index[bad[0]]

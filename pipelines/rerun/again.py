@@ -54,7 +54,10 @@ def again(archive: Archive, run_id: str, wanted: Wanted, *, report: bool = False
     with threadpool_limits(1), alone(new.path, wait=True):
         files.sweep(new.path)
         work = _Work(old, new, raw=raw)
-        stages = {step.name: work.do(step) for step in plan.steps}
+        try:
+            stages = {step.name: work.do(step) for step in plan.steps}
+        finally:
+            new.flush()  # an interrupted re-run goes on behind the last stage that was done
         if report and new.about.get("capture"):
             from pipelines.report import make_report  # plots are slow to import
 

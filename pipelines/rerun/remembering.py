@@ -1,35 +1,61 @@
-"""A run whose tables are read once: the stages of a re-run ask for the same ones, and what one made is what the next is given."""
+"""A run whose tables are read once and written together: the stages of a re-run ask for the same ones, and make many."""
 
 from __future__ import annotations
 
+import json
+from functools import cached_property
+from hashlib import sha256
+from io import BytesIO
 from typing import TYPE_CHECKING, Any
 
-from pipelines.archive import Run
-from schemas import tables
+import pyarrow.parquet as pq
+
+from pipelines.archive import Run, files
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
-
     import pandas as pd
 
     from pipelines.archive import Archive
 
 
 class Remembering(Run):
-    """A run that keeps its tables in memory, as they are in its files."""
+    """A run that keeps its tables in memory, as they are in its files, and its new files until they are flushed."""
 
     def __init__(self, archive: Archive, run_id: str) -> None:
         super().__init__(archive, run_id)
         self._known: dict[str, pd.DataFrame] = {}
+        self._waiting: dict[str, bytes] = {}
+
+    @cached_property
+    def about(self) -> dict[str, Any]:  # pyright: ignore[reportIncompatibleMethodOverride]  # it does not change
+        """What the run was started with."""
+        return files.read_json(self.path / "run.json")
 
     def table(self, name: str) -> pd.DataFrame:
-        """A table of the run; whoever is given it may change it."""
+        """A table of the run; whoever is given it may change it.
+
+        What was made here is decoded from its bytes, too: a table in memory may lie there otherwise than one from a file, and
+        sums over it end in other last digits.
+        """
         if name not in self._known:
-            self._known[name] = super().table(name)
+            waiting = self._waiting.get(f"{name}.parquet")
+            self._known[name] = super().table(name) if waiting is None else pq.read_table(BytesIO(waiting)).to_pandas()
         return self._known[name].copy(deep=False)
 
-    def save(self, stage: str, key: str, outputs: Mapping[str, pd.DataFrame], about: Mapping[str, Any]) -> None:
-        """Publish the tables of a stage, and remember them with the types that they have in their files."""
-        checked = {name: tables.check(name, frame, where=f"{stage} → {name}") for name, frame in outputs.items()}
-        super().save(stage, key, checked, about)
-        self._known |= {name: frame.reset_index(drop=True) for name, frame in checked.items()}
+    def manifest(self, name: str) -> dict[str, Any]:
+        """The manifest of a table, flushed or not."""
+        waiting = self._waiting.get(f"{name}.json")
+        return super().manifest(name) if waiting is None else json.loads(waiting)
+
+    def flush(self) -> None:
+        """Publish all that waits, tables and manifests in the order in which they were made."""
+        if self._waiting:
+            files.publish_all(self.path, self._waiting)
+            self._waiting = {}
+
+    def _put(self, name: str, data: bytes) -> None:
+        self._waiting[name] = data
+
+    def _hash_of(self, name: str) -> str:
+        waiting = self._waiting.get(name)
+        return super()._hash_of(name) if waiting is None else sha256(waiting).hexdigest()

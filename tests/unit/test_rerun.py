@@ -87,6 +87,15 @@ def test_changed_code_of_one_stage_leaves_the_stages_before_it(run: Run, monkeyp
     assert hashes(run.archive.run(outcome.new)) == hashes(run)
 
 
+def test_what_a_rerun_makes_of_tables_that_it_made_itself_has_the_same_bytes(
+    run: Run, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    other_code(monkeypatch, "reduce", "fit", "verify", "noise", "grade")
+    outcome = again(run.archive, run.id, wanted(effects=LARGER))
+    assert outcome.stages["reduce"] == "computed"
+    assert check(run.archive, outcome.new).same
+
+
 def test_a_rerun_gives_the_bytes_of_a_first_run_with_that_model(run: Run, tmp_path: Path) -> None:
     effects = ["bias", "scale", "misalignment", "bias_temperature", "scale_temperature", "third_order"]
     listed = 'effects = ["bias", "scale", "misalignment", "bias_temperature", "scale_temperature"]'
