@@ -142,7 +142,7 @@ def _inquired(
         table: Table = Table(directly, consent(quiet), progress, told, _tell)
         if direct:
             return play(request.job(), archive, terms, table)
-        from pipelines.flows.investigate import investigate_locally
+        from pipelines.flows.investigate_locally import investigate_locally
 
         return investigate_locally(request, archive, terms, table, ask=paused)
 

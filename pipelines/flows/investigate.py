@@ -15,9 +15,7 @@ from prefect import flow
 from prefect.runtime import flow_run
 
 from pipelines.archive import Archive
-from pipelines.chain import ORDER
-from pipelines.flows.calibrate import close_dead_runs, settle_history, stage
-from pipelines.flows.local import reached
+from pipelines.flows.calibrate import stage
 from pipelines.flows.operator import Paused
 from pipelines.inquiry.play import Consent, Table, Terms, always, play
 from pipelines.job import Request
@@ -89,24 +87,3 @@ def investigate(  # noqa: PLR0913 - a flow's parameters are its form on the serv
     approve = Asked(Paused()) if ask else (table.approve if _tables else always)
     at = Table(_stage, approve, table.progress, table.told, table.looked)
     return play(job, Archive(archive), Terms(tuple(effects or ()), budget_min, unseen), at)
-
-
-def investigate_locally(request: Request, archive: Archive, terms: Terms, table: Table, *, ask: bool) -> dict[str, Any]:
-    """The inquiry as the flow makes it, on the server named by PREFECT_API_URL or on one of our own."""
-    archive.prepare()
-    job = request.job()
-    name = f"investigate {job.recipe.name} {job.capture_id}"
-    with reached(archive):
-        close_dead_runs(name)
-        with seated(table):
-            named = investigate.with_options(flow_run_name=name)
-            found: Any = named(
-                **request.parameters(),
-                archive=archive.address,
-                effects=list(terms.effects),
-                budget_min=terms.budget,
-                unseen=terms.unseen,
-                ask=ask,
-            )
-        settle_history(name, len(ORDER))
-    return found

@@ -34,7 +34,6 @@ EXTRA = 0.3
 """Share of the first run's station time that follow-ups may take where no budget is given."""
 
 MOST_ROUNDS = 6
-SETTLED = frozenset({"adequate", "told_apart"})
 FOLLOW_UP = ("capture", "validate", "reduce")
 TABLE_OF_CODE = ("inertial", "pipelines.stages.criticise", "pipelines.stages.measured")
 FILE = "inquiry.json"
@@ -133,7 +132,7 @@ class Inquiry:
         ended = _ended(finding)
         showing = finding.following.showing
         if ended is not None:
-            if self.unseen and showing is not None and ended.end in SETTLED and len(self.lineage.runs) <= MOST_ROUNDS:
+            if self.unseen and showing is not None and ended.end != "blocked" and len(self.lineage.runs) <= MOST_ROUNDS:
                 return self._move((showing,), (shows(finding.state, self.effects, showing),))
             return ended
         if len(self.lineage.runs) > MOST_ROUNDS:
