@@ -121,8 +121,9 @@ class Reader:
         values, profile = self._registers.read_group("guard"), self._registers.profile
         door, stop, vibration = values["door"], values["emergency_stop"], values["vibration"]
         if not isinstance(door, int) or not isinstance(stop, int) or not isinstance(vibration, int | float):
-            message = f"{self._registers.name}: door {door!r}, emergency stop {stop!r}, vibration {vibration!r}: numbers are needed"
-            raise StationRefused(f"{message}; check the profile")
+            found = f"door {door!r}, emergency stop {stop!r}, vibration {vibration!r}"
+            message = f"{self._registers.name}: {found}, numbers are needed; check the profile"
+            raise StationRefused(message)
         closed = named(profile.register("door"), door) == "closed"
         released = named(profile.register("emergency_stop"), stop) == "released"
         return Guarded(not closed, not released, float(vibration))
