@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from pipelines.cli.options import ArchiveOption, EffectsOption, JsonOption, error_console, print_json
+from pipelines.cli.options import ArchiveOption, JsonOption, error_console, print_json
 from pipelines.cli.run import shown
 from schemas.errors import DONE, PART_FAILED
 
@@ -41,7 +41,9 @@ def command(
         int,
         typer.Option("--repeat", min=0, help="Count of fresh measurements of the same lot: 1, 2, … measure it anew."),
     ] = 0,
-    effects: EffectsOption = "",
+    effects: Annotated[
+        str, typer.Option("--effects", metavar="a,b,c", help="The model to judge; the recipe's by default.")
+    ] = "",
     budget: Annotated[
         float | None,
         typer.Option(
