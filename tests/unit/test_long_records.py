@@ -14,6 +14,7 @@ from inertial.noise.allan import overlapping
 from pipelines.archive import Archive
 from pipelines.stages import capture as capture_stage
 from pipelines.stages import noise as noise_stage
+from pipelines.stages import taking
 from pipelines.stages.pieces import by_record, dwells_whole
 from pipelines.stages.reduce import reduce
 from pipelines.stages.validate import validate
@@ -33,8 +34,8 @@ def captured(recipe, sink: MemorySink) -> MemorySink:
 def test_a_record_in_pieces_has_the_samples_of_one_in_a_piece(monkeypatch: pytest.MonkeyPatch) -> None:
     recipe = short_recipe(poses=1, static_s=120.0)
     whole = captured(recipe, MemorySink())
-    monkeypatch.setattr(capture_stage, "LONG_ROWS", 20000)
-    monkeypatch.setattr(capture_stage, "PIECE_ROWS", 5000)
+    monkeypatch.setattr(taking, "LONG_ROWS", 20000)
+    monkeypatch.setattr(taking, "PIECE_ROWS", 5000)
     pieces = captured(recipe, MemorySink())
     assert len(pieces.ahead) == 4
     assert max(len(piece) for piece in pieces.ahead) < 8000

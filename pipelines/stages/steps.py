@@ -1,0 +1,47 @@
+"""The steps of a capture: every record of a recipe, in order."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Literal
+
+if TYPE_CHECKING:
+    from schemas.recipe import Pose, Recipe
+
+Kind = Literal["dwell", "verification", "allan"]
+
+
+@dataclass(frozen=True)
+class Step:
+    """One record to take: its number, what it is for, the soak that it belongs to, and the pose.
+
+    wait_s : after the move; the recipe's where None
+    settled : whether the devices settle at the soak's temperature first, or are read while they follow the chamber
+    """
+
+    record: int
+    kind: Kind
+    soak: int
+    temperature: float
+    pose: Pose
+    wait_s: float | None = None
+    settled: bool = True
+
+
+def steps(recipe: Recipe) -> list[Step]:
+    """Every record of a recipe in order: per temperature the poses, then those for verification; the static record last.
+
+    The static record has a soak of its own, unless it is taken at the last temperature.
+    """
+    found: list[Step] = []
+    for soak, temperature in enumerate(recipe.temperatures_C):
+        poses, waits, settled = recipe.poses_at(soak), recipe.waits_at(soak), recipe.settles_at(soak)
+        for pose, wait in zip(poses, waits, strict=True):
+            found.append(Step(len(found), "dwell", soak, temperature, pose, wait, settled))
+        for pose in recipe.verification_at(soak):
+            found.append(Step(len(found), "verification", soak, temperature, pose, settled=settled))
+    if recipe.static_record_s > 0.0:
+        again = recipe.static_temperature_C == recipe.temperatures_C[-1]
+        soak = len(recipe.temperatures_C) - (1 if again else 0)
+        found.append(Step(len(found), "allan", soak, recipe.static_temperature_C, recipe.static_pose))
+    return found
