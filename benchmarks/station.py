@@ -161,12 +161,13 @@ def day_of_noise(folder: Path, hours: float, units: int) -> None:
     analysed = time.perf_counter() - start
     seconds = station_seconds(run.table("readings"))
     samples = sum(len(piece) for piece in run.records.samples())
-    n = run.table("noise").drop_duplicates(["axis", "term"]).set_index(["axis", "term"]).loc[("x", "N"), "value"]
+    first = run.table("allan").query("axis == 'x'").iloc[0]
     early = told[len(told) // 8] if told else after
     rate = wall * 24.0 * HOUR_S / seconds
     print(
         f"static record of {hours:g} h, {units} unit(s) at 100 Hz: {samples} samples in {len(told) + 1} pieces; capture "
-        f"{wall:.0f} s, {rate:.0f} s for 24 h of station time; validate to noise {analysed:.0f} s (N {n:.1f} µg/√Hz on x)"
+        f"{wall:.0f} s, {rate:.0f} s for 24 h of station time; validate to noise {analysed:.0f} s "
+        f"(σ of x {first['deviation_ug']:.0f} µg at {first['tau_s']:.2f} s)"
     )
     late = told[-1] if told else after
     print(
