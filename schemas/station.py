@@ -187,9 +187,8 @@ def with_faults(config: StationConfig, faults: Sequence[Fault]) -> StationConfig
     if not faults:
         return config
     if config.kind != "simulated" or config.simulation is None:
-        message = (
-            f"station {config.name}: fault {faults[0].kind} on kind {config.kind}, a simulated station is needed; leave it out"
-        )
+        found = f"fault {faults[0].kind} on kind {config.kind}"
+        message = f"station {config.name}: {found}, a simulated station is needed; leave it out"
         raise WrongUse(message)
     simulation = config.simulation.model_copy(update={"faults": [*config.simulation.faults, *faults]})
     return config.model_copy(update={"simulation": simulation})
