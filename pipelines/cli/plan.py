@@ -78,6 +78,10 @@ def command(
     noise: NoiseOption = None,
     wander: WanderOption = None,
     page: PageOption = None,
+    pictures: Annotated[
+        Path | None,
+        typer.Option("--pictures", metavar="DIR", help="Also write the page's pictures there, as RECIPE-NAME.svg."),
+    ] = None,
     *,
     as_json: JsonOption = False,
 ) -> None:
@@ -95,6 +99,8 @@ def command(
     if page is not None:
         _write(page, document, course)
         document["page"] = str(page)
+    if pictures is not None:
+        _draw(pictures, document, course)
     if as_json:
         print_json(document)
     else:
@@ -209,6 +215,15 @@ def _write(page: Path, document: dict[str, Any], course: Planned) -> None:
     from pipelines.report.plan import render_plan
 
     _save(page, render_plan(document, course))
+
+
+def _draw(folder: Path, document: dict[str, Any], course: Planned) -> None:
+    """Writes the pictures, each in a file of its own."""
+    from pipelines.report.plan import pictures
+
+    for name, text in pictures(document, course).items():
+        if text:
+            _save(folder / f"{document['recipe']}-{name}.svg", text)
 
 
 def _print(document: dict[str, Any]) -> None:

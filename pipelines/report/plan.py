@@ -29,11 +29,18 @@ def render_plan(document: dict[str, Any], course: Planned) -> str:
         coefficients=_coefficients(document["coefficients"]),
         seen=[row for row in document["effects"] if row["seen"]],
         unseen=[row for row in document["effects"] if not row["seen"]],
-        sphere=sphere_plot(course),
-        temperature=temperature_plot(course),
-        aliases=alias_plot(course),
-        sights=sight_plot(document["effects"]),
+        **pictures(document, course),
     )
+
+
+def pictures(document: dict[str, Any], course: Planned) -> dict[str, str]:
+    """The pictures of a plan by name, as SVG texts: the poses, the temperatures, what it sees, what it takes for what."""
+    return {
+        "sphere": sphere_plot(course),
+        "temperature": temperature_plot(course),
+        "sights": sight_plot(document["effects"]),
+        "aliases": alias_plot(course),
+    }
 
 
 def _coefficients(rows: list[dict[str, Any]]) -> list[dict[str, Any]]:

@@ -148,9 +148,13 @@ def alias_plot(course: Planned) -> str:
     names, cosines = [names[k] for k in order], cosines[np.ix_(order, order)]
     size = len(names)
     with mpl.rc_context({**STYLE, "axes.grid": False, "font.size": 9.0}):
-        figure = Figure(figsize=(WIDTH_IN, 2.4 + 0.27 * size), layout="constrained")
+        figure = Figure(
+            figsize=(WIDTH_IN, 2.4 + 0.27 * size), layout="constrained", dpi=160
+        )  # of the squares; the rest is lines
         place = figure.subplots()
-        picture = place.pcolormesh(cosines, cmap="Blues", vmin=0.0, vmax=1.0, edgecolors="white", linewidth=0.6)
+        picture = place.pcolormesh(
+            cosines, cmap="Blues", vmin=0.0, vmax=1.0, edgecolors="white", linewidth=0.6, rasterized=True
+        )
         for row, column in np.argwhere(cosines > 0.98):
             if row != column:
                 place.annotate(
