@@ -1,0 +1,135 @@
+"""Samples on their way: lost answers, changed bytes, counters that contradict each other."""
+
+import pytest
+from small_station import MemorySink, lot_of, quiet_progress, short_recipe
+
+from pipelines.stages.capture import capture
+from schemas.errors import StationRefused
+from schemas.event import MemoryLog
+from schemas.fault import Fault
+from schemas.station import load_station
+from stations.opening import make_plant, serve_plant
+from stations.plant.faults import wire
+from stations.plant.faults.proxy import HEADER, Meddling
+
+WRITE, READ = 16, 3
+SLOT_1 = 12
+
+
+def captured(monkeypatch: pytest.MonkeyPatch, script) -> tuple[MemorySink, MemoryLog]:
+    monkeypatch.setattr(wire, "script_of", lambda _plant: script)
+    config, lot = load_station(), lot_of()
+    config = config.model_copy(update={"link": config.link.model_copy(update={"timeout_s": 0.2})})
+    sink, events = MemorySink(), MemoryLog()
+    with serve_plant(config, lot, make_plant(config, lot)) as station:
+        capture(station, short_recipe(), lot, sink, progress=quiet_progress, events=events)
+    return sink, events
+
+
+def undisturbed() -> MemorySink:
+    config, lot, sink = load_station(), lot_of(), MemorySink()
+    with serve_plant(config, lot, make_plant(config, lot)) as station:
+        capture(station, short_recipe(), lot, sink, progress=quiet_progress)
+    return sink
+
+
+def test_a_slot_whose_answer_to_what_was_taken_is_lost_is_asked_and_keeps_its_unit(monkeypatch) -> None:
+    lost: list[bytes] = []
+
+    def script(way, frame):
+        if way == "reply" and frame[HEADER - 1] == SLOT_1 and frame[HEADER] == WRITE and len(lost) < 3:
+            lost.append(frame)
+            return Meddling("drop")
+        return None
+
+    sink, _ = captured(monkeypatch, script)
+    assert len(lost) == 3
+    assert (sink.all(1)["status"] == "ok").all()
+    assert (sink.all(1)["n"] == 200).all()
+    assert sink.all(0).equals(undisturbed().all(0)), "nothing is taken twice, nothing is missing"
+
+
+@pytest.mark.parametrize(
+    ("byte", "bit"), [(9, 0x40), (9 + 8 * 3 + 2, 0x04), (9 + 8 * 10 + 5, 0x40), (9 + 8 * 5 + 7, 0x01)]
+)
+def test_samples_that_change_on_their_way_are_measured_again(monkeypatch, byte: int, bit: int) -> None:
+    changed: list[bytes] = []
+
+    def script(way, frame):
+        samples = way == "reply" and frame[HEADER - 1] == SLOT_1 and frame[HEADER] == READ and len(frame) > 240
+        if samples and not changed:
+            changed.append(frame)
+            spoilt = bytearray(frame)
+            spoilt[byte] ^= bit
+            raise Changed(bytes(spoilt))
+
+    sink, events = captured(monkeypatch, changing(script))
+    assert changed
+    reasons = [event.reason for event in events.noted() if event.kind == "spoilt"]
+    assert len(reasons) == 1
+    assert "slot 1: sample" in reasons[0]
+    assert (sink.all(1)["status"] == "ok").all()
+
+
+class Changed(Exception):
+    """The frame that is delivered instead."""
+
+
+def changing(script):
+    """A script that may raise what is to be delivered: a duplicate whose first copy is that."""
+    from stations.plant.faults import proxy
+
+    usual = proxy.spoilt
+    instead: list[bytes] = []
+
+    def asked(way, frame):
+        try:
+            return script(way, frame)
+        except Changed as one:
+            instead.append(one.args[0])
+            return Meddling("duplicate")
+
+    def spoilt(frame, meddling, of):
+        return [instead.pop()] if instead else usual(frame, meddling, of)
+
+    proxy.spoilt = spoilt
+    return asked
+
+
+@pytest.fixture(autouse=True)
+def _as_it_was():
+    from stations.plant.faults import proxy
+
+    usual = proxy.spoilt
+    yield
+    proxy.spoilt = usual
+
+
+def test_a_slot_that_forgets_what_was_taken_is_refused() -> None:
+    config, lot = load_station(), lot_of(1)
+    plant = make_plant(config, lot)
+    with serve_plant(config, lot, plant) as station:
+        slot = station.reader.slots[0]
+        station.reader.start(100.0)
+        station.clock.sleep(1.0)
+        assert len(slot.take().outputs) == 100
+        plant.sampler.tail[0] = 50
+        station.clock.sleep(1.0)
+        with pytest.raises(StationRefused, match="says that 50 samples of 200 were taken, 100 is right"):
+            slot.take()
+
+
+def test_words_in_the_wrong_order_are_no_identity() -> None:
+    config, lot = load_station(), lot_of(1)
+    plant = make_plant(config, lot)
+    plant.inject(Fault(kind="swapped_words", serial="U000"))
+    with serve_plant(config, lot, plant) as station, pytest.raises(StationRefused, match="word order"):
+        station.reader.slots[0].identity()
+
+
+def test_a_reader_that_does_not_start_is_refused() -> None:
+    config, lot = load_station(), lot_of(1)
+    plant = make_plant(config, lot)
+    plant.inject(Fault(kind="exceptions_off", device="reader"))
+    with serve_plant(config, lot, plant) as station, pytest.raises(StationRefused, match="sampling is stopped"):
+        station.reader.start(100.0)
