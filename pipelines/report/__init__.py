@@ -22,6 +22,8 @@ MODULES = ("schemas.limits", "schemas.tables", "pipelines.report")
 
 def make_report(run: Run) -> bool:
     """Whether the run's report was there already, made from its tables as they are; it is now."""
+    if run.about.get("parents") and run.report.is_file():
+        return True  # a follow-up has no decisions: its report is the diagnosis of all runs together
     _refuse_unfinished(run)
     inputs, code = {name: run.manifest(name)["sha256"] for name in INPUTS}, code_hash(MODULES)
     key = stage_key("report", inputs, {}, code)

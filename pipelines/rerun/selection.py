@@ -23,7 +23,7 @@ class Entry:
     """One run of an archive as its ``run.json`` tells.
 
     measured : when its data were measured, which for a re-run is when the first run of them was
-    derived : whether the run is a re-run of another
+    derived : whether the run is a re-run of another, or goes on with the measurements of one
     """
 
     id: str
@@ -155,5 +155,5 @@ def _entry(run_id: str, about: dict[str, Any]) -> Entry:
         station=about.get("station", {}).get("name", ""),
         units=tuple(unit["serial"] for unit in lot.get("units", [])),
         measured=when if when.tzinfo else when.replace(tzinfo=UTC),
-        derived="rerun_of" in about,
+        derived="rerun_of" in about or bool(about.get("parents")),
     )

@@ -16,6 +16,7 @@ from pipelines.archive import Archive
 from pipelines.cli import app
 from pipelines.inquiry.inquiry import Finding, Inquiry, Move
 from pipelines.inquiry.play import Consent, Table, Terms, play
+from pipelines.rerun.selection import selected
 from schemas.errors import WrongUse
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -74,6 +75,9 @@ def test_a_follow_up_has_a_report_and_is_listed_and_shown(told_apart: tuple[Path
     kept = json.loads((follower.path / "inquiry.json").read_text(encoding="utf-8"))
     assert kept["runs"][0] == told_apart[1]["run"]
     assert next(info for info in archive.runs() if info.id == follower.id).finished
+    found = CliRunner().invoke(app, ["report", follower.id, "--archive", str(archive.root)])
+    assert found.exit_code == 0, found.output
+    assert follower.id not in [entry.id for entry in selected(archive, ["all"])]
     shown = CliRunner().invoke(app, ["show", follower.id, "--archive", str(archive.root), "--json"])
     assert shown.exit_code in (0, 1), shown.output
 
