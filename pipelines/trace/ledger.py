@@ -8,7 +8,6 @@ event one is told that it is there, reads it and decides anew; so an event was a
 from __future__ import annotations
 
 import hashlib
-import re
 from contextlib import nullcontext
 from dataclasses import replace
 from datetime import datetime, timedelta
@@ -21,6 +20,7 @@ from pipelines.archive.locks import alone
 from pipelines.archive.store import ObjectPath, place_of
 from pipelines.trace.days import LAST, today
 from pipelines.trace.events import Event, event_of
+from pipelines.trace.refusals import nothing_to_revoke, refuse_other_device, refuse_serial
 from pipelines.trace.validity import Calibration, calibrations_of, overlapped
 from schemas.errors import ArchiveUnusable, WrongUse
 
@@ -31,7 +31,6 @@ if TYPE_CHECKING:
     from pipelines.archive.store import Place
     from pipelines.trace.certifying import Certified
 
-SERIAL = re.compile(r"[A-Za-z0-9][A-Za-z0-9._+-]{0,63}")
 FOLDER = "calibrations"
 CLOCK_SLACK = timedelta(minutes=5)  # clocks of hosts that write into one archive differ by less
 
@@ -108,7 +107,7 @@ class Ledger:
             known = calibrations_of(events)
             if any(_same(one, event) for one in known):
                 return None
-            _refuse_other_device(events, event)
+            refuse_other_device(known, event)
             ends = overlapped(known, event.start, event.until, supersede=supersede)
             return replace(event, action="supersede" if ends else "certify", ends=ends)
 
@@ -134,7 +133,7 @@ class Ledger:
             chosen = [one for one in known if certificate in {0, one.event.sequence}]
             meant = [one for one in chosen if one.until > (day or ("" if certificate else today()))]
             if not meant:
-                raise WrongUse(_nothing_to_revoke(serial, known, certificate, day))
+                raise WrongUse(nothing_to_revoke(serial, known, certificate, day))
             start = day or min(one.start for one in meant)
             ends = tuple(one.event.sequence for one in meant)
             last = meant[-1].event
@@ -144,7 +143,7 @@ class Ledger:
 
         written = self._append(serial, decided)
         if written is None:  # revoking always has something to write, or raises
-            raise WrongUse(_nothing_to_revoke(serial, [], certificate, day))
+            raise WrongUse(nothing_to_revoke(serial, [], certificate, day))
         self.anchor([written])
         return written
 
@@ -211,16 +210,6 @@ def folder_of(serial: str) -> str:
     return f"{FOLDER}/{name[:2]}/{name[:16]}"
 
 
-def refuse_serial(serial: str, where: str) -> None:
-    """Refuse what cannot be printed on a device: line ends, separators of paths and the like."""
-    if not SERIAL.fullmatch(serial):
-        message = (
-            f"{where}: serial {serial!r}, one of letters, digits and . _ + - is needed (1 to 64, the first a letter or digit); "
-            "correct the serial where it was entered"
-        )
-        raise WrongUse(message)
-
-
 def _events(folder: Place) -> list[tuple[Event, str]]:
     """Events of a unit's folder with the hashes of their files; refused where one is missing among them."""
     if isinstance(folder, Path):
@@ -259,25 +248,3 @@ def _same(one: Calibration, event: Event) -> bool:
     """Whether a calibration that holds is what an event would certify again."""
     old = (one.run, one.event.coefficients, one.start, one.until)
     return old == (event.run, event.coefficients, event.start, event.until)
-
-
-def _refuse_other_device(events: Sequence[Event], event: Event) -> None:
-    devices = {one.device for one in events} - {event.device}
-    if devices:
-        message = (
-            f"certify: unit {event.serial} of run {event.run} is a device {event.device}, the ledger knows this serial as "
-            f"{', '.join(sorted(devices))}: two units have one serial; find out which is which, and give one another"
-        )
-        raise WrongUse(message)
-
-
-def _nothing_to_revoke(serial: str, known: Sequence[Calibration], certificate: int, day: str) -> str:
-    if not known:
-        return f"revoke: unit {serial!r} has no calibration that holds, one is needed; see 'tumbleline show' with --at"
-    there = ", ".join(f"{one.certificate} ({one.start} to {one.until})" for one in known)
-    what = (
-        f"certificate {serial}/{certificate}"
-        if certificate
-        else f"a calibration of unit {serial} after {day or today()}"
-    )
-    return f"revoke: there is no {what} that still holds; there are {there}"

@@ -134,6 +134,9 @@ def test_two_kinds_of_device_under_one_serial_are_told(tmp_path: Path) -> None:
     ledger.add(event())
     with pytest.raises(WrongUse, match="the ledger knows this serial as ADXL355: two units have one serial"):
         ledger.add(event(start="2026-10-01", until="2027-10-01", device="ADXL357"))
+    ledger.revoke("A1", "was another unit", certificate=1)
+    ledger.add(event(start="2026-10-01", until="2027-10-01", device="ADXL357"))
+    assert ledger.valid_at("A1", "2026-12-01").event.device == "ADXL357"
 
 
 def test_a_clock_that_went_backwards_is_told_and_nothing_is_written(tmp_path: Path) -> None:
