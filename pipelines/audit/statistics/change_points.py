@@ -54,7 +54,7 @@ def change_points(values: Array, level: float = 1e-3) -> list[Change]:
     for number, place in enumerate(places):
         low = places[number - 1] if number else 0
         high = places[number + 1] if number + 1 < len(places) else n
-        found = _best(values[low:high], sigma)
+        found = _best(values[low:high])
         if found is not None:
             out.append(_described(values[low:high], low, found, sigma))
         else:
@@ -76,7 +76,7 @@ def noise_of(values: Array) -> float:
 
 
 def _segment(values: Array, start: int, stop: int, sigma: float, level: float) -> list[int]:
-    place = _best(values[start:stop], sigma)
+    place = _best(values[start:stop])
     if place is None:
         return []
     part = values[start:stop]
@@ -95,9 +95,8 @@ def _statistic(values: Array) -> Array:
     return np.abs(difference) * np.sqrt(k * (n - k) / n)
 
 
-def _best(values: Array, sigma: float) -> int | None:
+def _best(values: Array) -> int | None:
     """The most likely first point of a new level; None where the series is too short."""
-    del sigma
     if values.size < 2 * FEWEST:
         return None
     allowed = _statistic(values)[FEWEST - 1 : values.size - FEWEST]
