@@ -15,6 +15,7 @@ if TYPE_CHECKING:
 
 READ = {"coil": 1, "discrete": 2, "holding": 3, "input": 4}
 WRITE_COIL, WRITE_COILS, WRITE_REGISTERS = 5, 15, 16
+WRITES = frozenset({WRITE_COIL, WRITE_COILS, WRITE_REGISTERS})
 ON, OFF = 0xFF00, 0x0000
 EXCEPTION = 0x80
 LONGEST_READ = 125  # registers in one request (6.3)
@@ -69,7 +70,7 @@ def values_in(request: bytes, reply: bytes) -> list[int]:
         shown = f"function {reply[0]}, {len(reply)} bytes" if reply else "nothing"
         message = f"{shown}; function {function}, {size} bytes are needed"
         raise Malformed(message)
-    if function in {WRITE_COIL, WRITE_COILS, WRITE_REGISTERS}:
+    if function in WRITES:
         if reply != request[:5]:
             message = f"it confirms {reply[1:].hex()}; {request[1:5].hex()} is needed"
             raise Malformed(message)

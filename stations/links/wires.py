@@ -2,6 +2,9 @@
 
 Whatever goes wrong, the connection is closed: an answer that comes late must not meet the next question. On TCP the transaction's
 number tells too, and it goes on counting over connections, because a gateway may answer the next one with the last one's answer.
+
+One thing keeps its connection: a write without an answer. What is asked next is to find out what became of it, and only on
+the same connection can it not overtake the write. Should that be met with silence too, the connection is closed.
 """
 
 from __future__ import annotations
@@ -17,7 +20,7 @@ from typing import TYPE_CHECKING, Protocol
 import serial
 from serial import PARITY_EVEN, PARITY_NONE, PARITY_ODD, Serial
 
-from stations.links.frames import EXCEPTION, Malformed, crc16, reply_size
+from stations.links.frames import EXCEPTION, WRITES, Malformed, crc16, reply_size
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -67,12 +70,14 @@ class TcpWire:
         self._server_name = server_name or host
         self._socket: socket.socket | None = None
         self._buffer = b""
+        self._unsure = False  # the last request was a write, and nothing came back
         self._number = int.from_bytes(os.urandom(2), "big")  # a gateway may still hold what an earlier process asked
 
     def exchange(self, device_id: int, request: bytes) -> bytes:
         """The answer under this request's number; answers under other numbers are dropped."""
         deadline = time.monotonic() + self.timeout_s
         self._number = self._number % 0xFFFF + 1
+        first, self._unsure = not self._unsure, False
         frame = struct.pack(">HHHB", self._number, 0, len(request) + 1, device_id) + request
         try:
             connection = self._connected()
@@ -80,7 +85,9 @@ class TcpWire:
             connection.sendall(frame)
             return self._answer(connection, device_id, deadline)
         except TimeoutError:
-            self.close()
+            self._unsure = first and request[0] in WRITES and self._socket is not None
+            if not self._unsure:
+                self.close()
             raise Silence from None
         except OSError as problem:
             self.close()
@@ -93,7 +100,7 @@ class TcpWire:
         """Ends the connection."""
         if self._socket is not None:
             self._socket.close()
-        self._socket, self._buffer = None, b""
+        self._socket, self._buffer, self._unsure = None, b"", False
 
     def _connected(self) -> socket.socket:
         if self._socket is None:

@@ -15,7 +15,7 @@ from stations.plant.faults.proxy import ChaosProxy, Meddling
 from stations.plant.server import PlantServer
 from stations.profile_files import load_profile
 
-TIMEOUT_S = 0.05
+TIMEOUT_S = 0.08
 TROUBLES = [
     Meddling("drop"),
     Meddling("drop"),
@@ -103,3 +103,21 @@ def test_nothing_moves_twice_in_a_thousand_runs(drive):
     tries, spoilt = run_many(drive, runs, seed=11)  # refuses any run in which an axis was not moved exactly once
     assert tries > runs  # the trouble was real: runs had to be tried again
     assert spoilt > 2 * runs
+
+
+def test_reading_back_does_not_overtake_a_write_that_is_slow_on_its_way():
+    config, plant = station_with(), plant_of(station_with(), lot_of(1))
+    config = config.model_copy(update={"link": config.link.model_copy(update={"timeout_s": 0.3, "read_attempts": 1})})
+    with PlantServer(plant) as server, ChaosProxy(server.host, server.port) as proxy:
+        table, links = table_through(proxy, config, plant)
+        outer = table.axes["outer"]
+
+        def slow(way, frame):
+            return Meddling("delay", "request", delay_s=0.45) if way == "request" and frame[7] == 16 else None
+
+        outer.position()
+        proxy.script = slow
+        outer.start(30.0)  # the order arrives after its time-out, and in front of the question what became of it
+        assert plant.outer._moves == 1
+        assert outer.moving()
+        links.close()
