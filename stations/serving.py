@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from contextlib import ExitStack
+import socket
+from contextlib import ExitStack, suppress
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -23,6 +24,7 @@ if TYPE_CHECKING:
     from stations.codec import Value
 
 TICK_S = 0.05
+TRIES = 50
 OCCUPIED = "occupied"
 NAMES = (("outer axis", "outer"), ("inner axis", "inner"), ("chamber", "chamber"), ("reader", "reader"))
 
@@ -93,7 +95,8 @@ def serve(
     plant = make_plant(config, lot)
     silence = Silence(plant, config.devices, silence_s)
     with ExitStack() as stack:
-        server = stack.enter_context(PlantServer(plant, host, port))
+        begin = _with_room_behind(host) if plant.speakers and port == 0 else port
+        server = stack.enter_context(PlantServer(plant, host, begin))
         for number, device_id in enumerate(plant.speakers, server.port + 1):
             stack.enter_context(LineServer(plant, device_id, host, number))
         ready(server.host, server.port)
@@ -103,6 +106,16 @@ def serve(
             plant.advance(round((now - done) * speed * 1e6))
             silence.look(now)
             done = now
+
+
+def _with_room_behind(host: str) -> int:
+    """A free port whose next one is free too; 0, which is any, where there is none to be found."""
+    for _ in range(TRIES):
+        with socket.create_server((host, 0)) as first:
+            port = int(first.getsockname()[1])
+            with suppress(OSError, OverflowError), socket.create_server((host, port + 1)):
+                return port
+    return 0
 
 
 def look(config: StationConfig, lot: Lot | None) -> list[Reading]:
