@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from schemas.station import Limits
     from stations.devices.registers import Registers
 
+SETTLING_DEG = 0.5  # how near its target an axis is while it comes to rest
 BEGIN_LOOKS = 3  # looks at the drive before a move that has not begun counts as over
 
 
@@ -95,8 +96,10 @@ class TableAxis(ABC):
             raise
 
     def _took(self, target: float) -> bool:
-        """Whether the drive is on its way, or stands there."""
-        return self.state().moving or self._stands(target)
+        """Whether the drive is on its way, still rings at its target, or stands there."""
+        state = self.state()
+        settling = not state.in_position and abs(self.position() - target) <= SETTLING_DEG
+        return state.moving or settling or self._stands(target)
 
     def _stands(self, target: float) -> bool:
         return abs(self.position() - target) <= self._tolerance()

@@ -121,3 +121,22 @@ def test_reading_back_does_not_overtake_a_write_that_is_slow_on_its_way():
         assert plant.outer._moves == 1
         assert outer.moving()
         links.close()
+
+
+def test_an_axis_that_still_rings_at_its_target_is_not_ordered_there_again():
+    config, plant = station_with(), plant_of(station_with(), lot_of(1))
+    with PlantServer(plant) as server, ChaosProxy(server.host, server.port) as proxy:
+        table, links = table_through(proxy, config, plant)
+        outer = table.axes["outer"]
+        for late_ms in range(
+            10, 400, 30
+        ):  # the other axis failed, and the pose is asked for again a moment after the stop
+            target = 30.0 + late_ms / 10.0
+            before = plant.outer._moves
+            outer.start(target)
+            plant.advance(round(plant.outer.move.end * 1e6) - plant.now_us + 1000 * late_ms)
+            outer.start(target)
+            assert plant.outer._moves == before + 1
+            plant.advance(5_000_000)
+            outer.confirm(target)
+        links.close()
