@@ -55,7 +55,8 @@ def dwell_covariance(
 
     White noise, flicker as a sum of Ornstein–Uhlenbeck processes with time constants an octave apart, each averaged over
     the dwells in closed form, and a random walk that is zero at ``since``. Flicker slower than the time from there to
-    the end, or than ``slowest``, is left out: for the run it is the bias itself. Plans of different length are compared at one value.
+    the end, or than ``slowest``, is left out: for the run it is the bias itself. Plans of different length are compared
+    at one value.
 
     Parameters
     ----------

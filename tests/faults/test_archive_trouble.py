@@ -74,7 +74,8 @@ def test_a_disk_that_fills_in_the_middle_of_a_rerun_loses_nothing(root: Path, co
     before = tables(old)
     arguments = [command, old.id, "--effects", MORE, "--archive", root]
     stopped = limited(9_000, *arguments)
-    assert stopped.returncode == (2 if command == "fit" else 1), stopped.stderr  # a re-run tells of each run, and goes on
+    expected = 2 if command == "fit" else 1  # a re-run tells of each run, and goes on
+    assert stopped.returncode == expected, stopped.stderr
     assert "cannot be written (File too large)" in " ".join((stopped.stdout + stopped.stderr).split())
     assert "Traceback" not in stopped.stderr
     assert tables(old) == before
