@@ -150,10 +150,13 @@ class TableAxis(ABC):
         """The encoder's reading, degrees."""
         return self._registers.number("feedback_position")
 
+    def done(self) -> None:
+        """Forgets the order: all that was ordered with it has been confirmed, and the next one is new, whatever its target."""
+        self._pending = None
+
     def confirm(self, target: float) -> None:
         """Refuses to go on when the encoder says another angle than was asked."""
         found = self.position()
-        self._pending = None
         if abs(found - target) > self._tolerance():
             message = (
                 f"{self.name}: stands at {found:.4f} deg, {target:g} ± {self._limits.position_deg:g} deg is needed; "

@@ -49,6 +49,8 @@ class TiltTable:
         self.still_since = self._clock.now()
         self._outer.confirm(outer_deg)
         self._inner.confirm(inner_deg)
+        for axis in self.axes.values():
+            axis.done()
 
     def _rest(self) -> None:
         """Waits for axes that an earlier order, or an earlier process, has left moving."""

@@ -123,20 +123,23 @@ def test_reading_back_does_not_overtake_a_write_that_is_slow_on_its_way():
         links.close()
 
 
-def test_an_axis_that_still_rings_at_its_target_is_not_ordered_there_again():
+def test_a_pose_asked_for_again_because_one_axis_was_not_confirmed_moves_neither_a_second_time():
     config, plant = station_with(), plant_of(station_with(), lot_of(1))
     with PlantServer(plant) as server, ChaosProxy(server.host, server.port) as proxy:
         table, links = table_through(proxy, config, plant)
-        outer = table.axes["outer"]
-        for late_ms in range(
-            10, 400, 30
-        ):  # the other axis failed, and the pose is asked for again a moment after the stop
-            target = 30.0 + late_ms / 10.0
-            before = plant.outer._moves
-            outer.start(target)
-            plant.advance(round(plant.outer.move.end * 1e6) - plant.now_us + 1000 * late_ms)
-            outer.start(target)
-            assert plant.outer._moves == before + 1
-            plant.advance(5_000_000)
-            outer.confirm(target)
+        inner, failures = table.axes["inner"], [StationTimeout("the answer was lost")]
+        confirm = inner.confirm
+
+        def lost_once(target):
+            if failures:
+                raise failures.pop()
+            confirm(target)
+
+        inner.confirm = lost_once
+        with pytest.raises(StationTimeout):
+            table.move(30.0, -20.0)
+        table.move(30.0, -20.0)
+        assert (plant.outer._moves, plant.inner._moves) == (1, 1)
+        table.move(30.0, -20.0)  # a pose of its own, ordered like any other
+        assert (plant.outer._moves, plant.inner._moves) == (2, 2)
         links.close()
