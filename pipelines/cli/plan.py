@@ -24,10 +24,12 @@ MICRO = 1e-6
 class _RecipeFirst(TyperGroup):
     """Subcommands by name; anything else that comes first is a recipe."""
 
+    usual = RECIPE
+
     def parse_args(self, ctx: Context, args: list[str]) -> list[str]:
         """The arguments, with the name of the command that is meant where none is given."""
         if not args or args[0] not in {*self.commands, "--help", "-h"}:
-            args = [RECIPE, *args]
+            args = [self.usual, *args]
         return super().parse_args(ctx, args)
 
 

@@ -41,7 +41,8 @@ def command_of(words: list[str]) -> tuple[object, list[str]]:
     rest = words[1:]
     while getattr(command, "commands", None) and rest and rest[0] in command.commands:
         command, rest = command.commands[rest[0]], rest[1:]
-    return command, rest
+    usual = getattr(command, "usual", "")  # the subcommand that is meant where none is named
+    return (command.commands[usual] if usual else command), rest
 
 
 def test_the_pages_show_commands() -> None:

@@ -159,7 +159,7 @@ def test_slots_lag_behind_the_air_each_by_its_own():
     plant = plant_of(lot=lot_of(8))
     write(plant, 3, "set_point", 60.0)
     plant.advance(600_000_000)
-    readings = np.array(plant.temperature_reading())
+    readings = np.array(plant.temperature_reading())[:8]  # the other slots are empty
     assert (readings < plant.air_reading() - 3.0).all()
     assert np.ptp(readings) > 1.0
 
