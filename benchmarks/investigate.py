@@ -237,7 +237,9 @@ def arguments() -> argparse.Namespace:
     parser.add_argument("--first", type=int, default=1, help="the first seed")
     parser.add_argument("--scene", action="append", choices=[s.name for s in SCENES], help="only these (repeatable)")
     parser.add_argument("--units", type=int, default=4)
-    parser.add_argument("--budget", type=float, default=0.0, help="station minutes; 30 %% of the first run's by default")
+    parser.add_argument(
+        "--budget", type=float, default=0.0, help="station minutes; 30 %% of the first run's by default"
+    )
     parser.add_argument("--jobs", type=int, default=1)
     parser.add_argument("--out", type=Path, help="JSON lines with every outcome")
     return parser.parse_args()
