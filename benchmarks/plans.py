@@ -30,6 +30,7 @@ from pipelines.recipes import load_recipe  # noqa: E402
 from pipelines.stages.minutes import spent  # noqa: E402
 from pipelines.stages.optimise import Wish, candidates, optimise, seen_by, textbook  # noqa: E402
 from pipelines.stages.plan import Planned, identified, planned  # noqa: E402
+from schemas.errors import TumblelineError  # noqa: E402
 from schemas.station import load_station  # noqa: E402
 from stations.plant.device import Devices, Truth, draw_truth, rotation, stream  # noqa: E402
 from stations.plant.noise import Noise  # noqa: E402
@@ -144,8 +145,12 @@ def compared(name: str, options: argparse.Namespace) -> None:
     if options.bias_factor != 1.0:
         wanted[:, 0] *= options.bias_factor
     begun = time.perf_counter()
-    wish = Wish(wanted, seen_by(against, levels), levels, candidates(station))
-    best = optimise(base, against, wish, lambda _: None)
+    wish = Wish(wanted, seen_by(against, levels), levels, candidates(station), verification=options.verification)
+    try:
+        best = optimise(base, against, wish, lambda _: None)
+    except TumblelineError as refusal:
+        print(f"{name}: {refusal}")
+        return
     took = time.perf_counter() - begun
     recipe = best.planned.recipe
     heat = ", ".join(f"{t:g}" for t in recipe.temperatures_C)
@@ -193,6 +198,9 @@ def main() -> None:
     parser.add_argument("--temperatures", default="-10,25,60")
     parser.add_argument("--factor", type=float, default=1.0, help="errors wanted over those of the textbook plan")
     parser.add_argument("--bias-factor", type=float, default=1.0, help="besides, of the bias alone")
+    parser.add_argument(
+        "--verification", type=int, default=1, help="dwells of each verification pose; the textbook plan has none"
+    )
     options = parser.parse_args()
     print(f"python benchmarks/plans.py --units {options.units} --seed {options.seed} --factor {options.factor:g}")
     for name in options.device or ("adxl355", "analogue"):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, cast, get_args
 
 from pipelines.cli.options import console, error_console, print_table, short
@@ -30,16 +30,17 @@ class Asked:
     temperatures: str
     poses: str
     criterion: str
+    verification: int | None = None
 
 
 def found(base: Recipe, station: StationConfig, noise: DwellNoise, asked: Asked) -> tuple[Optimum, dict[str, Any]]:
     """The cheapest recipe, and the document about it."""
-    from pipelines.stages.optimise import optimise, textbook
+    from pipelines.stages.optimise import optimise, textbook, verified_in
     from pipelines.stages.plan import plan, planned
 
     levels = _levels(base, asked.temperatures)
     against = planned(textbook(base, levels), station, noise)
-    wish = _wish(asked, against, levels)
+    wish = replace(_wish(asked, against, levels), verification=asked.verification or verified_in(base))
     progress = error_console()
     with progress.status("looking for the cheapest recipe") as status:
         best = optimise(base, against, wish, lambda note: status.update(f"looking: {note}"))
@@ -125,11 +126,16 @@ def document(best: Optimum, plan: dict[str, Any], textbook: dict[str, Any]) -> d
         "minutes": plan["minutes"],
         "textbook_minutes": textbook["minutes"],
         "share": best.share,
+        "verification_dwells": _verification(best.planned.recipe),
         "worst": best.worst,
         "coefficients": rows,
         "seen_besides": sorted({row["effect"] for row in plan["effects"] if row["seen"]} - seen),
         "plan": plan,
     }
+
+
+def _verification(recipe: Recipe) -> int:
+    return sum(len(recipe.verification_at(k)) for k in range(len(recipe.temperatures_C)))
 
 
 def written(best: Optimum, target: Path, home: Path) -> str:
@@ -157,7 +163,11 @@ def print_optimum(document: dict[str, Any]) -> None:
     )
     parts = [[name.replace("_", " "), f"{minutes[name]:.0f}", f"{textbook[name]:.0f}"] for name in minutes]
     print_table(["station time, min", "this recipe", "textbook plan"], parts)
-    out.print(f"{100.0 * document['share']:.0f} % of the textbook plan's time, the static record apart")
+    out.print(
+        f"{100.0 * document['share']:.0f} % of the textbook plan's time, the static record apart; "
+        f"{document['verification_dwells']} dwells are for verification, of which the textbook plan has none",
+        soft_wrap=True,
+    )
     lines = [
         [
             f"{r['effect']} {r['name']}",

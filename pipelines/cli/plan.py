@@ -148,6 +148,12 @@ def optimise(
     criterion: Annotated[
         str, typer.Option("--criterion", help="worst (coefficient), A (mean variance) or D (volume).")
     ] = "worst",
+    verification: Annotated[
+        int | None,
+        typer.Option(
+            "--verification", min=1, help="How often each verification pose is measured; as in the recipe by default."
+        ),
+    ] = None,
     noise: NoiseOption = None,
     wander: WanderOption = None,
     page: PageOption = None,
@@ -163,7 +169,7 @@ def optimise(
     from schemas.station import load_station
 
     base = with_model(recipe, effects, model)
-    asked = Asked(see, tuple(wanted or ()), factor, temperatures, poses, criterion)
+    asked = Asked(see, tuple(wanted or ()), factor, temperatures, poses, criterion, verification)
     optimum, document = found(base, load_station(station), noise_of(base, device or base.device, noise, wander), asked)
     target = output or Path(f"{optimum.planned.recipe.name}.toml")
     document["file"] = str(target)

@@ -60,6 +60,7 @@ class Wish:
     levels : °C, temperatures that it must meet
     candidates : angles (c, 2) in degrees that its poses are chosen from
     criterion : see :mod:`inertial.exchange`
+    verification : how often each pose for verification is measured in the whole run, spread over the soaks
     """
 
     wanted: Array
@@ -67,6 +68,7 @@ class Wish:
     levels: tuple[float, ...]
     candidates: Array
     criterion: Criterion = "worst"
+    verification: int = 1
 
 
 @dataclass(frozen=True)
@@ -319,7 +321,7 @@ class _Search:
             SoakPart(
                 temperature_C=t,
                 poses=[number[int(c)] for c in row],
-                verification=[k for k in range(1, len(verification) + 1) if k % len(order) == soak],
+                verification=_turns(len(verification), self.wish.verification, soak, len(order)),
             )
             for soak, (t, row) in enumerate(zip(order, choice, strict=True))
         ]
@@ -339,6 +341,17 @@ class _Search:
         """Effects that must be seen and are not."""
         seen = {s.effect: s.left for s in sights(found.state, self.recipe.effects, 1.0, self.wish.see)}
         return [name for name in self.wish.see if seen.get(name, 1.0) < PART_SEEN]
+
+
+def _turns(count: int, repeats: int, soak: int, soaks: int) -> list[int]:
+    """Numbers, from 1, of the poses for verification that are measured at a soak: each goes on from soak to soak."""
+    return [k for turn in range(repeats) for k in range(1, count + 1) if (k + turn) % soaks == soak]
+
+
+def verified_in(recipe: Recipe) -> int:
+    """How often a recipe measures each of its poses for verification in the whole run, rounded up."""
+    taken = [(p.outer_deg, p.inner_deg) for k in range(len(recipe.temperatures_C)) for p in recipe.verification_at(k)]
+    return -(-len(taken) // len(set(taken))) if taken else 1
 
 
 def _least(good: Callable[[int], bool], low: int, high: int) -> int | None:

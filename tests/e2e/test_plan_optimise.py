@@ -1,6 +1,7 @@
 """`tumbleline plan optimise`: the recipe it writes is usable, cheaper, and as good as it says."""
 
 import json
+from collections import Counter
 
 import numpy as np
 import pytest
@@ -74,7 +75,15 @@ def test_verification_poses_are_kept_apart_from_those_of_the_fit(found):
     )
     assert len(check) == 6
     assert np.degrees(np.arccos(np.max(check @ fit.T))) > 8.0
-    assert sum(len(recipe.verification_at(k)) for k in range(len(recipe.soaks))) == 6
+
+
+def test_every_verification_pose_is_measured_as_often_as_in_the_recipe_and_at_all_soaks_alike(found):
+    base, recipe = load_recipe(), load_recipe(str(found[1]))
+    taken = [[pose.name for pose in recipe.verification_at(k)] for k in range(len(recipe.soaks))]
+    of_each = Counter(name for names in taken for name in names)
+    assert set(of_each.values()) == {len(base.verification) // 6 * len(base.temperatures_C)}
+    assert found[0]["verification_dwells"] == sum(of_each.values())
+    assert max(map(len, taken)) - min(map(len, taken)) <= 6
 
 
 def test_poses_for_verification_are_far_from_one_another():
@@ -142,7 +151,7 @@ def test_errors_that_no_recipe_reaches_are_refused_with_the_nearest(tmp_path):
 
 @pytest.mark.slow
 def test_the_textbook_plan_is_matched_in_six_tenths_of_its_time(tmp_path):
-    done, _ = asked(tmp_path)
+    done, _ = asked(tmp_path, "--verification", "1")
     document = json.loads(done.stdout)
     assert document["share"] <= 0.60
     assert document["worst"] <= 1.0
