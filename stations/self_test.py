@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 WILD = 0.05  # of full scale: no device at rest is so noisy
 NOISIER = 3.0  # times what is usual among the slots, of which there must be so many:
 FEWEST_TO_COMPARE = 3
-KEPT = 0.99  # of the samples that should be there
+KEPT = 0.9  # of the samples that the time is worth: orders to start and stop take their time on a busy link
 SIGMAS = 3.0
 MOVING_RANGE = 1.128  # mean range of two over sigma, normal: NIST/SEMATECH e-Handbook of Statistical Methods, 6.3.2.2
 UP, DOWN = (0.0, 0.0), (180.0, 0.0)
@@ -87,7 +87,9 @@ class Bench:
     def _found(self, check: str, part: str, value: float, unit: str, bounds: tuple[float, float]) -> None:
         low, high = bounds
         ok = low <= value <= high
-        text = "" if ok else f"{part}: {check} {value:.6g} {unit}, {low:.6g} to {high:.6g} {unit} is needed"
+        measure = f" {unit}" if unit else ""
+        needed = f"{low:.6g} to {high:.6g}" if math.isfinite(high) else f"at least {low:.6g}"
+        text = "" if ok else f"{part}: {check} {value:.6g}{measure}, {needed}{measure} is needed"
         self.findings.append(Finding(check, part, ok, value, unit, _finite(low), _finite(high), text))
 
     def _state(self, check: str, part: str, found: str, needed: str) -> None:
