@@ -2,19 +2,25 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-from typing import Annotated
-
 import typer
 
-from pipelines.cli.options import ArchiveOption, JsonOption, RunArgument, error_console, print_json
+from pipelines.cli.options import (
+    ArchiveOption,
+    JsonOption,
+    ModelOption,
+    OtherEffectsOption,
+    OtherLimitsOption,
+    RunArgument,
+    error_console,
+    print_json,
+)
 
 
 def command(
     run: RunArgument = "latest",
-    effects: Annotated[str, typer.Option("--effects", metavar="a,b,c", help="The model as a list of effects.")] = "",
-    model: Annotated[Path | None, typer.Option("--model", metavar="FILE", help="The model as a model file.")] = None,
-    limits: Annotated[str, typer.Option("--limits", help="A limits file or the name of built-in limits.")] = "",
+    effects: OtherEffectsOption = "",
+    model: ModelOption = None,
+    limits: OtherLimitsOption = "",
     archive: ArchiveOption = None,
     *,
     as_json: JsonOption = False,

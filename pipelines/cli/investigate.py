@@ -4,12 +4,20 @@ from __future__ import annotations
 
 import shlex
 import sys
-from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from pipelines.cli.options import ArchiveOption, JsonOption, error_console, print_json
+from pipelines.cli.options import (
+    ArchiveOption,
+    JsonOption,
+    RecipeArgument,
+    RepeatOption,
+    SeedOption,
+    StationOption,
+    error_console,
+    print_json,
+)
 from pipelines.cli.run import shown
 from schemas.errors import DONE, PART_FAILED
 
@@ -25,22 +33,14 @@ SETTLED = frozenset({"adequate", "told_apart"})
 
 
 def command(
-    recipe: Annotated[
-        str, typer.Argument(metavar="[RECIPE]", help="A recipe file or a built-in recipe.")
-    ] = "production",
-    station: Annotated[
-        Path | None,
-        typer.Option("--station", metavar="FILE", help="The station; the built-in simulated one by default."),
-    ] = None,
+    recipe: RecipeArgument = "production",
+    station: StationOption = None,
     units: Annotated[
         str, typer.Option("--units", metavar="SN,…|FILE", help="Serial numbers slot by slot, or a slot map.")
     ] = "",
     archive: ArchiveOption = None,
-    seed: Annotated[int | None, typer.Option("--seed", help="Seed of a simulated station.")] = None,
-    repeat: Annotated[
-        int,
-        typer.Option("--repeat", min=0, help="Count of fresh measurements of the same lot: 1, 2, … measure it anew."),
-    ] = 0,
+    seed: SeedOption = None,
+    repeat: RepeatOption = 0,
     effects: Annotated[
         str, typer.Option("--effects", metavar="a,b,c", help="The model to judge; the recipe's by default.")
     ] = "",

@@ -27,6 +27,15 @@ ArchiveOption = Annotated[
     ),
 ]
 JsonOption = Annotated[bool, typer.Option("--json", help="Print one JSON document and nothing else.")]
+RecipeArgument = Annotated[str, typer.Argument(metavar="[RECIPE]", help="A recipe file or a built-in recipe.")]
+StationOption = Annotated[
+    Path | None,
+    typer.Option("--station", metavar="FILE", help="The station; the built-in simulated one by default."),
+]
+SeedOption = Annotated[int | None, typer.Option("--seed", help="Seed of a simulated station.")]
+RepeatOption = Annotated[
+    int, typer.Option("--repeat", min=0, help="Count of fresh measurements of the same lot: 1, 2, … measure it anew.")
+]
 RunArgument = Annotated[str, typer.Argument(metavar="RUN", help="A run's name, its beginning, or 'latest'.")]
 DwellsArgument = Annotated[
     str, typer.Argument(metavar="DWELLS", help="A file in the exchange format, or a run of the archive.")
@@ -47,9 +56,29 @@ FreshOption = Annotated[
 FreshHistoryOption = Annotated[
     str, typer.Option("--fresh-history", metavar="FILE", help="Temperatures against time of the fresh run.")
 ]
+OtherEffectsOption = Annotated[
+    str, typer.Option("--effects", metavar="a,b,c", help="Another model, as a list of effects.")
+]
+OtherLimitsOption = Annotated[str, typer.Option("--limits", metavar="FILE", help="Other limits: a file or a name.")]
 EffectFileOption = Annotated[
     list[Path] | None,
     typer.Option("--effect-file", metavar="FILE.py", help="A Python file with effects of your own; may be repeated."),
+]
+SelectionArgument = Annotated[
+    list[str],
+    typer.Argument(
+        metavar="SELECTION…",
+        help="Names of runs or their beginnings, 'latest', 'all', device:…, station:…, unit:…, recipe:…, since:DATE, until:DATE.",
+    ),
+]
+DaskOption = Annotated[
+    str,
+    typer.Option(
+        "--dask", metavar="ADDRESS|local", help="Work on Dask workers: of the scheduler at an address, or started here."
+    ),
+]
+WorkersOption = Annotated[
+    int | None, typer.Option("--workers", min=1, help="Processes on this machine; as many as it has cores by default.")
 ]
 
 STYLES = {"pass": "bold green", "fail": "bold red", "refused": "bold magenta"}

@@ -8,7 +8,16 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 from typer.core import TyperGroup
 
-from pipelines.cli.options import JsonOption, ModelOption, console, print_json, print_table, short
+from pipelines.cli.options import (
+    JsonOption,
+    ModelOption,
+    RecipeArgument,
+    StationOption,
+    console,
+    print_json,
+    print_table,
+    short,
+)
 
 if TYPE_CHECKING:
     from typer._click import Context
@@ -44,10 +53,6 @@ app = typer.Typer(
 DeviceOption = Annotated[
     str, typer.Option("--device", metavar="PRESET", help="Preset whose noise is meant; the recipe's device by default.")
 ]
-StationOption = Annotated[
-    Path | None,
-    typer.Option("--station", metavar="FILE", help="The station; the built-in simulated one by default."),
-]
 NoiseOption = Annotated[
     float | None,
     typer.Option("--noise", min=0.0, help="White noise of the device, µg/√Hz; its preset's by default."),
@@ -70,9 +75,7 @@ PageOption = Annotated[
 
 @app.command(RECIPE)
 def command(
-    recipe: Annotated[
-        str, typer.Argument(metavar="[RECIPE]", help="A recipe file or a built-in recipe.")
-    ] = "production",
+    recipe: RecipeArgument = "production",
     device: DeviceOption = "",
     station: StationOption = None,
     effects: EffectsOption = "",

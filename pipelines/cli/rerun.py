@@ -3,15 +3,20 @@
 from __future__ import annotations
 
 from dataclasses import asdict
-from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from pipelines.cli.options import (
     ArchiveOption,
+    DaskOption,
     EffectFileOption,
     JsonOption,
+    ModelOption,
+    OtherEffectsOption,
+    OtherLimitsOption,
+    SelectionArgument,
+    WorkersOption,
     console,
     error_console,
     print_json,
@@ -28,29 +33,12 @@ if TYPE_CHECKING:
 
 SHOWN = 40
 
-SelectionArgument = Annotated[
-    list[str],
-    typer.Argument(
-        metavar="SELECTION…",
-        help="Names of runs or their beginnings, 'latest', 'all', device:…, station:…, unit:…, recipe:…, since:DATE, until:DATE.",
-    ),
-]
-DaskOption = Annotated[
-    str,
-    typer.Option(
-        "--dask", metavar="ADDRESS|local", help="Work on Dask workers: of the scheduler at an address, or started here."
-    ),
-]
-WorkersOption = Annotated[
-    int | None, typer.Option("--workers", min=1, help="Processes on this machine; as many as it has cores by default.")
-]
-
 
 def command(
     selection: SelectionArgument,
-    effects: Annotated[str, typer.Option("--effects", metavar="a,b,c", help="The model as a list of effects.")] = "",
-    model: Annotated[Path | None, typer.Option("--model", metavar="FILE", help="The model as a model file.")] = None,
-    limits: Annotated[str, typer.Option("--limits", metavar="FILE", help="Other limits: a file or a name.")] = "",
+    effects: OtherEffectsOption = "",
+    model: ModelOption = None,
+    limits: OtherLimitsOption = "",
     effect_file: EffectFileOption = None,
     archive: ArchiveOption = None,
     dask: DaskOption = "",

@@ -3,12 +3,20 @@
 from __future__ import annotations
 
 from contextlib import contextmanager
-from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from pipelines.cli.options import ArchiveOption, JsonOption, error_console, print_json
+from pipelines.cli.options import (
+    ArchiveOption,
+    JsonOption,
+    RecipeArgument,
+    RepeatOption,
+    SeedOption,
+    StationOption,
+    error_console,
+    print_json,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Generator
@@ -21,13 +29,8 @@ if TYPE_CHECKING:
 
 
 def command(
-    recipe: Annotated[
-        str, typer.Argument(metavar="[RECIPE]", help="A recipe file or a built-in recipe.")
-    ] = "production",
-    station: Annotated[
-        Path | None,
-        typer.Option("--station", metavar="FILE", help="The station; the built-in simulated one by default."),
-    ] = None,
+    recipe: RecipeArgument = "production",
+    station: StationOption = None,
     units: Annotated[
         str,
         typer.Option(
@@ -37,11 +40,8 @@ def command(
         ),
     ] = "",
     archive: ArchiveOption = None,
-    seed: Annotated[int | None, typer.Option("--seed", help="Seed of a simulated station.")] = None,
-    repeat: Annotated[
-        int,
-        typer.Option("--repeat", min=0, help="Count of fresh measurements of the same lot: 1, 2, … measure it anew."),
-    ] = 0,
+    seed: SeedOption = None,
+    repeat: RepeatOption = 0,
     fault: Annotated[
         list[str] | None,
         typer.Option("--fault", metavar="KIND[:KEY=VALUE…]", help="Trouble for a simulated station; may be repeated."),

@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from pipelines.cli.options import JsonOption, console, print_json, print_table
+from pipelines.cli.options import JsonOption, StationOption, console, print_json, print_table
 from pipelines.cli.station_check import check
 from pipelines.cli.station_log import log
-from pipelines.cli.station_lot import DeviceOption, StationOption, UnitsOption, made_up
+from pipelines.cli.station_lot import DeviceOption, UnitsOption, made_up
 from pipelines.cli.station_status import status
 from pipelines.cli.station_watch import watch
 

@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from pipelines.cli.options import JsonOption, error_console, print_json, print_table
-from pipelines.cli.station_lot import DeviceOption, StationOption, UnitsOption, made_up
+from pipelines.cli.options import JsonOption, StationOption, error_console, print_json, print_table
+from pipelines.cli.station_lot import DeviceOption, UnitsOption, made_up
 
 if TYPE_CHECKING:
     from pathlib import Path

@@ -1,8 +1,7 @@
-"""Options that the commands of stations share, and the made-up lot that sits in a simulated one."""
+"""Options that commands of simulated stations share, and the made-up lot that sits in a simulated one."""
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
@@ -10,10 +9,6 @@ import typer
 if TYPE_CHECKING:
     from schemas.recipe import Lot
 
-StationOption = Annotated[
-    Path | None,
-    typer.Option("--station", metavar="FILE", help="The station; the built-in simulated one by default."),
-]
 DeviceOption = Annotated[str, typer.Option("--device", help="Preset of the simulated devices under test.")]
 UnitsOption = Annotated[
     int, typer.Option("--units", min=1, max=32, help="How many simulated devices sit in the slots.")

@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from pipelines.cli.options import JsonOption, console, error_console, print_json
-from pipelines.cli.station_lot import DeviceOption, StationOption, UnitsOption, made_up
+from pipelines.cli.options import JsonOption, StationOption, console, error_console, print_json
+from pipelines.cli.station_lot import DeviceOption, UnitsOption, made_up
 
 if TYPE_CHECKING:
     from rich.console import Group

@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from pipelines.cli.chart import Line, chart, clock
-from pipelines.cli.options import ArchiveOption, JsonOption, console, print_json
-from pipelines.cli.station_lot import StationOption, made_up
+from pipelines.cli.options import ArchiveOption, JsonOption, StationOption, console, print_json
+from pipelines.cli.station_lot import made_up
 
 if TYPE_CHECKING:
     from collections.abc import Generator

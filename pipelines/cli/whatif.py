@@ -9,15 +9,17 @@ import typer
 
 from pipelines.cli.options import (
     ArchiveOption,
+    DaskOption,
     EffectFileOption,
     JsonOption,
+    OtherLimitsOption,
+    WorkersOption,
     console,
     error_console,
     print_json,
     print_table,
     short,
 )
-from pipelines.cli.rerun import DaskOption, WorkersOption
 
 if TYPE_CHECKING:
     from pipelines.archive import Archive
@@ -33,7 +35,7 @@ def command(
         list[str] | None,
         typer.Argument(metavar="[SELECTION…]", help="Runs as for 'tumbleline rerun'; all by default."),
     ] = None,
-    limits: Annotated[str, typer.Option("--limits", metavar="FILE", help="Other limits: a file or a name.")] = "",
+    limits: OtherLimitsOption = "",
     effect_file: EffectFileOption = None,
     archive: ArchiveOption = None,
     dask: DaskOption = "",
