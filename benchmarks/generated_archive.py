@@ -31,7 +31,7 @@ sys.path.insert(0, str(ROOT))
 from benchmarks.generated_lots import PER_LOT, Factory, Lot  # noqa: E402 - run as a script from anywhere
 from benchmarks.generated_tables import EFFECTS, Measured, base_tables, decided_tables, fitted_tables  # noqa: E402
 from inertial import poses  # noqa: E402
-from pipelines.archive import files  # noqa: E402
+from pipelines.archive import files, parquet  # noqa: E402
 from pipelines.archive.archive import FORMAT  # noqa: E402
 from pipelines.archive.keys import digest, libraries, stage_key  # noqa: E402
 from pipelines.stages.calibration import column_names, unit_texts  # noqa: E402
@@ -200,7 +200,7 @@ def _write_tables(run: Path, content: dict[str, dict[str, Any]], when: str, capt
 
 def _parquet(name: str, columns: dict[str, Any]) -> bytes:
     arrays = {key: pa.array(v, pa.string()) if v.dtype.kind in "OU" else pa.array(v) for key, v in _arrays(columns)}
-    marks = {files.TABLE_MARK: name.encode(), files.SCHEMA_MARK: str(tables.VERSION).encode()}
+    marks = {parquet.TABLE_MARK: name.encode(), parquet.SCHEMA_MARK: str(tables.VERSION).encode()}
     sink = pa.BufferOutputStream()
     pq.write_table(pa.table(arrays).replace_schema_metadata(marks), sink, compression="zstd", compression_level=1)
     return sink.getvalue().to_pybytes()

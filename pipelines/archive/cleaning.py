@@ -11,8 +11,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from pipelines.archive import chain, files
-from pipelines.archive.archive import Run, provenance
 from pipelines.archive.locks import CLAIM, LEASE_S, alone
+from pipelines.archive.provenance import provenance
+from pipelines.archive.run import Run
 from pipelines.archive.store import ObjectPath
 from schemas.errors import OperatorNeeded
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from pipelines.archive import files
 
 if TYPE_CHECKING:
-    from pipelines.archive.archive import Run
+    from pipelines.archive.run import Run
     from pipelines.archive.store import Place
 
 SEALED = "sealed.json"

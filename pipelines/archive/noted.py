@@ -19,7 +19,7 @@ from schemas.errors import ArchiveUnusable
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from pipelines.archive.archive import Run
+    from pipelines.archive.run import Run
     from pipelines.archive.store import Place
 
 FEWEST_NEW = 32  # fewer are read again sooner than they are written

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from hashlib import sha256
 from typing import TYPE_CHECKING
 
-from pipelines.archive import files
+from pipelines.archive import files, parquet
 from pipelines.archive.events import Events
 from pipelines.archive.keys import digest
 from pipelines.archive.store import ObjectPath
@@ -63,7 +62,7 @@ class Records:
             self._forget(record)
         name, data = f"samples-{number:05d}.parquet", self._encoded("samples", samples)
         files.publish(place / name, data)
-        self._ahead[name] = sha256(data).hexdigest()
+        self._ahead[name] = files.hash_of(data)
 
     def put(
         self,
@@ -96,10 +95,10 @@ class Records:
         state = self._state_path(record)
         files.publish(state, station_state)
         about = {"record": record, "order": order, "schema": tables.VERSION, "previous": self._head()}
-        hashes = {name: sha256(data).hexdigest() for name, data in content.items()}
+        hashes = {name: files.hash_of(data) for name, data in content.items()}
         manifest = files.manifest_bytes({**about, "content": {**self._ahead, **hashes}})
         files.publish_folder(self.path / f"{record:05d}", {**content, "record.json": manifest})
-        self._newest, self._ahead = sha256(manifest).hexdigest(), {}
+        self._newest, self._ahead = files.hash_of(manifest), {}
         for old in state.parent.glob("*.bin"):
             if old != state:
                 old.unlink()
@@ -171,10 +170,10 @@ class Records:
         content = files.read_json(folder / "record.json")["content"]
         for name in sorted(content):
             if name == f"{part}.parquet" or name.startswith(f"{part}-"):
-                yield files.read_table(folder / name, part, content[name])
+                yield parquet.read_table(folder / name, part, content[name])
 
     @staticmethod
     def _encoded(name: str, frame: pd.DataFrame) -> bytes:
         from schemas import tables  # slow to import, and only writers of tables need it
 
-        return files.table_bytes(name, tables.check(name, frame), tables.VERSION)
+        return parquet.table_bytes(name, tables.check(name, frame), tables.VERSION)

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from hashlib import sha256
 from typing import TYPE_CHECKING
 
 import numpy as np
 import pandas as pd
 from threadpoolctl import threadpool_limits
 
-from pipelines.archive import Archive, Run, files
+from pipelines.archive import Archive, Run, files, parquet
 from pipelines.archive.keys import libraries
 from pipelines.rerun.again import raw_samples
 from pipelines.rerun.steps import RAW, plan_of
@@ -76,9 +75,9 @@ def _static(run: Run) -> bool:
 
 def _compare(run: Run, step: Step, found: Checked) -> None:
     for name, frame in step.call(run).items():
-        made = files.table_bytes(name, tables.check(name, frame, where=f"{step.name} → {name}"), tables.VERSION)
+        made = parquet.table_bytes(name, tables.check(name, frame, where=f"{step.name} → {name}"), tables.VERSION)
         stored = run.manifest(name)["sha256"]
-        same = sha256(made).hexdigest() == stored
+        same = files.hash_of(made) == stored
         found.tables[name] = SAME if same else OTHER
         if not same:
             found.differences.append(f"{name}: {_difference(run.table(name), frame)}")

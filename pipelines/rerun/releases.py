@@ -12,9 +12,9 @@ from datetime import UTC, datetime
 from typing import TYPE_CHECKING, Any
 
 from pipelines.archive import chain, files
-from pipelines.archive.archive import provenance
 from pipelines.archive.keys import digest
 from pipelines.archive.locks import alone
+from pipelines.archive.provenance import provenance
 from pipelines.recipes import LINE
 from schemas.errors import RecipeInvalid, WrongUse
 from schemas.recipe import FormulaSpec

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 from functools import cached_property
-from hashlib import sha256
 from io import BytesIO
 from typing import TYPE_CHECKING, Any
 
@@ -58,4 +57,4 @@ class Remembering(Run):
 
     def _hash_of(self, name: str) -> str:
         waiting = self._waiting.get(name)
-        return super()._hash_of(name) if waiting is None else sha256(waiting).hexdigest()
+        return super()._hash_of(name) if waiting is None else files.hash_of(waiting)

@@ -15,8 +15,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from pipelines.archive import Archive, chain, files
-from pipelines.archive.archive import provenance
 from pipelines.archive.locks import alone
+from pipelines.archive.provenance import provenance
 from pipelines.archive.store import ObjectPath, place_of
 from pipelines.trace.days import LAST, today
 from pipelines.trace.events import Event, event_of

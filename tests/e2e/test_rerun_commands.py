@@ -12,7 +12,7 @@ import pandas as pd
 import pytest
 from capture_double import CaptureDouble, small_job, small_run
 
-from pipelines.archive import Archive, files
+from pipelines.archive import Archive, parquet
 from pipelines.chain import ORDER
 from pipelines.runner import Runner
 from schemas import tables as contracts
@@ -65,7 +65,7 @@ def test_check_proves_the_archive_and_names_a_value_that_was_exchanged_with_its_
     place = own / "runs" / run.id
     figures = pd.read_parquet(place / "figures.parquet")
     figures.loc[2, "value"] += 1.0
-    data = files.table_bytes("figures", figures, contracts.VERSION)
+    data = parquet.table_bytes("figures", figures, contracts.VERSION)
     (place / "figures.parquet").write_bytes(data)
     manifest = json.loads((place / "figures.json").read_text())
     (place / "figures.json").write_text(json.dumps(manifest | {"sha256": sha256(data).hexdigest()}))

@@ -14,7 +14,7 @@ import pandas as pd
 import pytest
 from capture_double import CaptureDouble, recipe_file, small_job
 
-from pipelines.archive import Archive, Run, archive, chain
+from pipelines.archive import Archive, Run, chain, provenance
 from pipelines.cli import main
 from pipelines.job import Request
 from pipelines.runner import Runner
@@ -147,7 +147,7 @@ def test_a_clock_that_goes_backwards_loses_nothing_and_is_told(tmp_path: Path, m
         def now(cls, tz=None):
             return datetime.now(tz) - timedelta(days=1)
 
-    monkeypatch.setattr(archive, "datetime", Yesterday)
+    monkeypatch.setattr(provenance, "datetime", Yesterday)
     later = Runner(small_job(tmp_path, ("seed = 5", "seed = 6")), store, measure=CaptureDouble())
     list(later.all())
     report = verify(store, keys={})

@@ -166,12 +166,12 @@ def test_an_edited_manifest_is_found_even_unsigned(copy: Path, pattern: str, key
 
 def test_a_table_with_a_manifest_to_match_is_found_by_the_chain(copy: Path) -> None:
     """Somebody writes other coefficients, and a manifest with their hash."""
-    from pipelines.archive import files
+    from pipelines.archive import files, parquet
 
     run = run_of(copy)
     frame = run.table("coefficients").assign(value=lambda t: t["value"] * 1.01)
     path = run.path / "coefficients.parquet"
-    path.write_bytes(files.table_bytes("coefficients", frame, 1))
+    path.write_bytes(parquet.table_bytes("coefficients", frame, 1))
     edit(run.path / "coefficients.json", lambda content: content.update(sha256=files.sha256(path)))
     found = {(f.kind, Path(f.path).name) for f in verified(copy).checked.findings}
     assert ("edited", "coefficients.json") in found

@@ -13,7 +13,7 @@ from capture_double import CaptureDouble, PulledPlug, small_job, small_run
 from ledger_events import event
 from typer.testing import CliRunner
 
-from pipelines.archive import Archive, chain, files
+from pipelines.archive import Archive, chain, files, parquet
 from pipelines.archive.cleaning import clean
 from pipelines.archive.locks import alone
 from pipelines.chain import ORDER
@@ -89,7 +89,7 @@ def test_eight_writers_at_once_lose_nothing_and_nobody_reads_half(tmp_path: Path
         while not over.is_set():
             for path in root.glob("runs/*/*.parquet"):
                 try:
-                    files.read_table(path, path.stem)
+                    parquet.read_table(path, path.stem)
                 except ArchiveUnusable as problem:
                     halves.append(str(problem))
                 looks += 1

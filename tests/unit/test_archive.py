@@ -7,7 +7,7 @@ import pandas as pd
 import pytest
 from capture_double import CaptureDouble, small_job, small_run
 
-from pipelines.archive import Archive, Run, code_hash, files, stage_key
+from pipelines.archive import Archive, Run, code_hash, files, parquet, stage_key
 from pipelines.chain import ORDER
 from pipelines.runner import Runner
 from schemas.errors import ArchiveUnusable, OperatorNeeded, WrongUse
@@ -21,12 +21,12 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> Run:
 
 
 def test_equal_tables_give_equal_bytes() -> None:
-    assert files.table_bytes("t", FRAME, 1) == files.table_bytes("t", FRAME.copy(), 1)
+    assert parquet.table_bytes("t", FRAME, 1) == parquet.table_bytes("t", FRAME.copy(), 1)
 
 
 def test_reading_gives_back_what_was_written(tmp_path: Path) -> None:
-    files.publish(tmp_path / "t.parquet", files.table_bytes("t", FRAME, 1))
-    pd.testing.assert_frame_equal(files.read_table(tmp_path / "t.parquet", "t"), FRAME)
+    files.publish(tmp_path / "t.parquet", parquet.table_bytes("t", FRAME, 1))
+    pd.testing.assert_frame_equal(parquet.read_table(tmp_path / "t.parquet", "t"), FRAME)
 
 
 def test_leaves_nothing_under_a_temporary_name(tmp_path: Path) -> None:
@@ -37,21 +37,21 @@ def test_leaves_nothing_under_a_temporary_name(tmp_path: Path) -> None:
 
 def test_names_a_truncated_file_and_its_size(tmp_path: Path) -> None:
     path = tmp_path / "t.parquet"
-    path.write_bytes(files.table_bytes("t", FRAME, 1)[:100])
+    path.write_bytes(parquet.table_bytes("t", FRAME, 1)[:100])
     with pytest.raises(ArchiveUnusable, match=r"t\.parquet \(100 bytes\) is not a whole Parquet file"):
-        files.read_table(path, "t")
+        parquet.read_table(path, "t")
 
 
 def test_refuses_a_foreign_parquet_file(tmp_path: Path) -> None:
     FRAME.to_parquet(tmp_path / "t.parquet")
     with pytest.raises(ArchiveUnusable, match="was not written by this archive"):
-        files.read_table(tmp_path / "t.parquet", "t")
+        parquet.read_table(tmp_path / "t.parquet", "t")
 
 
 def test_refuses_another_table_under_a_tables_name(tmp_path: Path) -> None:
-    files.publish(tmp_path / "t.parquet", files.table_bytes("other", FRAME, 1))
+    files.publish(tmp_path / "t.parquet", parquet.table_bytes("other", FRAME, 1))
     with pytest.raises(ArchiveUnusable, match="holds table 'other'"):
-        files.read_table(tmp_path / "t.parquet", "t")
+        parquet.read_table(tmp_path / "t.parquet", "t")
 
 
 def test_refuses_a_folder_that_holds_something_else(tmp_path: Path) -> None:

@@ -7,7 +7,7 @@ import pandas as pd
 import pytest
 from capture_double import CaptureDouble
 
-from pipelines.archive import Archive, Run, files
+from pipelines.archive import Archive, Run, parquet
 from pipelines.job import job_of_run
 from pipelines.runner import Runner
 from pipelines.trace import Ledger
@@ -90,15 +90,15 @@ def test_a_table_is_brought_up_version_by_version(monkeypatch: pytest.MonkeyPatc
     )
     for written, columns in ((1, ["unit", "value", "renamed"]), (3, ["unit", "value"])):
         path = tmp_path / f"{written}.parquet"
-        path.write_bytes(files.table_bytes("dwells", FRAME, written))
-        assert list(files.read_table(path, "dwells").columns) == columns
-        assert files.table_bytes("dwells", FRAME, written) == path.read_bytes()
+        path.write_bytes(parquet.table_bytes("dwells", FRAME, written))
+        assert list(parquet.read_table(path, "dwells").columns) == columns
+        assert parquet.table_bytes("dwells", FRAME, written) == path.read_bytes()
 
 
 def test_a_table_of_a_newer_version_is_refused(tmp_path: Path) -> None:
     path = tmp_path / "dwells.parquet"
-    path.write_bytes(files.table_bytes("dwells", FRAME, version.VERSION + 1))
+    path.write_bytes(parquet.table_bytes("dwells", FRAME, version.VERSION + 1))
     with pytest.raises(
         ArchiveUnusable, match=f"has schema {version.VERSION + 1}, this version knows up to {version.VERSION}"
     ):
-        files.read_table(path, "dwells")
+        parquet.read_table(path, "dwells")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from pipelines.archive import files, stage_key
+from pipelines.archive import files, parquet, stage_key
 from pipelines.archive.records import COMPLETE
 from pipelines.archive.store import ObjectPath
 from pipelines.trace.checks.findings import EDITED, FOREIGN, MISSING, Checked
@@ -113,4 +113,4 @@ def table_mark(place: Place) -> str:
         metadata = pq.read_metadata(source).metadata or {}
     except (pa.ArrowInvalid, OSError):
         return ""
-    return metadata.get(files.TABLE_MARK, b"").decode(errors="replace")
+    return metadata.get(parquet.TABLE_MARK, b"").decode(errors="replace")

@@ -1,0 +1,67 @@
+"""Tables of the archive as Parquet: equal tables give equal bytes, whatever the host and the hour; reading trusts nothing."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from pipelines.archive.files import hash_of
+from pipelines.archive.store import first_line
+from schemas.errors import ArchiveUnusable
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+    from pipelines.archive.store import Place
+
+TABLE_MARK = b"tumbleline.table"
+SCHEMA_MARK = b"tumbleline.schema"
+
+
+def table_bytes(name: str, frame: pd.DataFrame, version: int) -> bytes:
+    """A table as Parquet: zstd, no index, no library notes, the table's name and schema version in the metadata."""
+    import pyarrow as pa  # a quarter of a second, which commands without a table need not spend
+    import pyarrow.parquet as pq
+
+    table = pa.Table.from_pandas(frame, preserve_index=False)
+    table = table.replace_schema_metadata({TABLE_MARK: name.encode(), SCHEMA_MARK: str(version).encode()})
+    sink = pa.BufferOutputStream()
+    pq.write_table(table, sink, compression="zstd", compression_level=3)
+    return sink.getvalue().to_pybytes()
+
+
+def read_table(path: Place, name: str, expected: str | None = None) -> pd.DataFrame:
+    """A table of the archive, checked to be whole, ours and unchanged since it was written.
+
+    Parameters
+    ----------
+    expected : hash that the manifest gives; None where there is no manifest to compare with.
+    """
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    remedy = "restore it from a copy, or remove the run's folder and run it again"
+    try:
+        data = path.read_bytes()
+    except (FileNotFoundError, IsADirectoryError):
+        message = (
+            f"archive: {path} is not there, table '{name}' is needed; if the run was stopped, give its command again "
+            "and it goes on"
+        )
+        raise ArchiveUnusable(message) from None
+    try:
+        table = pq.read_table(pa.BufferReader(data))
+    except (pa.ArrowInvalid, OSError) as problem:
+        message = f"archive: {path} ({len(data)} bytes) is not a whole Parquet file ({first_line(problem)}); {remedy}"
+        raise ArchiveUnusable(message) from None
+    marks = table.schema.metadata or {}
+    mark = marks.get(TABLE_MARK, b"").decode(errors="replace")
+    if mark != name:
+        found = f"holds table '{mark}'" if mark else "was not written by this archive"
+        message = f"archive: {path} {found}, table '{name}' is needed; import foreign files with 'tumbleline import'"
+        raise ArchiveUnusable(message)
+    if expected is not None and hash_of(data) != expected:
+        message = f"archive: {path} has changed since it was written (its hash is not its manifest's); {remedy}"
+        raise ArchiveUnusable(message)
+    from schemas.upgrades import upgraded
+
+    return upgraded(name, table.to_pandas(), int(marks.get(SCHEMA_MARK, b"1")), str(path))

@@ -1,0 +1,29 @@
+"""Who made something, where, when and with what: kept beside results, never inside them nor in keys."""
+
+from __future__ import annotations
+
+import getpass
+import platform
+from datetime import UTC, datetime
+from functools import cache
+from importlib.metadata import version
+from typing import Any
+
+from pipelines.archive.keys import libraries
+
+
+def provenance() -> dict[str, Any]:
+    """The user, the host, the moment, and the versions of the product and of the libraries that a number may depend on."""
+    return {
+        "who": getpass.getuser(),
+        "where": platform.node(),
+        "when": datetime.now(UTC).isoformat(timespec="milliseconds"),
+        "software": _software(),
+        "libraries": libraries(),
+    }
+
+
+@cache
+def _software() -> dict[str, str]:
+    """Versions of the product and of what runs it; reading them takes a look into the installation."""
+    return {"tumbleline": version("tumbleline"), "python": platform.python_version()}

@@ -1,0 +1,181 @@
+"""One run of the archive: tables with a manifest beside each, the report, and the seal that names them all."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from pipelines.archive import chain, files
+from pipelines.archive.listing import SEALED, stages_of
+from pipelines.archive.parquet import read_table, table_bytes
+from pipelines.archive.provenance import provenance
+from pipelines.archive.records import COMPLETE, PARTS, Records
+from pipelines.archive.signatures import ENTRY
+from schemas.errors import ArchiveUnusable, WrongUse, did_you_mean
+from schemas.version import refuse_newer
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    import pandas as pd
+
+    from pipelines.archive.archive import Archive
+    from pipelines.archive.store import Place
+
+START = "run.json"
+
+
+class Run:
+    """One run: its tables, their manifests, and what it was started with."""
+
+    def __init__(self, archive: Archive, run_id: str) -> None:
+        self.archive, self.id = archive, run_id
+        self.path = archive.root / "runs" / run_id
+
+    @property
+    def about(self) -> dict[str, Any]:
+        """What the run was started with: recipe, limits, lot, station, capture; and who, where, when."""
+        return files.read_json(self.path / START)
+
+    @property
+    def records(self) -> Records | None:
+        """What was captured for this run; None for a run on imported tables."""
+        capture = self.about.get("capture")
+        return Records(self.archive.root / "captures" / capture) if capture else None
+
+    @property
+    def report(self) -> Place:
+        """Where the report for people lies."""
+        return self.path / "report.html"
+
+    def has(self, names: tuple[str, ...], key: str) -> bool:
+        """Whether all these tables are there, made by the stage with this key."""
+        return all(self._is_made_by(name, key) for name in names)
+
+    def save(
+        self,
+        stage: str,
+        key: str,
+        outputs: Mapping[str, pd.DataFrame],
+        about: Mapping[str, Any],
+    ) -> None:
+        """Publish the tables of a stage with a manifest beside each.
+
+        Parameters
+        ----------
+        about : the stage's inputs, parameters and code, as they went into the key.
+        """
+        from schemas import tables  # slow to import, and only writers of tables need it
+
+        by, follows = provenance(), self._manifests(about.get("inputs", {}))
+        for name, frame in outputs.items():
+            data = table_bytes(name, tables.check(name, frame, where=f"{stage} → {name}"), tables.VERSION)
+            self._put(f"{name}.parquet", data)
+            content = {
+                "stage": stage,
+                "key": key,
+                "sha256": files.hash_of(data),
+                "rows": len(frame),
+            }
+            manifest = {**by, **content, **about, "schema": tables.VERSION, "manifests": follows}
+            self._put(f"{name}.json", files.manifest_bytes(manifest))
+
+    def adopt(self, other: Run, names: tuple[str, ...]) -> None:
+        """Take tables over from another run of the same archive, byte for byte, with who made them, when and with what."""
+        for name in names:
+            path, manifest = other.path / f"{name}.parquet", other.manifest(name)
+            data = path.read_bytes()
+            if files.hash_of(data) != manifest["sha256"]:
+                message = (
+                    f"archive: {path} has changed since it was written (its hash is not its manifest's); restore it from a "
+                    "copy before the run is run again"
+                )
+                raise ArchiveUnusable(message)
+            self._put(f"{name}.parquet", data)
+            follows = self._manifests(manifest.get("inputs", {}))
+            kept = {key: value for key, value in manifest.items() if key != ENTRY}  # what is told anew is signed anew
+            content = {**kept, "taken_from": manifest.get("taken_from", other.id), "manifests": follows}
+            self._put(f"{name}.json", files.manifest_bytes(content))
+
+    def save_report(self, key: str, html: str, about: Mapping[str, Any]) -> None:
+        """Publish the report for people with its manifest."""
+        data = html.encode()
+        files.publish(self.report, data)
+        content = {"stage": "report", "key": key, "sha256": files.hash_of(data)}
+        manifest = {**provenance(), **content, **about, "manifests": self._manifests(about.get("inputs", {}))}
+        files.publish(self.path / "report.json", files.manifest_bytes(manifest))
+        self.seal()
+
+    def seal(self) -> int:
+        """The number of the entry in the archive's chain that names all manifests of the run as they are."""
+        mark = self.path / SEALED
+        names = [path for path in self.path.glob("*.json") if path.name != mark.name]
+        sealed = {f"runs/{self.id}/{path.name}": files.sha256(path) for path in sorted(names, key=lambda one: one.name)}
+        if self.records is not None and self.records.is_complete():
+            end = self.records.path / COMPLETE
+            sealed[f"captures/{end.parent.name}/{end.name}"] = files.sha256(end)
+        before = files.read_json(mark) if mark.is_file() else {}
+        if before.get("files") == sealed:
+            return int(before["entry"])
+        entry = chain.append(self.archive.root, "run", sealed, {**provenance(), "run": self.id})
+        files.publish(mark, files.json_bytes({"entry": entry, "files": sealed, "stages": stages_of(self)}))
+        return entry
+
+    def has_report(self, key: str) -> bool:
+        """Whether the report is there, made with this key."""
+        return self.report.is_file() and self._manifest_key("report") == key
+
+    def table(self, name: str) -> pd.DataFrame:
+        """A table of the run, whole and unchanged since it was written."""
+        path = self.path / f"{name}.parquet"
+        if name in PARTS and not path.is_file() and self.records is not None:
+            return self.records.gathered(name)
+        from schemas import tables
+
+        if name not in tables.TABLES:
+            message = f"archive: no table is called '{name}'; {did_you_mean(name, tables.TABLES)}"
+            raise WrongUse(message)
+        return read_table(path, name, self.manifest(name)["sha256"] if path.is_file() else None)
+
+    def manifest(self, name: str) -> dict[str, Any]:
+        """The manifest of a table."""
+        place = self.path / f"{name}.json"
+        content = files.read_json(place)
+        refuse_newer(content.get("schema"), str(place))
+        return content
+
+    def tables(self) -> list[str]:
+        """Names of the tables that are there."""
+        return sorted(path.stem for path in self.path.glob("*.parquet"))
+
+    def _manifests(self, inputs: Mapping[str, str]) -> dict[str, str]:
+        """Hashes of the manifests of a stage's inputs, and of what the run was started with: each names those before it."""
+        found = {name: self._hash_of(f"{name}.json") for name in ("run", *inputs)}
+        records = self.records
+        if records is not None and (records.path / COMPLETE).is_file():
+            found["records"] = files.sha256(records.path / COMPLETE)
+        return {name: value for name, value in sorted(found.items()) if value}
+
+    def _put(self, name: str, data: bytes) -> None:
+        """Publish a file of the run."""
+        files.publish(self.path / name, data)
+
+    def _hash_of(self, name: str) -> str:
+        """Hash of a file of the run; empty where it is not there."""
+        place = self.path / name
+        return files.sha256(place) if place.is_file() else ""
+
+    def _is_made_by(self, name: str, key: str) -> bool:
+        path = self.path / f"{name}.parquet"
+        if not path.is_file() or self._manifest_key(name) != key:
+            return False
+        if files.sha256(path) != self.manifest(name)["sha256"]:
+            message = (
+                f"archive: {path} ({path.stat().st_size} bytes) is truncated or has changed since it was written; "
+                "restore it from a copy, or remove it and its manifest to have the stage run again"
+            )
+            raise ArchiveUnusable(message)
+        return True
+
+    def _manifest_key(self, name: str) -> str:
+        path = self.path / f"{name}.json"
+        return files.read_json(path)["key"] if path.is_file() else ""
