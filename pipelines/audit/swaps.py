@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     Flags = NDArray[np.bool_]
     Index = NDArray[np.int64]
 
+YEAR_D = 365.25
 FEWEST_PAIRS = 20  # of calibrations of one kind, below which its usual change is not known
 TURNS = [k for k, name in enumerate(PARAMETERS) if FAMILY_OF[name] == "rotation"]
 ROUNDS = 4
@@ -60,10 +61,11 @@ def strangers(all_: Calibrations) -> list[Stranger]:
         pairs = np.flatnonzero(before >= 0)
         if pairs.size < FEWEST_PAIRS:
             continue
-        scale = change_scale(values[pairs], values[before[pairs]])
+        years = (all_.day[own] - all_.day[own][before]) / YEAR_D
+        scale = change_scale(values[pairs], values[before[pairs]], years[pairs], values[before < 0])
         if scale.count == 0:
             continue
-        foreign = _foreign(values, all_.histories[own], scale)
+        foreign = _foreign(values, all_.histories[own], all_.day[own], scale)
         out += _described(all_, own, values, foreign, scale)
     return sorted(out, key=lambda stranger: stranger.row)
 
@@ -88,14 +90,15 @@ def _before(histories: Index, good: Flags) -> Index:
     return out
 
 
-def _foreign(values: Array, histories: Index, scale: Scale) -> Flags:
+def _foreign(values: Array, histories: Index, days: Array, scale: Scale) -> Flags:
     """Which calibrations do not fit the last one before them that does."""
     foreign = np.zeros(len(values), dtype=bool)
     for _ in range(ROUNDS):
         before = _before(histories, ~foreign)
         far = np.zeros_like(foreign)
         pairs = np.flatnonzero(before >= 0)
-        far[pairs] = distance(values[pairs], values[before[pairs]], scale) > foreign_above(scale)
+        years = (days[pairs] - days[before[pairs]]) / YEAR_D
+        far[pairs] = distance(values[pairs], values[before[pairs]], scale, years) > foreign_above(scale)
         if np.array_equal(far, foreign):
             break
         # of neighbours that are both far the earlier one is judged first: the later may fit once it is left out
@@ -111,18 +114,21 @@ def _described(all_: Calibrations, own: Index, values: Array, foreign: Flags, sc
     for k in map(int, np.flatnonzero(foreign)):
         other, unit = _fits(k, values, foreign, histories, days, scale)
         back = _exchanged(k, unit, values, foreign, histories, days, before, scale) if other >= 0 else False
-        usual = float(np.sqrt(distance(values[k], values[before[k]], scale) / scale.count))
+        years = float(days[k] - days[before[k]]) / YEAR_D
+        usual = float(np.sqrt(distance(values[k], values[before[k]], scale, years) / scale.count))
         out.append(Stranger(int(own[k]), usual, str(all_.unit[own[other]]) if other >= 0 else "", back))
     return out
 
 
 def _fits(k: int, values: Array, foreign: Flags, histories: Index, days: Array, scale: Scale) -> tuple[int, int]:
-    """The good earlier calibration of another unit that a stranger fits, and that unit; (−1, −1) where there is none."""
+    """The good earlier calibration of the one other unit that a stranger fits, and that unit; (−1, −1) for none or several."""
     candidates = np.flatnonzero((days < days[k]) & ~foreign & (histories != histories[k]))
     if not candidates.size:
         return -1, -1
-    best, found = nearest(values[k], values[candidates], scale)
-    if found > foreign_above(scale) and found > alike_below(scale):
+    years = (days[k] - days[candidates]) / YEAR_D
+    best, found = nearest(values[k], values[candidates], scale, years)
+    fitting = histories[candidates[distance(values[k], values[candidates], scale, years) <= foreign_above(scale)]]
+    if found > alike_below(scale) or np.any(fitting != histories[candidates[best]]):
         return -1, -1
     return int(candidates[best]), int(histories[candidates[best]])
 
@@ -132,4 +138,5 @@ def _exchanged(
 ) -> bool:
     """Whether the other unit has a stranger of the same days that fits the past of this one."""
     near = np.flatnonzero(foreign & (histories == unit) & (np.abs(days - days[k]) <= 1.0))
-    return any(float(distance(values[n], values[before[k]], scale)) <= foreign_above(scale) for n in near)
+    years = np.abs(days[near] - days[before[k]]) / YEAR_D
+    return bool(np.any(distance(values[near], values[before[k]], scale, years) <= foreign_above(scale)))
