@@ -4,7 +4,7 @@ Blocks are the series of one unit and axis, each with coefficients of its own; f
 blocks share. All series are in units of their white standard error.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from itertools import product
 
@@ -123,11 +123,18 @@ class Series:
 
     def deviances(self, first: Array, second: Array) -> Array:
         """Restricted deviance on a grid, (k, l), for shares (k,) of the first kernel and (l,) of the second."""
+        return self._likelihood()(first, second)
+
+    def _likelihood(self) -> Callable[[Array, Array], Array]:
+        """What gives the restricted deviance of the sound blocks on a grid."""
         if self._s.shape[-1]:
-            grid = [self.solve(pair).deviance for pair in product(first.tolist(), second.tolist())]
-            return np.reshape(grid, (len(first), len(second)))
+            return self._pair_by_pair
         h = np.broadcast_to(self._h, (*self._z.shape, self._h.shape[-1]))
-        return Restricted(h[self.sound], self._z[self.sound], self.white, self.kernels).on_grid(first, second)
+        return Restricted(h[self.sound], self._z[self.sound], self.white, self.kernels).on_grid
+
+    def _pair_by_pair(self, first: Array, second: Array) -> Array:
+        grid = [self.solve(pair).deviance for pair in product(first.tolist(), second.tolist())]
+        return np.reshape(grid, (len(first), len(second)))
 
     def best_shares(self) -> tuple[float, float]:
         """Shares of flicker and walk: their mean over the restricted likelihood; zero where the lot shows no wander.
@@ -135,16 +142,16 @@ class Series:
         A slow drift within one record may be either, and the likelihood is flat between the two: its peak jumps from one
         answer to the other, its mean does not.
         """
-        shares = np.array(_SHARES)
-        coarse = self.deviances(shares, shares)
+        shares, deviances = np.array(_SHARES), self._likelihood()
+        coarse = deviances(shares, shares)
         if coarse[0, 0] - coarse.min() < _CHARGE:
             return 0.0, 0.0
         rows, columns = np.nonzero(coarse - coarse.min() < _FAR)
         flicker, walk = (_around(shares[found]) for found in (rows, columns))
-        deviance = self.deviances(flicker**2, walk**2)
+        deviance = deviances(flicker**2, walk**2)
         rows, columns = np.nonzero(deviance - deviance.min() < _FAR)
         flicker, walk = _between(flicker[rows] ** 2), _between(walk[columns] ** 2)
-        deviance = self.deviances(flicker**2, walk**2)
+        deviance = deviances(flicker**2, walk**2)
         # half of the belief beforehand is that a kind of wander is not there at all
         belief = np.outer(*(np.where(one > 0.0, 1.0, _FINE - 1.0) for one in (flicker, walk)))
         weight = belief * np.exp(-0.5 * (deviance - deviance.min()))

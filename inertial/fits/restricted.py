@@ -1,13 +1,15 @@
 """Restricted likelihood of a lot's series under white noise and two kinds of wander, on a whole grid of strengths at once.
 
-For one share of the second kernel the covariance is B + s·K with B = W + t·K₂. With the vectors of K·x = λ·B·x every share s
-only weighs: the whitened products of all columns are Σ xᵢ·xⱼ/(1 + s·λ), one matrix product for all shares and blocks. What
-elimination leaves of the bordered matrix (H z)ᵀV⁻¹(H z) is ln|HᵀV⁻¹H| and the whitened sum of squares.
+The covariance is W + t·K₂ + s·K₁. Columns that all blocks have in common (the poses are those of the table) are taken out once,
+by contrasts R with R·H = 0 and R·W·Rᵀ = 1, turned so that R·K₂·Rᵀ = Λ: what is left of every block is smaller. For one
+share t the vectors of D·R·K₁·Rᵀ·D with D = (1 + t·Λ)^(−1/2) make all shares s diagonal: the whitened products of all
+columns are Σ xᵢ·xⱼ/(1 + s·λ), one matrix product for all shares and blocks. What elimination leaves of the bordered matrix
+(H z)ᵀV⁻¹(H z) is ln|HᵀV⁻¹H| and the whitened sum of squares.
 """
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import eigh
+from scipy.linalg import solve_triangular
 
 Array = NDArray[np.float64]
 
@@ -25,57 +27,89 @@ class Restricted:
     """
 
     def __init__(self, h: Array, z: Array, white: Array, kernels: tuple[Array, ...]) -> None:
+        common, own = _common(h)
+        root = np.linalg.cholesky(white)
+        turn, triangle = np.linalg.qr(_solved(root, common), mode="complete")
+        contrasts = _solved(root, turn[:, common.shape[-1] :], transposed=True).T
+        values, vectors = np.linalg.eigh(contrasts @ kernels[1] @ contrasts.T)
+        self._second, contrasts = np.maximum(values, 0.0), vectors.T @ contrasts
+        self._first = contrasts @ kernels[0] @ contrasts.T
+        # ln|V| + ln|HᵀV⁻¹H| = ln|R·V·Rᵀ| + a constant, with the columns H that are taken out
+        self._volume = 2.0 * float(_log_sizes(root) + _log_sizes(triangle))
+        self.blocks, self.n, p = h.shape
+        self.width = own.shape[-1] + 1
+        self._dof = self.blocks * (self.n - p)
         # what a plain fit explains is taken off first: the likelihood is the same, and its rounding that of the residuals
-        plain = np.matmul(np.linalg.pinv(h), z[..., None])
-        columns = np.concatenate([h, z[..., None] - np.matmul(h, plain)], axis=-1)
-        self.blocks, self.n, self.width = columns.shape
-        self._columns = np.moveaxis(columns, 0, 2)
-        self._white, self._first, self._second = white, *kernels
+        columns = np.concatenate([own, _left(h, z)[..., None]], axis=-1)
+        self._columns = (contrasts @ np.moveaxis(columns, 0, 2).reshape(self.n, -1)).reshape(
+            -1, self.width, self.blocks
+        )
         self._i, self._j = np.tril_indices(self.width)
 
     def on_grid(self, first: Array, second: Array) -> Array:
         """Restricted deviance, (k, l), for shares (k,) of the first kernel and (l,) of the second."""
-        bases = [self._basis(share) for share in second.tolist()]
-        weights = [1.0 / (1.0 + np.outer(first, values)) for values, _ in bases]
-        # VᵀBV = 1: ln|B| = −2 ln|det V|
-        volumes = [
-            -2.0 * np.linalg.slogdet(vectors)[1] - np.log(weight).sum(axis=1)
-            for (_, vectors), weight in zip(bases, weights, strict=True)
-        ]
+        shrink = 1.0 / np.sqrt(1.0 + np.outer(second, self._second))
+        values, vectors = np.linalg.eigh(shrink[:, :, None] * self._first * shrink[:, None, :])
+        spread = 1.0 + first[:, None] * np.maximum(values, 0.0)[:, None, :]
+        volumes = self._volume - 2.0 * np.log(shrink).sum(axis=1)[:, None] + np.log(spread).sum(axis=-1)
+        turns = np.swapaxes(vectors * shrink[:, :, None], -1, -2)
         squares, own = np.zeros((2, len(second), len(first)))
         for start in range(0, self.blocks, _PIECE):
             piece = np.ascontiguousarray(self._columns[..., start : start + _PIECE])
-            rows = [self._products(piece, vectors, w) for (_, vectors), w in zip(bases, weights, strict=True)]
-            pivots = self._pivots(np.stack(rows))
+            pivots = self._pivots([self._products(piece, *one) for one in zip(turns, 1.0 / spread, strict=True)])
             squares += pivots[-1].sum(axis=-1)
             own += np.log(pivots[:-1]).sum(axis=(0, -1))
-        dof = self.blocks * (self.n - self.width + 1)
-        return (dof * np.log(np.maximum(squares / dof, 1e-300)) + self.blocks * np.stack(volumes) + own).T
+        return (self._dof * np.log(np.maximum(squares / self._dof, 1e-300)) + self.blocks * volumes + own).T
 
-    def _basis(self, share: float) -> tuple[Array, Array]:
-        """λ (n,) and vectors (n, n) of K·x = λ·B·x at a share of the second kernel."""
-        values, vectors = eigh(self._first, self._white + share * self._second, check_finite=False)
-        return np.maximum(np.asarray(values, dtype=np.float64), 0.0), np.asarray(vectors, dtype=np.float64)
-
-    def _products(self, piece: Array, vectors: Array, weight: Array) -> Array:
-        """Products (k, pairs, b) of the columns (n, p + 1, b) of some blocks, weighted for every share."""
-        rotated = (vectors.T @ piece.reshape(self.n, -1)).reshape(piece.shape)
-        pairs = np.empty((self.n, len(self._i), piece.shape[-1]))
-        for column in range(
-            self.width
-        ):  # in the order of the lower triangle; picking pairs by index takes six times as long
+    def _products(self, piece: Array, turn: Array, weight: Array) -> Array:
+        """Products (k, pairs, b) of the columns (m, p + 1, b) of some blocks, weighted for every share."""
+        rotated = (turn @ piece.reshape(len(piece), -1)).reshape(piece.shape)
+        pairs = np.empty((len(piece), len(self._i), piece.shape[-1]))
+        # in the order of the lower triangle; picking pairs by index takes six times as long
+        for column in range(self.width):
             first = column * (column + 1) // 2
             own = pairs[:, first : first + column + 1]
             np.multiply(rotated[:, column : column + 1], rotated[:, : column + 1], out=own)
-        return (weight @ pairs.reshape(self.n, -1)).reshape(len(weight), len(self._i), -1)
+        return (weight @ pairs.reshape(len(piece), -1)).reshape(len(weight), len(self._i), -1)
 
-    def _pivots(self, products: Array) -> Array:
+    def _pivots(self, products: list[Array]) -> Array:
         """Pivots (p + 1, l, k, b) of Gaussian elimination of every bordered matrix, the measurements last."""
-        matrix = np.empty((self.width, self.width, *products.shape[:2], products.shape[-1]))
-        matrix[self._i, self._j] = np.moveaxis(products, 2, 0)
+        shape = (len(products), len(products[0]), products[0].shape[-1])
+        matrix = np.empty((self.width, self.width, *shape))
+        matrix[self._i, self._j] = np.moveaxis(np.stack(products), 2, 0)
         for column in range(self.width - 1):
             below = matrix[column + 1 :, column]
             ratio = below / matrix[column, column]
             for row in range(len(below)):
                 matrix[column + 1 + row, column + 1 : column + 2 + row] -= ratio[row] * below[: row + 1]
         return matrix[np.arange(self.width), np.arange(self.width)]
+
+
+def _common(h: Array) -> tuple[Array, Array]:
+    """Columns (n, c) that every block has, wherever they stand in it, and the others of each block, (b, n, p − c)."""
+    kept = np.ones((h.shape[0], h.shape[2]), dtype=bool)
+    found: list[Array] = []
+    blocks = np.arange(len(h))
+    for column in h[0].T:
+        same = np.all(h == column[:, None], axis=1) & kept
+        if same.any(axis=1).all():
+            kept[blocks, same.argmax(axis=1)] = False
+            found.append(column)
+    own = np.swapaxes(np.swapaxes(h, 1, 2)[kept].reshape(len(h), -1, h.shape[1]), 1, 2)
+    return np.stack(found, axis=1) if found else np.zeros((h.shape[1], 0)), own
+
+
+def _left(h: Array, z: Array) -> Array:
+    """What plain least squares leaves of the measurements, (b, n)."""
+    basis = np.linalg.qr(h)[0]
+    return z - np.matmul(basis, np.matmul(np.swapaxes(basis, -1, -2), z[..., None]))[..., 0]
+
+
+def _solved(root: Array, columns: Array, *, transposed: bool = False) -> Array:
+    """Columns with the lower triangular ``root`` (n, n), or its transpose, divided off from the left."""
+    return np.asarray(solve_triangular(root, columns, lower=True, trans=int(transposed)), dtype=np.float64)
+
+
+def _log_sizes(triangle: Array) -> float:
+    """Logarithm of the determinant of a triangular matrix, less its sign."""
+    return float(np.log(np.abs(np.diagonal(triangle))).sum())

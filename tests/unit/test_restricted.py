@@ -26,6 +26,28 @@ def test_the_grid_holds_the_deviance_of_the_fit_at_every_pair_of_shares(rng: np.
     np.testing.assert_allclose(own.deviances(first, second), one_by_one, rtol=0.0, atol=1e-6)
 
 
+def test_columns_that_all_blocks_have_are_taken_out_wherever_they_stand(rng: np.random.Generator) -> None:
+    n, time = 40, np.cumsum(rng.uniform(10.0, 40.0, 40))
+    poses, own = rng.normal(size=(n, 3)), rng.normal(size=(4, 3, n, 2))
+    turned = [np.column_stack([np.ones(n), np.roll(poses, -axis, axis=1)]) for axis in range(3)]
+    h = np.concatenate([own[..., :1], np.broadcast_to(np.stack(turned), (4, 3, n, 4)), own[..., 1:]], axis=-1)
+    z = 1e4 * h.sum(axis=-1) + np.cumsum(rng.normal(size=(4, 3, n)), axis=-1)
+    lot = Series(h, np.zeros((4, 3, n, 0)), z, rng.uniform(0.9, 1.1, n), wander_kernels(time))
+    shares = np.array([0.0, 0.4, 70.0])
+    one_by_one = np.array([[lot.solve((s, t)).deviance for t in shares] for s in shares])
+    np.testing.assert_allclose(lot.deviances(shares, shares), one_by_one, rtol=0.0, atol=1e-6)
+    alone = restricted.Restricted(h.reshape(-1, n, 6), z.reshape(-1, n), lot.white, lot.kernels)
+    assert alone.width == 3  # the two columns of its own, and the measurements
+
+
+def test_a_single_block_shares_all_its_columns_with_itself(rng: np.random.Generator) -> None:
+    own, shares = series(rng), np.array([0.0, 2.0])
+    own.sound[:] = False
+    own.sound[2, 1] = True
+    one_by_one = np.array([[own.solve((s, t)).deviance for t in shares] for s in shares])
+    np.testing.assert_allclose(own.deviances(shares, shares), one_by_one, rtol=0.0, atol=1e-6)
+
+
 def test_blocks_that_are_not_sound_take_no_part(rng: np.random.Generator) -> None:
     own = series(rng)
     own.sound[1, 2] = False
