@@ -5,10 +5,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from inertial.criticism.model import Model, Term
-from inertial.criticism.penalty import cost_of, freedom, log_p_value
+from inertial.criticism.penalty import cost_in, freedom, log_p_value
 from inertial.criticism.refinement import refine
 from inertial.criticism.search import Field, size_of
-from inertial.criticism.space import Candidate, Space
+from inertial.criticism.space import Space
 
 TOLD_APART = 15.0
 """Difference of penalised chi-square that parts two effects.
@@ -67,10 +67,9 @@ def class_of(field: Field, model: Model, term: Term) -> EffectClass:
     least = min(m.score for m in by_id.values())
     members = [Member(m.term, m.score - least) for m in by_id.values() if m.score < least + TOLD_APART]
     best_term = members[0].term
-    gain = space.gain(field.problem.candidate(best_term.effect, [best_term.keywords], first=best_term.first))
-    return EffectClass(
-        tuple(members), log_p_value(space, float(gain.drop[0]), int(gain.rank[0])), size_of(rest, best_term)
-    )
+    gain = space.gain(best_term.candidate(field.problem))
+    log_p = log_p_value(space, float(gain.drop[0]), int(gain.rank[0]))
+    return EffectClass(tuple(members), log_p, size_of(rest, best_term))
 
 
 def _scores(field: Field, rest: Model, space: Space, variance: float) -> list[tuple[float, Term]]:
@@ -91,12 +90,10 @@ def _scores(field: Field, rest: Model, space: Space, variance: float) -> list[tu
 
 
 def _score(field: Field, space: Space, variance: float, term: Term) -> float:
-    candidate: Candidate = field.problem.candidate(term.effect, [term.keywords], first=term.first)
-    gain = space.gain(candidate)
+    gain = space.gain(term.candidate(field.problem))
     return _penalised(field, term, float(gain.drop[0]), int(gain.rank[0]), variance)
 
 
 def _penalised(field: Field, term: Term, drop: float, rank: int, variance: float) -> float:
-    columns = max(1, round(rank / field.problem.blocks))
-    nonlinear = freedom(term)
-    return -drop / variance + cost_of(rank, columns, nonlinear)
+    """Penalised chi-square of a term beside the rest; the noise is the whole model's for every rival."""
+    return -drop / variance + cost_in(field.problem, rank, freedom(term))

@@ -13,7 +13,7 @@ from inertial.criticism.classes import EffectClass, class_of
 from inertial.criticism.drivers import Driver, Place, drivers_of, places
 from inertial.criticism.heldout import fit_rms, heldout_rms
 from inertial.criticism.model import Model, Term, refuse_without_freedom
-from inertial.criticism.penalty import cost_of_model, log_p_value
+from inertial.criticism.penalty import PER_COEFFICIENT, cost_of_model, log_p_value
 from inertial.criticism.problem import Lot, Problem
 from inertial.criticism.refinement import terms_of
 from inertial.criticism.search import (
@@ -240,12 +240,13 @@ def _beyond(part: "_Part", base: Model, found: Found, drivers: list[Driver]) -> 
 
 def _convincing(model: Model, driver: Driver, looks: int) -> bool:
     """Whether a driver is significant and large, the wander estimated with it inside: slow drivers and wander look alike."""
-    if _driver_size(model, driver) < UNEXPLAINED * model.floor():
+    if model.explained(driver.candidate, model.floor()) < UNEXPLAINED * model.floor():
         return False
     return _driver_log_p(model, driver) + np.log(looks) < np.log(NAMED_BELOW)
 
 
 def _driver_log_p(model: Model, driver: Driver) -> float:
+    """Logarithm of the probability that noise follows a driver as much, the share of wander estimated with it inside."""
     richer = model.with_curves(driver.candidate.columns[:, :, 0, :])
     space = model.at(richer.share)
     gain = space.gain(driver.candidate)
@@ -253,14 +254,6 @@ def _driver_log_p(model: Model, driver: Driver) -> float:
 
 
 def _worth(model: Model, driver: Driver) -> float:
+    """What a driver takes off, in chi-square, less the price of its coefficients."""
     gain = model.space.gain(driver.candidate)
-    return float(gain.drop[0]) / model.space.variance - 2.5 * float(gain.rank[0])
-
-
-def _driver_size(model: Model, driver: Driver) -> float:
-    """RMS, g, of what a driver explains beyond noise."""
-    gain = model.at(0.0).gain(driver.candidate)
-    error = model.problem.basis.error
-    white = float(np.mean(error[np.isfinite(error)] ** 2))
-    beyond = float(gain.drop[0]) * white - model.floor() ** 2 * float(gain.rank[0])
-    return float(np.sqrt(max(beyond, 0.0) / model.problem.count))
+    return float(gain.drop[0]) / model.space.variance - PER_COEFFICIENT * float(gain.rank[0])

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inertial.criticism.problem import Problem
-from inertial.criticism.space import Space, information
+from inertial.criticism.space import Candidate, Space, information
 from inertial.effects.base import AnyEffect
 from inertial.errors import NotIdentified
 
@@ -33,6 +33,10 @@ class Term:
     def keywords(self) -> dict[str, float | tuple[float, ...]]:
         """Values as keywords of the effect's columns."""
         return dict(self.values)
+
+    def candidate(self, problem: Problem) -> Candidate:
+        """The term's columns in a problem, as something that a model may gain by."""
+        return problem.candidate(self.effect, [self.keywords], first=self.first)
 
 
 class Model:
@@ -116,11 +120,15 @@ class Model:
     def floor(self) -> float:
         """RMS of the noise of a dwell mean, g: white and wander about the record's own mean."""
         basis, space = self.problem.basis, self.space
-        there = np.isfinite(basis.error)
-        white = float(np.mean(basis.error[there] ** 2))
         # the constant part of the wander goes into the bias of the run and is no error of the dwells against each other
         slow = space.share * basis.wander_about_mean
-        return float(np.sqrt(space.variance * white * (1.0 + slow)))
+        return float(np.sqrt(space.variance * basis.white * (1.0 + slow)))
+
+    def explained(self, candidate: Candidate, floor: float) -> float:
+        """RMS, g, of what a candidate explains that the model cannot absorb, less what noise of RMS ``floor`` would."""
+        gain = self.at(0.0).gain(candidate)
+        beyond = float(gain.drop[0]) * self.problem.basis.white - floor**2 * float(gain.rank[0])
+        return float(np.sqrt(max(beyond, 0.0) / self.problem.count))
 
     def _variant(
         self, terms: Sequence[Term], curves: Array | None = None, shared_curves: Array | None = None

@@ -57,6 +57,11 @@ class Basis:
         return weighted if self.turn is None else np.matmul(self.turn, weighted)
 
     @cached_property
+    def white(self) -> float:
+        """Mean variance of the white noise of the dwells that are there, g²."""
+        return float(np.mean(self.error[np.isfinite(self.error)] ** 2))
+
+    @cached_property
     def wander_about_mean(self) -> float:
         """Mean variance of the wander about the record's own mean, for share ρ = 1."""
         if self.turn is None:

@@ -4,6 +4,7 @@ import numpy as np
 from scipy import stats
 
 from inertial.criticism.model import Model, Term
+from inertial.criticism.problem import Problem
 from inertial.criticism.space import Space
 
 PER_COEFFICIENT = 2.5
@@ -14,6 +15,11 @@ PER_COLUMN = 6.0
 def cost_of(rank: int, columns: int, nonlinear: int) -> float:
     """Penalty of an effect, in chi-square."""
     return PER_COEFFICIENT * (rank + nonlinear) + PER_COLUMN * columns
+
+
+def cost_in(problem: Problem, rank: int, nonlinear: int) -> float:
+    """Penalty of an effect that the plan determines so many coefficients of, in chi-square."""
+    return cost_of(rank, max(1, round(rank / problem.blocks)), nonlinear)
 
 
 def log_p_value(space: Space, drop: float, rank: int) -> float:

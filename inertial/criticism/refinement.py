@@ -45,7 +45,7 @@ def _refine_one(space: Space, problem: Problem, term: Term, parameter: Nonlinear
 
 def _per_axis(space: Space, problem: Problem, term: Term, parameter: Nonlinear) -> Term:
     """The same for every axis by itself, where the axes differ by more than noise."""
-    common = float(space.gain(problem.candidate(term.effect, [term.keywords], first=term.first)).drop[0])
+    common = float(space.gain(term.candidate(problem)).drop[0])
     best: list[float] = []
     total = 0.0
     for axis in range(3):

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inertial.criticism.model import Model, Term
-from inertial.criticism.penalty import cost_of, cost_of_model, deviance, freedom, log_p_value
+from inertial.criticism.penalty import cost_in, cost_of_model, deviance, freedom, log_p_value
 from inertial.criticism.problem import Problem, grid_of
 from inertial.criticism.refinement import refine
 from inertial.criticism.space import Candidate, Gain, Space
@@ -149,13 +149,8 @@ def convincing(field: Field, model: Model, rival: Rival) -> bool:
 
 
 def size_of(model: Model, term: Term) -> float:
-    """RMS, in g, of what a term explains that the model cannot absorb, less what noise would."""
-    flat = model.at(0.0)
-    wanted = model.problem.candidate(term.effect, [term.keywords], first=term.first)
-    gain = flat.gain(wanted)
-    noise = model.with_term(term).floor() ** 2 * float(gain.rank[0])
-    white = float(np.mean(model.problem.basis.error[np.isfinite(model.problem.basis.error)] ** 2))
-    return float(np.sqrt(max(float(gain.drop[0]) * white - noise, 0.0) / model.problem.count))
+    """RMS, g, of what a term explains that the model cannot absorb, less what noise would."""
+    return model.explained(term.candidate(model.problem), model.with_term(term).floor())
 
 
 def _contest(field: Field, model: Model, barred: str = "", finalists: int = _FINALISTS) -> list[Rival]:
@@ -178,9 +173,9 @@ def _contest(field: Field, model: Model, barred: str = "", finalists: int = _FIN
 def _best_of(field: Field, space: Space, name: str, gain: Gain) -> tuple[int, float]:
     """Best grid value of a candidate, and its penalised deviance there."""
     place = int(np.argmax(gain.drop))
-    columns = max(1, round(gain.rank[place] / field.problem.blocks))
     nonlinear = len(field.grids[name][0]) if len(field.grids[name]) > 1 else 0
-    return place, deviance(space, float(gain.drop[place])) + cost_of(int(gain.rank[place]), columns, nonlinear)
+    cost = cost_in(field.problem, int(gain.rank[place]), nonlinear)
+    return place, deviance(space, float(gain.drop[place])) + cost
 
 
 def _exact(field: Field, model: Model, name: str, place: int, first: int | None) -> Rival:
@@ -195,11 +190,9 @@ def _exact(field: Field, model: Model, name: str, place: int, first: int | None)
 def judge(field: Field, model: Model, term: Term, share: float) -> Rival:
     """A term beside a model at a given share of wander."""
     space = model.at(share)
-    gain = space.gain(field.problem.candidate(term.effect, [term.keywords], first=term.first))
+    gain = space.gain(term.candidate(field.problem))
     drop, rank = float(gain.drop[0]), int(gain.rank[0])
-    columns = max(1, round(rank / field.problem.blocks))
-    nonlinear = freedom(term)
-    cost = deviance(space, drop) + cost_of(rank, columns, nonlinear)
+    cost = deviance(space, drop) + cost_in(field.problem, rank, freedom(term))
     return Rival(term, drop, rank, cost, log_p_value(space, drop, rank))
 
 
@@ -224,7 +217,7 @@ def _reexamine(field: Field, base: Model, model: Model, chosen: list[Term]) -> t
 def _taken_apart(field: Field, base: Model, model: Model, chosen: list[Term]) -> tuple[Model, list[Term]]:
     """Each effect of several columns once more against two simpler ones that together do what it does."""
     for term in tuple(chosen):
-        columns = field.problem.candidate(term.effect, [term.keywords], first=term.first).columns.shape[-1]
+        columns = term.candidate(field.problem).columns.shape[-1]
         if columns < 2 or term.effect.scope == "station":
             continue
         others = [t for t in chosen if t is not term]
