@@ -17,6 +17,7 @@ from inertial.changes import CHANGES, Change, Driver
 from inertial.effects import SensorEffect
 from inertial.effects.base import AnyEffect, excited
 from inertial.errors import MissingInput
+from inertial.sequences import Pace, Step, extended
 from inertial.signatures import signature, symbol
 from inertial.state import State
 
@@ -30,6 +31,7 @@ _VANISHED = 1e-6
 _BETTER = 1.5
 _ABSORBED = 0.05
 _ERROR = 1e-5
+_OFF_S = 600.0
 
 _COLUMNS = {
     "theta": "unit_C", "temperature": "unit_C", "temperature (unit_C)": "unit_C", "chamber": "chamber_C",
@@ -248,6 +250,17 @@ def _hiding(state: State, effect_id: str, base: Sequence[str], axis: int | None,
     return kept
 
 
+def begins_again(state: State, effect_id: str) -> bool:
+    """Whether an effect is another one after the devices were off for a while than if they had stayed on."""
+    one = _one(state)
+    step = Step(0.0, 0.0, 25.0)
+    off, on = (extended(one, [replace(step, off=seconds)], Pace(rest=_OFF_S - seconds)) for seconds in (_OFF_S, 0.0))
+    effect = catalogue.get(effect_id)
+    values = design.starting_values([effect], one).get(effect.id, {})
+    there = [_columns(of, effect, values, axis)[-1] for of in (off, on) for axis in range(3)]
+    return not np.allclose(np.concatenate(there[:3]), np.concatenate(there[3:]), rtol=1e-3, atol=1e-9)
+
+
 def drivers_of(state: State, effect: AnyEffect) -> set[Driver]:
     """What an effect answers to: quantities whose change changes its column, and the order of the dwells."""
     state = _one(state)
@@ -298,7 +311,10 @@ def _stirred(state: State) -> list[tuple[Driver, State]]:
     return made
 
 
-_ROWS = ("time", "temperature", "chamber", "outer", "inner", "supply", "vibration", "since_move", "since_power", "felt")
+_ROWS = (
+    "time", "temperature", "chamber", "outer", "inner", "supply", "vibration", "since_move", "since_power", "power_off",
+    "felt",
+)  # fmt: skip
 
 
 def _reordered(state: State) -> State:

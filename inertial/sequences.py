@@ -67,6 +67,7 @@ class Timeline:
     """When steps are taken, and what the devices are at then; times from the end of the dwells before.
 
     time : (k,), s, middle of each dwell; since_move : (k,), s, likewise
+    since_on : (k,), s since the devices were switched on again among the steps; infinite where they were not
     device, air : (k,), °C
     grid, grid_device : (m,), s and °C, all the way through
     end : s
@@ -74,6 +75,7 @@ class Timeline:
 
     time: Array
     since_move: Array
+    since_on: Array
     device: Array
     air: Array
     grid: Array
@@ -91,7 +93,8 @@ def timeline(steps: Sequence[Step], pace: Pace, start: Step | None, device: floa
     """
     there = start or replace(steps[0], temperature=device)
     follow = _Follow(there.temperature, device)
-    rows: list[tuple[float, float, float, float]] = []
+    rows: list[tuple[float, float, float, float, float]] = []
+    on = -math.inf
     for step in steps:
         turn = max(abs(step.outer - there.outer), abs(step.inner - there.inner))
         if step.temperature != there.temperature and step.soaked:
@@ -99,13 +102,14 @@ def timeline(steps: Sequence[Step], pace: Pace, start: Step | None, device: floa
         elif not step.soaked:
             follow.target = step.temperature
         follow.go_on(step.off, pace)
+        on = follow.now if step.off > 0.0 else on
         follow.go_on(pace.overhead_s + pace.move_s * math.sqrt(turn / (0.5 * np.pi)), pace)
         follow.go_on(step.wait + 0.5 * pace.dwell_s, pace)
-        rows.append((follow.now, step.wait + 0.5 * pace.dwell_s, follow.device, follow.air))
+        rows.append((follow.now, step.wait + 0.5 * pace.dwell_s, follow.now - on, follow.device, follow.air))
         follow.go_on(0.5 * pace.dwell_s, pace)
         there = step
-    time, since, devices, air = np.array(rows).T
-    return Timeline(time, since, devices, air, np.array(follow.times), np.array(follow.devices), follow.now)
+    time, since, since_on, devices, air = np.array(rows).T
+    return Timeline(time, since, since_on, devices, air, np.array(follow.times), np.array(follow.devices), follow.now)
 
 
 class _Follow:
@@ -140,7 +144,9 @@ class _Follow:
 def extended(state: State, steps: Sequence[Step], pace: Pace | None = None, *, response: Array | None = None) -> State:
     """A state with steps taken after its last dwell.
 
-    What the steps do not set (supply, vibration, other columns) is as it was, dwell for dwell from the beginning.
+    What the steps do not set (supply, vibration, other columns) is as it was, dwell for dwell from the beginning. Where the pace
+    says where the station stands, the steps begin when the history ends: what came after the last dwell took its time. Else they
+    come in between, and the history ends with the last dwell.
 
     Parameters
     ----------
@@ -160,8 +166,12 @@ def extended(state: State, steps: Sequence[Step], pace: Pace | None = None, *, r
     scale = float(np.mean(np.linalg.norm(state.force, axis=-1)))
     force = np.broadcast_to(scale * frames.force_from_angles(outer, inner), (*wide, 3))
     whole = np.concatenate([np.broadcast_to(state.force, (*batch, n_of(state), 3)), force], axis=-2)
-    begin = np.max(state.time) + pace.rest + 0.5 * pace.dwell_s
-    powered = None if state.since_power is None else _since_power(state.since_power, steps, pace.rest + ran.time)
+    history = state.history if pace.start is not None else _until(state.history, float(np.max(state.time)))
+    rest = max(pace.rest, 0.0 if history is None else float(history.time[-1] - np.max(state.time)) - 0.5 * pace.dwell_s)
+    passed = rest + 0.5 * pace.dwell_s + ran.time
+    begin = np.max(state.time) + rest + 0.5 * pace.dwell_s
+    powered = None if state.since_power is None else np.minimum(state.since_power[..., -1:] + passed, ran.since_on)
+    off = np.array([s.off for s in steps])
     return replace(
         state,
         force=whole,
@@ -170,13 +180,14 @@ def extended(state: State, steps: Sequence[Step], pace: Pace | None = None, *, r
         temperature=_joined_if(state.temperature, apart[..., None] + ran.device),
         chamber=_joined_if(state.chamber, np.broadcast_to(ran.air, wide)),
         since_power=_joined_if(state.since_power, powered),
+        power_off=_power_off(state, off, wide),
         since_move=_joined_if(state.since_move, np.broadcast_to(ran.since_move, wide)),
         supply=_again(state.supply, count),
         vibration=_again(state.vibration, count),
         outer=_joined_if(state.outer, np.broadcast_to(outer, wide)),
         inner=_joined_if(state.inner, np.broadcast_to(inner, wide)),
         covariates={name: _joined(values, _next(values, count)) for name, values in state.covariates.items()},
-        history=_history(state.history, begin + ran.grid, ran.grid_device + apart[..., None]),
+        history=_history(history, begin + ran.grid, ran.grid_device + apart[..., None]),
         memory={},
     )
 
@@ -203,16 +214,12 @@ def _felt(state: State, force: Array, response: Array | None) -> Array | None:
     return np.einsum("...ij,...nj->...ni", response, force)
 
 
-def _since_power(since: Array, steps: Sequence[Step], time: Array) -> Array:
-    """Seconds since power-on at each step, (..., k); a step with the power off before it begins anew."""
-    last = since[..., -1:]
-    found: list[Array] = []
-    on_again: float | None = None
-    for step, now in zip(steps, time, strict=True):
-        if step.off > 0.0:
-            on_again = float(now) - step.wait - 10.0
-        found.append(last + now if on_again is None else np.full_like(last, max(float(now) - on_again, 0.0)))
-    return np.concatenate(found, axis=-1)
+def _power_off(state: State, off: Array, wide: tuple[int, ...]) -> Array | None:
+    """Seconds without power before each dwell; None where the devices were never switched."""
+    if state.power_off is None and not np.any(off > 0.0):
+        return None
+    before = np.zeros(state.time.shape) if state.power_off is None else state.power_off
+    return _joined(before, np.broadcast_to(off, wide))
 
 
 def _history(history: History | None, time: Array, temperature: Array) -> History | None:
@@ -225,6 +232,14 @@ def _history(history: History | None, time: Array, temperature: Array) -> Histor
         np.concatenate([history.time, time[later]]),
         np.concatenate([history.temperature, more[..., later]], axis=-1),
     )
+
+
+def _until(history: History | None, end: float) -> History | None:
+    """What a history says until some time, or the first two readings of it."""
+    if history is None or history.time[-1] <= end:
+        return history
+    count = max(int(np.searchsorted(history.time, end, side="right")), 2)
+    return History(history.time[:count], history.temperature[..., :count])
 
 
 def _joined(values: Array, more: Array) -> Array:

@@ -37,6 +37,7 @@ class State:
     temperature : (..., n), °C, the sensor's own
     chamber : (..., n), °C
     since_power, since_move : (..., n), s
+    power_off : (..., n), s without power right before the dwell; 0 where the devices stayed on, None where nobody switched
     supply : (..., n), V
     vibration : (..., n), g rms
     outer, inner : (..., n), rad, table angles
@@ -51,6 +52,7 @@ class State:
     chamber: Array | None = None
     since_power: Array | None = None
     since_move: Array | None = None
+    power_off: Array | None = None
     supply: Array | None = None
     vibration: Array | None = None
     outer: Array | None = None

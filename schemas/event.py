@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import asdict, dataclass, field
 from typing import Any, Literal, Protocol
 
-Kind = Literal["reference", "soak", "suspended", "resumed", "spoilt", "unit_lost", "emergency_stop", "stopped"]
+Kind = Literal["reference", "soak", "suspended", "resumed", "spoilt", "unit_lost", "power", "emergency_stop", "stopped"]
 
 NO_RECORD = -1
 

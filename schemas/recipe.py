@@ -67,13 +67,15 @@ class SoakPart(Strict):
 
     ``poses`` and ``verification`` are numbers in the recipe's lists, from 1, in order of measurement; a pose may come again.
     Left out, all of the list are meant. ``waits_s`` are waits after the move, one for each of ``poses``, in place of the recipe's
-    ``settle_s``. With ``settled = false`` the dwells begin at once, while the devices still follow the chamber.
+    ``settle_s``. With ``settled = false`` the dwells begin at once, while the devices still follow the chamber. ``off_s`` are
+    seconds for which the devices are switched off before the move to each of ``poses``; 0 leaves them on.
     """
 
     temperature_C: FiniteFloat
     poses: list[Annotated[int, Field(ge=1)]] | None = None
     verification: list[Annotated[int, Field(ge=1)]] | None = None
     waits_s: list[NotNegative] | None = None
+    off_s: list[NotNegative] | None = None
     settled: bool = True
 
 
@@ -229,18 +231,25 @@ class Recipe(_Measurement):
                         f"soaks: soak {number} names {key} {beyond[0]}, there are {len(listed)}; correct the number"
                     )
                     raise ValueError(message)
-            if part.waits_s is not None and len(part.waits_s) != len(self.poses_at(number - 1)):
-                message = (
-                    f"soaks: soak {number} has {len(part.waits_s)} waits for {len(self.poses_at(number - 1))} poses, each pose "
-                    "needs one; correct waits_s"
-                )
-                raise ValueError(message)
+            for key, what in (("waits_s", "waits"), ("off_s", "times without power")):
+                given, count = getattr(part, key), len(self.poses_at(number - 1))
+                if given is not None and len(given) != count:
+                    message = (
+                        f"soaks: soak {number} has {len(given)} {what} for {count} poses, each pose needs one; "
+                        f"correct {key}"
+                    )
+                    raise ValueError(message)
         return self
 
     def waits_at(self, soak: int) -> list[float]:
         """Waits after the move to each of the poses of a soak, from 0, s."""
         waits = self.soaks[soak].waits_s if self.soaks else None
         return [self.settle_s] * len(self.poses_at(soak)) if waits is None else waits
+
+    def off_at(self, soak: int) -> list[float]:
+        """Seconds without power before the move to each of the poses of a soak, from 0."""
+        off = self.soaks[soak].off_s if self.soaks else None
+        return [0.0] * len(self.poses_at(soak)) if off is None else off
 
     def settles_at(self, soak: int) -> bool:
         """Whether the devices settle at a soak, from 0, before its dwells begin."""

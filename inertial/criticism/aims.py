@@ -12,6 +12,7 @@ from inertial.criticism.model import Model, Term
 from inertial.criticism.penalty import cost_of, freedom
 from inertial.criticism.problem import Lot, Problem
 from inertial.criticism.separation import Rivals, left_of, predictions, separations, smallest, widened
+from inertial.criticism.turn_on import with_turn_on
 from inertial.sequences import Pace, Step
 
 Array = NDArray[np.float64]
@@ -92,7 +93,8 @@ class Parting:
         rivals = self.rivals
         problem = widened(rivals, [*held, *grid], pace)
         truths = predictions(rivals, problem)
-        fits = [Fitting(problem, [*rivals.rest, wrong]) for wrong in rivals.terms]
+        rest = with_turn_on(problem.lot.state, rivals.rest)
+        fits = [Fitting(problem, [*rest, wrong]) for wrong in rivals.terms]
         n = problem.n - len(grid)
         error = _error(problem)[:, n:, None]
 
@@ -143,7 +145,8 @@ class Sighting:
         rivals = self.rivals
         problem = widened(rivals, steps, pace) if steps else Problem(rivals.lot, steep=rivals.steep)
         columns, sizes = _typical(problem, self.terms)
-        left = left_of(Model(problem, rivals.rest), problem.basis.rotate(columns), rivals.share)
+        rest = with_turn_on(problem.lot.state, rivals.rest)
+        left = left_of(Model(problem, rest), problem.basis.rotate(columns), rivals.share)
         per_column = left * rivals.weight / rivals.variance / problem.blocks
         return np.array([float(np.mean(part)) for part in np.split(per_column, np.cumsum(sizes)[:-1])])
 
@@ -152,7 +155,7 @@ class Sighting:
         rivals = self.rivals
         problem = widened(rivals, [*held, *grid], pace)
         columns, _ = _typical(problem, self.terms)
-        fit = Fitting(problem, rivals.rest)
+        fit = Fitting(problem, with_turn_on(problem.lot.state, rivals.rest))
         n = problem.n - len(grid)
         error = _error(problem)[:, n:, None]
 

@@ -59,7 +59,7 @@ def estimate(model: Model) -> Estimate:
 CONDITION = 1e-8
 """Directions of the scaled normal matrix below this are the jitter of the angles, not physics: they get no coefficient."""
 
-OWN = ("bias", "scale", "misalignment")
+OWN = ("bias", "scale", "misalignment", "turn_on_bias")
 """Effects that differ from unit to unit by far more than their errors: nothing is learnt from the others."""
 
 _FEW_UNITS = 4

@@ -24,6 +24,7 @@ from inertial.criticism.search import (
     anything,
     search,
 )
+from inertial.criticism.turn_on import with_turn_on
 from inertial.criticism.unknown import Suspect, better_curve, suspects
 from inertial.effects.base import AnyEffect
 from inertial.effects.covariate import COVARIATE_PREFIX, Covariate
@@ -108,7 +109,7 @@ def _examined(problem: Problem, effects: Sequence[str], rng: Generator) -> Diagn
     """The diagnosis under one kind of wander."""
     lot = problem.lot
     held = catalogue.get_all(effects)
-    base = Model(problem, terms_of(held, problem))
+    base = Model(problem, with_turn_on(lot.state, terms_of(held, problem)))
     refuse_without_freedom(base)
     candidates = [e for e in catalogue.catalogue().values() if e.id not in set(effects)]
     covariates = [Covariate(name) for name in lot.state.covariates if f"{COVARIATE_PREFIX}{name}" not in set(effects)]

@@ -1,7 +1,7 @@
 """What a station could do next: sequences of steps, of every kind that parts effects.
 
 Poses in new directions, at the temperatures of the run; waits of different length after a move; approaches from both sides;
-excursions of temperature up and down, soaked or read on the way; the same poses later.
+excursions of temperature up and down, soaked or read on the way; the same poses later; the devices switched off and on.
 """
 
 from collections.abc import Sequence
@@ -17,7 +17,7 @@ from inertial.sequences import Pace, Step, n_of, standing
 from inertial.state import T_REFERENCE, State
 
 Array = NDArray[np.float64]
-Kind = Literal["poses", "soaks", "waits", "approach", "excursion", "ramp", "later"]
+Kind = Literal["poses", "soaks", "waits", "approach", "excursion", "ramp", "later", "power"]
 
 _DETOUR = np.radians(20.0)
 _EXCURSION_K = 25.0
@@ -33,12 +33,14 @@ class Reach:
     outer, inner : rad, bounds of the table
     temperature : °C, bounds for further soaks; None where the temperature stays as it is
     settle : s, the usual wait after a move
+    power : whether it can switch the devices off and on
     """
 
     outer: tuple[float, float] = (-np.pi, np.pi)
     inner: tuple[float, float] = (-2.0 * np.pi, 2.0 * np.pi)
     temperature: tuple[float, float] | None = None
     settle: float = 2.0
+    power: bool = False
 
     def allows(self, step: Step) -> bool:
         """Whether a step lies within the bounds."""
@@ -126,6 +128,7 @@ def courses(state: State, reach: Reach, best: Sequence[Step], here: float) -> li
         *_waits(here),
         *_approaches(state, reach, here, chosen),
         *_laters(chosen),
+        *(_power_cycles(chosen) if reach.power and state.since_power is not None else ()),
     ]
     if reach.temperature is not None:
         found += [*_excursions(reach, here, chosen), *_ramps(reach, here, chosen)]
@@ -180,6 +183,18 @@ def _laters(chosen: Sequence[Step]) -> list[Course]:
     for wait, times in ((120.0, 3), (600.0, 1), (600.0, 3), (1800.0, 1), (1800.0, 2)):
         group = [replace(chosen[0], wait=wait), *chosen[1:], chosen[0]]
         found.append(Course("later", tuple(group * times)))
+    return found
+
+
+def _power_cycles(chosen: Sequence[Step]) -> list[Course]:
+    """A pose before and after the devices were off for a while, and again as they warm up, with another opposite to it."""
+    first, second = chosen[0], chosen[1]
+    found: list[Course] = []
+    for off, later in product((300.0, 600.0, 1800.0), ((), (60.0,), (60.0, 300.0), (60.0, 300.0, 900.0))):
+        before = [first, second, first, second]
+        after = [replace(first, off=off), second, first, second]
+        again = [step for wait in later for step in (replace(first, wait=wait), second, first, second)]
+        found.append(Course("power", (*before, *after, *again)))
     return found
 
 

@@ -154,7 +154,9 @@ class _Search:
         self.reach = around.reach or reach_of(self.state)
         self.pace = around.pace
         # dwells on the way shake everything that follows temperature: only for what answers to its rate
-        self.rated = any("rate" in drivers_of(self.state, t.effect) for t in aim.terms)
+        answers = [drivers_of(self.state, t.effect) for t in aim.terms]
+        self.rated = any("rate" in found for found in answers)
+        self.timed = any("since_power" in found for found in answers)
 
     def best(self) -> Proposal | None:
         """Courses one after the other, each the best beside those before it, until all is there or nothing more helps.
@@ -208,7 +210,7 @@ class _Search:
             further = self._picked(held, temperature)
             offers += [Course("soaks", tuple(further[:size])) for size in _SIZES]
         further = courses(self.state, self.reach, picks, here)
-        offers += [c for c in further if c.kind != "ramp" or self.rated]
+        offers += [c for c in further if (c.kind != "ramp" or self.rated) and (c.kind != "power" or self.timed)]
         return [c for c in offers if c.steps]
 
     def _picked(self, held: Sequence[Step], temperature: float) -> list[Step]:

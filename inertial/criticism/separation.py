@@ -15,6 +15,7 @@ from inertial.criticism.comparison import estimate
 from inertial.criticism.model import Model, Term
 from inertial.criticism.problem import Lot, Problem
 from inertial.criticism.space import Space
+from inertial.criticism.turn_on import with_turn_on
 from inertial.sequences import Pace, Step, extended
 
 Array = NDArray[np.float64]
@@ -96,16 +97,22 @@ def separations(rivals: Rivals, steps: Sequence[Step] = (), pace: Pace | None = 
     count = len(rivals.terms)
     left = np.zeros((count, count))
     for column, wrong in enumerate(rivals.terms):
-        near = [left_of(Model(problem, [*rivals.rest, t]), rotated, rivals.share) for t in _neighbours(problem, wrong)]
+        rest = with_turn_on(problem.lot.state, rivals.rest)
+        near = [left_of(Model(problem, [*rest, t]), rotated, rivals.share) for t in _neighbours(problem, wrong)]
         left[:, column] = np.min(near, axis=0)
     np.fill_diagonal(left, 0.0)
     return left * rivals.weight / rivals.variance
 
 
 def _neighbours(problem: Problem, term: Term) -> list[Term]:
-    """A rival as it was fitted, and with each nonlinear parameter a step to both sides: it will be fitted again."""
+    """A rival as it was fitted, and with each nonlinear parameter a step to both sides: it will be fitted again.
+
+    A choice that only the next measurement offers (whether ageing goes on without power) will be made as suits it best.
+    """
     found = [term]
     for parameter in term.effect.parameters(problem.lot.state):
+        if parameter.choices and parameter.name not in term.keywords:
+            found += [Term(term.effect, (*term.values, (parameter.name, c)), term.first) for c in parameter.choices]
         if parameter.choices or isinstance(value := term.keywords[parameter.name], tuple):
             continue
         for factor in (1.0 / _STEP, _STEP):

@@ -5,11 +5,17 @@ from typing import ClassVar
 import numpy as np
 
 from inertial.effects.base import Array, Nonlinear, SensorEffect, stack
+from inertial.power import running, switched
 from inertial.state import State
+
+GOES_ON, BEGINS_AGAIN = 0.0, 1.0
 
 
 class AgingLog(SensorEffect):
-    """Bias that drifts with the logarithm of the time since power-on."""
+    """Bias that drifts with the logarithm of the time since power-on.
+
+    Where the devices were switched off for a while within a run, it may have gone on without power, or have begun again.
+    """
 
     id: ClassVar[str] = "aging_log"
     symbol: ClassVar[str] = "kl"
@@ -21,9 +27,17 @@ class AgingLog(SensorEffect):
     simplicity: ClassVar[int] = 29
     nonlinear: ClassVar[tuple[Nonlinear, ...]] = (Nonlinear("tau", "s", 30.0, 36000.0, "log", 8),)
 
-    def columns(self, state: State, axis: int, *, tau: float, **nonlinear: float) -> Array:
+    def parameters(self, state: State) -> tuple[Nonlinear, ...]:
+        """What the time counts from, too, where that makes a difference."""
+        if not switched(state):
+            return self.nonlinear
+        return (*self.nonlinear, Nonlinear("clock", "", GOES_ON, BEGINS_AGAIN, choices=(GOES_ON, BEGINS_AGAIN)))
+
+    def columns(self, state: State, axis: int, *, tau: float, clock: float = GOES_ON, **nonlinear: float) -> Array:
         del axis, nonlinear
-        since = state.time - state.time[..., :1] if state.since_power is None else state.since_power
+        since = running(state)
+        if clock == BEGINS_AGAIN and state.since_power is not None:
+            since = state.since_power
         return stack(state, [np.log1p(since / tau)])
 
     def names(self, axis: int) -> tuple[str, ...]:

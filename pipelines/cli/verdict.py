@@ -182,7 +182,7 @@ def measurements_table(proposed: list[dict[str, Any]], out: Console | None = Non
             short(p["outer_deg"]),
             short(p["inner_deg"]),
             short(p["chamber_C"]) + ("" if p.get("soaked", True) else " (on the way)"),
-            short(p.get("wait_s")),
+            short(p.get("wait_s")) + (f" after {short(p['off_s'] / 60.0)} min off" if p.get("off_s") else ""),
             str(p.get("repeats", 1)),
             p["why"],
         ]

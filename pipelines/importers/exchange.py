@@ -28,7 +28,8 @@ KNOWN = (
     *FORCE,
     *ANGLES,
     *DEVIATIONS,
-    *("slot", "n", "duration_s", "unit_C", "chamber_C", "since_move_s", "since_power_s", "supply_V", "vibration_g"),
+    *("slot", "n", "duration_s", "unit_C", "chamber_C", "since_move_s", "since_power_s", "power_off_s"),
+    *("supply_V", "vibration_g"),
     *("kind", "pose", "soak", "record", "out_unit", "outer_command_deg", "inner_command_deg", "full_scale", "rate_hz"),
 )
 """Columns with a meaning; every other numeric column is a covariate."""

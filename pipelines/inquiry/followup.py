@@ -15,6 +15,7 @@ from pipelines.job import Job
 from pipelines.stages.capture import Step, steps
 from pipelines.stages.minutes import Standing, axis_seconds, lag_of, minutes
 from schemas.recipe import Pose, Recipe, SoakPart
+from stations.profile_files import profile_of
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -66,6 +67,7 @@ def circumstances(base: Job, last: Job, budget: float) -> Circumstances:
         inner=_radians(limits.inner_deg),
         temperature=(low, high) if high - low > VARIED_K else None,
         settle=recipe.settle_s,
+        power=profile_of(station.devices.reader).has("power"),
     )
     quarter = axis_seconds(QUARTER_DEG, limits.speed_deg_s, limits.acceleration_deg_s2)
     pace = Pace(
@@ -89,7 +91,8 @@ def station_minutes(wanted: Sequence[Wanted], base: Job, place: Place) -> float:
     for soak, part in enumerate(parts):
         settled = _settled(soak, part, place)
         plan += [
-            Step(len(plan) + k, "dwell", soak, s.temperature, pose_of(s), s.wait, settled) for k, s in enumerate(part)
+            Step(len(plan) + k, "dwell", soak, s.temperature, pose_of(s), s.wait, settled, s.off)
+            for k, s in enumerate(part)
         ]
     start = Standing(place.pose.outer_deg, place.pose.inner_deg, place.temperature, place.temperature)
     return minutes(plan, base.station, base.recipe, start).total
@@ -110,6 +113,7 @@ def follow_up(wanted: Sequence[Wanted], base: Job, last: Job, parents: Sequence[
             poses=[numbers[_key(s)] for s in part],
             verification=[],
             waits_s=[round(s.wait, 1) for s in part],
+            off_s=[round(s.off, 1) for s in part] if any(s.off > 0.0 for s in part) else None,
             settled=_settled(k, part, place),
         )
         for k, part in enumerate(_parts(wanted, place))

@@ -9,7 +9,7 @@ import numpy as np
 from inertial import frames
 from inertial.changes import Driver
 from inertial.criticism.menus import Kind
-from inertial.reasons import hiding, likeness, reason
+from inertial.reasons import begins_again, hiding, likeness, reason
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -27,6 +27,7 @@ VARIED: dict[Kind, tuple[Driver, ...]] = {
     "excursion": ("temperature",),
     "ramp": ("rate", "temperature"),
     "later": ("time", "since_power"),
+    "power": ("since_power",),
 }
 """What the steps of a kind vary: features of the plan that keep that as it is have hidden the difference."""
 
@@ -43,14 +44,14 @@ def why(state: State, base: Sequence[str], found: Proposal) -> str:
     rivals = " and ".join([", ".join(found.ids[:-1]), found.ids[-1]])
     hidden = _hidden(state, base, found.kinds, first, second)
     parted = f"χ² between {first} and its nearest rival goes from {found.before:.1f} to {found.after:.0f}"
-    return f"{rivals} fit alike: {hidden}. {what(found)} parts them ({parted}; {found.minutes:.1f} min)"
+    return f"{rivals} fit alike: {hidden}. {what(state, found)} parts them ({parted}; {found.minutes:.1f} min)"
 
 
 def shows(state: State, base: Sequence[str], found: Proposal) -> str:
     """One sentence: why effects were not seen so far, and what is measured to see them."""
     hidden = dict.fromkeys(r.split("; ")[0] for name in found.ids if (r := reason(state, name, base)))
     least = f"χ² of a coefficient of typical size: {found.before:.1f}, then {found.after:.0f} at least"
-    return f"{'; '.join(hidden)}. {what(found)} shows {', '.join(found.ids)} ({least}; {found.minutes:.1f} min)"
+    return f"{'; '.join(hidden)}. {what(state, found)} shows {', '.join(found.ids)} ({least}; {found.minutes:.1f} min)"
 
 
 def _hidden(state: State, base: Sequence[str], kinds: Sequence[Kind], first: str, second: str) -> str:
@@ -62,7 +63,7 @@ def _hidden(state: State, base: Sequence[str], kinds: Sequence[Kind], first: str
     return f"with {feature or 'what was measured'} {first} and {second} differ by less than the noise"
 
 
-def what(found: Proposal) -> str:
+def what(state: State, found: Proposal) -> str:
     """The steps in words."""
     words = {
         "poses": lambda: f"measuring {_directions(found.steps)}",
@@ -72,6 +73,7 @@ def what(found: Proposal) -> str:
         "excursion": lambda: f"going to {_temperatures(found.steps)} in this order",
         "ramp": lambda: f"reading while the temperature moves to {_temperatures(found.steps)}",
         "later": lambda: f"measuring the same poses again after {_waits(found.steps)}",
+        "power": lambda: f"switching the units off for {_off(found.steps)}: {_power(state, found.ids)}",
     }
     text = ", and ".join(words[kind]() for kind in found.kinds)
     return text[:1].upper() + text[1:]
@@ -94,3 +96,16 @@ def _waits(steps: Sequence[Step]) -> str:
     if len(long) == 1 or long[-1] < DRAWN_OUT_S:
         return f"{long[-1]} s"
     return f"{long[0]} to {long[-1]} s"
+
+
+def _off(steps: Sequence[Step]) -> str:
+    minutes = sorted({round(s.off / 60.0, 1) for s in steps if s.off > 0.0})
+    return " and ".join(f"{m:g}" for m in minutes) + " min"
+
+
+def _power(state: State, ids: Sequence[str]) -> str:
+    """Which of some effects begin again with the power, and which go on without it."""
+    again = [name for name in ids if begins_again(state, name)]
+    on = [name for name in ids if name not in again]
+    parts = [(again, "begins again", "begin again"), (on, "goes on", "go on")]
+    return ", ".join(f"{' and '.join(names)} {one if len(names) == 1 else many}" for names, one, many in parts if names)

@@ -85,6 +85,8 @@ def capture(
 def check(station: Station, recipe: Recipe, plan: list[Step]) -> None:
     """Refuses a recipe that the station may not do; nothing has moved then."""
     for step in plan:
+        if step.off_s > 0.0:
+            station.reader.require_switch()
         station.chamber.check(step.temperature)
         station.table.check(step.pose.outer_deg, step.pose.inner_deg)
     station.reader.check(recipe.rate_hz)
@@ -101,6 +103,7 @@ class _Work(Taking):
     def run(self, plan: list[Step]) -> None:
         """Every step that is not done; whatever the station ends the run with is noted, and leaves it safe."""
         done = self.sink.finished()
+        self.power.require_on()
         self.identify()
         try:
             self.guard.begin(self.lot.units)
@@ -124,6 +127,9 @@ class _Work(Taking):
                 if not settled:
                     self.soak(step, shortest)
                 settled = True
+                if step.off_s > 0.0:
+                    self.tell(step, f"{step.temperature:g} °C, devices off for {step.off_s / 60.0:g} min")
+                    self.power.cycle(step)
                 self.take(step)
             except Suspended as why:
                 spoilt += 1

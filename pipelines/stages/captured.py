@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from stations.devices.slot import Identity, Samples
 
 AXES = ("x", "y", "z")
+POWER_OFF = "power_off_s"
 STRAY_SIGMA = 20.0
 STRAY_PART = 1e-3  # of the full scale: what is less moves a mean of a hundred samples by no more than a part in 100 000
 FEWEST_TO_STRAY = 20
@@ -62,6 +63,7 @@ class Record:
     rate: float
     since_move: float = 0.0
     since_power: float = 0.0
+    power_off: float | None = None
     looks: list[NDArray[np.float64]] = field(default_factory=list)
     parts: dict[str, list[Samples]] = field(default_factory=dict)
     stored: dict[str, int] = field(default_factory=dict)
@@ -183,6 +185,7 @@ def readings_row(record: Record, unit: Unit, identity: Identity, status: str) ->
         **{name: seen[name] for name in ("chamber_C", "unit_C", "supply_V", "vibration_g")},
         "since_move_s": record.since_move,
         "since_power_s": record.since_power,
+        **({} if record.power_off is None else {POWER_OFF: record.power_off}),
         "start_s": record.start,
         "duration_s": record.duration,
         "rate_hz": record.rate,

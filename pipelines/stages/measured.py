@@ -150,6 +150,7 @@ def _state(table: _Table, force: Array, units: tuple[str, ...], history: pd.Data
         chamber=table.one("chamber_C"),
         since_power=table.one("since_power_s"),
         since_move=table.one("since_move_s"),
+        power_off=_power_off(table),
         supply=table.one("supply_V"),
         vibration=table.one("vibration_g"),
         outer=None if outer is None else np.radians(outer),
@@ -158,6 +159,16 @@ def _state(table: _Table, force: Array, units: tuple[str, ...], history: pd.Data
         covariates={n: v for n in covariates(table.frame) if (v := table.one(n)) is not None and np.ptp(v) > 0.0},
         history=_history(history, units, time) if history is not None and temperature is not None else None,
     )
+
+
+def _power_off(table: _Table) -> Array | None:
+    """Seconds without power before each dwell; None where no run switched its devices, or since when they have it is not known.
+
+    Runs that did not switch have no such column: beside one that did, their devices stayed on.
+    """
+    if "power_off_s" not in table.frame.columns or not table.has("since_power_s"):
+        return None
+    return np.nan_to_num(_filled(table.raw(("power_off_s",)))[..., 0], nan=0.0)
 
 
 def _history(history: pd.DataFrame, units: tuple[str, ...], time: Array) -> History | None:

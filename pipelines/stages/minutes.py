@@ -104,7 +104,7 @@ def itinerary(
             parts.append(("soak", waited, replace(reached, soak=step.soak)))
             now = parts[-1][2]
         wait = recipe.settle_s if step.wait_s is None else step.wait_s
-        going = move_seconds(now, step.pose, station) + wait + station.pace.record_s
+        going = step.off_s + move_seconds(now, step.pose, station) + wait + station.pace.record_s
         there = replace(_later(now, going, station), outer=step.pose.outer_deg, inner=step.pose.inner_deg)
         lasting = recipe.static_record_s if step.kind == "allan" else recipe.dwell_s
         parts.append(("move", going, there))

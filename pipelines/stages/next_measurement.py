@@ -89,6 +89,7 @@ def rows_of(found: Proposal) -> list[dict[str, Any]]:
             "why": about,
             "wait_s": round(step.wait, 1),
             "soaked": step.soaked,
+            **({"off_s": round(step.off, 1)} if step.off > 0.0 else {}),
         }
         if rows and {k: rows[-1][k] for k in row} == row:
             rows[-1]["repeats"] += 1

@@ -37,6 +37,8 @@ KEPT = (
         "out_unit",
     ),
 )
+WHERE_THERE = ("power_off_s",)
+"""Of runs that switch their devices off and on."""
 
 
 def reduce(
@@ -59,7 +61,8 @@ def reduce(
     nothing = [_means(pd.DataFrame(columns=["unit", "record", *AXES]))]
     means = pd.concat([frame for frame in kept if len(frame)] or kept[:1] or nothing, ignore_index=True)
     static = readings[readings["unit"].isin(accepted) & (readings["kind"] != "allan")]
-    columns = static[[*KEPT, "start_s"]].assign(time_s=static["start_s"] + 0.5 * static["duration_s"])
+    kept = [*KEPT, *(c for c in WHERE_THERE if c in static.columns)]
+    columns = static[[*kept, "start_s"]].assign(time_s=static["start_s"] + 0.5 * static["duration_s"])
     dwells = columns.drop(columns="start_s").merge(means, on=["unit", "record"], validate="one_to_one")
     dwells = dwells.assign(
         dwell=dwells["record"],

@@ -16,6 +16,7 @@ class Step:
     """One record to take: its number, what it is for, the soak that it belongs to, and the pose.
 
     wait_s : after the move; the recipe's where None
+    off_s : without power before the move
     settled : whether the devices settle at the soak's temperature first, or are read while they follow the chamber
     """
 
@@ -26,6 +27,7 @@ class Step:
     pose: Pose
     wait_s: float | None = None
     settled: bool = True
+    off_s: float = 0.0
 
 
 def steps(recipe: Recipe) -> list[Step]:
@@ -36,8 +38,8 @@ def steps(recipe: Recipe) -> list[Step]:
     found: list[Step] = []
     for soak, temperature in enumerate(recipe.temperatures_C):
         poses, waits, settled = recipe.poses_at(soak), recipe.waits_at(soak), recipe.settles_at(soak)
-        for pose, wait in zip(poses, waits, strict=True):
-            found.append(Step(len(found), "dwell", soak, temperature, pose, wait, settled))
+        for pose, wait, off in zip(poses, waits, recipe.off_at(soak), strict=True):
+            found.append(Step(len(found), "dwell", soak, temperature, pose, wait, settled, off))
         for pose in recipe.verification_at(soak):
             found.append(Step(len(found), "verification", soak, temperature, pose, settled=settled))
     if recipe.static_record_s > 0.0:

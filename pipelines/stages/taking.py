@@ -10,6 +10,7 @@ import pandas as pd
 
 from pipelines.stages.captured import History, Record, readings_row
 from pipelines.stages.guard import Guard, short_of_samples
+from pipelines.stages.power import Power
 from pipelines.stages.soundness import Soundness
 from schemas.errors import LinkLost, OperatorNeeded, StationError, StationTimeout
 from schemas.event import NO_RECORD
@@ -56,10 +57,13 @@ class Taking:
     lost: dict[str, str] = field(default_factory=dict)
     identities: dict[str, Identity] = field(default_factory=dict)
     soundness: Soundness = field(init=False)
+    power: Power = field(init=False)
     at: int = NO_RECORD
 
     def __post_init__(self) -> None:
-        """Data are judged by what the slots say of their units."""
+        """Data are judged by what the slots say of their units; the supply is switched where the recipe says so."""
+        switched = any(seconds > 0.0 for part in self.recipe.soaks for seconds in part.off_s or ())
+        self.power = Power(self.station, self.guard, switched)
         self.soundness = Soundness(self.station.reader, self.identities)
 
     def identify(self) -> None:
@@ -138,6 +142,7 @@ class Taking:
         record = Record(step.record, step.kind, step.pose, step.soak, station.clock.now(), duration, recipe.rate_hz)
         record.since_move = record.start + duration / 2.0 - station.table.still_since  # in the middle, as the mean is
         record.since_power = powered + duration / 2.0
+        record.power_off = self.power.off_before(step) if self.power.ordered else None
         for _ in self._spans(record):
             self.observe(step, record)
             self.empty(record)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 from schemas.errors import OperatorNeeded, StationRefused
 from stations.codec import named
@@ -131,6 +131,29 @@ class Reader:
     def since_power(self) -> float:
         """Seconds since the devices were powered."""
         return self._registers.number("since_power")
+
+    @property
+    def switches(self) -> bool:
+        """Whether the devices' supply can be switched from here."""
+        return self._registers.has("power")
+
+    def powered(self) -> bool:
+        """Whether the devices have their supply; those that nobody can switch always have."""
+        return not self.switches or self._registers.text("power") == "on"
+
+    def require_switch(self) -> None:
+        """Refuses to switch the devices where the reader cannot."""
+        if not self.switches:
+            message = (
+                f"{self._registers.name}: profile {self._registers.profile.name} has no register 'power', one is needed to "
+                "switch the devices off and on; take off_s out of the recipe's soaks, or name the register of the supply's relay"
+            )
+            raise StationRefused(message)
+
+    def switch(self, wanted: Literal["on", "off"]) -> None:
+        """Switches the supply of all devices: an absolute state, written once and read back; given twice it changes nothing."""
+        self.require_switch()
+        self._registers.set("power", wanted)
 
     def require_closed_door(self) -> None:
         """Stops the run while the chamber's door is open."""

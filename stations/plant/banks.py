@@ -47,6 +47,8 @@ def _reader(plant: Plant, profile: Profile, slots: int) -> Bank:
             if sampler.running:
                 raise Busy(profile.name)
             sampler.millihertz = round(1000.0 * number(values, "rate"))
+        if "power" in values:
+            plant.switch(on=values["power"] == 1)
         if "sampling" in values:
             if values["sampling"] == 1:
                 sampler.start(plant.now_us)
@@ -57,7 +59,8 @@ def _reader(plant: Plant, profile: Profile, slots: int) -> Bank:
         "slots": lambda: slots,
         "sampling": lambda: int(sampler.running),
         "rate": lambda: sampler.rate,
-        "since_power": lambda: plant.now,
+        "since_power": lambda: plant.since_power,
+        "power": lambda: int(plant.powered),
         "door": lambda: int(plant.fixture.chamber.door_open),
         "emergency_stop": lambda: int(plant.emergency_stop),
         "vibration": plant.vibration_reading,

@@ -86,10 +86,11 @@ def draw_truth(
 class Devices:
     """The units of a lot, computed together."""
 
-    def __init__(self, preset: Preset, truths: Sequence[Truth]) -> None:
+    def __init__(self, preset: Preset, truths: Sequence[Truth], turn_on: Sequence[np.random.Generator] = ()) -> None:
         self._preset = preset
+        self._turn_on = list(turn_on)  # a stream a unit, for what each switching on changes
         self._lsb = float(np.float32(preset.lsb))  # as the reader's register tells it
-        self._bias = np.stack([t.bias_g for t in truths])
+        self._bias = self._first_bias = np.stack([t.bias_g for t in truths])
         self._scale = np.stack([1.0 + 1e-6 * t.scale_ppm for t in truths])
         self._matrix = np.stack([t.misalignment for t in truths])
         self._bias_t = np.stack([t.bias_tempco for t in truths])
@@ -109,6 +110,12 @@ class Devices:
         bias = self._bias + theta * (self._bias_t + theta * self._bias_t2)
         scale = self._scale * (1.0 + theta * (self._scale_t + theta * self._scale_t2))
         return bias + scale * along
+
+    def switched_on(self) -> None:
+        """The devices come on again: the bias of none is quite where it was."""
+        if self._turn_on:
+            drawn = np.stack([rng.standard_normal(3) for rng in self._turn_on])
+            self._bias = self._first_bias + 1e-6 * self._preset.bias_stability_ug * drawn
 
     def supply(self, part: Array) -> None:
         """Supplies at ``part`` (s,) of what they were: ratiometric outputs follow, the bias of others moves."""

@@ -62,6 +62,10 @@ class HiddenEffect(Protocol):
         """The effect's memory (s, 3) after ``step`` seconds at ``temperature`` (s,) and ``force`` (s, 3)."""
         ...
 
+    def power(self, now: float, *, on: bool) -> None:
+        """The devices' supply is switched at ``now`` s; they have it when everything begins."""
+        ...
+
     def output(self, force: Array, block: Block) -> Array | float:
         """What is added to the outputs, (n, s, 3), g, under ``force`` (n, s, 3)."""
         ...
@@ -88,6 +92,9 @@ class Untouched:
     def slow(self, temperature: Array, force: Array, step: float) -> Array:
         """No memory."""
         return np.zeros_like(force)
+
+    def power(self, now: float, *, on: bool) -> None:
+        """It goes on as it did."""
 
     def output(self, force: Array, block: Block) -> Array | float:
         """Nothing is added."""
@@ -258,15 +265,42 @@ class VibrationRectification(Untouched):
 
 @dataclass
 class WarmUp(Untouched):
-    """The device heats itself after power-on and its bias goes along."""
+    """The device heats itself after power-on and its bias goes along; without power it cools as slowly as it warmed."""
 
-    size: float = 500e-6  # g at power-on
+    size: float = 500e-6  # g, of a device that is cold, beside one that is warm
     tau: float = 900.0  # s
+    _cold: float = field(
+        default=1.0, init=False
+    )  # part of the warmth that was missing when the supply was last switched
+    _switched: float = field(default=0.0, init=False)
+
+    def power(self, now: float, *, on: bool) -> None:
+        """How cold the device has become, or is still."""
+        kept = math.exp(-(now - self._switched) / self.tau)
+        self._cold = 1.0 - (1.0 - self._cold) * kept if on else self._cold * kept
+        self._switched = now
 
     def output(self, force: Array, block: Block) -> Array:
         """What is left of it."""
-        left = self.size * np.exp(-block.since_power / self.tau)
+        left = self.size * self._cold * np.exp(-block.since_power / self.tau)
         return np.broadcast_to(left[:, None, None], force.shape)
+
+
+@dataclass
+class StressRelaxation(Untouched):
+    """Stress of the assembly that lets go over barriers of every height, with power or without: times spread over decades."""
+
+    size: float = 100e-6  # g, let go in each factor of e of time
+    shortest: float = 300.0  # s
+    longest: float = 3e6
+
+    def output(self, force: Array, block: Block) -> Array:
+        """What has been let go since the run began."""
+        count = 1 + math.ceil(2.0 * math.log(self.longest / self.shortest))
+        times = np.geomspace(self.shortest, self.longest, count)
+        each = self.size * math.log(times[1] / times[0])
+        gone = each * np.sum(1.0 - np.exp(-block.time[:, None] / times), axis=1)
+        return np.broadcast_to(gone[:, None, None], force.shape)
 
 
 @dataclass
@@ -293,6 +327,7 @@ HIDDEN: Mapping[str, Callable[..., HiddenEffect]] = {
     "slot_rotation": SlotRotation,
     "vibration_rectification": VibrationRectification,
     "warm_up": WarmUp,
+    "stress_relaxation": StressRelaxation,
     "step_change": StepChange,
 }
 

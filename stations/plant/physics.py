@@ -56,6 +56,7 @@ class Physics:
             self._up = effect.up(self._up)
         self.dead_from = np.full(len(rotations), math.inf)
         self._held = devices.counts(np.zeros((1, len(rotations), 3)))[0]
+        self._on, self._on_since = True, 0.0
 
     def force(self, time: Array) -> Array:
         """True specific force on every unit, (n, s, 3) in g, without vibration."""
@@ -71,6 +72,15 @@ class Physics:
         """True specific force at one instant, (s, 3), g."""
         return self.force(np.array([time]))[0]
 
+    def power(self, *, on: bool, now: float) -> None:
+        """The devices lose their supply, or get it again."""
+        self._on = on
+        if on:
+            self._on_since = now
+            self.devices.switched_on()
+        for effect in self._hidden:
+            effect.power(now, on=on)
+
     def begin(self, start: float, rate: float) -> None:
         """Sampling starts at ``start`` s with ``rate`` Hz."""
         self._noise.jump(start - self._sampled_until)
@@ -85,8 +95,9 @@ class Physics:
         temperature = self._fixture.temperature.at(time)
         out = self.devices.output(felt, temperature)
         for effect, memory in zip(self._hidden, self._fixture.memory, strict=True):
-            out = out + effect.output(felt, Block(time, time, shaking, temperature, memory.at(time)))
+            out = out + effect.output(felt, Block(time, time - self._on_since, shaking, temperature, memory.at(time)))
         counts = self.devices.counts(out + self._noise.sample(len(time), rate))
+        counts = counts if self._on else np.zeros_like(counts)
         self._sampled_until = float(time[-1])
         return self._with_the_dead(counts, time)
 

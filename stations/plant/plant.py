@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import heapq
+import math
 import threading
 from functools import partial
 from typing import TYPE_CHECKING
@@ -54,6 +55,8 @@ class Plant:
         self.lock = threading.RLock()
         self.now_us = 0
         self.emergency_stop = False
+        self.powered = True
+        self._switched_us = 0  # when the devices' supply was last switched
         self.heard: set[int] = set()  # ids that were asked something since somebody last cleared this
         self.preset: Preset = load_preset(lot.device, sim.preset_overrides)
         self.serials = [unit.serial for unit in lot.units]
@@ -69,11 +72,12 @@ class Plant:
         self._sag = np.ones(len(self.slots))
         self._truths = self._draw_truths(sim, lot)
         noise = [stream(sim.seed, lot.seed, lot.repeat, serial, "noise") for serial in self.serials]
+        turn_on = [stream(sim.seed, lot.seed, lot.repeat, serial, "turn-on") for serial in self.serials]
         self.physics = Physics(
             (self.outer, self.inner),
             self.fixture,
             np.stack([t.slot_rotation for t in self._truths]),
-            Devices(self.preset, self._truths),
+            Devices(self.preset, self._truths, turn_on),
             Dynamics(self.preset),
             Noise(self.preset, noise),
             effects,
@@ -194,6 +198,18 @@ class Plant:
             return self._devices.slots.device_id + self.slots[self.serials.index(fault.serial)]
         return 0
 
+    def switch(self, *, on: bool) -> None:
+        """The supply of all devices, by the station's relay; the state that it is in already changes nothing."""
+        if on == self.powered:
+            return
+        self.powered, self._switched_us = on, self.now_us
+        self.physics.power(on=on, now=self.now)
+
+    @property
+    def since_power(self) -> float:
+        """Seconds since the devices were powered; 0 while they are off."""
+        return (self.now_us - self._switched_us) * 1e-6 if self.powered else 0.0
+
     def sag(self, units: Sequence[int], factor: float) -> None:
         """Supplies of some units at a part of what they were."""
         self._sag[list(units)] = factor
@@ -216,12 +232,15 @@ class Plant:
         raw = element + self.preset.thermometer_noise_K * self._noise(THERMOMETER, len(element))
         step = self.preset.thermometer_resolution_K
         told = self._by_slot(np.round(raw / step) * step, float(self.fixture.air.at(np.array([self.now]))[0]))
+        if not self.powered:
+            told = [math.nan if slot in self.slots else value for slot, value in enumerate(told)]
         return [self.frozen.get(slot, value) for slot, value in enumerate(told)]
 
     def supply_reading(self) -> list[float]:
         """Supply of the slots, V; nothing at empty ones."""
         noise = SUPPLY_NOISE * self._noise(SUPPLY, len(self.slots))
-        return self._by_slot(self.preset.supply_V * self._sag * (self._supply + noise), 0.0)
+        told = self.preset.supply_V * self._sag * (self._supply + noise)
+        return self._by_slot(told if self.powered else 0.0 * told, 0.0)
 
     def vibration_reading(self) -> float:
         """The fixture's vibration, g rms."""

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
     from schemas.safety import Suspenders
     from schemas.station import Soak
-    from stations.devices.reader import Instruments
+    from stations.devices.reader import Guarded, Instruments
 
 Condition = Literal["door", "vibration", "supply", "chamber", "device", "table", "samples", "link", "clock"]
 
@@ -40,7 +40,7 @@ class EmergencyStop(OperatorNeeded):
     """Somebody has pressed the emergency stop: nothing waits for its release."""
 
 
-def require_released(instruments: Instruments) -> None:
+def require_released(instruments: Instruments | Guarded) -> None:
     """Ends the run where the emergency stop is pressed."""
     if instruments.stop_pressed:
         message = "station: the emergency stop is pressed, released is needed; make sure that nobody is in danger, release it "

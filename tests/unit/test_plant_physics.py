@@ -170,6 +170,7 @@ def test_every_hidden_effect_moves_an_output_and_nothing_at_zero_size(kind):
         "cubic_transfer": "hardening", "pendulous_mass": "compliance", "hysteresis_play": "gain", "element_lag": "tempco",
         "creep": "size", "level_error": "about_x", "encoder_harmonic": "size", "slot_rotation": "size",
         "vibration_rectification": "coefficient", "warm_up": "size", "step_change": "size",
+        "stress_relaxation": "size",
     }[kind]  # fmt: skip
     zero = {size: 0.0} | ({"about_y": 0.0} if kind == "level_error" else {})
 

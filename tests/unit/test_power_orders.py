@@ -1,0 +1,181 @@
+"""The devices switched off and on by the station: physics of the plant, the register, the capture, and what the dwells say."""
+
+import math
+
+import numpy as np
+import pytest
+from small_station import QUIET, MemorySink, lot_of, plant_of, quiet_progress, short_recipe, station_of, write
+
+from pipelines.stages.capture import capture
+from pipelines.stages.guard import Guard
+from pipelines.stages.minutes import minutes
+from pipelines.stages.power import Power
+from pipelines.stages.steps import steps
+from schemas.errors import OperatorNeeded, StationRefused
+from schemas.event import MemoryLog
+from schemas.recipe import Recipe, SoakPart
+from stations.opening import make_plant, open_station, serve_plant
+from stations.plant.hidden import StressRelaxation, WarmUp
+
+READER = 10
+OFF_S = 600.0
+LSB_PER_G = 256000.0
+COLD = {**QUIET, "bias_stability_ug": 0.0}
+
+
+def recipe_with_power_off(off: tuple[float, ...] = (0.0, OFF_S, 0.0)) -> Recipe:
+    """The same pose three times, the devices off before some."""
+    plain = short_recipe(poses=1)
+    soak = SoakPart(temperature_C=25.0, poses=[1] * len(off), verification=[], off_s=list(off))
+    changed = {"soaks": [soak.model_dump()], "verification": [], "soak_min_s": 60.0, "allow_short_soak": True}
+    return Recipe.model_validate({**plain.model_dump(), **changed})
+
+
+def run(sink=None, events=None, recipe=None, hidden=(), **simulation):
+    config, lot = station_of(**{"preset_overrides": COLD, **simulation}), lot_of(2)
+    sink, events = sink or MemorySink(), events or MemoryLog()
+    with open_station(config, lot, resume=sink.last_state(), hidden=hidden) as station:
+        capture(station, recipe or recipe_with_power_off(), lot, sink, progress=quiet_progress, events=events)
+    return sink, events
+
+
+def biases(sink):
+    """Mean output of the first unit by record, (records, 3), g."""
+    samples = sink.all(0).query("unit == 'U000'")
+    return samples.groupby("record")[["x", "y", "z"]].mean().to_numpy() / LSB_PER_G
+
+
+def test_the_time_with_power_begins_again_and_the_readings_say_for_how_long_there_was_none():
+    sink, events = run()
+    readings = sink.all(1).drop_duplicates("record").set_index("record")
+    assert readings["power_off_s"].tolist() == [0.0, pytest.approx(OFF_S, abs=1.0), 0.0]
+    assert readings["since_power_s"][1] < 60.0 < readings["since_power_s"][0]
+    assert readings["since_power_s"][2] > readings["since_power_s"][1]
+    assert readings["start_s"][1] - readings["start_s"][0] > OFF_S
+    told = [(e.record, e.action) for e in events.noted() if e.kind == "power"]
+    assert told == [(1, "devices off"), (1, "devices on again")]
+
+
+def test_a_run_that_switches_nothing_says_nothing_of_it():
+    sink, _ = run(recipe=recipe_with_power_off((0.0, 0.0)))
+    assert "power_off_s" not in sink.all(1).columns
+
+
+def test_warm_up_begins_where_the_device_has_cooled_to():
+    size, tau = 4e-3, 500.0
+    sink, _ = run(hidden=[WarmUp(size=size, tau=tau)])
+    found = biases(sink)[:, 0]
+    middle = sink.all(1).drop_duplicates("record")["since_power_s"].to_numpy()
+    # warmth by a differential equation, stepped, not the closed form
+    warmth, at, seconds = 0.0, [], 0.01
+    stop = float(middle[0] + 1.0)
+    for target, until in ((1.0, stop), (0.0, OFF_S), (1.0, middle[1])):
+        for _ in range(round(until / seconds)):
+            warmth += (target - warmth) * seconds / tau
+        at.append(warmth)
+    expected = -size * (at[2] - (1.0 - math.exp(-middle[0] / tau)))
+    assert found[1] - found[0] == pytest.approx(expected, abs=3e-5)
+
+
+def test_stress_goes_on_letting_go_without_power():
+    truth = StressRelaxation(size=2e-3, shortest=100.0)
+    sink, _ = run(hidden=[truth])
+    first, second = sink.all(1).drop_duplicates("record")["start_s"].to_numpy()[:2] + 1.0
+    found = biases(sink)
+    assert (found[1] - found[0])[0] == pytest.approx(
+        2e-3 * (math.log1p(second / 100.0) - math.log1p(first / 100.0)), rel=0.2
+    )
+
+
+def test_the_bias_after_a_power_on_differs_by_what_the_preset_says():
+    repeats = 24
+    overrides = {**QUIET, "bias_stability_ug": 2000.0}
+    sink, _ = run(recipe=recipe_with_power_off((0.0, *[5.0] * repeats)), preset_overrides=overrides)
+    found = biases(sink)
+    jumps = found[1:] - found[0]
+    assert np.std(jumps) == pytest.approx(2e-3, rel=0.25)
+    plain, _ = run()
+    assert np.ptp(biases(plain), axis=0) == pytest.approx(0.0, abs=4e-5)
+
+
+def test_without_power_the_devices_tell_nothing_and_the_same_order_twice_is_one():
+    plant = plant_of(station_of(preset_overrides={**QUIET, "bias_stability_ug": 500.0}))
+    plant.advance(5_000_000)
+    for _ in range(2):
+        write(plant, READER, "power", "off")
+        plant.advance(1_000_000)
+    assert plant.since_power == 0.0
+    assert max(plant.supply_reading()) == 0.0
+    assert all(math.isnan(plant.temperature_reading()[slot]) for slot in plant.slots)
+    write(plant, READER, "power", "on")
+    bias = plant.physics.devices._bias.copy()
+    plant.advance(7_000_000)
+    write(plant, READER, "power", "on")
+    assert plant.since_power == pytest.approx(7.0)
+    assert np.array_equal(plant.physics.devices._bias, bias)
+
+
+def test_a_run_killed_after_a_power_order_comes_to_the_same_records():
+    whole, _ = run()
+    dying, events = MemorySink(die_after=1), MemoryLog()
+    with pytest.raises(KeyboardInterrupt):
+        run(sink=dying, events=events)
+    dying.die_after = 10**6
+    run(sink=dying, events=events)
+    for part in (0, 1):
+        assert whole.all(part).equals(dying.all(part))
+
+
+def test_devices_that_a_killed_run_left_without_power_are_switched_on_and_their_record_knows():
+    config, lot = station_of(preset_overrides=COLD), lot_of(2)
+    plant, events, step = make_plant(config, lot), MemoryLog(), steps(recipe_with_power_off())[1]
+    with serve_plant(config, lot, plant) as station:
+        guard = Guard(station, events)
+        guard.note("power", step.record, "the recipe asks for it", "devices off")
+        station.reader.switch("off")  # and the process is gone
+        plant.advance(90_000_000)
+        again = Power(station, Guard(station, events), ordered=True)
+        again.require_on()
+        assert station.reader.powered()
+        assert again.off_before(step) == pytest.approx(90.0, abs=1.0)
+        before = plant.now
+        again.cycle(step)
+        assert plant.now == before  # not twice for one record
+
+
+def test_the_emergency_stop_ends_the_wait_and_the_devices_have_their_power_again():
+    config, lot = station_of(preset_overrides=COLD, faults=[{"kind": "emergency_stop", "at_s": 300.0}]), lot_of(2)
+    plant, events = make_plant(config, lot), MemoryLog()
+    recipe = recipe_with_power_off((0.0, 3000.0))
+    with serve_plant(config, lot, plant) as station, pytest.raises(OperatorNeeded, match="emergency stop"):
+        capture(station, recipe, lot, MemorySink(), progress=quiet_progress, events=events)
+    assert plant.powered
+    assert plant.now < 330.0
+
+
+def test_a_reader_that_cannot_switch_refuses_before_anything_moves(monkeypatch):
+    config, lot = station_of(preset_overrides=COLD), lot_of(2)
+    with open_station(config, lot) as station:
+        registers = station.reader._registers
+        monkeypatch.setattr(registers, "has", lambda name: name != "power")
+        with pytest.raises(StationRefused, match="no register 'power', one is needed"):
+            capture(station, recipe_with_power_off(), lot, MemorySink(), progress=quiet_progress)
+        assert station.clock.now() < 1.0
+
+
+def test_the_time_without_power_is_in_the_minutes_of_the_recipe():
+    station = station_of()
+    long, short = (
+        minutes(steps(r), station, r).total for r in (recipe_with_power_off(), recipe_with_power_off((0.0, 0.0, 0.0)))
+    )
+    assert long - short == pytest.approx(OFF_S / 60.0, abs=0.02)
+
+
+def test_each_pose_needs_its_time_without_power():
+    with pytest.raises(ValueError, match="soak 1 has 1 times without power for 2 poses"):
+        Recipe.model_validate(
+            {
+                **short_recipe(poses=1).model_dump(),
+                "soaks": [{"temperature_C": 25.0, "poses": [1, 1], "verification": [], "off_s": [5.0]}],
+            }
+        )
