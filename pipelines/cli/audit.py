@@ -124,7 +124,7 @@ def _show(found: Audit, told: list[Finding], page: Path | None) -> None:
     for who, words in WHO.items():
         own = [finding for finding in told if finding.who == who]
         if own:
-            out.print(f"\n[bold]{words}[/]", soft_wrap=True)
+            out.print(f"\n{words}", style="bold", soft_wrap=True)
         for kind in dict.fromkeys(finding.kind for finding in own):
             _show_kind([finding for finding in own if finding.kind == kind])
     if not told:

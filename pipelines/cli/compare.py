@@ -41,12 +41,11 @@ def command(
     as_json: JsonOption = False,
 ) -> None:
     """Fit a model to dwells and tell its error there, on poses left out, and on a fresh run with the coefficients unchanged."""
-    from pipelines.cli.inputs import add_effect_files, both_runs
-    from pipelines.models import chosen_effects
+    from pipelines.cli.inputs import add_effect_files, both_runs, judged_effects
     from pipelines.stages.criticise import default_model
 
     add_effect_files(effect_file)
-    chosen = chosen_effects(effects, model, "compare")
+    chosen = judged_effects(dwells, archive, effects, model, "compare")
     tables = both_runs(dwells, history, fresh, fresh_history, archive)
     document = compared(chosen or default_model(tables[0]), *tables)
     if as_json:

@@ -207,7 +207,7 @@ class _Game:
         if self.asks:
             typer.prompt("\nEnter goes on", default="", show_default=False, prompt_suffix=" ")
         if not self.quiet:
-            console().print(f"\n[bold cyan]{title}[/bold cyan]")
+            console().print(f"\n{title}", style="bold cyan")
             if line:
                 console().print(f"  {line}", style="dim", markup=False, soft_wrap=True)
 

@@ -34,7 +34,9 @@ def command(
     effect_file: EffectFileOption = None,
     report: Annotated[
         Path | None,
-        typer.Option("--report", metavar="FILE.html", help="Write the diagnosis with pictures, as one HTML file."),
+        typer.Option(
+            "--report", "--page", metavar="FILE.html", help="Write the diagnosis with pictures, as one HTML file."
+        ),
     ] = None,
     archive: ArchiveOption = None,
     *,
@@ -44,11 +46,10 @@ def command(
 
     Exit status 0: the model is adequate. 1: it is not, or every unit has a data fault. 2: the input cannot be used.
     """
-    from pipelines.cli.inputs import add_effect_files, dwells_and_history
-    from pipelines.models import chosen_effects
+    from pipelines.cli.inputs import add_effect_files, dwells_and_history, judged_effects
 
     add_effect_files(effect_file)
-    judged = chosen_effects(effects, model, "diagnose")
+    judged = judged_effects(dwells, archive, effects, model, "diagnose")
     table, temperatures = dwells_and_history(dwells, history, archive)
     document, report_text = diagnosed(table, temperatures, judged, dwells, wanted=report is not None)
     if report is not None:

@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import math
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from pipelines.cli.options import STYLES, ArchiveOption, JsonOption, console, print_json, print_table, short
+
+if TYPE_CHECKING:
+    from rich.text import Text
 
 SHOWN = 12
 
@@ -58,9 +61,10 @@ def _print_flips(document: dict[str, Any]) -> None:
     print_table(["unit", "a", "b", "because"], lines, title=f"{len(flips)} of {len(document['units'])} units flip")
 
 
-def _styled(outcome: str, grade: str) -> str:
-    style = STYLES.get(outcome, "")
-    return f"[{style}]{outcome}[/] {grade}" if style else f"{outcome} {grade}".strip() or "not graded"
+def _styled(outcome: str, grade: str) -> Text:
+    from rich.text import Text
+
+    return Text.assemble((outcome, STYLES.get(outcome, "")), f" {grade}") if outcome else Text(grade or "not graded")
 
 
 def _reason(row: dict[str, Any]) -> str:

@@ -28,6 +28,27 @@ def dwells_and_history(source: str, history: str, archive: str | None) -> tuple[
     return dwells, read_history(source, archive=archive)
 
 
+def judged_effects(source: str, archive: str | None, listed: str, model: Path | None, where: str) -> list[str] | None:
+    """The model that a command judges: the one given, else a run's own; None where there is neither.
+
+    Parameters
+    ----------
+    listed : effects as they were named on the command line; empty where they were not
+    where : the command, for its messages
+    """
+    from pipelines.archive import Archive
+    from pipelines.importers.exchange import is_file
+    from pipelines.models import chosen_effects, use_formulas_of
+
+    chosen = chosen_effects(listed, model, where)
+    store = Archive(archive)
+    if chosen or is_file(source) or not store.runs():
+        return chosen
+    run = store.run(source)
+    use_formulas_of(run)
+    return list(run.about.get("recipe", {}).get("effects", ())) or None
+
+
 def _has_history(run: str, archive: str | None) -> bool:
     from pipelines.archive import Archive
 

@@ -158,7 +158,7 @@ def print_optimum(document: dict[str, Any]) -> None:
     out, minutes, textbook = console(), document["minutes"], document["textbook_minutes"]
     heat = ", ".join(f"{t:g}" for t in document["temperatures_C"])
     out.print(
-        f"[bold]{document['recipe']}[/bold]: {document['dwells']} dwells of {document['dwell_s']:g} s "
+        f"{document['recipe']}: {document['dwells']} dwells of {document['dwell_s']:g} s "
         f"in {document['poses']} poses, soaks at {heat} °C"
     )
     parts = [[name.replace("_", " "), f"{minutes[name]:.0f}", f"{textbook[name]:.0f}"] for name in minutes]

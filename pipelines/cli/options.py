@@ -17,6 +17,7 @@ if TYPE_CHECKING:
 
     import pandas as pd
     from rich.console import Console
+    from rich.text import Text
 
 ArchiveOption = Annotated[
     str | None,
@@ -43,7 +44,9 @@ DwellsArgument = Annotated[
 EffectsOption = Annotated[
     str,
     typer.Option(
-        "--effects", metavar="a,b,c", help="The model as a list of effects; a plain or thermal one by default."
+        "--effects",
+        metavar="a,b,c",
+        help="The model as a list of effects; by default the run's own, for a file a plain or thermal one.",
     ),
 ]
 ModelOption = Annotated[Path | None, typer.Option("--model", metavar="FILE", help="The model as a model file.")]
@@ -81,21 +84,24 @@ WorkersOption = Annotated[
     int | None, typer.Option("--workers", min=1, help="Processes on this machine; as many as it has cores by default.")
 ]
 
+NARROW = 16
+"""Characters that a column of words keeps where room is scarce."""
+
 STYLES = {"pass": "bold green", "fail": "bold red", "refused": "bold magenta"}
 
 
 def console() -> Console:
-    """Where results for people go."""
+    """Where results for people go; what stands in brackets or between colons is somebody's text, never markup."""
     from rich.console import Console
 
-    return Console(highlight=False)
+    return Console(highlight=False, markup=False, emoji=False)
 
 
 def error_console() -> Console:
     """Where progress and remarks go, so that standard output holds results only."""
     from rich.console import Console
 
-    return Console(stderr=True, highlight=False)
+    return Console(stderr=True, highlight=False, markup=False, emoji=False)
 
 
 def print_json(document: Any) -> None:
@@ -110,30 +116,45 @@ def rows(table: pd.DataFrame) -> list[dict[str, Any]]:
 
 def print_table(
     columns: Sequence[str],
-    lines: Sequence[Sequence[str]],
+    lines: Sequence[Sequence[str | Text]],
     title: str = "",
     *,
     whole: int = 1,
     out: Console | None = None,
 ) -> None:
-    """A table for people; numbers stand to the right, and the first ``whole`` columns are never broken."""
+    """A table for people; numbers stand to the right.
+
+    Neither they nor the first ``whole`` columns are ever broken or cut: a table that needs more than the terminal is wider.
+    """
     from rich import box
     from rich.table import Table
 
+    shown = out or console()
     table = Table(title=title or None, box=box.SIMPLE_HEAD, title_justify="left")
     for number, column in enumerate(columns):
-        numeric = all(_is_number(line[number]) for line in lines) and bool(lines)
-        widest = max((len(line[number]) for line in lines), default=0) if number == 0 else None
+        cells = [str(line[number]) for line in lines]
+        numeric = bool(cells) and all(_is_number(cell) for cell in cells)
+        kept = number < whole or numeric
+        least = _longest([column, *cells], None if kept else " ")
         table.add_column(
             column,
             justify="right" if numeric else "left",
             overflow="fold",
-            no_wrap=number < whole or numeric,
-            min_width=widest,
+            no_wrap=kept,
+            min_width=least if kept else min(least, NARROW),
         )
     for line in lines:
         table.add_row(*line)
-    (out or console()).print(table)
+    needed = sum((column.min_width or 0) + 3 for column in table.columns) + 1  # padding, dividers and edges
+    if needed > shown.width:
+        table.width = needed
+    shown.print(table, crop=False)
+
+
+def _longest(texts: Sequence[str], between: str | None) -> int:
+    """The longest line of texts, or the longest word where words are parted ``between``."""
+    pieces = (piece for text in texts for line in text.splitlines() for piece in line.split(between or "\n"))
+    return max(map(len, pieces), default=0)
 
 
 def _is_number(text: str) -> bool:

@@ -241,7 +241,7 @@ def _print(document: dict[str, Any]) -> None:
     minutes, error = document["minutes"], document["dwell_error_ug"]
     out = console()
     out.print(
-        f"[bold]{document['recipe']}[/bold] with {document['device']} on station {document['station']}: "
+        f"{document['recipe']} with {document['device']} on station {document['station']}: "
         f"{document['dwells']} dwells in {document['poses']} poses at {len(document['temperatures_C'])} soaks"
     )
     parts = " + ".join(f"{name.replace('_', ' ')} {minutes[name]:.0f}" for name in minutes if name != "total")

@@ -11,6 +11,7 @@ from schemas.errors import DONE, PART_FAILED
 
 if TYPE_CHECKING:
     import pandas as pd
+    from rich.text import Text
 
     from pipelines.archive import Run
 
@@ -69,11 +70,13 @@ def exit_status(document: dict[str, Any]) -> int:
 
 def print_summary(document: dict[str, Any]) -> None:
     """The result for people."""
-    lines = []
+    from rich.text import Text
+
+    lines: list[list[str | Text]] = []
     for unit in document["units"]:
         values = [short(unit["figures"].get(name, {}).get("value")) for name, _ in SHOWN]
-        style = STYLES[unit["outcome"]]
-        lines.append([str(unit["slot"]), unit["unit"], f"[{style}]{unit['outcome']}[/]", unit["grade"], *values])
+        outcome = Text(unit["outcome"], style=STYLES[unit["outcome"]])
+        lines.append([str(unit["slot"]), unit["unit"], outcome, unit["grade"], *values])
     print_table(["slot", "unit", "result", "grade", *(title for _, title in SHOWN)], lines)
     out = console()
     out.print(LEGEND, style="dim")

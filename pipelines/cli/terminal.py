@@ -29,7 +29,7 @@ class Terminal:
         """Enter goes on, ``stop`` stops."""
         with self._quiet():
             out = error_console()
-            out.print(f"\n[bold]{TITLES[prompt.kind]}[/bold]  ", end="")
+            out.print(f"\n{TITLES[prompt.kind]}  ", style="bold", end="")
             out.print(f"{prompt.text}.", markup=False, soft_wrap=True)
             for slot, serial in prompt.slots:
                 out.print(f"  slot {slot:>2}  {serial}", markup=False)
