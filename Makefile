@@ -8,14 +8,17 @@ export OPENBLAS_NUM_THREADS ?= 1
 export PREFECT_SERVER_ANALYTICS_ENABLED = false
 export DO_NOT_TRACK = 1
 
-.PHONY: run test check lint types layers pytest test-slow debian clean locks bench
+.PHONY: run test help check lint types layers pytest test-slow debian clean locks bench
 
 run: $(VENV)/.run  ## set up and run the main job on the simulated station
 	$(BIN)/tumbleline run || [ $$? -eq 1 ]  # 1: the run is done and a unit missed its limits, which is a result
 
 test: check pytest  ## set up, lint, types, layers and tests
 
-check: lint types layers
+help:  ## what can be made
+	@sed -n 's/^\([a-z-]*\):.*  ## /\1\t/p' $(MAKEFILE_LIST) | expand -t 12
+
+check: lint types layers  ## what needs no test to be run
 
 lint: $(VENV)/.dev
 	$(BIN)/ruff check .
@@ -73,5 +76,5 @@ locks:  ## resolve the locks anew (needs uv)
 	uv pip compile pyproject.toml --extra build --extra dev --extra bench --python-version 3.11 --generate-hashes --no-strip-extras --no-emit-index-url --no-annotate --no-header -o requirements-bench.lock
 	echo 'roc-validator>=0.13' | uv pip compile - --python-version 3.11 --generate-hashes --no-strip-extras --no-emit-index-url --no-annotate --no-header -o requirements-crate.lock
 
-clean:
-	rm -rf $(VENV) archive build dist *.egg-info
+clean:  ## take away what was made here, but no archive: it holds measurements
+	rm -rf $(VENV) build dist *.egg-info .hypothesis .ruff_cache .import_linter_cache
