@@ -143,7 +143,7 @@ def _inquired(
     with shown() as (progress, told, quiet):
         table: Table = Table(directly, consent(quiet), progress, told, _tell)
         if direct:
-            return play(request.job(), archive, terms, table)
+            return play(request.job(archive), archive, terms, table)
         from pipelines.flows.investigate_locally import investigate_locally
 
         return investigate_locally(request, archive, terms, table, ask=paused)

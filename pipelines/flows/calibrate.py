@@ -97,16 +97,28 @@ def calibrate_lot(  # noqa: PLR0913 - a flow's parameters are its form on the se
     Without ``repeat`` every flow run measures the lot anew, and a retry of the same flow run goes on where it was. With
     ``prompts`` the flow run pauses for the operator: to load, to put right what is wrong, to unload.
     """
-    anew = int(str(flow_run.id).replace("-", "")[:7], 16) if repeat is None else repeat
     progress, told, operator = _listeners[-1] if _listeners else (silent, lambda _done: None, None)
-    where = Path(station) if station else None
-    request = Request(recipe, where, tuple(units or ()), tuple(slots or ()), seed, anew, tuple(faults or ()))
-    job = request.job(Archive(archive))
+    job = requested(recipe, station, units, slots, seed, repeat, faults).job(Archive(archive))
     runner = Runner(job, Archive(archive), progress)
     told(_capture(runner, operator or (Paused() if prompts else None)))
     for name in ORDER[1:]:
         told(stage(name, runner))
     return runner.run.id
+
+
+def requested(
+    recipe: str,
+    station: str | None,
+    units: list[str] | None,
+    slots: list[int] | None,
+    seed: int | None,
+    repeat: int | None,
+    faults: list[str] | None,
+) -> Request:
+    """What a flow run's parameters ask for; without ``repeat`` a count of its own, the same when it is tried again."""
+    anew = int(str(flow_run.id).replace("-", "")[:7], 16) if repeat is None else repeat
+    where = Path(station) if station else None
+    return Request(recipe, where, tuple(units or ()), tuple(slots or ()), seed, anew, tuple(faults or ()))
 
 
 def _capture(runner: Runner, operator: Operator | None) -> Done:

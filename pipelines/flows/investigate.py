@@ -8,17 +8,14 @@ from __future__ import annotations
 
 from contextlib import contextmanager
 from dataclasses import dataclass
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from prefect import flow
-from prefect.runtime import flow_run
 
 from pipelines.archive import Archive
-from pipelines.flows.calibrate import stage
+from pipelines.flows.calibrate import requested, stage
 from pipelines.flows.operator import Paused
 from pipelines.inquiry.play import Consent, Table, Terms, always, play
-from pipelines.job import Request
 from pipelines.operator import Prompt
 
 if TYPE_CHECKING:
@@ -80,9 +77,7 @@ def investigate(  # noqa: PLR0913 - a flow's parameters are its form on the serv
     Without ``repeat`` every flow run measures the lot anew, and a retry of the same flow run goes on where it was. With ``ask``
     the flow run pauses before every follow-up until somebody approves its minutes.
     """
-    anew = int(str(flow_run.id).replace("-", "")[:7], 16) if repeat is None else repeat
-    where = Path(station) if station else None
-    job = Request(recipe, where, tuple(units or ()), tuple(slots or ()), seed, anew, tuple(faults or ())).job()
+    job = requested(recipe, station, units, slots, seed, repeat, faults).job(Archive(archive))
     table = _tables[-1] if _tables else Table()
     approve = Asked(Paused()) if ask else (table.approve if _tables else always)
     at = Table(_stage, approve, table.progress, table.told, table.looked)

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 def investigate_locally(request: Request, archive: Archive, terms: Terms, table: Table, *, ask: bool) -> dict[str, Any]:
     """The document of the inquiry that the flow makes, on the server named by PREFECT_API_URL or on one of our own."""
     archive.prepare()
-    job = request.job()
+    job = request.job(archive)
     name = f"investigate {job.recipe.name} {job.capture_id}"
     with reached(archive):
         from pipelines.flows.calibrate import close_dead_runs, settle_history
