@@ -47,14 +47,16 @@ def starting_values(effects: Sequence[AnyEffect], state: State) -> dict[str, dic
 
 def local_columns(effects: Sequence[SensorEffect], state: State, values: Values) -> Array:
     """Columns of the sensor's effects, (..., 3, n, p), g per unit of the coefficient; p counts the same on every axis."""
-    axes = [_joined([e.columns(state, axis, **on_axis(values, e.id, axis)) for e in effects]) for axis in range(3)]
-    return np.stack(np.broadcast_arrays(*axes), axis=-3)
-
-
-def _joined(columns: Sequence[Array]) -> Array:
-    """Columns (..., n, p) side by side, those that all units share repeated where others differ from unit to unit."""
-    shape = np.broadcast_shapes(*(c.shape[:-1] for c in columns))
-    return np.concatenate([np.broadcast_to(c, (*shape, c.shape[-1])) for c in columns], axis=-1)
+    axes = [[e.columns(state, axis, **on_axis(values, e.id, axis)) for e in effects] for axis in range(3)]
+    # columns that all units share are repeated where others differ from unit to unit
+    *batch, n = np.broadcast_shapes(*{c.shape[:-1] for columns in axes for c in columns})
+    found = np.empty((*batch, 3, n, sum(c.shape[-1] for c in axes[0])))
+    for axis, columns in enumerate(axes):
+        start = 0
+        for own in columns:
+            found[..., axis, :, start : start + own.shape[-1]] = own
+            start += own.shape[-1]
+    return found
 
 
 def shared_columns(effects: Sequence[StationEffect], state: State, values: Values, response: Array) -> Array:

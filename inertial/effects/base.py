@@ -164,4 +164,7 @@ def others(axis: int) -> tuple[int, int]:
 def stack(state: State, columns: Sequence[Array]) -> Array:
     """Columns of shape (..., n) as one array (..., n, p), broadcast against the state's force and one another."""
     shape = np.broadcast_shapes(state.force.shape[:-1], *(c.shape for c in columns))
-    return np.stack([np.broadcast_to(c, shape) for c in columns], axis=-1)
+    found = np.empty((*shape, len(columns)))
+    for place, column in enumerate(columns):
+        found[..., place] = column
+    return found

@@ -28,14 +28,14 @@ class Restricted:
 
     def __init__(self, h: Array, z: Array, white: Array, kernels: tuple[Array, ...]) -> None:
         common, own = _common(h)
-        root = np.linalg.cholesky(white)
+        root: Array = np.linalg.cholesky(white).astype(np.float64)
         turn, triangle = np.linalg.qr(_solved(root, common), mode="complete")
         contrasts = _solved(root, turn[:, common.shape[-1] :], transposed=True).T
         values, vectors = np.linalg.eigh(contrasts @ kernels[1] @ contrasts.T)
         self._second, contrasts = np.maximum(values, 0.0), vectors.T @ contrasts
         self._first = contrasts @ kernels[0] @ contrasts.T
         # ln|V| + ln|HᵀV⁻¹H| = ln|R·V·Rᵀ| + a constant, with the columns H that are taken out
-        self._volume = 2.0 * float(_log_sizes(root) + _log_sizes(triangle))
+        self._volume = 2.0 * (_log_sizes(root) + _log_sizes(triangle.astype(np.float64)))
         self.blocks, self.n, p = h.shape
         self.width = own.shape[-1] + 1
         self._dof = self.blocks * (self.n - p)

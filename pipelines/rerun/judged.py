@@ -17,6 +17,7 @@ from pipelines.stages.arrays import lot_arrays
 from pipelines.stages.calibration import Calibration, read_calibration
 from pipelines.stages.fit import fit
 from pipelines.stages.grade import Evidence, grade
+from pipelines.stages.unit_rows import ByUnit
 from pipelines.stages.verify import verify
 from schemas.errors import DataRejected, TumblelineError
 
@@ -116,13 +117,14 @@ def _both(run: Run, wanted: Wanted) -> tuple[Side, Side]:
 
 
 def _side(tables: Mapping[str, pd.DataFrame]) -> Side:
-    grades = tables["grades"]
-    units = grades["unit"].astype(str)
+    units, outcome, grades, reasons = (
+        tables["grades"][name].tolist() for name in ("unit", "outcome", "grade", "reasons")
+    )
     coefficients = tables["coefficients"]
     return Side(
-        outcome=dict(zip(units, grades["outcome"].astype(str), strict=True)),
-        grade=dict(zip(units, grades["grade"].astype(str), strict=True)),
-        reasons=dict(zip(units, grades["reasons"].astype(str), strict=True)),
+        outcome=dict(zip(units, outcome, strict=True)),
+        grade=dict(zip(units, grades, strict=True)),
+        reasons=dict(zip(units, reasons, strict=True)),
         fitted=_sums(tables["residuals"], "residual_ug"),
         verified=_sums(tables["verification"], "error_ug"),
         calibration=read_calibration(coefficients, tables["covariance"]) if len(coefficients) else None,
@@ -130,8 +132,9 @@ def _side(tables: Mapping[str, pd.DataFrame]) -> Side:
 
 
 def _sums(table: pd.DataFrame, column: str) -> Sums:
-    squares = table.assign(square=table[column] ** 2).groupby("unit", sort=False)["square"]
-    return {str(unit): (float(values.sum()), len(values)) for unit, values in squares}
+    rows = ByUnit(table)
+    errors = ((unit, rows.of(unit)[column]) for unit in rows.units)
+    return {unit: (float(np.sum(own**2)), len(own)) for unit, own in errors}
 
 
 def fresh(tasks: Sequence[FreshTask]) -> list[Fresh]:

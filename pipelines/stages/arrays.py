@@ -11,11 +11,14 @@ from inertial.state import History, State
 from schemas.errors import DataRejected
 
 if TYPE_CHECKING:
+    from collections.abc import Collection
+
     import pandas as pd
     from numpy.typing import NDArray
 
 AXES = ("x", "y", "z")
 HISTORY_POINTS = 4000
+FEWEST_POINTS = 2
 
 
 @dataclass(frozen=True)
@@ -40,89 +43,118 @@ class LotArrays:
         return np.asarray(self.kinds == kind)
 
 
-def lot_arrays(dwells: pd.DataFrame, history: pd.DataFrame | None = None) -> LotArrays:
+def lot_arrays(
+    dwells: pd.DataFrame, history: pd.DataFrame | None = None, kinds: Collection[str] | None = None
+) -> LotArrays:
     """The dwells of a lot as arrays, for units that were all measured in the same dwells.
 
     Parameters
     ----------
     dwells : of all kinds, so that what an effect remembers of the dwell before is there
     history : temperatures between the dwells
+    kinds : of the dwells that are wanted; all where None
 
     Raises
     ------
     DataRejected
         A unit lacks a dwell that others have, or units differ in the unit of their output.
     """
-    ordered = dwells.sort_values(["unit", "dwell"])
-    units = tuple(str(unit) for unit in ordered["unit"].unique())
-    numbers = np.unique(ordered["dwell"].to_numpy())
-    if not units or len(ordered) != len(units) * len(numbers):
+    rows = _Rows(dwells, kinds)
+    units, numbers = rows.units, np.unique(rows.dwell)
+    if not units or len(rows.dwell) != len(units) * len(numbers):
         message = (
-            f"dwells: {len(ordered)} rows for {len(units)} units and {len(numbers)} dwells, every unit needs every dwell; "
+            f"dwells: {len(rows.dwell)} rows for {len(units)} units and {len(numbers)} dwells, every unit needs every dwell; "
             "remove the units that lack some, or measure them again"
         )
         raise DataRejected(message)
-    out_units = sorted(ordered["out_unit"].unique())
+    out_units = sorted(set(rows.texts("out_unit")))
     if len(out_units) != 1:
         message = f"dwells: outputs in {' and '.join(out_units)}, one lot has one unit; split the lot by device"
         raise DataRejected(message)
-    first = ordered.iloc[: len(numbers)]
     return LotArrays(
         units=units,
         dwells=numbers,
-        poses=tuple(first["pose"].astype(str)),
-        kinds=first["kind"].to_numpy(dtype=np.str_),
-        state=_state(ordered, units, history),
-        output=_grid(ordered, [f"out_{axis}" for axis in AXES], len(units)),
-        standard_error=_standard_error(ordered, len(units)),
+        poses=tuple(rows.texts("pose", len(numbers))),
+        kinds=np.asarray(rows.texts("kind", len(numbers)), dtype=np.str_),
+        state=_state(rows, history),
+        output=rows.by_axis("out"),
+        standard_error=rows.by_axis("sd") / np.sqrt(rows.grid("n"))[..., None],
         out_unit=out_units[0],
     )
 
 
-def _grid(ordered: pd.DataFrame, columns: list[str], units: int) -> NDArray[np.float64]:
-    return ordered[columns].to_numpy(dtype=float).reshape(units, -1, len(columns))
+class _Rows:
+    """The rows of a table of dwells in order of unit and dwell; every column is taken out of the table once.
 
+    units : serials in order; dwell : (rows,), numbers
+    """
 
-def _standard_error(ordered: pd.DataFrame, units: int) -> NDArray[np.float64]:
-    spread = _grid(ordered, [f"sd_{axis}" for axis in AXES], units)
-    return spread / np.sqrt(_grid(ordered, ["n"], units))
+    def __init__(self, dwells: pd.DataFrame, kinds: Collection[str] | None) -> None:
+        self._table = dwells
+        codes, names = dwells["unit"].factorize()
+        rank = np.argsort(np.argsort(np.asarray(names, dtype=object)))
+        place, dwell = rank[codes], dwells["dwell"].to_numpy()
+        order = np.lexsort((dwell, place))
+        if kinds is not None:
+            order = order[dwells["kind"].isin(list(kinds)).to_numpy()[order]]
+        self.dwell = dwell[order]
+        self._order = None if np.array_equal(order, np.arange(len(dwells))) else order
+        found = np.unique(place[order])
+        by_rank = dict(zip(rank.tolist(), names, strict=True))
+        self.units = tuple(str(by_rank[one]) for one in found.tolist())
 
+    def grid(self, column: str) -> NDArray[np.float64]:
+        """A column of numbers, (units, n)."""
+        values = np.array(self._table[column], dtype=np.float64)  # a copy: sums over it must not depend on the table
+        return (values if self._order is None else values[self._order]).reshape(len(self.units), -1)
 
-def _state(ordered: pd.DataFrame, units: tuple[str, ...], history: pd.DataFrame | None) -> State:
-    def optional(column: str) -> NDArray[np.float64] | None:
-        if column not in ordered.columns:
+    def by_axis(self, name: str) -> NDArray[np.float64]:
+        """Three columns of numbers, (units, n, 3)."""
+        return np.stack([self.grid(f"{name}_{axis}") for axis in AXES], axis=-1)
+
+    def optional(self, column: str) -> NDArray[np.float64] | None:
+        """A column of numbers, (units, n), where the table has it without gaps."""
+        if column not in self._table.columns:
             return None
-        values = ordered[column].to_numpy(dtype=float).reshape(len(units), -1)
+        values = self.grid(column)
         return None if np.isnan(values).any() else values
 
-    outer, inner = optional("outer_deg"), optional("inner_deg")
-    slot = optional("slot")
+    def texts(self, column: str, count: int | None = None) -> list[str]:
+        """A column of texts, of the first rows or of all."""
+        values = self._table[column].to_numpy(dtype=object)
+        return [str(one) for one in (values if self._order is None else values[self._order])[:count]]
+
+
+def _state(rows: _Rows, history: pd.DataFrame | None) -> State:
+    outer, inner, slot = (rows.optional(name) for name in ("outer_deg", "inner_deg", "slot"))
     return State(
-        force=_grid(ordered, [f"force_{axis}" for axis in AXES], len(units)),
-        time=_grid(ordered, ["time_s"], len(units))[..., 0],
+        force=rows.by_axis("force"),
+        time=rows.grid("time_s"),
         outer=None if outer is None else np.radians(outer),
         inner=None if inner is None else np.radians(inner),
         slot=None if slot is None else slot[:, 0],
-        temperature=optional("unit_C"),
-        chamber=optional("chamber_C"),
-        since_power=optional("since_power_s"),
-        since_move=optional("since_move_s"),
-        supply=optional("supply_V"),
-        vibration=optional("vibration_g"),
-        history=None if history is None else _history(history, units),
+        temperature=rows.optional("unit_C"),
+        chamber=rows.optional("chamber_C"),
+        since_power=rows.optional("since_power_s"),
+        since_move=rows.optional("since_move_s"),
+        supply=rows.optional("supply_V"),
+        vibration=rows.optional("vibration_g"),
+        history=None if history is None else _history(history, rows.units),
     )
 
 
 def _history(history: pd.DataFrame, units: tuple[str, ...]) -> History | None:
     """Temperatures of every unit on one time grid; None where a unit has none."""
-    own = history[history["unit_C"].notna()]
-    by_unit = {str(unit): rows for unit, rows in own.groupby("unit") if len(rows) > 1}
-    if not set(units) <= set(by_unit):
+    time, temperature = (np.array(history[name], dtype=np.float64) for name in ("time_s", "unit_C"))
+    codes, names = history["unit"].factorize()
+    rank = {unit: place for place, unit in enumerate(units)}
+    place = np.array([rank.get(str(name), -1) for name in names], dtype=np.int64)[codes]
+    known = np.flatnonzero(~np.isnan(temperature))
+    counts = np.bincount(place[known] + 1, minlength=len(units) + 1)[1:]
+    if np.any(counts < FEWEST_POINTS):
         return None
-    times = own["time_s"].to_numpy(dtype=float)
+    times = time[known]
     grid = np.linspace(times.min(), times.max(), min(HISTORY_POINTS, np.unique(times).size))
-    series = [
-        np.interp(grid, rows["time_s"].to_numpy(dtype=float), rows["unit_C"].to_numpy(dtype=float))
-        for rows in (by_unit[unit].sort_values("time_s") for unit in units)
-    ]
-    return History(grid, np.stack(series))
+    order = known[np.lexsort((times, place[known]))][-int(counts.sum()) :]  # rows of no unit of the lot come first
+    parts = np.split(order, np.cumsum(counts)[:-1])
+    return History(grid, np.stack([np.interp(grid, time[own], temperature[own]) for own in parts]))

@@ -155,8 +155,8 @@ def read_calibration(coefficients: pd.DataFrame, covariance: pd.DataFrame) -> Ca
     values = covariance["value"].to_numpy().reshape(len(units), 3, -1)
     matrix[:, :, row, column] = values
     matrix[:, :, column, row] = values
-    common = coefficients[(texts["unit"] == units[0]) & ~is_linear]
-    shared, nonlinear = _read_shared(common, model)
+    common = np.flatnonzero((texts["unit"] == units[0]) & ~is_linear)
+    shared, nonlinear = _read_shared(coefficients.iloc[common], model) if common.size else (np.zeros(0), {})
     return Calibration(units, model, own.reshape(len(units), 3, p), matrix, nonlinear, shared)
 
 
@@ -164,7 +164,7 @@ def _read_shared(common: pd.DataFrame, model: Sequence[str]) -> tuple[NDArray[np
     """Parameters of the station, and nonlinear parameters: a tuple where they are one per axis."""
     shared: list[float] = []
     nonlinear: dict[str, dict[str, Any]] = {}
-    for name in model if len(common) else ():
+    for name in model:
         effect = effects.get(name)
         station = effect.names() if isinstance(effect, StationEffect) else ()
         for row in common[common["effect"] == name].itertuples():

@@ -11,7 +11,7 @@ import pandas as pd
 from inertial import design
 from inertial.errors import InertialError
 from inertial.fits.linear import LotFit, felt_force, fit_lot
-from inertial.fits.wander import WanderFit, fit_lot_with_wander
+from inertial.fits.wander import WanderFit, fit_lot_with_wander, student
 from pipelines.stages.arrays import AXES, LotArrays, lot_arrays
 from pipelines.stages.calibration import coefficient_rows, covariance_rows
 from pipelines.stages.empty import empty_table
@@ -26,7 +26,8 @@ if TYPE_CHECKING:
     Array = NDArray[np.float64]
 
 MICRO = 1e6
-FEWEST_TO_SPARE = 10  # degrees of freedom of the lot, below which nothing can be said of the kind of its noise
+KINDS = ("dwell", "verification")
+FEWEST_TO_SPARE = 4  # degrees of freedom of the lot, below which nothing can be said of the kind of its noise
 
 
 @dataclass(frozen=True)
@@ -65,7 +66,7 @@ def fit(dwells: pd.DataFrame, history: pd.DataFrame, effects: Sequence[str]) -> 
     """
     if not np.any(dwells["kind"] == "dwell"):
         return _nothing()
-    lot = lot_arrays(dwells[dwells["kind"].isin(["dwell", "verification"])], history)
+    lot = lot_arrays(dwells, history, KINDS)
     try:
         found = _fitted(lot, effects)
     except InertialError as problem:
@@ -119,11 +120,12 @@ def _by_wander(lot: LotArrays, found: WanderFit, used: NDArray[np.bool_]) -> _No
 
 
 def _by_birge(lot: LotArrays, plain: LotFit, used: NDArray[np.bool_]) -> _Noisy:
-    """The plain fit with its covariance scaled; all its noise is taken to be white."""
+    """The plain fit with its covariance scaled, by Student's factor too; all its noise is taken to be white."""
     stretch = birge_squared(plain)
     noise = lot.standard_error * np.sqrt(stretch)[:, None, :]
     columns = design.local_columns(design.split(plain.effects)[0], lot.state, plain.nonlinear)
-    covariance = plain.covariance * stretch[..., None, None]
+    known = np.where(stretch > 1.0, np.vectorize(student, otypes=[np.float64])(np.maximum(plain.dof, 1)), 1.0)
+    covariance = plain.covariance * (known**2 * stretch)[..., None, None]
     unseen = columns[..., ~used, :]
     model = np.einsum("...np,...pq,...mq->...nm", unseen, covariance, unseen)
     own = np.swapaxes(noise[:, ~used] ** 2, -1, -2)

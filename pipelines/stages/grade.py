@@ -10,16 +10,24 @@ import pandas as pd
 
 from pipelines.stages.calibration import read_calibration
 from pipelines.stages.empty import empty_table
-from pipelines.stages.figures import NEEDS_EFFECT, NEEDS_STATIC, NEEDS_VERIFICATION, Figure, UnitTables, figures_of
+from pipelines.stages.figures import (
+    NEEDS_EFFECT,
+    NEEDS_STATIC,
+    NEEDS_VERIFICATION,
+    Figure,
+    UnitTables,
+    coefficient_figures,
+    figures_of,
+)
+from pipelines.stages.unit_rows import ByUnit
 from schemas.errors import RecipeInvalid
 from schemas.limits import FIGURES, GRADE_FIGURE, GRADES, Decision, Limits, decide, describe_rule, grade_of
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-
     from schemas.recipe import Recipe
 
 NO_GRADE = "none"
+FIGURE_TEXTS, FIGURE_NUMBERS = "unit figure unit_text outcome rule", "value uncertainty limit"
 
 
 @dataclass(frozen=True)
@@ -59,39 +67,38 @@ def grade(evidence: Evidence, limits: Limits, zero_g: float = 0.0) -> dict[str, 
     zero_g : nominal output at 0 g, output unit.
     """
     rule = describe_rule(limits)
-    calibrated = set(evidence.coefficients["unit"].astype(str))
-    calibration = read_calibration(evidence.coefficients, evidence.covariance) if calibrated else None
+    own = _coefficient_figures(evidence, zero_g)
     shown = [
-        _by_unit(t) for t in (evidence.residuals, evidence.verification, evidence.verification_poses, evidence.noise)
+        ByUnit(t) for t in (evidence.residuals, evidence.verification, evidence.verification_poses, evidence.noise)
     ]
     figure_rows: list[dict[str, object]] = []
     grade_rows: list[dict[str, object]] = []
     for verdict in evidence.verdicts.to_dict("records"):
         unit = str(verdict["unit"])
-        if verdict["refused"] or calibration is None:
+        if verdict["refused"] or not own:
             grade_rows.append(_grade_row(verdict, "refused", NO_GRADE, str(verdict["reason"])))
             continue
-        own = UnitTables(*(table(unit) for table in shown))
-        figures = list(figures_of(unit, calibration, own, zero_g))
+        figures = list(figures_of(UnitTables(*(table.of(unit) for table in shown)), own[unit]))
         decisions = [decide(limits, f.name, f.value, f.uncertainty) for f in figures if f.name in limits.figures]
         figure_rows += [_figure_row(unit, figure, decisions) for figure in figures]
         grade_rows.append(_decided(verdict, figures, decisions, limits))
-    empty = empty_table(texts="unit figure unit_text outcome rule", numbers="value uncertainty limit")
     return {
-        "figures": pd.DataFrame(figure_rows) if figure_rows else empty,
-        "grades": pd.DataFrame(grade_rows).assign(rule=rule),
+        "figures": _table(figure_rows) if figure_rows else empty_table(texts=FIGURE_TEXTS, numbers=FIGURE_NUMBERS),
+        "grades": _table(grade_rows).assign(rule=rule),
     }
 
 
-def _by_unit(table: pd.DataFrame) -> Callable[[str], pd.DataFrame]:
-    """The rows of a unit in a table, in their order; none for a unit that is not there."""
-    units = table["unit"].to_numpy(dtype=object)
-    turns = np.flatnonzero(units[1:] != units[:-1]) + 1
-    starts, ends = [0, *turns.tolist()], [*turns.tolist(), len(units)]
-    places = {units[start]: slice(start, end) for start, end in zip(starts, ends, strict=True)} if len(units) else {}
-    if len(places) != len(starts):  # the rows of a unit do not stand together
-        return lambda unit: table[units == unit]
-    return lambda unit: table.iloc[places.get(unit, slice(0, 0))]
+def _coefficient_figures(evidence: Evidence, zero_g: float) -> dict[str, list[Figure]]:
+    """By unit the figures of its coefficients; none where no unit was calibrated."""
+    if evidence.coefficients.empty:
+        return {}
+    calibration = read_calibration(evidence.coefficients, evidence.covariance)
+    return dict(zip(calibration.units, coefficient_figures(calibration, zero_g), strict=True))
+
+
+def _table(rows: list[dict[str, object]]) -> pd.DataFrame:
+    """Rows that all have the same columns as a table."""
+    return pd.DataFrame({name: [row[name] for row in rows] for name in (rows[0] if rows else ())})
 
 
 def _decided(verdict: dict, figures: list[Figure], decisions: list[Decision], limits: Limits) -> dict[str, object]:

@@ -63,11 +63,12 @@ def verify(
 
 def _expected(predictions: pd.DataFrame, units: tuple[str, ...]) -> Array:
     """Covariance of the errors of the dwells that a right model leaves, (units, 3, m, m), µg²."""
-    ordered = predictions.sort_values(["unit", "axis", "dwell", "other"])
-    m = ordered["dwell"].nunique()
+    unit, axis = (predictions[name].factorize(sort=True)[0] for name in ("unit", "axis"))
+    dwell, other = (predictions[name].to_numpy() for name in ("dwell", "other"))
+    m = np.unique(dwell).size
     row, column = np.tril_indices(m)
     out = np.zeros((len(units), 3, m, m))
-    values = ordered["covariance_ug2"].to_numpy().reshape(len(units), 3, -1)
+    values = predictions["covariance_ug2"].to_numpy()[np.lexsort((other, dwell, axis, unit))].reshape(len(units), 3, -1)
     out[..., row, column] = values
     out[..., column, row] = values
     return out
@@ -75,13 +76,22 @@ def _expected(predictions: pd.DataFrame, units: tuple[str, ...]) -> Array:
 
 def _pose_rows(lot: LotArrays, unseen: NDArray[np.bool_], error: Array, expected: Array) -> pd.DataFrame:
     poses = np.asarray(lot.poses, dtype=object)[unseen]
-    rows = []
-    for pose in dict.fromkeys(poses.tolist()):
-        own = np.flatnonzero(poses == pose)
-        spread = np.sqrt(expected[:, own][:, :, own].mean(axis=(1, 2)))
-        for unit, value, uncertainty in zip(lot.units, error[:, own].mean(axis=1), spread, strict=True):
-            rows.append((unit, pose, own.size, value, uncertainty))
-    return pd.DataFrame(rows, columns=["unit", "pose", "dwells", "error_ug", "uncertainty_ug"])
+    names = list(dict.fromkeys(poses.tolist()))
+    own = [np.flatnonzero(poses == pose) for pose in names]
+    return pd.DataFrame(
+        {
+            "unit": list(lot.units) * len(names),
+            "pose": [pose for pose in names for _ in lot.units],
+            "dwells": np.repeat([places.size for places in own], len(lot.units)),
+            "error_ug": np.concatenate([error[:, places].mean(axis=1) for places in own]),
+            "uncertainty_ug": np.concatenate([_mean_spread(expected, places) for places in own]),
+        }
+    )
+
+
+def _mean_spread(expected: Array, own: NDArray[np.intp]) -> Array:
+    """Standard deviation of the mean over some dwells of every unit, (units,), µg."""
+    return np.sqrt(expected[:, own][:, :, own].mean(axis=(1, 2)))
 
 
 def _rows(lot: LotArrays, unseen: NDArray[np.bool_], columns: dict[str, Array], by_axis: Array) -> pd.DataFrame:
