@@ -127,7 +127,7 @@ def test_coefficients_lie_within_their_errors_for_a_device_that_wanders(rng: np.
 
 def test_says_so_where_there_are_too_few_dwells_for_the_noise(rng: np.random.Generator) -> None:
     dwells, _ = lot(rng, units=1)
-    few = dwells[dwells["dwell"] < 6]
+    few = dwells[dwells["dwell"] < 5]
     found = fit(few, NO_HISTORY, ["bias", "scale", "misalignment"])
     assert set(found["wander"]["method"]) == {"birge"}
     assert np.isfinite(found["coefficients"]["standard_error"]).all()
