@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sys
 from importlib import import_module
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 from typer.core import TyperCommand, TyperGroup
@@ -17,42 +17,53 @@ if TYPE_CHECKING:
 
 INTERRUPTED = 130  # as shells tell of Ctrl-C
 
-COMMANDS: dict[str, tuple[str, str]] = {
-    "run": ("run", "Measure and calibrate a lot, from recipe to report: the main job."),
-    "operator": ("operator", "Answer runs that wait for somebody to load, help or unload."),
-    "demo": ("demo", "See a hidden effect found, added and the error fall."),
-    "import": ("import_", "Bring recordings of others into the archive."),
-    "list": ("list", "List the runs of the archive."),
-    "show": ("show", "Show a run, one of its tables, or which calibration of a unit holds on a date."),
-    "certify": ("certify", "Certify a run's units that passed: from when until when their calibration holds."),
-    "revoke": ("revoke", "Revoke a unit's calibration, with the reason."),
-    "lineage": ("lineage", "Tell where certificates, tables and samples came from, and what was made of them."),
-    "verify": ("verify", "Compute every hash of the archive anew: find what was changed, edited or lost."),
-    "fit": ("fit", "Fit a model to archived data again, with other effects if wanted."),
-    "rerun": ("rerun", "Run archived runs through today's code, another model or other limits."),
-    "diff": ("diff", "Tell what differs between two runs, by how much, and because of what."),
-    "whatif": ("whatif", "Tell what a model would make of the archive's lots, before it is released."),
-    "release": ("release", "Make a model the line's from a date, or list the releases."),
-    "audit": ("audit", "Audit the archive: what drifts, what is due, which station moved, how the population stands."),
-    "query": ("query", "Ask the archive in SQL."),
-    "compare": ("compare", "Judge a model on dwells, and on fresh ones."),
-    "diagnose": ("diagnose", "Say whether a model is adequate, where it fails, and which effect is missing."),
-    "investigate": ("investigate", "Measure a lot, and then only what tells apart what its model may lack."),
-    "extend": ("extend", "Write the next version of a model with one more effect."),
-    "history": ("history", "Show the error over the versions of a model."),
-    "plan": ("plan", "Say what a recipe can and cannot see, before it is measured."),
-    "report": ("report", "Say where a run's report is; make it where it is missing."),
-    "export": ("export", "Write coefficients for firmware and autopilots."),
-    "archive": ("archive", "Look after the archive: the key that signs, what killed writers left."),
-    "station": ("station", "See, check, serve and describe stations."),
+MEASURE = "Measure"
+FIND = "Is the model good enough, and what is missing?"
+RESULTS = "Results"
+TRACE = "Certificates, trace, audit"
+AGAIN = "Old data, new models"
+
+COMMANDS: dict[str, tuple[str, str, str]] = {
+    "run": ("run", MEASURE, "Measure and calibrate a lot, from recipe to report: the main job."),
+    "plan": ("plan", MEASURE, "Say what a recipe can and cannot see, before it is measured."),
+    "investigate": ("investigate", MEASURE, "Measure a lot, and then only what tells apart what its model may lack."),
+    "operator": ("operator", MEASURE, "Answer runs that wait for somebody to load, help or unload."),
+    "station": ("station", MEASURE, "See, check, serve and describe stations."),
+    "import": ("import_", MEASURE, "Bring recordings of others into the archive."),
+    "demo": ("demo", FIND, "See a hidden effect found, added and the error fall."),
+    "diagnose": ("diagnose", FIND, "Say whether a model is adequate, where it fails, and which effect is missing."),
+    "extend": ("extend", FIND, "Write the next version of a model with one more effect."),
+    "compare": ("compare", FIND, "Judge a model on dwells, and on fresh ones."),
+    "history": ("history", FIND, "Show the error over the versions of a model."),
+    "list": ("list", RESULTS, "List the runs of the archive."),
+    "show": ("show", RESULTS, "Show a run, one of its tables, or which calibration of a unit holds on a date."),
+    "report": ("report", RESULTS, "Say where a run's report is; make it where it is missing."),
+    "export": ("export", RESULTS, "Write coefficients for firmware and autopilots."),
+    "query": ("query", RESULTS, "Ask the archive in SQL."),
+    "certify": ("certify", TRACE, "Certify a run's units that passed: from when until when their calibration holds."),
+    "revoke": ("revoke", TRACE, "Revoke a unit's calibration, with the reason."),
+    "lineage": ("lineage", TRACE, "Tell where certificates, tables and samples came from, and what was made of them."),
+    "verify": ("verify", TRACE, "Compute every hash of the archive anew: find what was changed, edited or lost."),
+    "audit": (
+        "audit",
+        TRACE,
+        "Audit the archive: what drifts or is due, which station moved, how the population stands.",
+    ),
+    "archive": ("archive", TRACE, "Look after the archive: the key that signs, what killed writers left."),
+    "fit": ("fit", AGAIN, "Fit a model to archived data again, with other effects if wanted."),
+    "rerun": ("rerun", AGAIN, "Run archived runs through today's code, another model or other limits."),
+    "diff": ("diff", AGAIN, "Tell what differs between two runs, by how much, and because of what."),
+    "whatif": ("whatif", AGAIN, "Tell what a model would make of the archive's lots, before it is released."),
+    "release": ("release", AGAIN, "Make a model the line's from a date, or list the releases."),
 }
+"""Name → module, part of the help, summary."""
 
 
 class _OnDemand(TyperCommand):
     """A command known by name and one line of help; the rest is in its module."""
 
-    def __init__(self, name: str, module: str, summary: str) -> None:
-        super().__init__(name, help=summary)
+    def __init__(self, name: str, module: str, part: str, summary: str) -> None:
+        super().__init__(name, help=summary, rich_help_panel=part)
         self._module = module
 
     def make_context(self, *args: Any, **kwargs: Any) -> Context:
@@ -69,7 +80,7 @@ class _OnDemand(TyperCommand):
 
 
 class _Commands(TyperGroup):
-    """The commands in the order in which they are used."""
+    """The commands by what they are for."""
 
     def list_commands(self, ctx: Context) -> list[str]:
         """Names of the commands."""
@@ -98,8 +109,21 @@ app = typer.Typer(
 )
 
 
+def _tell_version(wanted: bool) -> None:
+    if wanted:
+        from importlib.metadata import version
+
+        typer.echo(f"tumbleline {version('tumbleline')}")
+        raise typer.Exit
+
+
 @app.callback()
-def _product() -> None:
+def _product(
+    *,
+    version: Annotated[
+        bool, typer.Option("--version", callback=_tell_version, is_eager=True, help="Show the version and exit.")
+    ] = False,
+) -> None:
     """Calibrate accelerometers in production: measure, fit, judge the model, grade, and keep it all traceable."""
 
 

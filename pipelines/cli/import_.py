@@ -68,7 +68,9 @@ def command(
         "signs": [part.strip() for part in signs.split(",")] if signs else None,
         "local_gravity_m_s2": local_g,
     }
-    how = mapped.build(given | {key: value for key, value in options.items() if value}, str(mapping or "import"))
+    wanted = given | {key: value for key, value in options.items() if value}
+    _refuse_unmapped(files[0], wanted)
+    how = mapped.build(wanted, str(mapping or "import"))
     _refuse_unknown_fit(fit)
     imports = [_import_one(path, how, fit, archive) for path in files]
     adequate = all(one["adequate"] is not False for one in imports)
@@ -78,6 +80,26 @@ def command(
         for one in imports:
             _print(one)
     raise typer.Exit(DONE if adequate else PART_FAILED)
+
+
+def _refuse_unmapped(path: Path, wanted: dict[str, Any]) -> None:
+    """Refuse a mapping without columns or the output's unit, with the columns that there are."""
+    if "columns" in wanted and "units" in wanted:
+        return
+    from pipelines.importers import files
+    from pipelines.importers.mapping import OUTPUT_UNITS
+
+    if "columns" in wanted:
+        message = (
+            f"import: the output's unit is not told, one of {', '.join(OUTPUT_UNITS)} is needed; add --units output=…"
+        )
+        raise WrongUse(message)
+    table, _ = files.read(path)
+    message = (
+        f"import: no column of {path.name} is mapped, x, y and z are needed at least (its columns: "
+        f"{', '.join(map(str, table.columns))}); add --map time=…,x=…,y=…,z=… and --units output=…, or --mapping FILE.toml"
+    )
+    raise WrongUse(message)
 
 
 def _refuse_unknown_fit(fit: str) -> None:

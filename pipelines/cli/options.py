@@ -84,7 +84,7 @@ WorkersOption = Annotated[
     int | None, typer.Option("--workers", min=1, help="Processes on this machine; as many as it has cores by default.")
 ]
 
-NARROW = 16
+NARROW = 24
 """Characters that a column of words keeps where room is scarce."""
 
 STYLES = {"pass": "bold green", "fail": "bold red", "refused": "bold magenta"}

@@ -10,7 +10,7 @@ from pipelines.cli.options import ArchiveOption, JsonOption, console, print_json
 from schemas.errors import DONE, PART_FAILED
 
 if TYPE_CHECKING:
-    from pipelines.archive import Run
+    from pipelines.archive import Archive, Run
 
 MANY = 40
 
@@ -30,21 +30,31 @@ def command(
     *,
     as_json: JsonOption = False,
 ) -> None:
-    """Show what a run came to, one of its tables, or which calibration of a unit holds on a date.
+    """Show what a run came to, one of its tables, or which calibration of a unit holds on a date; today's where none is named.
 
     Exit status 1: no calibration of the unit holds on that date.
     """
     from pipelines.archive import Archive
 
-    if at or known:
+    store = Archive(archive)
+    if at or known or _is_unit(store, run):
         from pipelines.cli.validity import show_validity
 
-        raise typer.Exit(DONE if show_validity(Archive(archive), run, at, known, as_json=as_json) else PART_FAILED)
-    found = Archive(archive).run(run)
+        raise typer.Exit(DONE if show_validity(store, run, at, known, as_json=as_json) else PART_FAILED)
+    found = store.run(run)
     if table:
         _show_table(found, table, as_json=as_json)
     else:
         _show_run(found, as_json=as_json)
+
+
+def _is_unit(archive: Archive, name: str) -> bool:
+    """Whether no run begins so, and a unit with calibrations is called so."""
+    from pipelines.trace import Ledger
+
+    if name == "latest" or any(run.startswith(name) for run in archive.run_ids()):
+        return False
+    return bool(Ledger(archive).events(name))
 
 
 def _show_run(run: Run, *, as_json: bool) -> None:
