@@ -83,7 +83,7 @@ def test_a_disk_that_fills_in_the_middle_of_a_rerun_loses_nothing(root: Path, co
     assert report.checked.findings == []
     [new] = [run_id for run_id in Archive(root).run_ids() if run_id != old.id]
     begun = set(tables(Archive(root).run(new)))
-    assert begun, "the disk was full before anything was written"
+    assert bool(begun) == (command == "fit")  # which publishes stage by stage; a re-run, all its files together
     assert begun < set(before)
     assert limited(10**9, *arguments).returncode in {0, 1}
     assert set(tables(Archive(root).run(new))) >= begun | {"grades.parquet"}
