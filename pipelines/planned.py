@@ -18,9 +18,13 @@ from schemas.station import load_station
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from numpy.typing import NDArray
+
     from pipelines.stages.minutes import Stretch
     from schemas.recipe import Recipe
     from schemas.station import StationConfig
+
+    Array = NDArray[np.float64]
 
 NOMINAL_SUPPLY_V = 3.3
 SUPPLY_WANDER_V = 1e-3
@@ -48,16 +52,23 @@ def state_of(stretches: Sequence[Stretch], station: StationConfig, recipe: Recip
     dwells = [s for s in stretches if s.kind == "dwell"]
     outer, inner = np.radians([(s.step.pose.outer_deg, s.step.pose.inner_deg) for s in dwells]).T
     time = np.array([s.start + 0.5 * s.seconds for s in dwells])
-    chamber = np.array([s.step.temperature for s in dwells])
+    settled = np.array([s.step.settled for s in dwells])
+    chamber, unit = np.array(
+        [(0.5 * (s.begin.air + s.end.air), 0.5 * (s.begin.device + s.end.device)) for s in dwells]
+    ).T
+    chamber, unit = (
+        np.where(settled, [s.step.temperature for s in dwells], on_the_way) for on_the_way in (chamber, unit)
+    )
+    waits = np.array([recipe.settle_s if s.step.wait_s is None else s.step.wait_s for s in dwells])
     wander = np.random.default_rng(0).normal(size=(2, time.size))
     gravity = recipe.local_gravity_m_s2 / STANDARD_GRAVITY_M_S2
     return State(
         force=gravity * force_from_angles(outer, inner),
         time=time,
-        temperature=chamber,
+        temperature=unit,
         chamber=chamber,
-        since_power=time,
-        since_move=(recipe.settle_s + 0.5 * recipe.dwell_s) * (1.0 + 0.01 * wander[0]),
+        since_power=_since_power(stretches, time),
+        since_move=(waits + 0.5 * recipe.dwell_s) * (1.0 + 0.01 * wander[0]),
         supply=NOMINAL_SUPPLY_V + SUPPLY_WANDER_V * wander[1],
         vibration=QUIET_G * (1.0 + 0.1 * np.abs(wander[0])),
         outer=outer,
@@ -65,6 +76,12 @@ def state_of(stretches: Sequence[Stretch], station: StationConfig, recipe: Recip
         slot=np.zeros(()),
         history=_history(stretches, station) if history else None,
     )
+
+
+def _since_power(stretches: Sequence[Stretch], time: Array) -> Array:
+    """Seconds since the devices were last switched on, at some times: a move with the power off before it ends that pause."""
+    on = np.array([0.0, *(s.start + s.step.off_s for s in stretches if s.kind == "move" and s.step.off_s > 0.0)])
+    return time - on[np.searchsorted(on, time, side="right") - 1]
 
 
 def _history(stretches: Sequence[Stretch], station: StationConfig) -> History:

@@ -98,17 +98,19 @@ def itinerary(
         begin = now
         parts: list[tuple[StretchKind, float, Standing]] = []
         if step.soak != now.soak and not step.settled:
-            now = replace(now, air=step.temperature, soak=step.soak)  # read on the way: nobody waits
+            now = replace(now, soak=step.soak)  # read on the way: nobody waits
         elif step.soak != now.soak:
             waited, reached = soaked(now, step.temperature, station, recipe.soak_min_s)
             parts.append(("soak", waited, replace(reached, soak=step.soak)))
             now = parts[-1][2]
         wait = recipe.settle_s if step.wait_s is None else step.wait_s
         going = step.off_s + move_seconds(now, step.pose, station) + wait + station.pace.record_s
-        there = replace(_later(now, going, station), outer=step.pose.outer_deg, inner=step.pose.inner_deg)
+        there = replace(
+            _later(now, step.temperature, going, station), outer=step.pose.outer_deg, inner=step.pose.inner_deg
+        )
         lasting = recipe.static_record_s if step.kind == "allan" else recipe.dwell_s
         parts.append(("move", going, there))
-        parts.append((step.kind, lasting, _later(there, lasting, station)))
+        parts.append((step.kind, lasting, _later(there, step.temperature, lasting, station)))
         for what, seconds, end in parts:
             found.append(Stretch(what, step, clock, seconds, begin, end))
             clock, begin = clock + seconds, end
@@ -125,18 +127,19 @@ def temperatures(stretches: Sequence[Stretch], station: StationConfig) -> list[t
     found: list[tuple[float, float, float]] = []
     for stretch in stretches:
         target = stretch.step.temperature
-        if stretch.kind != "soak":
-            found.append((stretch.start, target, target))
-            continue
         air, device = stretch.begin.air, stretch.begin.device
+        if stretch.kind != "soak":
+            found.append((stretch.start, target, target) if stretch.step.settled else (stretch.start, air, device))
+            continue
         ends = (found[-1][2] - device if found else 0.0, target - stretch.end.device)
         count = math.ceil(stretch.seconds / thermal.poll)
         for k in range(count):
             part = k / count
             found.append((stretch.start + k * thermal.poll, air, device + (1.0 - part) * ends[0] + part * ends[1]))
-            air, device = _followed(air, device, target, thermal)
+            air, device = _followed(air, device, target, thermal.poll, thermal)
     last = stretches[-1]
-    return [*found, (last.start + last.seconds, last.step.temperature, last.step.temperature)]
+    end = (last.step.temperature,) * 2 if last.step.settled else (last.end.air, last.end.device)
+    return [*found, (last.start + last.seconds, *end)]
 
 
 def move_seconds(now: Standing, pose: Pose, station: StationConfig) -> float:
@@ -196,7 +199,7 @@ def _soak(air: float, device: float, target: float, shortest: float, thermal: _T
     while waited < shortest or not _settled(past, target, thermal):
         if waited > shortest + thermal.limit:
             break
-        air, device = _followed(air, device, target, thermal)
+        air, device = _followed(air, device, target, thermal.poll, thermal)
         past.append(device)
         waited += thermal.poll
     return waited, device
@@ -212,18 +215,18 @@ def _settled(past: deque[float], target: float, thermal: _Thermal) -> bool:
     return max(abs(t - target) for t in rows) <= thermal.band and drift / (span / 2.0) <= thermal.rate
 
 
-def _followed(air: float, device: float, target: float, thermal: _Thermal) -> tuple[float, float]:
-    """Air and device one poll later: exact for a ramp that ends at the target, and a lag of first order behind it."""
-    ramping = min(thermal.poll, abs(target - air) / thermal.ramp)
+def _followed(air: float, device: float, target: float, seconds: float, thermal: _Thermal) -> tuple[float, float]:
+    """Air and device some seconds later: exact for a ramp that ends at the target, and a lag of first order behind it."""
+    ramping = min(seconds, abs(target - air) / thermal.ramp)
     slope = math.copysign(thermal.ramp, target - air)
     far = slope * thermal.lag  # how far the device is behind a ramp that never ends
     behind = far + (air - device - far) * math.exp(-ramping / thermal.lag)
-    behind *= math.exp(-(thermal.poll - ramping) / thermal.lag)
-    air = target if ramping < thermal.poll else air + slope * ramping
+    behind *= math.exp(-(seconds - ramping) / thermal.lag)
+    air = target if ramping < seconds else air + slope * ramping
     return air, air - behind
 
 
-def _later(now: Standing, seconds: float, station: StationConfig) -> Standing:
-    """How the station stands after some seconds at the temperature of its air."""
-    keep = math.exp(-seconds / lag_of(station))
-    return replace(now, device=now.air + (now.device - now.air) * keep)
+def _later(now: Standing, target: float, seconds: float, station: StationConfig) -> Standing:
+    """How the station stands some seconds later, while its air is at ``target`` °C or on the way there."""
+    air, device = _followed(now.air, now.device, target, seconds, _thermal(station))
+    return replace(now, air=air, device=device)

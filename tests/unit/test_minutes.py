@@ -2,12 +2,14 @@
 
 import dataclasses
 
+import numpy as np
 import pytest
 from small_station import MemorySink, lot_of, quiet_progress, short_recipe, station_of
 
+from pipelines.planned import planned_state
 from pipelines.stages.capture import capture, steps
 from pipelines.stages.minutes import Standing, minutes
-from schemas.recipe import Pose
+from schemas.recipe import Pose, SoakPart
 from stations.opening import open_station
 
 
@@ -74,3 +76,41 @@ def test_hardware_takes_its_pace_from_the_stations_file():
     config = station_of().model_copy(update={"simulation": None})
     fast = config.model_copy(update={"pace": config.pace.model_copy(update={"ramp_K_per_min": 10.0, "lag_s": 60.0})})
     assert minutes(steps(recipe), fast, recipe).soaks < minutes(steps(recipe), config, recipe).soaks
+
+
+def ordered_recipe():
+    """A recipe of soaks with waits of their own, dwells on the way to a temperature, and a pause without power."""
+    recipe = short_recipe(4)
+    soaks = [
+        SoakPart(temperature_C=25.0, poses=[1, 2, 3, 4], waits_s=[2.0, 60.0, 300.0, 2.0]),
+        SoakPart(temperature_C=60.0, poses=[1, 2, 3, 4, 1, 2], waits_s=[30.0] * 6, settled=False),
+        SoakPart(temperature_C=25.0, poses=[1, 2], verification=[], off_s=[0.0, 240.0]),
+    ]
+    return recipe.model_copy(update={"soaks": soaks, "temperatures_C": [s.temperature_C for s in soaks]})
+
+
+def test_waits_readings_on_the_way_and_pauses_without_power_take_the_minutes_that_are_planned():
+    recipe, config = ordered_recipe(), station_of()
+    total, soaks = really_taken(recipe, config)
+    planned = minutes(steps(recipe), config, recipe)
+    assert planned.soaks == pytest.approx(soaks, rel=0.1)
+    assert planned.total - planned.soaks == pytest.approx(total - soaks, rel=0.1)
+
+
+def test_devices_read_on_the_way_are_planned_at_the_temperatures_they_have_there():
+    recipe, config = ordered_recipe(), station_of(slot_gradient_K=0.0, slot_lag_s=(200.0, 200.0))
+    with open_station(config, lot_of(1)) as station:
+        sink = MemorySink()
+        capture(station, recipe, lot_of(1), sink, progress=quiet_progress)
+    plan = [step for step in steps(recipe) if step.kind == "dwell"]
+    really = [float(sink.records[step.record][1]["unit_C"].iloc[0]) for step in plan]
+    state = planned_state(recipe, config, history=True)
+    assert not plan[4].settled
+    assert state.temperature == pytest.approx(really, abs=0.6)
+    assert state.temperature[4] < state.temperature[9] < 50.0
+    assert state.since_move[2] == pytest.approx(301.0, rel=0.1)
+    assert state.since_power[11] < state.since_power[10]
+    assert state.history is not None
+    assert np.interp(state.time[4:10], state.history.time, state.history.temperature) == pytest.approx(
+        state.temperature[4:10], abs=0.5
+    )
