@@ -11,7 +11,6 @@ import json
 import os
 import platform
 import re
-import socket
 import time
 import uuid
 from dataclasses import asdict, dataclass, field, replace
@@ -21,10 +20,11 @@ from typing import TYPE_CHECKING, Literal, TextIO
 
 from schemas.errors import OperatorNeeded, StationRefused
 from schemas.safety import SAFE_WITHIN_S
+from stations.safety.addresses import address_of
 from stations.safety.folder import told
 
 if TYPE_CHECKING:
-    from schemas.station import Device, Slots, StationConfig
+    from schemas.station import StationConfig
 
 Role = Literal["run", "watchdog"]
 Part = Literal["outer", "inner", "chamber", "reader"]
@@ -66,17 +66,6 @@ def addresses(config: StationConfig, *, every: bool = False) -> dict[Part, str]:
         if every or address not in found.values():
             found[part] = address
     return found
-
-
-def address_of(device: Device | Slots) -> str:
-    """One name for the place of a device: the host's number, port and device id, or its serial line."""
-    if device.serial:
-        return f"{os.path.realpath(device.serial)}/{device.device_id}"
-    try:
-        host = socket.gethostbyname(device.host)
-    except OSError:  # a name that nobody knows now is still the same name
-        host = device.host.lower()
-    return f"{host}:{device.port}/{device.device_id}"
 
 
 @dataclass
