@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from pipelines.audit.calibrations import Calibrations, load, runs_of
+from pipelines.audit.calibrations import Calibrations, captures_of, load, runs_of
+from pipelines.audit.certificates import Certificates, certificates_of
 from pipelines.audit.drifts import KindDrift, UnitDrift, kind_drifts, unit_drifts
 from pipelines.audit.due import Due, due
 from pipelines.audit.gauge_mounts import Study, studies
@@ -70,6 +71,7 @@ class Audit:
     kinds: tuple[KindDrift, ...]
     units: dict[str, list[UnitDrift]]
     due: Due
+    certificates: Certificates
     stations: tuple[Series, ...]
     slots: tuple[Series, ...]
     slot_means: tuple[dict[str, object], ...]
@@ -100,6 +102,7 @@ def audit(archive: Archive, rules: Rules, scope: Scope, *, dask: str | None = No
     inside = product & _named(all_, scope)
     period = inside & (all_.day >= scope.since)
     figures = figures_of(index, all_, period)
+    ledger = certificates_of(archive.root, scope.until, captures_of(index))
     kinds = kind_drifts(all_, good & inside, rules, scope.since)
     units = unit_drifts(all_, good & inside, kinds, rules, _limits(all_, figures))
     station = index.table("station").to_pandas()
@@ -119,7 +122,8 @@ def audit(archive: Archive, rules: Rules, scope: Scope, *, dask: str | None = No
         strangers=tuple(one for one in found if all_.day[one.row] >= scope.since),
         kinds=tuple(kinds),
         units=units,
-        due=due(all_, good & inside, rules, kinds, units),
+        due=due(all_, good & inside, rules, kinds, units, ledger),
+        certificates=ledger,
         stations=tuple(station_series(station, runs)),
         slots=tuple(slots),
         slot_means=tuple(means),

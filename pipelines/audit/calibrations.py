@@ -98,6 +98,12 @@ def runs_of(index: Index, until: float) -> pd.DataFrame:
     return chosen[["run", "day", "device", "station"]].astype({"device": str, "station": str})
 
 
+def captures_of(index: Index) -> dict[str, str]:
+    """The capture of every run that has one, by the run's name."""
+    runs = index.table("runs", ["run", "capture"]).to_pydict()
+    return {run: capture for run, capture in zip(runs["run"], runs["capture"], strict=True) if capture}
+
+
 def load(index: Index, runs: pd.DataFrame) -> Calibrations:
     """The calibrations of chosen runs."""
     units = index.table("units").to_pandas()

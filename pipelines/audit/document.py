@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from pipelines.audit.calibrations import date_of
-from pipelines.audit.findings import WHO, Finding
+from pipelines.audit.due import uncertified
+from pipelines.audit.finding import WHO, Finding
 from pipelines.audit.parameters import unit_text
 from pipelines.audit.statistics.control_charts import RULES
 
@@ -58,6 +59,7 @@ def counts(audit: Audit) -> dict[str, int]:
         "runs": int(np.unique(own.run.astype(str)).size),
         "stations": int(np.unique(own.station.astype(str)).size),
         "unreadable_runs": len(audit.problems),
+        "certificates": len(audit.certificates),
     }
 
 
@@ -84,11 +86,19 @@ def _due(audit: Audit) -> dict[str, Any]:
                 "unit": str(audit.all.unit[row]), "device": str(audit.all.device[row]),
                 "last": date_of(float(audit.all.day[row])), "due": date_of(float(own.day[k])), "run": str(audit.all.run[row]),
                 "months": float(own.months[k]), "because": str(own.because[k]),
+                "certificate": str(own.certificate[k]), "valid": bool(own.valid[k]),
             }
             for k, row in zip(which, own.row[which], strict=True)
         ]  # fmt: skip
 
-    return {"interval": audit.rules.interval, "units": own.row.size, "overdue": listed(late), "soon": listed(soon)}
+    return {
+        "interval": audit.rules.interval,
+        "units": own.row.size,
+        "valid": int(own.valid.sum()),
+        "overdue": listed(late),
+        "soon": listed(soon),
+        "uncertified": listed(uncertified(audit.all, own, audit.certificates)),
+    }
 
 
 def _kinds(audit: Audit) -> list[dict[str, Any]]:

@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from pipelines.audit.calibrations import Calibrations
+    from pipelines.audit.certificates import Certificates
     from pipelines.audit.drifts import KindDrift, UnitDrift
     from pipelines.audit.rules import Rules
 
@@ -26,21 +27,35 @@ if TYPE_CHECKING:
 class Due:
     """The last calibrations of the units, in order of unit: row among the calibrations, day when each is due, and why then.
 
-    months : the interval that counted; because : ``fixed``, ``drift`` or ``never passed``
+    months : the interval that the rules give
+    because : ``fixed`` or ``drift`` (the interval after the last pass), ``certificate`` (it ends, or has ended), ``revoked``, or
+        ``did not pass``
+    certificate : the one that holds on the day of the audit, else the one certified last; empty where there is none
+    valid : whether one holds; entered : whether what was measured last is certified, in whatever state
     """
 
     row: NDArray[np.int64]
     day: Array
     months: Array
     because: NDArray[np.object_]
+    certificate: NDArray[np.object_]
+    valid: Flags
+    entered: Flags
 
 
 def due(
-    all_: Calibrations, good: Flags, rules: Rules, kinds: list[KindDrift], units: Mapping[str, list[UnitDrift]]
+    all_: Calibrations,
+    good: Flags,
+    rules: Rules,
+    kinds: list[KindDrift],
+    units: Mapping[str, list[UnitDrift]],
+    certificates: Certificates | None = None,
 ) -> Due:
-    """When every unit is due: a fixed interval of its kind after its last pass, or when its drift uses its reliability up.
+    """When every unit is due: when its certificate ends, or did; at once where it was revoked or the unit did not pass.
 
-    By drift the interval is that of the unit's own forecast where it has a history, else of its kind's, inside the rules' bounds.
+    Without a certificate for its last measurement a unit is due a fixed interval of its kind after that. Where drift decides
+    it is due when its drift uses its reliability up (by the unit's own forecast where it has a history, else by its kind's,
+    inside the rules' bounds), unless its certificate ends before.
     """
     rows = np.flatnonzero(good)
     last = rows[np.concatenate([all_.histories[rows[1:]] != all_.histories[rows[:-1]], [True]])] if rows.size else rows
@@ -49,11 +64,42 @@ def due(
     because = np.full(last.size, "fixed", dtype=object)
     if rules.interval == "drift":
         months, because = _by_drift(all_, last, months, rules, kinds, units)
-    passed = all_.outcome[last] == "pass"
-    unknown = all_.outcome[last] == ""  # imported results have no decision: they count
-    day = np.where(passed | unknown, _months_after(all_.day[last], months), all_.day[last])
-    because = np.where(passed | unknown, because, "did not pass")
-    return Due(last, day, months, because)
+    found = Due(
+        last,
+        _months_after(all_.day[last], months),
+        months,
+        because,
+        np.full(last.size, "", dtype=object),
+        np.zeros(last.size, dtype=bool),
+        np.zeros(last.size, dtype=bool),
+    )
+    if certificates is not None:
+        _by_certificate(all_, found, certificates)
+    # imported results have no decision: they count
+    failed = (all_.outcome[last] != "pass") & (all_.outcome[last] != "")
+    found.day[failed], found.because[failed] = all_.day[last][failed], "did not pass"
+    return found
+
+
+def uncertified(all_: Calibrations, found: Due, certificates: Certificates) -> NDArray[np.int64]:
+    """Units that passed last and were not certified for it, as places among those that are due; none without a ledger."""
+    if not len(certificates):
+        return np.zeros(0, dtype=np.int64)
+    return np.flatnonzero((all_.outcome[found.row] == "pass") & ~found.entered)
+
+
+def _by_certificate(all_: Calibrations, found: Due, certificates: Certificates) -> None:
+    """Put what the ledger says of every unit in the place of the interval."""
+    for k, row in enumerate(found.row):
+        one = certificates.standing(str(all_.device[row]), str(all_.unit[row]), str(all_.run[row]))
+        if one is None:
+            continue
+        found.certificate[k], found.valid[k], found.entered[k] = one.certificate, one.state == "valid", one.entered
+        if one.state != "valid" and not one.entered:  # measured again after it ended: the interval counts from that
+            continue
+        if found.because[k] == "drift" and one.state != "revoked" and found.day[k] < one.until:
+            continue
+        found.day[k], found.because[k] = one.until, "revoked" if one.state == "revoked" else "certificate"
 
 
 def _by_drift(

@@ -23,12 +23,13 @@ import pyarrow.parquet as pq
 from pipelines.archive import files
 from pipelines.archive.locks import alone
 from pipelines.archive.store import ObjectPath, address_of, place_of
-from pipelines.audit.run_rows import KEPT, SCHEMAS, TABLES, rows_of_run
+from pipelines.audit.run_files import read_runs, stamps_of
+from pipelines.audit.run_rows import SCHEMAS, TABLES, rows_of_runs
 from pipelines.flows.partitions import map_partitions
 from schemas.errors import ArchiveUnusable
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Sequence
+    from collections.abc import Sequence
 
     from pipelines.archive import Archive
     from pipelines.archive.store import Place
@@ -36,8 +37,7 @@ if TYPE_CHECKING:
 FOLDER = "index"
 RUNS_PER_PART = 500
 MOST_SMALL = 24  # parts with less than half of that, before they are put together
-WATCHED = ("run.json", *(f"{name}{end}" for name in KEPT for end in (".json", ".parquet")))
-SOURCES = ("run_rows.py", "parameters.py", "station_effects.py")
+SOURCES = ("run_files.py", "run_rows.py", "parameters.py", "station_effects.py")
 VERSION = b"tumbleline.index"
 
 
@@ -101,7 +101,7 @@ def up_to_date(archive: Archive, dask: str | None = None, workers: int = 1) -> I
     dask, workers : where parts are made, see :func:`pipelines.flows.partitions.map_partitions`
     """
     place = archive.root / FOLDER
-    stamps = _stamps(archive.root)
+    stamps = stamps_of(archive.root)
     if not stamps:  # an address with a slip of the pen is not made into a folder
         return Index((), 0, 0)
     try:
@@ -139,12 +139,9 @@ def make_part(portion: Portion) -> str:
     """Name of a part of the index, made of its runs' files and published."""
     root = place_of(portion.archive)
     runs, place = root / "runs", Path(portion.place) if portion.place else root / FOLDER
-    found = [rows_of_run(runs / run, stamp) for run, stamp in portion.runs]
-    content: dict[str, bytes] = {}
-    for name in reversed(TABLES):  # ``runs`` last: where it is, all are
-        own = [rows[name] for rows in found if name in rows]
-        table = pa.concat_tables(own) if own else SCHEMAS[name].empty_table()
-        content[f"{name}.parquet"] = _encoded(table, portion.version)
+    found = rows_of_runs(read_runs(runs, portion.runs))
+    # ``runs`` last: where it is, all are
+    content = {f"{name}.parquet": _encoded(found[name], portion.version) for name in reversed(TABLES)}
     text = "\n".join([portion.version, *(f"{run} {stamp}" for run, stamp in portion.runs)])
     name = hashlib.sha256(text.encode()).hexdigest()[:16]
     files.publish_folder(place / name, content)
@@ -203,42 +200,3 @@ def _remove(part: Place) -> None:
         part.remove_all()
     else:
         shutil.rmtree(part, ignore_errors=True)
-
-
-def _stamps(root: Place) -> dict[str, str]:
-    """What the files of every run look like: size and time of each that the index is made from."""
-    runs = root / "runs"
-    if isinstance(runs, ObjectPath):
-        return _stamps_of_objects(runs)
-    if not runs.is_dir():
-        return {}
-    out: dict[str, str] = {}
-    with os.scandir(runs) as folders:
-        for folder in folders:
-            marks = [_mark(f"{folder.path}/{name}") for name in WATCHED]
-            if marks[0]:  # a run without run.json has not begun
-                out[folder.name] = _short(marks)
-    return out
-
-
-def _mark(path: str) -> str:
-    try:
-        found = os.stat(path)  # noqa: PTH116 - a hundred thousand of these
-    except OSError:
-        return ""
-    return f"{found.st_size}.{found.st_mtime_ns}"
-
-
-def _stamps_of_objects(runs: ObjectPath) -> dict[str, str]:
-    from pyarrow.fs import FileSelector, FileType
-
-    marks: dict[str, dict[str, str]] = {}
-    for info in runs.system.get_file_info(FileSelector(runs.key, allow_not_found=True, recursive=True)):
-        run, _, name = info.path.rpartition("/")
-        if info.type == FileType.File and name in WATCHED:
-            marks.setdefault(run.rpartition("/")[2], {})[name] = f"{info.size}.{info.mtime_ns}"
-    return {run: _short([own.get(n, "") for n in WATCHED]) for run, own in marks.items() if "run.json" in own}
-
-
-def _short(marks: Iterable[str]) -> str:
-    return hashlib.sha256("|".join(marks).encode()).hexdigest()[:16]

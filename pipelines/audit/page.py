@@ -8,7 +8,7 @@ import numpy as np
 
 from pipelines.audit.calibrations import date_of
 from pipelines.audit.document import counts, furthest
-from pipelines.audit.findings import WHO
+from pipelines.audit.finding import WHO
 from pipelines.audit.parameters import unit_text
 from pipelines.audit.pictures import chart_plot, drift_plot, due_plot, series_plot, yield_plot
 from pipelines.report.diagnosis import chance
@@ -18,7 +18,7 @@ from pipelines.report.templates import template
 if TYPE_CHECKING:
     from pipelines.audit.audit import Audit
     from pipelines.audit.drifts import UnitDrift
-    from pipelines.audit.findings import Finding
+    from pipelines.audit.finding import Finding
     from pipelines.audit.stations_over_time import Chart, Series
 
 MOST_SERIES, MOST_CHARTS, MOST_HISTORIES, MOST_ROWS, MOST_OF_KIND = 8, 4, 4, 25, 40

@@ -7,16 +7,17 @@ first (Geist 2017, NIST J. Res. 122.032: intrinsic parameters).
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Mapping, Sequence
 
     from numpy.typing import NDArray
 
     Array = NDArray[np.float64]
+    Numbers = NDArray[np.int64]
 
 AXES = ("x", "y", "z")
 
@@ -53,26 +54,31 @@ def unit_text(name: str) -> str:
 _CYCLE = ((1, 2), (2, 0), (0, 1))  # the two axes that a rotation about x, y, z mixes
 
 
-def parameters_of(columns: Mapping[str, NDArray[Any]], zero: float) -> tuple[list[str], dict[str, Array]]:
-    """Units, and value and standard error of every parameter: ``bias_x``, ``bias_x_error``, …; NaN where the model has none.
+def parameters_of(
+    row: Numbers, texts: Mapping[str, tuple[Sequence[str], Numbers]], value: Array, error: Array, zero: Array
+) -> dict[str, Array]:
+    """Value and standard error of every parameter, each (n,): ``bias_x``, ``bias_x_error``, …; NaN where the model has none.
 
     ``scale`` stays in output units per g: parts per million need a nominal value, which only the population has.
 
     Parameters
     ----------
-    columns : of the table of coefficients, any order
-    zero : nominal output at 0 g
+    row : (m,), of each coefficient the number of its calibration, from 0 to n - 1
+    texts : columns ``effect``, ``name`` and ``axis``: the different texts, and (m,) the number of each coefficient's
+    value, error : (m,)
+    zero : (n,), nominal output at 0 g
     """
-    units, unit = _numbered(columns["unit"].tolist())
-    place, key = _numbered(list(zip(*(columns[name].tolist() for name in ("effect", "name", "axis")), strict=True)))
-    value, error = (np.full((len(units), len(place)), np.nan) for _ in range(2))
-    value[unit, key] = columns["value"]
-    error[unit, key] = columns["standard_error"]
-    nothing = np.full(len(units), np.nan)
+    nothing = np.full(zero.size, np.nan)
 
-    def pick(effect: str, coefficient: str, axis: str) -> tuple[Array, Array]:
-        column = place.get((effect, coefficient, axis))
-        return (value[:, column], error[:, column]) if column is not None else (nothing, nothing)
+    def pick(*words: str) -> tuple[Array, Array]:
+        columns = zip(texts.values(), words, strict=True)
+        if not all(word in known for (known, _), word in columns):
+            return nothing, nothing
+        places = [numbers == known.index(word) for (known, numbers), word in zip(texts.values(), words, strict=True)]
+        own = np.flatnonzero(places[0] & places[1] & places[2])
+        found = nothing.copy(), nothing.copy()
+        found[0][row[own]], found[1][row[own]] = value[own], error[own]
+        return found
 
     scale = [pick("scale", "K1", axis) for axis in AXES]
     out: dict[str, Array] = {}
@@ -85,8 +91,8 @@ def parameters_of(columns: Mapping[str, NDArray[Any]], zero: float) -> tuple[lis
         _put(out, f"scale_{axis}", s, e)
     for number, (j, k) in enumerate(_CYCLE):
         (a, a_error), (b, b_error) = (
-            (1e3 * v / np.abs(scale[row][0]), 1e3 * e / np.abs(scale[row][0]))
-            for row, (v, e) in (
+            (1e3 * v / np.abs(scale[line][0]), 1e3 * e / np.abs(scale[line][0]))
+            for line, (v, e) in (
                 (j, pick("misalignment", f"K{AXES[j]}{AXES[k]}", AXES[j])),
                 (k, pick("misalignment", f"K{AXES[k]}{AXES[j]}", AXES[k])),
             )
@@ -94,7 +100,7 @@ def parameters_of(columns: Mapping[str, NDArray[Any]], zero: float) -> tuple[lis
         spread = np.hypot(a_error, b_error)
         _put(out, FAMILIES["square"].names[number], a + b, spread)
         _put(out, FAMILIES["rotation"].names[number], 0.5 * (b - a), 0.5 * spread)
-    return [*units], out
+    return out
 
 
 _SIMPLE = (
@@ -102,12 +108,6 @@ _SIMPLE = (
     ("bias_temperature", "bias_temperature", "kT"),
     ("scale_temperature", "scale_temperature", "aT"),
 )
-
-
-def _numbered(values: list[Any]) -> tuple[dict[Any, int], NDArray[np.int64]]:
-    """Every different value with its number in order of appearance, and the number of each."""
-    numbers: dict[Any, int] = {}
-    return numbers, np.array([numbers.setdefault(value, len(numbers)) for value in values], dtype=np.int64)
 
 
 def _put(out: dict[str, Array], name: str, value: Array, error: Array) -> None:

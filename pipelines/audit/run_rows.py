@@ -1,112 +1,161 @@
-"""What the audit keeps of one run: its rows in the tables of the index, made from its files and from nothing else."""
+"""What the audit keeps of runs: their rows in the tables of the index, made from their files and from nothing else.
+
+Files are read run by run, what follows is done for all runs of a part together: a call costs more than a run's few rows.
+"""
 
 from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from collections.abc import Iterable, Mapping, Sequence
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from pipelines.audit.parameters import NAMES, parameters_of
+from pipelines.archive.parquet import SCHEMA_MARK, TABLE_MARK
+from pipelines.archive.store import first_line
+from pipelines.audit.parameters import AXES, NAMES, parameters_of
+from pipelines.audit.run_files import START
 from pipelines.audit.station_effects import station_values
+from schemas.errors import ArchiveUnusable
+from schemas.upgrades import upgraded
+from schemas.version import VERSION
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from pipelines.archive.store import Place
-
-KEPT: Mapping[str, list[str]] = {  # tables that are read, with their columns of few different texts
-    "coefficients": ["unit", "axis", "effect", "name", "unit_text"],
-    "figures": ["unit", "figure", "unit_text", "outcome", "rule"],
-    "grades": ["unit", "outcome", "grade"],
-    "residuals": ["unit", "axis", "pose"],
-}
-TABLES = ("runs", "units", "parameters", "station", "coefficients", "figures")
+    from pipelines.audit.run_files import RunFiles
 
 _TEXT, _NUMBER = pa.string(), pa.float64()
+_FEW = pa.dictionary(pa.int32(), _TEXT)  # texts of which there are few different ones
+READ: Mapping[str, pa.Schema] = {  # what is read of the runs' tables
+    "coefficients": pa.schema(
+        [*((n, _FEW) for n in ("unit", "axis", "effect", "name")), ("value", _NUMBER), ("standard_error", _NUMBER),
+         ("unit_text", _FEW)]
+    ),
+    "figures": pa.schema(
+        [("unit", _FEW), ("figure", _FEW), ("value", _NUMBER), ("uncertainty", _NUMBER), ("limit", _NUMBER),
+         ("unit_text", _FEW), ("outcome", _FEW), ("rule", _FEW)]
+    ),
+    "grades": pa.schema([("unit", _FEW), ("slot", pa.int64()), ("outcome", _FEW), ("grade", _FEW)]),
+    "residuals": pa.schema(
+        [("unit", _FEW), ("dwell", pa.int64()), ("axis", _FEW), ("pose", _FEW), ("force_g", _NUMBER),
+         ("residual_ug", _NUMBER), ("unit_C", _NUMBER)]
+    ),
+}  # fmt: skip
+TABLES = ("runs", "units", "parameters", "station", "coefficients", "figures")
 RUN_FIELDS = ("run", "measured", "started", "recipe", "device", "station", "capture", "rerun_of", "problem", "stamp")
+
+
+def _kept(schema: pa.Schema) -> pa.Schema:
+    """Columns of a run's table as the index has them: with the run in front, texts as texts."""
+    return pa.schema([("run", _TEXT), *((f.name, _TEXT if f.type == _FEW else f.type) for f in schema)])
+
+
 SCHEMAS: Mapping[str, pa.Schema] = {
     "runs": pa.schema([(name, _TEXT) for name in RUN_FIELDS]),
-    "units": pa.schema([("run", _TEXT), ("unit", _TEXT), ("slot", pa.int64()), ("outcome", _TEXT), ("grade", _TEXT)]),
+    "units": _kept(READ["grades"]),
     "parameters": pa.schema(
         [("run", _TEXT), ("unit", _TEXT), *((f"{n}{end}", _NUMBER) for n in NAMES for end in ("", "_error"))]
     ),
-    "station": pa.schema(
-        [("run", _TEXT), ("effect", _TEXT), ("name", _TEXT), ("value", _NUMBER), ("error", _NUMBER)]
-    ),
-    "coefficients": pa.schema(
-        [("run", _TEXT), *((n, _TEXT) for n in ("unit", "axis", "effect", "name")), ("value", _NUMBER),
-         ("standard_error", _NUMBER), ("unit_text", _TEXT)]
-    ),
-    "figures": pa.schema(
-        [("run", _TEXT), ("unit", _TEXT), ("figure", _TEXT), ("value", _NUMBER), ("uncertainty", _NUMBER),
-         ("limit", _NUMBER), ("unit_text", _TEXT), ("outcome", _TEXT), ("rule", _TEXT)]
-    ),
-}  # fmt: skip
+    "station": pa.schema([("run", _TEXT), ("effect", _TEXT), ("name", _TEXT), ("value", _NUMBER), ("error", _NUMBER)]),
+    "coefficients": _kept(READ["coefficients"]),
+    "figures": _kept(READ["figures"]),
+}
 
 
-def rows_of_run(path: Place, stamp: str) -> dict[str, pa.Table]:
-    """The rows of one run in the tables of the index that it has any in.
+class _Run(NamedTuple):
+    """A run that could be read: its name, its ``run.json`` and its tables."""
+
+    id: str
+    about: Mapping[str, Any]
+    tables: Mapping[str, pa.Table]
+
+
+def rows_of_runs(found: Iterable[RunFiles]) -> dict[str, pa.Table]:
+    """The rows of runs in every table of the index.
 
     What cannot be read (a changed byte, a foreign file, a run cut off) makes a run without rows, with the problem in ``runs``:
     one bad file must not hide the rest of an archive.
-
-    Parameters
-    ----------
-    path : the run's folder; stamp : what its files looked like, from which a change is seen
     """
-    about: dict[str, Any] = {}
-    try:
-        about = json.loads((path / "run.json").read_bytes())
-        tables, problem = {name: _table(path, name) for name in KEPT}, ""
-    except (OSError, ValueError, KeyError) as trouble:  # ArrowInvalid and JSONDecodeError are ValueErrors
-        tables, problem = dict.fromkeys(KEPT), str(trouble).splitlines()[0] or type(trouble).__name__
-    out = {"runs": _run_row(path.name, about, stamp, problem)}
-    for name in ("coefficients", "figures"):
-        if tables[name] is not None:
-            out[name] = _with_run(path.name, tables[name], SCHEMAS[name])
-    if tables["grades"] is not None:
-        out["units"] = _with_run(path.name, tables["grades"], SCHEMAS["units"])
-    if tables["coefficients"] is not None and len(tables["coefficients"]):
-        out |= _derived(path.name, about, tables)
-    return out
+    lines: list[tuple[str, ...]] = []
+    runs: list[_Run] = []
+    for files in found:
+        about: dict[str, Any] = {}
+        problem = files.trouble
+        try:
+            about = _about(files)
+            runs.append(_Run(files.run, about, _tables(files)))
+        except (OSError, ValueError, KeyError, ArchiveUnusable) as trouble:  # ArrowInvalid is a ValueError
+            problem = problem or first_line(trouble)
+        lines.append(_line(files, about, problem))
+    kept = {"units": "grades", "coefficients": "coefficients", "figures": "figures"}
+    return {
+        "runs": _from_rows(lines, SCHEMAS["runs"]),
+        **{name: _together(runs, table, SCHEMAS[name]) for name, table in kept.items()},
+        "parameters": _parameters([run for run in runs if len(run.tables.get("coefficients", ()))]),
+        "station": _from_rows([row for run in runs for row in _station(run)], SCHEMAS["station"]),
+    }
 
 
-def _table(path: Place, name: str) -> pa.Table | None:
-    """A table as it was written; None where the run has none of this name."""
-    manifest = path / f"{name}.json"
-    try:
-        data = (path / f"{name}.parquet").read_bytes()
-    except FileNotFoundError:
-        return None
-    if hashlib.sha256(data).hexdigest() != json.loads(manifest.read_bytes())["sha256"]:
+def _about(files: RunFiles) -> dict[str, Any]:
+    if files.trouble:
+        raise ValueError(files.trouble)
+    content = json.loads(files.content[START])
+    if not isinstance(content, dict):
+        message = f"{START} holds no manifest"
+        raise ValueError(message)  # noqa: TRY004 - what stands in a file, not what a caller gave
+    return content
+
+
+def _tables(files: RunFiles) -> dict[str, pa.Table]:
+    """The tables of a run as they were written, those that it has."""
+    there = [name for name in READ if f"{name}.parquet" in files.content]
+    return {name: _table(name, files.content) for name in there}
+
+
+def _table(name: str, content: Mapping[str, bytes]) -> pa.Table:
+    data, wanted = content[f"{name}.parquet"], READ[name]
+    if f"{name}.json" not in content:
+        message = f"{name}.parquet has no manifest"
+        raise ValueError(message)
+    if hashlib.sha256(data).hexdigest() != json.loads(content[f"{name}.json"])["sha256"]:
         message = f"{name}.parquet has changed since it was written"
         raise ValueError(message)
-    file = pq.ParquetFile(pa.BufferReader(data), read_dictionary=KEPT[name], pre_buffer=False)
-    table = file.read(use_threads=False)  # threads cost more than so few rows
-    mark = (table.schema.metadata or {}).get(b"tumbleline.table", b"").decode()
+    texts = [field.name for field in wanted if field.type == _FEW]
+    file = pq.ParquetFile(pa.BufferReader(data), read_dictionary=texts, pre_buffer=False)
+    marks = file.schema_arrow.metadata or {}
+    mark = marks.get(TABLE_MARK, b"").decode(errors="replace")
     if mark != name:
         message = f"{name}.parquet holds '{mark or 'a foreign table'}'"
         raise ValueError(message)
-    return table
+    version = int(marks.get(SCHEMA_MARK, b"1"))
+    if version == VERSION:
+        table = file.read(columns=wanted.names, use_threads=False)  # threads cost more than so few rows
+    else:
+        table = pa.Table.from_pandas(upgraded(name, file.read().to_pandas(), version, f"{name}.parquet"))
+    return _as_wanted(table, wanted)
 
 
-def _with_run(run: str, table: pa.Table, schema: pa.Schema) -> pa.Table:
-    def column(field: pa.Field) -> pa.ChunkedArray | pa.Array:
-        there = field.name in table.column_names
-        return table.column(field.name).cast(field.type) if there else pa.nulls(len(table), field.type)
+def _as_wanted(table: pa.Table, wanted: pa.Schema) -> pa.Table:
+    """The columns that are wanted, in their order and types; empty ones where there are none."""
+    found = [table.schema.field(name).type if name in table.column_names else None for name in wanted.names]
+    if found == wanted.types:
+        return table.select(wanted.names)
+    columns = [
+        pa.nulls(len(table), field.type) if type_ is None else table.column(field.name).cast(field.type)
+        for field, type_ in zip(wanted, found, strict=True)
+    ]
+    return pa.table(columns, schema=wanted)
 
-    return pa.table([pa.repeat(pa.scalar(run), len(table)), *map(column, list(schema)[1:])], schema=schema)
 
-
-def _run_row(run: str, about: Mapping[str, Any], stamp: str, problem: str) -> pa.Table:
+def _line(files: RunFiles, about: Mapping[str, Any], problem: str) -> tuple[str, ...]:
+    """The run's row in the table of runs."""
     recipe, lot, station = (about.get(key) or {} for key in ("recipe", "lot", "station"))
     row = {
-        "run": run,
+        "run": files.run,
         "measured": about.get("measured", about.get("when", "")),
         "started": about.get("when", ""),
         "recipe": recipe.get("name", about.get("name", "")),
@@ -115,36 +164,66 @@ def _run_row(run: str, about: Mapping[str, Any], stamp: str, problem: str) -> pa
         "capture": about.get("capture") or "",
         "rerun_of": about.get("rerun_of", ""),
         "problem": problem,
-        "stamp": stamp,
+        "stamp": files.stamp,
     }
-    return pa.table({name: [str(row[name])] for name in RUN_FIELDS}, schema=SCHEMAS["runs"])
+    return tuple(str(row[name]) for name in RUN_FIELDS)
 
 
-def _derived(run: str, about: Mapping[str, Any], tables: Mapping[str, pa.Table | None]) -> dict[str, pa.Table]:
-    recipe = about.get("recipe") or {}
-    coefficients = _columns(tables["coefficients"], ("unit", "axis", "effect", "name", "value", "standard_error"))
-    units, values = parameters_of(coefficients, float(recipe.get("zero_output", 0.0)))
-    wide = {"run": [run] * len(units), "unit": units, **values}
-    out = {"parameters": pa.table(wide, schema=SCHEMAS["parameters"])}
-    if tables["residuals"] is not None and recipe.get("poses"):
-        out["station"] = _station(run, recipe, coefficients, tables["residuals"])
-    return out
+def _together(runs: Sequence[_Run], name: str, schema: pa.Schema) -> pa.Table:
+    """One table of all runs, with the run in front."""
+    own = [run for run in runs if name in run.tables]
+    if not own:
+        return schema.empty_table()
+    whole = pa.concat_tables([run.tables[name] for run in own])
+    names = np.repeat(np.array([run.id for run in own], dtype=object), [len(run.tables[name]) for run in own])
+    return whole.add_column(0, "run", pa.array(names, _TEXT)).cast(schema)
 
 
-def _station(
-    run: str, recipe: Mapping[str, Any], coefficients: Mapping[str, NDArray[Any]], residuals: pa.Table
-) -> pa.Table:
+def _parameters(runs: Sequence[_Run]) -> pa.Table:
+    """The parameters of every unit of every run, in the order in which the runs' coefficients name them."""
+    schema = SCHEMAS["parameters"]
+    if not runs:
+        return schema.empty_table()
+    table = pa.concat_tables([run.tables["coefficients"] for run in runs]).unify_dictionaries()
+    counts = [len(run.tables["coefficients"]) for run in runs]
+    zeros = [float((run.about.get("recipe") or {}).get("zero_output", 0.0)) for run in runs]
+    units, unit = _coded(table, "unit")
+    run = np.repeat(np.arange(len(runs)), counts)
+    _, first, row = np.unique(run * len(units) + unit, return_index=True, return_inverse=True)
+    order = np.argsort(first)
+    rank = np.empty_like(order)
+    rank[order] = np.arange(order.size)
+    columns = {name: _coded(table, name) for name in ("effect", "name", "axis")}
+    numbers = [table.column(name).to_numpy() for name in ("value", "standard_error")]
+    found = parameters_of(rank[row], columns, numbers[0], numbers[1], np.array(zeros)[run[first[order]]])
+    names = [runs[k].id for k in run[first[order]]], [units[k] for k in unit[first[order]]]
+    return pa.table({"run": names[0], "unit": names[1], **found}, schema=schema)
+
+
+def _station(run: _Run) -> list[tuple[Any, ...]]:
     """The station's values that the residuals tell, on top of those that the run's own model has taken up."""
-    frame = _columns(residuals, ("dwell", "pose", "force_g", "residual_ug", "unit_C"))
-    frame["unit"], axis = _codes(residuals, "unit"), _codes(residuals, "axis", ("x", "y", "z"))
-    order = np.lexsort((axis, frame["dwell"], frame["unit"]))
-    model = list(dict.fromkeys(coefficients["effect"].tolist()))
-    found = station_values({name: values[order] for name, values in frame.items()}, recipe, model)
-    shared = coefficients["axis"] == "*"
-    in_model = {(e, n): 1e6 * float(v) for e, n, v in zip(*(coefficients[c][shared] for c in ("effect", "name", "value")),
-                                                           strict=True)}  # fmt: skip
-    rows = [(run, v.effect, v.name, v.value + in_model.get((v.effect, v.name), 0.0), v.error) for v in found]
-    return _from_rows(rows, SCHEMAS["station"])
+    recipe, residuals = run.about.get("recipe") or {}, run.tables.get("residuals")
+    coefficients = run.tables.get("coefficients")
+    if residuals is None or not len(residuals) or not coefficients or not recipe.get("poses"):
+        return []
+    frame = {name: residuals.column(name).to_numpy() for name in ("dwell", "force_g", "residual_ug", "unit_C")}
+    axes, axis = _coded(residuals, "axis")
+    poses, pose = _coded(residuals, "pose")
+    frame |= {"unit": _coded(residuals, "unit")[1], "pose": pose}
+    order = np.lexsort((np.array([AXES.index(text) for text in axes])[axis], frame["dwell"], frame["unit"]))
+    frame = {name: values[order] for name, values in frame.items()}
+    model = _coded(coefficients, "effect")[0]
+    found = station_values({**frame, "pose": np.array(poses, dtype=object)[frame["pose"]]}, recipe, model)
+    known = _of_the_model(coefficients)
+    return [(run.id, v.effect, v.name, v.value + known.get((v.effect, v.name), 0.0), v.error) for v in found]
+
+
+def _of_the_model(coefficients: pa.Table) -> dict[tuple[str, str], float]:
+    """The station's own coefficients in the run's model, in millionths, by effect and name."""
+    if "*" not in _coded(coefficients, "axis")[0]:
+        return {}
+    rows = coefficients.select(["axis", "effect", "name", "value"]).to_pylist()
+    return {(row["effect"], row["name"]): 1e6 * row["value"] for row in rows if row["axis"] == "*"}
 
 
 def _from_rows(rows: Sequence[tuple[Any, ...]], schema: pa.Schema) -> pa.Table:
@@ -152,14 +231,7 @@ def _from_rows(rows: Sequence[tuple[Any, ...]], schema: pa.Schema) -> pa.Table:
     return pa.table([pa.array(c, f.type) for c, f in zip(columns, schema, strict=True)], schema=schema)
 
 
-def _codes(table: pa.Table, name: str, known: Sequence[str] = ()) -> NDArray[Any]:
-    """A column of texts as numbers: by their place in ``known``, or any where none are given."""
+def _coded(table: pa.Table, name: str) -> tuple[list[str], NDArray[np.int64]]:
+    """The different texts of a column, and the number of each row's."""
     column = table.column(name).combine_chunks()
-    texts, numbers = column.dictionary.to_pylist(), column.indices.to_numpy()
-    return np.array([known.index(text) for text in texts])[numbers] if known else numbers
-
-
-def _columns(table: pa.Table | None, names: Sequence[str]) -> dict[str, NDArray[Any]]:
-    if table is None:
-        return {}
-    return {name: table.column(name).to_numpy() for name in names}
+    return column.dictionary.to_pylist(), column.indices.to_numpy().astype(np.int64)

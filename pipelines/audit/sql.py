@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     import pyarrow as pa
 
     from pipelines.archive import Archive
+    from pipelines.trace.validity import Calibration
 
 READING = {"SELECT", "EXPLAIN"}  # statements that change nothing; DESCRIBE, SHOW and WITH count as SELECT
 FILES: tuple[str, ...] = (  # tables of the runs that are read where they lie
@@ -158,19 +159,19 @@ def _gathered(files: Iterable[Any]) -> pa.Table:
     return pa.concat_tables(parts, promote_options="default") if parts else pa.table({"run": pa.array([], pa.string())})
 
 
-LEDGER = (
-    "certificate",
-    "serial",
-    "device",
-    "from",
-    "until",
-    "state",
-    "stated_until",
-    "run",
-    "grade",
-    "station",
-    "recipe",
-)
+LEDGER: Mapping[str, Callable[[Calibration], str]] = {  # columns of the view, as a calibration's document names them
+    "certificate": lambda one: one.certificate,
+    "serial": lambda one: one.serial,
+    "device": lambda one: one.event.device,
+    "from": lambda one: one.start,
+    "until": lambda one: one.until,
+    "state": lambda one: one.state,
+    "stated_until": lambda one: one.stated_until,
+    "run": lambda one: one.run,
+    "grade": lambda one: one.event.grade,
+    "station": lambda one: one.event.station,
+    "recipe": lambda one: one.event.recipe,
+}
 
 
 def _of_ledger(archive: Archive) -> Callable[[duckdb.DuckDBPyConnection], None]:
@@ -179,8 +180,8 @@ def _of_ledger(archive: Archive) -> Callable[[duckdb.DuckDBPyConnection], None]:
 
         from pipelines.trace.ledger import Ledger
 
-        documents = [one.document() for one in Ledger(archive).all()]
-        rows = {name: pa.array([d[name] for d in documents], pa.string()) for name in LEDGER}
+        known = list(Ledger(archive).all())
+        rows = {name: pa.array([of(one) for one in known], pa.string()) for name, of in LEDGER.items()}
         connection.register("calibrations_rows", pa.table(rows))
         connection.execute("CREATE VIEW calibrations AS SELECT * FROM calibrations_rows")
 

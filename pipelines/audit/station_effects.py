@@ -102,10 +102,14 @@ class _Seen(NamedTuple):
 _seen: dict[tuple[object, ...], _Seen] = {}
 
 
-def _what_is_seen(state: State, model: Sequence[str]) -> _Seen:
-    """What a plan lets see; worked out once for all runs of a recipe whose temperatures agree within a kelvin."""
-    temperature = b"" if state.temperature is None else np.round(state.temperature).tobytes()
-    key = (tuple(model), np.round(state.force, 3).tobytes(), temperature)
+def _what_is_seen(exact: State, model: Sequence[str]) -> _Seen:
+    """What a plan lets see; worked out once for all runs of a recipe whose temperatures agree within a kelvin.
+
+    It is worked out of the rounded state, so that a run's values do not depend on which runs were looked at before it.
+    """
+    state = _rounded(exact)
+    parts = (state.force, state.temperature, state.outer, state.inner)
+    key = (tuple(model), *(b"" if part is None else np.asarray(part).tobytes() for part in parts))
     if key not in _seen:
         bases = _bases(state, model)
         found: list[tuple[StationEffect, Array, Array]] = []
@@ -116,6 +120,13 @@ def _what_is_seen(state: State, model: Sequence[str]) -> _Seen:
                 found.append((effect, columns, inverse))
         _seen[key] = _Seen(bases, found, 3 * state.time.size - sum(base.shape[1] for base in bases))
     return _seen[key]
+
+
+def _rounded(state: State) -> State:
+    """The state to a milli-g, a kelvin and 10 µrad; a zero has no sign."""
+    temperature = None if state.temperature is None else np.round(state.temperature) + 0.0
+    angles = {name: np.round(getattr(state, name), 5) + 0.0 for name in ("outer", "inner")}
+    return replace(state, force=np.round(state.force, 3) + 0.0, temperature=temperature, **angles)
 
 
 def _fitted(mean: Array, state: State, model: Sequence[str]) -> list[StationValue]:

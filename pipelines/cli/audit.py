@@ -12,7 +12,7 @@ from schemas.errors import DONE, PART_FAILED, WrongUse
 
 if TYPE_CHECKING:
     from pipelines.audit.audit import Audit, Scope
-    from pipelines.audit.findings import Finding
+    from pipelines.audit.finding import Finding
 
 SHOWN = 12  # findings of one kind
 
@@ -110,7 +110,7 @@ def _write_page(page: Path, found: Audit, told: list[Finding], root: str) -> Non
 def _show(found: Audit, told: list[Finding], page: Path | None) -> None:
     from pipelines.audit.calibrations import date_of
     from pipelines.audit.document import counts
-    from pipelines.audit.findings import WHO
+    from pipelines.audit.finding import WHO
 
     out, number = console(), counts(found)
     period = f"{date_of(found.scope.since)} to {date_of(found.scope.until - 1)}" if found.scope.since > _BEGINNING else (
@@ -121,6 +121,7 @@ def _show(found: Audit, told: list[Finding], page: Path | None) -> None:
         f"stations; {period}", markup=False, soft_wrap=True,
     )  # fmt: skip
     _show_yield(found)
+    out.print(_certificates(found), markup=False, soft_wrap=True)
     for who, words in WHO.items():
         own = [finding for finding in told if finding.who == who]
         if own:
@@ -134,6 +135,16 @@ def _show(found: Audit, told: list[Finding], page: Path | None) -> None:
 
 
 _BEGINNING = -700000.0  # days before any calibration
+
+
+def _certificates(found: Audit) -> str:
+    """What the ledger has, in one line."""
+    if not len(found.certificates):
+        return "ledger  nothing is certified: units are due an interval after their last pass"
+    return (
+        f"ledger  {len(found.certificates)} certificates; {int(found.due.valid.sum())} of {found.due.row.size} units have one "
+        f"that holds on {found.certificates.day}"
+    )
 
 
 def _show_kind(own: list[Finding]) -> None:

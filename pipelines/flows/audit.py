@@ -15,7 +15,8 @@ from pipelines.archive.files import ELSEWHERE, json_bytes, publish
 from pipelines.audit.audit import Scope, audit
 from pipelines.audit.calibrations import date_of, day_of
 from pipelines.audit.document import counts, document
-from pipelines.audit.findings import WHO, findings
+from pipelines.audit.finding import WHO
+from pipelines.audit.findings import findings
 from pipelines.audit.page import render
 from pipelines.audit.rules import load_rules
 from pipelines.plain import plain
@@ -23,7 +24,7 @@ from pipelines.trace.days import today
 
 if TYPE_CHECKING:
     from pipelines.audit.audit import Audit
-    from pipelines.audit.findings import Finding
+    from pipelines.audit.finding import Finding
 
 KEY = "tumbleline-audit"
 MOST_ROWS = 500  # of the table of findings; the page and the document have all

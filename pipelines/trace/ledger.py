@@ -20,6 +20,7 @@ from pipelines.archive.provenance import provenance
 from pipelines.archive.store import ObjectPath, place_of
 from pipelines.trace.days import LAST, today
 from pipelines.trace.events import Event, event_of
+from pipelines.trace.places import folder_of
 from pipelines.trace.refusals import nothing_to_revoke, refuse_other_device, refuse_serial
 from pipelines.trace.validity import Calibration, calibrations_of, overlapped
 from schemas.errors import ArchiveUnusable, WrongUse
@@ -31,7 +32,6 @@ if TYPE_CHECKING:
     from pipelines.archive.store import Place
     from pipelines.trace.certifying import Certified
 
-FOLDER = "calibrations"
 CLOCK_SLACK = timedelta(minutes=5)  # clocks of hosts that write into one archive differ by less
 
 
@@ -68,14 +68,15 @@ class Ledger:
         for events in self.histories():
             yield from calibrations_of(events)
 
-    def histories(self) -> Iterator[list[Event]]:
-        """The events of every unit, unit by unit, in no order that means anything."""
-        top = self.root / FOLDER
-        for shard in sorted(top.iterdir(), key=lambda place: place.name) if top.is_dir() else ():
-            for folder in sorted(shard.iterdir(), key=lambda place: place.name) if shard.is_dir() else ():
-                events = [event for event, _ in _events(folder)]
-                if events:
-                    yield events
+    def histories(self) -> list[list[Event]]:
+        """The events of every unit, unit by unit, in no order that means anything; few files are read where they were before."""
+        from pipelines.trace.noted import histories_of  # needs a table library, which looking up one unit does not
+
+        found = histories_of(self.root)
+        for folder, problem in found.problems.items():
+            message = f"calibrations: {folder} {problem}"
+            raise ArchiveUnusable(message)
+        return found.units
 
     def certify(
         self,
@@ -204,19 +205,13 @@ class Ledger:
         return found
 
 
-def folder_of(serial: str) -> str:
-    """Folder of a unit's events below the archive's root."""
-    name = hashlib.sha256(serial.encode("utf-8", "surrogateescape")).hexdigest()
-    return f"{FOLDER}/{name[:2]}/{name[:16]}"
-
-
 def _events(folder: Place) -> list[tuple[Event, str]]:
     """Events of a unit's folder with the hashes of their files; refused where one is missing among them."""
     if isinstance(folder, Path):
         names = sorted(path.name for path in folder.iterdir()) if folder.is_dir() else []
     else:
         names = sorted(path.name for path in folder.iterdir())
-    names = [name for name in names if name.endswith(".json") and not name.startswith(files.TEMPORARY)]
+    names = [name for name in names if name.endswith(".json") and chain.is_number(name.removesuffix(".json"))]
     found: list[tuple[Event, str]] = []
     for count, name in enumerate(names, 1):
         place = folder / name

@@ -43,6 +43,11 @@ def units_again(rng: np.random.Generator, units: int = 60, times: int = 6, sprea
     return rows, np.array(values)
 
 
+def coded(texts: list[str]) -> tuple[list[str], np.ndarray]:
+    known, numbers = np.unique(texts, return_inverse=True)
+    return known.tolist(), numbers
+
+
 def everything(found: Calibrations) -> np.ndarray:
     return np.ones(len(found), dtype=bool)
 
@@ -168,14 +173,9 @@ def test_a_lot_that_stands_out_is_told_once_and_not_unit_by_unit(rng):
 def test_parameters_come_from_coefficients_by_their_definitions():
     rows = [("scale", "K1", a, 2.0) for a in "xyz"] + [("bias", "K0", a, 1.5 + 0.002) for a in "xyz"]
     rows += [("misalignment", "Kxy", "x", 0.004), ("misalignment", "Kyx", "y", 0.002)]
-    columns = {
-        "unit": np.array(["U"] * len(rows), dtype=object),
-        **{name: np.array([r[k] for r in rows], dtype=object) for k, name in enumerate(("effect", "name", "axis"))},
-        "value": np.array([r[3] for r in rows]),
-        "standard_error": np.full(len(rows), 2e-6),
-    }
-    units, found = parameters_of(columns, 1.5)
-    assert units == ["U"]
+    texts = {name: coded([r[k] for r in rows]) for k, name in enumerate(("effect", "name", "axis"))}
+    value, error = np.array([r[3] for r in rows]), np.full(len(rows), 2e-6)
+    found = parameters_of(np.zeros(len(rows), dtype=np.int64), texts, value, error, np.array([1.5]))
     assert found["bias_x"][0] == pytest.approx(1000.0)  # µg
     assert found["bias_x_error"][0] == pytest.approx(1.0)
     assert found["square_xy"][0] == pytest.approx(3.0)  # mrad

@@ -8,8 +8,9 @@ from pipelines.archive import files
 from pipelines.archive.keys import digest
 from pipelines.archive.listing import SEALED
 from pipelines.archive.records import COMPLETE
-from pipelines.trace.ledger import Ledger, folder_of
+from pipelines.trace.ledger import Ledger
 from pipelines.trace.lineage.graph import Graph, Node, Step
+from pipelines.trace.places import folder_of
 
 if TYPE_CHECKING:
     from pipelines.archive import Archive, Run

@@ -1,0 +1,100 @@
+"""Findings about what is due: units to call in, certificates that do not agree with what was measured."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from pipelines.audit.calibrations import date_of
+from pipelines.audit.due import uncertified
+from pipelines.audit.finding import Finding, some
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from numpy.typing import NDArray
+
+    from pipelines.audit.audit import Audit
+
+    Numbers = NDArray[np.int64]
+
+REASONS = {  # why units are overdue, as a sentence tells it
+    "certificate": "their certificate has ended",
+    "fixed": "their interval is over",
+    "drift": "they drift",
+    "revoked": "their certificate was revoked",
+    "did not pass": "they did not pass",
+}
+
+
+def of_certificates(audit: Audit) -> Iterator[Finding]:
+    """Where the ledger and the measurements say different things."""
+    yield from _held_but_failed(audit)
+    yield from _uncertified(audit)
+
+
+def of_what_is_due(audit: Audit) -> Iterator[Finding]:
+    """What is overdue, then what comes due."""
+    yield from _overdue(audit)
+    yield from _coming_due(audit)
+
+
+def _held_but_failed(audit: Audit) -> Iterator[Finding]:
+    """Units that did not pass when they were measured last, and have a certificate that holds."""
+    own = audit.due
+    for k in np.flatnonzero(own.valid & (own.because == "did not pass")):
+        row = own.row[k]
+        unit, run, day = str(audit.all.unit[row]), str(audit.all.run[row]), date_of(float(audit.all.day[row]))
+        message = (
+            f"{unit} did not pass on {day} (run {run}), certificate {own.certificate[k]} holds all the same; revoke it from "
+            "the day on which the unit is no longer to be relied on, and measure the unit again"
+        )
+        evidence = {"run": run, "date": day, "certificate": str(own.certificate[k])}
+        yield Finding("quality", "held_but_failed", unit, message, (unit,), evidence)
+
+
+def _uncertified(audit: Audit) -> Iterator[Finding]:
+    """Units that passed and were not certified for it, by kind of device; none in an archive without a ledger."""
+    found = uncertified(audit.all, audit.due, audit.certificates)
+    for device, own in _by_device(audit, found):
+        units = _units(audit, own)
+        without = int(np.count_nonzero(~audit.due.valid[own]))
+        message = (
+            f"{device}: {len(units)} units passed when they were measured last and were not certified for it, {without} of them "
+            f"have no certificate that holds; certify their runs, or note why not ({some(units)})"
+        )
+        runs = sorted({str(run) for run in audit.all.run[audit.due.row[own]]})
+        yield Finding("quality", "uncertified", device, message, units, {"without": without, "runs": runs})
+
+
+def _overdue(audit: Audit) -> Iterator[Finding]:
+    for device, own in _by_device(audit, np.flatnonzero(audit.due.day < audit.scope.until)):
+        units, oldest = _units(audit, own), date_of(float(audit.due.day[own].min()))
+        counts = {why: int(np.count_nonzero(audit.due.because[own] == why)) for why in REASONS}
+        because = ", ".join(f"{count} because {REASONS[why]}" for why, count in counts.items() if count)
+        message = f"{device}: {len(units)} units are overdue ({because}), the first since {oldest}; call them in ({some(units)})"
+        evidence = {"oldest": oldest, "because": {why: count for why, count in counts.items() if count}}
+        yield Finding("line", "overdue", device, message, units, evidence)
+
+
+def _coming_due(audit: Audit) -> Iterator[Finding]:
+    until = audit.scope.until
+    soon = np.flatnonzero((audit.due.day >= until) & (audit.due.day < until + audit.rules.notice_days))
+    for device, own in _by_device(audit, soon):
+        units = _units(audit, own)
+        message = (
+            f"{device}: {len(units)} units come due within {audit.rules.notice_days} days; plan them ({some(units)})"
+        )
+        yield Finding("line", "due", device, message, units)
+
+
+def _by_device(audit: Audit, chosen: Numbers) -> Iterator[tuple[str, Numbers]]:
+    """Places among the units that are due, by kind of device."""
+    devices = audit.all.device[audit.due.row[chosen]].astype(str)
+    for device in np.unique(devices):
+        yield str(device), chosen[devices == device]
+
+
+def _units(audit: Audit, own: Numbers) -> tuple[str, ...]:
+    return tuple(str(unit) for unit in audit.all.unit[audit.due.row[own]])

@@ -1,0 +1,68 @@
+"""Findings about the population: what stands out, what the limits are too narrow for, what differs between groups."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from pipelines.audit.calibrations import date_of
+from pipelines.audit.finding import Finding
+from pipelines.audit.parameters import unit_text
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from pipelines.audit.audit import Audit
+
+TELLING_EFFECT = 0.02  # share of the variance between groups, below which a difference matters to nobody
+DIFFERENT_P = 1e-3
+
+
+def of_population(audit: Audit) -> Iterator[Finding]:
+    """All of them, what stands out first."""
+    yield from _odd(audit)
+    yield from _incapable(audit)
+    yield from _different(audit)
+
+
+def _odd(audit: Audit) -> Iterator[Finding]:
+    for odd in audit.odd:
+        what = f"lot of run {odd.run} ({odd.units} units)" if odd.kind == "lot" else f"unit {odd.name}"
+        text = unit_text(odd.parameter)
+        message = (
+            f"{odd.device}: {what} of {date_of(odd.day)} stands out in {odd.parameter}: {odd.value:.4g} {text}, "
+            f"{odd.z:+.1f} σ from its kind; look for what was different in making it"
+        )
+        evidence = {"run": odd.run, "station": odd.station, "parameter": odd.parameter, "value": odd.value, "z": odd.z}
+        yield Finding(
+            "product", f"odd_{odd.kind}", odd.name, message, (odd.name,) if odd.kind == "unit" else (), evidence
+        )
+
+
+def _incapable(audit: Audit) -> Iterator[Finding]:
+    for able in audit.abilities:
+        if able.ppk.low < audit.rules.ppk_least:
+            message = (
+                f"{able.device}: {able.figure} has Ppk {able.ppk.value:.2f} ({able.ppk.low:.2f} to {able.ppk.high:.2f}) "
+                f"against {able.limit:g} {able.unit_text}, at least {audit.rules.ppk_least:g} is needed; "
+                f"{100 * able.outside.value:.2g} % are outside: narrow the spread, or widen the limit"
+            )
+            evidence = {
+                "figure": able.figure,
+                "ppk": able.ppk.value,
+                "low": able.ppk.low,
+                "high": able.ppk.high,
+                "n": able.n,
+            }
+            yield Finding("product", "capability", able.device, message, (), evidence)
+
+
+def _different(audit: Audit) -> Iterator[Finding]:
+    for one in audit.differences:
+        if one.by != "lot" and one.p < DIFFERENT_P and one.found.effect > TELLING_EFFECT:
+            message = (
+                f"{one.device}: {one.figure} differs between {one.by}s: {100 * one.found.effect:.0f} % of its variance, "
+                f"p = {one.p:.1g} over {one.found.groups} {one.by}s; find out which, and why"
+            )
+            who = "station" if one.by in {"station", "slot"} else "product"
+            evidence = {"figure": one.figure, "by": one.by, "share": one.found.effect, "p_value": one.p}
+            yield Finding(who, f"differs_by_{one.by}", one.device, message, (), evidence)

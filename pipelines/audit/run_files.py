@@ -1,0 +1,117 @@
+"""The files of runs that the index is made from: what they look like, and their bytes.
+
+A disk that is cold answers many questions at once as fast as one; so files are looked at and read by several threads.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+from typing import TYPE_CHECKING, NamedTuple
+
+from pipelines.archive.store import ObjectPath
+from schemas.errors import ArchiveUnusable
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Iterator, Mapping, Sequence
+
+    from pipelines.archive.store import Place
+
+START = "run.json"
+NAMES = ("coefficients", "figures", "grades", "residuals")  # tables that are read
+WATCHED = (START, *(f"{name}{end}" for name in NAMES for end in (".json", ".parquet")))
+READERS = 8
+AT_ONCE = 128  # runs that one thread looks at in one go
+
+
+class RunFiles(NamedTuple):
+    """Files of a run by their names, those of :data:`WATCHED` that are there; ``trouble`` where they cannot be read.
+
+    stamp : what they looked like before they were read, from which a change is seen
+    """
+
+    run: str
+    stamp: str
+    content: Mapping[str, bytes]
+    trouble: str = ""
+
+
+def read_runs(runs: Place, stamps: Sequence[tuple[str, str]]) -> Iterator[RunFiles]:
+    """The files of runs, in the order given, read ahead of whoever uses them.
+
+    Parameters
+    ----------
+    runs : folder of the runs
+    stamps : names of runs, each with its stamp
+    """
+    with ThreadPoolExecutor(READERS) as pool:
+        yield from pool.map(lambda one: _read(runs / one[0], one[1]), stamps)
+
+
+def stamps_of(root: Place) -> dict[str, str]:
+    """What the files of every run look like, by run: size and time of each that the index is made from."""
+    runs = root / "runs"
+    if isinstance(runs, ObjectPath):
+        return _stamps_of_objects(runs)
+    if not runs.is_dir():
+        return {}
+    names = sorted(os.listdir(runs))  # noqa: PTH208 - ten thousand names, not paths
+    groups = [names[k : k + AT_ONCE] for k in range(0, len(names), AT_ONCE)]
+    out: dict[str, str] = {}
+    with ThreadPoolExecutor(READERS) as pool:
+        for found in pool.map(lambda group: _stamps(str(runs), group), groups):
+            out |= found
+    return out
+
+
+def _read(path: Place, stamp: str) -> RunFiles:
+    content: dict[str, bytes] = {}
+    for name in WATCHED:
+        try:
+            content[name] = _bytes(path, name)
+        except FileNotFoundError:
+            continue
+        except (OSError, ArchiveUnusable) as trouble:
+            return RunFiles(path.name, stamp, content, str(trouble).splitlines()[0])
+    return RunFiles(path.name, stamp, content)
+
+
+def _bytes(path: Place, name: str) -> bytes:
+    if isinstance(path, Path):
+        with open(f"{path}/{name}", "rb", buffering=0) as file:  # noqa: PTH123 - a hundred thousand of these
+            return file.readall()
+    return (path / name).read_bytes()
+
+
+def _stamps(runs: str, names: Iterable[str]) -> dict[str, str]:
+    out: dict[str, str] = {}
+    for run in names:
+        marks = [_mark(f"{runs}/{run}/{name}") for name in WATCHED]
+        if marks[0]:  # a run without run.json has not begun
+            out[run] = _short(marks)
+    return out
+
+
+def _mark(path: str) -> str:
+    try:
+        found = os.stat(path)  # noqa: PTH116 - a hundred thousand of these
+    except OSError:
+        return ""
+    return f"{found.st_size}.{found.st_mtime_ns}"
+
+
+def _stamps_of_objects(runs: ObjectPath) -> dict[str, str]:
+    from pyarrow.fs import FileSelector, FileType
+
+    marks: dict[str, dict[str, str]] = {}
+    for info in runs.system.get_file_info(FileSelector(runs.key, allow_not_found=True, recursive=True)):
+        run, _, name = info.path.rpartition("/")
+        if info.type == FileType.File and name in WATCHED:
+            marks.setdefault(run.rpartition("/")[2], {})[name] = f"{info.size}.{info.mtime_ns}"
+    return {run: _short([own.get(n, "") for n in WATCHED]) for run, own in marks.items() if START in own}
+
+
+def _short(marks: Iterable[str]) -> str:
+    return hashlib.sha256("|".join(marks).encode()).hexdigest()[:16]

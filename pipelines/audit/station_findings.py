@@ -1,0 +1,108 @@
+"""Findings about stations: levels and slots that moved, check standards out of control, gauges that take too much."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from pipelines.audit.calibrations import date_of
+from pipelines.audit.finding import Finding
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from pipelines.audit.audit import Audit
+    from pipelines.audit.stations_over_time import Series
+    from pipelines.audit.statistics.change_points import Change
+
+
+def of_stations(audit: Audit) -> Iterator[Finding]:
+    """All of them, the weightiest kind first."""
+    yield from _moved_stations(audit)
+    yield from _moved_slots(audit)
+    yield from _standards(audit)
+    yield from _gauges(audit)
+
+
+def _moved_stations(audit: Audit) -> Iterator[Finding]:
+    """Changes of a station's level, each told once: by the effect in which it is plainest."""
+    told: list[tuple[str, float]] = []
+    found = [(abs(c.shift) / c.error, series, c) for series in audit.stations for c in series.changes]
+    for _, series, change in sorted(found, key=lambda item: -item[0]):
+        first = float(series.day[change.first])
+        near = any(station == series.station and abs(day - first) < _reach(series, change) for station, day in told)
+        told.append((series.station, first))
+        if not near and first >= audit.scope.since:
+            yield _moved(audit, series, change, "station_moved", f"{series.where} ({series.parameter})")
+
+
+def _reach(series: Series, change: Change) -> float:
+    """Days within which another change is the same event."""
+    return 7.0 + float(series.day[min(change.high, series.day.size - 1)] - series.day[max(change.low - 1, 0)])
+
+
+def _moved_slots(audit: Audit) -> Iterator[Finding]:
+    for series in audit.slots:
+        for change in series.changes:
+            if float(series.day[change.first]) >= audit.scope.since:
+                yield _moved(audit, series, change, "slot_moved", f"{series.where} ({series.parameter})")
+
+
+def _moved(audit: Audit, series: Series, change: Change, kind: str, what: str) -> Finding:
+    first, low = float(series.day[change.first]), float(series.day[max(change.low - 1, 0)])
+    high = float(series.day[min(change.high, series.day.size - 1)])
+    later = [c.first for c in series.changes if c.first > change.first]
+    end = float(series.day[later[0]]) if later else np.inf
+    units, runs = _measured(audit, series, low, end)
+    until = f" until {date_of(end)}" if np.isfinite(end) else ""
+    message = (
+        f"{series.station}: {what} moved by {change.shift:+.0f} ± {2 * change.error:.0f} {series.unit_text} on "
+        f"{date_of(first)} (between {date_of(low)} and {date_of(high)}, 95 %); {len(units)} units in {runs} runs were "
+        f"measured there since{until}: level it and measure them again, or run them again with this effect in the model"
+    )
+    evidence = {
+        "station": series.station, "where": series.where, "parameter": series.parameter, "date": date_of(first),
+        "earliest": date_of(low), "latest": date_of(high), "shift_urad": change.shift, "standard_error_urad": change.error,
+        "p_value": change.p_value, "first_run": str(series.run[change.first]), "units_since": len(units), "runs_since": runs,
+    }  # fmt: skip
+    return Finding("station", kind, series.station, message, units, evidence)
+
+
+def _measured(audit: Audit, series: Series, start: float, end: float) -> tuple[tuple[str, ...], int]:
+    """Units measured on a series' station, or in its slot, after the last moment that was surely good."""
+    all_ = audit.all
+    rows = (all_.station == series.station) & (all_.day > start) & (all_.day < end) & audit.product
+    if series.where.startswith("slot "):
+        rows &= all_.slot == int(series.where.removeprefix("slot "))
+    return tuple(sorted({str(u) for u in all_.unit[rows]})), len({str(r) for r in all_.run[rows]})
+
+
+def _standards(audit: Audit) -> Iterator[Finding]:
+    for chart in audit.charts:
+        if not chart.in_control:
+            first = int(np.argmax(chart.rules.any(axis=0) | chart.outside))
+            message = (
+                f"{chart.station}: check standard {chart.standard}, {chart.parameter}: {chart.alarms} alarms on the control "
+                f"chart since {date_of(chart.day[first])}, {chart.expected:.1f} are expected by chance "
+                f"(p = {chart.p_value:.1g}); measure the standard on another station to see which of the two has moved"
+            )
+            evidence = {"station": chart.station, "standard": chart.standard, "parameter": chart.parameter,
+                        "first": date_of(chart.day[first]), "alarms": chart.alarms, "expected": chart.expected,
+                        "p_value": chart.p_value}  # fmt: skip
+            yield Finding("station", "standard", chart.station, message, (chart.standard,), evidence)
+
+
+def _gauges(audit: Audit) -> Iterator[Finding]:
+    """Gauge studies that take too much of the tolerance, one finding a study."""
+    most = audit.rules.gauge_most_percent
+    bad = [s for s in audit.studies if np.isfinite(s.of_tolerance) and s.of_tolerance > most]
+    for runs in dict.fromkeys(study.runs for study in bad):
+        own = sorted((study for study in bad if study.runs == runs), key=lambda study: -study.of_tolerance)
+        shares = ", ".join(f"{study.parameter} {study.of_tolerance:.0f} %" for study in own)
+        message = (
+            f"{own[0].device}: seating a unit again takes more of the tolerance than the {most:g} % allowed: {shares} "
+            f"(study of {date_of(own[0].first_day)}, {len(runs)} runs); measure longer, or widen the tolerance"
+        )
+        evidence = {"runs": list(runs), "percent_of_tolerance": {study.parameter: study.of_tolerance for study in own}}
+        yield Finding("station", "gauge", own[0].device, message, (), evidence)

@@ -1,0 +1,114 @@
+"""Findings about units: exchanged, found outside, leaving their limits, unlike their kind."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from pipelines.audit.calibrations import date_of
+from pipelines.audit.finding import Finding, date_or_never
+from pipelines.audit.parameters import unit_text
+from pipelines.audit.statistics.comparison import outlier_limit
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from pipelines.audit.audit import Audit
+    from pipelines.audit.drifts import UnitDrift
+
+
+def of_units(audit: Audit) -> Iterator[Finding]:
+    """All of them, the weightiest kind first."""
+    yield from _exchanged(audit)
+    yield from _out_of_tolerance(audit)
+    yield from _leaving(audit)
+    yield from _unlike_their_kind(audit)
+
+
+def _exchanged(audit: Audit) -> Iterator[Finding]:
+    for one in audit.strangers:
+        unit, run, day = (str(getattr(audit.all, n)[one.row]) for n in ("unit", "run", "day"))
+        evidence = {"run": run, "date": date_of(float(day)), "distance": one.distance, "looks_like": one.looks_like}
+        if one.looks_like:
+            how = "and the other way round" if one.exchanged else "whose own calibration of that day is another"
+            message = (
+                f"{unit} of {date_of(float(day))} (run {run}) does not fit its past, it fits {one.looks_like}, {how}: "
+                "serials were exchanged; read both labels, revoke the certificates and certify anew"
+            )
+            yield Finding("quality", "exchanged", unit, message, (unit, one.looks_like), evidence)
+        else:
+            message = (
+                f"{unit} of {date_of(float(day))} (run {run}) does not fit its past, nor that of any other unit: it was "
+                "damaged, or its serial is wrong; measure it again"
+            )
+            yield Finding("quality", "foreign", unit, message, (unit,), evidence)
+
+
+def _out_of_tolerance(audit: Audit) -> Iterator[Finding]:
+    """Units found outside at their re-calibration, by more than the uncertainty of both: what they measured is in doubt."""
+    for drift in _each(audit):
+        expanded = abs(drift.change / drift.e_n) if drift.e_n else np.inf
+        if drift.day >= audit.scope.since and abs(drift.change) - expanded > drift.tolerance:
+            text = unit_text(drift.parameter)
+            message = (
+                f"{drift.unit}: {drift.parameter} was {drift.change:+.4g} {text} off after {12 * drift.years:.0f} months, "
+                f"tolerance {drift.tolerance:g} {text}, U {expanded:.3g}, E_n {drift.e_n:+.1f}; what it measured since "
+                f"{_before(drift)} is in doubt: tell whoever used it"
+            )
+            yield Finding("quality", "found_outside", drift.unit, message, (drift.unit,), _numbers(drift))
+
+
+def _leaving(audit: Audit) -> Iterator[Finding]:
+    """Units that are expected to leave their tolerance or limit before they are due."""
+    due_day = {
+        f"{audit.all.device[row]} {audit.all.unit[row]}": float(day)
+        for row, day in zip(audit.due.row, audit.due.day, strict=True)
+    }
+    for drift in _each(audit):
+        due = due_day.get(f"{drift.device} {drift.unit}", np.inf)
+        for what, bound, days in (
+            ("tolerance", drift.tolerance, (drift.leaves, drift.soonest, drift.latest)),
+            ("limit", drift.limit, drift.limit_day),
+        ):
+            if days[0] < due and days[0] > drift.day:
+                text = unit_text(drift.parameter)
+                message = (
+                    f"{drift.unit}: {drift.parameter} moves {drift.slope:+.3g} {text} a year and leaves its {what} of "
+                    f"{bound:g} {text} about {date_or_never(days[0])} "
+                    f"({date_or_never(days[1])} to {date_or_never(days[2])}), before it is due on {date_of(due)}; call it in"
+                )
+                yield Finding("quality", "leaves", drift.unit, message, (drift.unit,), _numbers(drift))
+
+
+def _unlike_their_kind(audit: Audit) -> Iterator[Finding]:
+    """Units whose slope none of their kind has: each by its plainest parameter."""
+    count = sum(len(drifts) for drifts in audit.units.values())
+    for drifts in audit.units.values():
+        worst = max(drifts, key=lambda drift: abs(drift.odd), default=None)
+        if worst is not None and abs(worst.odd) > outlier_limit(count) and worst.day >= audit.scope.since:
+            text = unit_text(worst.parameter)
+            when = f"leaves its tolerance of {worst.tolerance:g} {text} about {date_or_never(worst.leaves)}"
+            message = (
+                f"{worst.unit}: {worst.parameter} moves {worst.slope:+.3g} {text} a year over {worst.calibrations} calibrations, "
+                f"{abs(worst.odd):.1f} σ from its kind, and {when} ({date_or_never(worst.soonest)} to "
+                f"{date_or_never(worst.latest)}): give it a shorter interval, or take it out of use"
+            )
+            yield Finding("quality", "drifts", worst.unit, message, (worst.unit,), _numbers(worst))
+
+
+def _each(audit: Audit) -> Iterator[UnitDrift]:
+    for drifts in audit.units.values():
+        yield from drifts
+
+
+def _numbers(drift: UnitDrift) -> dict[str, Any]:
+    return {
+        "parameter": drift.parameter, "run": drift.run, "date": date_of(drift.day), "change": drift.change,
+        "months": 12 * drift.years, "e_n": drift.e_n, "slope_per_year": drift.slope, "tolerance": drift.tolerance,
+        "leaves": date_or_never(drift.leaves), "soonest": date_or_never(drift.soonest), "latest": date_or_never(drift.latest),
+    }  # fmt: skip
+
+
+def _before(drift: UnitDrift) -> str:
+    return date_of(drift.day - 365.25 * drift.years)
