@@ -4,7 +4,7 @@ import lots
 import numpy as np
 import pytest
 
-from inertial.criticism.faults import lattice_step
+from inertial.criticism.faults.outputs import lattice_step
 from pipelines.stages.criticise import diagnose
 
 OUT = ["out_x", "out_y", "out_z"]

@@ -1,0 +1,42 @@
+"""Data faults: what must be mended before physics is diagnosed. The first look that finds one stands for a unit."""
+
+from inertial.criticism.faults.exchanges import changed_units, swapped_units, wrong_poses
+from inertial.criticism.faults.fault import Fault, Look
+from inertial.criticism.faults.outputs import noisy, outliers, quantised, stuck
+from inertial.criticism.faults.records import clock, dropped, truncated
+from inertial.criticism.faults.responses import dead, flipped, scale_units
+from inertial.criticism.faults.temperatures import stale, temperature_units
+from inertial.criticism.readings import Readings
+
+LOOKS: tuple[Look, ...] = (
+    truncated,
+    clock,
+    temperature_units,
+    stuck,
+    changed_units,
+    dead,
+    scale_units,
+    flipped,
+    swapped_units,
+    wrong_poses,
+    noisy,
+    outliers,
+    stale,
+    quantised,
+    dropped,
+)
+
+STILL_LOOKS: tuple[Look, ...] = (truncated, clock, temperature_units, stale, noisy, quantised, dropped)
+"""Looks for a record in one pose: nothing is known of its response, and an output may well repeat."""
+
+
+def find_faults(readings: Readings) -> list[Fault]:
+    """Data faults of a lot, at most one kind per unit; a unit without one is fit for diagnosis."""
+    found: dict[int, Fault] = {}
+    for look in LOOKS if readings.turned else STILL_LOOKS:
+        for fault in look(readings):
+            found.setdefault(fault.unit, fault)
+    return [found[u] for u in sorted(found)]
+
+
+__all__ = ["Fault", "find_faults"]

@@ -1,0 +1,100 @@
+"""What the outputs of single dwells show without physics: repeats, spikes, torn words, coarse steps."""
+
+from collections.abc import Iterator
+
+import numpy as np
+from numpy.typing import NDArray
+
+from inertial.criticism.faults.fault import Fault, dwells_of
+from inertial.criticism.readings import Array, Readings
+
+
+def stuck(readings: Readings) -> Iterator[Fault]:
+    """The same output, to the last digit, in dwells of different poses."""
+    for unit, out in enumerate(readings.output):
+        moved = np.linalg.norm(np.diff(readings.force[unit], axis=0), axis=-1) > 0.05
+        same = (np.diff(out, axis=0) == 0.0).any(axis=-1) & moved
+        if np.count_nonzero(same) >= 2:
+            places = np.flatnonzero(same) + 1
+            yield Fault(
+                "stuck_output", unit, dwells_of(places), f"output repeats exactly in {places.size} dwells of new poses"
+            )
+
+
+def noisy(readings: Readings) -> Iterator[Fault]:
+    """Dwells whose scatter is far above the unit's own and the lot's: spikes on an axis, torn words on all."""
+    if readings.spread is None:
+        return
+    typical = np.nanmedian(readings.spread, axis=1, keepdims=True)
+    ratio = readings.spread / np.where(typical > 0.0, typical, np.inf)
+    common = np.nanmedian(ratio, axis=0, keepdims=True) if len(ratio) > 2 else np.ones((1, *ratio.shape[1:]))
+    loud: NDArray[np.bool_] = np.logical_and(ratio > 5.0, ratio > 3.0 * common)
+    few = np.count_nonzero(loud.any(axis=-1), axis=1) < 3
+    loud &= ~(few[:, None, None] & (ratio < 10.0))  # one restless dwell is a transient, not a fault of the reading
+    if readings.vibration is not None:
+        level = np.nanmedian(readings.vibration, axis=1, keepdims=True)
+        loud &= ~(readings.vibration > 2.0 * np.maximum(level, 1e-12))[..., None]
+    for unit, row in enumerate(np.asarray(loud)):
+        places = np.flatnonzero(row.any(axis=-1))
+        if not places.size:
+            continue
+        together = float(np.mean(row[places].sum(axis=-1)))
+        name = "torn_words" if together > 2.0 and places.size >= 3 else "spikes"
+        worst = float(np.nanmax(np.where(row, ratio[unit], 0.0)))
+        yield Fault(
+            name, unit, dwells_of(places), f"scatter up to {worst:.0f} times the unit's own in {places.size} dwells"
+        )
+
+
+def outliers(readings: Readings) -> Iterator[Fault]:
+    """Single dwells far off on one axis alone, where no scatter was recorded to show spikes."""
+    if readings.spread is not None:
+        return
+    size = np.abs(readings.misfit)
+    typical = np.nanmedian(size, axis=1, keepdims=True)
+    out = np.any(size > np.maximum(0.005, 40.0 * typical), axis=-1)
+    for unit, row in enumerate(np.asarray(out)):
+        places = np.flatnonzero(row)
+        if 0 < places.size <= 0.1 * row.size:
+            yield Fault("spikes", unit, dwells_of(places), f"{places.size} dwells far off the others")
+
+
+def quantised(readings: Readings) -> Iterator[Fault]:
+    """Outputs on a lattice whose step, over √12, exceeds the noise of a mean."""
+    for unit, out in enumerate(readings.output):
+        there = readings.there[unit]
+        for axis in range(3):
+            step = lattice_step(out[there, axis])
+            noise = _white(readings, unit, axis)
+            if step is not None and noise is not None and step / np.sqrt(12.0) > 1.5 * noise:
+                ratio = step / np.sqrt(12.0) / noise
+                evidence = f"axis {'xyz'[axis]} moves in steps of {step:.3g}: LSB/√12 is {ratio:.1f} times the noise"
+                yield Fault("quantised", unit, (), evidence)
+                break
+
+
+def _white(readings: Readings, unit: int, axis: int) -> float | None:
+    """Standard error of a dwell mean from its scatter, output unit; None where it was not recorded."""
+    if readings.spread is None or readings.count is None:
+        return None
+    error = readings.spread[unit, :, axis] / np.sqrt(readings.count[unit])
+    return max(float(np.nanmedian(error)), 1e-300)
+
+
+def lattice_step(values: Array) -> float | None:
+    """Step of the lattice that all values lie on, by Euclid's algorithm with a tolerance; None where they lie on none."""
+    distinct = np.unique(values)
+    if distinct.size < 3:
+        return None
+    gaps = np.diff(distinct)
+    tolerance = 1e-6 * float(np.ptp(distinct)) + 1e-12 * float(np.max(np.abs(distinct)))
+    step = float(gaps[0])
+    for gap in gaps[1:]:
+        a, b = max(step, float(gap)), min(step, float(gap))
+        while b > tolerance:
+            rest = a % b
+            a, b = b, min(rest, b - rest)
+        step = a
+        if step < 30.0 * tolerance:
+            return None
+    return step
