@@ -3,7 +3,8 @@
 An effect is hidden in the simulated station by its mechanism (stations/plant/hidden.py, no column of the fit), and the recipe
 has a blind spot: edges without directions between, one wait, soaks one way, one temperature. Counted are the runs whose first
 diagnosis had the truth in a class with others, or among what it could not see; printed is in how many of them the truth stood
-alone in its class at the end, and what station time the follow-ups took beside the first run.
+alone in its class at the end, what station time the follow-ups took beside the first run, and what became of the rest: an
+open class is a weaker answer, another effect named alone in the truth's place is a wrong one.
 """
 
 from __future__ import annotations
@@ -71,6 +72,9 @@ SCENES = (
     ),
     Scene("creep on faces", "creep", ("creep_after_move",), {"size": 60e-6, "tau": 30.0}, "six", 6, one_order=True),
     Scene("warm-up seen late", "warm_up", ("warm_up",), {"size": 250e-6, "tau": 3000.0}, "eighteen", 8),
+    Scene(
+        "ageing seen late", "stress_relaxation", ("aging_log",), {"size": 60e-6, "shortest": 600.0}, "eighteen", 8
+    ),
     Scene("late step", "step_change", ("step_change",), {"size": 40e-6, "at": 1950.0}, "eighteen", 4),
     Scene(
         "hysteresis with 4 soaks", "hysteresis_play", ("thermal_hysteresis",), {"gain": 8e-6, "width": 10.0},
@@ -107,6 +111,8 @@ class Outcome:
     unseen: bool
     ambiguous: bool
     alone: bool
+    lost: bool
+    wrong: bool
     first_minutes: float
     extra_minutes: float
     rounds: int
@@ -189,6 +195,7 @@ def outcome(scene: Scene, seed: int, looks: list[Any], document: dict[str, Any],
     first = [group["effects"] for group in looks[0].told["classes"]]
     last = [group["effects"] for group in document["classes"]]
     held = [group for group in first if set(group) & set(scene.truths)]
+    kept = any(set(group) & set(scene.truths) for group in last)
     unseen = bool(set(looks[0].told["unseen"]) & set(scene.truths))
     minutes = document["minutes"]
     return Outcome(
@@ -199,6 +206,8 @@ def outcome(scene: Scene, seed: int, looks: list[Any], document: dict[str, Any],
         unseen=unseen,
         ambiguous=bool(held and len(held[0]) > 1) or (unseen and not held),
         alone=any(len(group) == 1 and group[0] in scene.truths for group in last),
+        lost=not kept,
+        wrong=not kept and any(len(group) == 1 for group in last),
         first_minutes=minutes["first_run"],
         extra_minutes=minutes["follow_ups"],
         rounds=len(document["rounds"]),
@@ -212,7 +221,9 @@ def show(found: list[Outcome]) -> None:
     """Prints a line per inquiry, then the figures."""
     for o in found:
         first, last = (" ; ".join("|".join(g) for g in groups) or "nothing" for groups in (o.first, o.last))
-        mark = "ok  " if o.alone else ("MISS" if o.ambiguous else "    ")
+        mark = "    "
+        if o.ambiguous:
+            mark = "ok  " if o.alone else "WRNG" if o.wrong else "LOST" if o.lost else "OPEN"
         print(
             f"{mark} {o.scene} [{o.seed}] {'ambiguous' if o.ambiguous else 'clear'}: {first} -> {last} "
             f"({o.rounds} rounds, {o.extra_minutes:.1f} of {o.first_minutes:.0f} min extra, {o.ended}, {o.seconds:.0f} s)"
@@ -227,6 +238,12 @@ def show(found: list[Outcome]) -> None:
         f"{len(found)} runs, {len(begun)} began ambiguous: truth alone in its class in {alone} "
         f"({100.0 * alone / len(begun):.0f} %); extra station time {100.0 * sum(shares) / len(shares):.0f} % in the mean, "
         f"{100.0 * shares[len(shares) // 2]:.0f} % in the median, {100.0 * shares[-1]:.0f} % at the most"
+    )
+    still = sum(not o.alone and not o.lost for o in begun)
+    wrong, lost = sum(o.wrong for o in begun), sum(o.lost and not o.wrong for o in begun)
+    print(
+        f"of the others: {still} with the truth in a class that is open, {lost} with the truth in none and nothing named alone, "
+        f"{wrong} with another effect named in its place"
     )
 
 

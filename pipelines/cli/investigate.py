@@ -116,6 +116,7 @@ def _consent(*, yes: bool | None, here: bool) -> Callable[[Callable[[], Abstract
 
 def _question(inquiry: Inquiry, finding: Finding, move: Move) -> Consent:
     """What the person at the terminal says to a proposal."""
+    from pipelines.cli.terminal import agreed
     from pipelines.cli.verdict import measurements_table
 
     out = error_console()
@@ -125,7 +126,7 @@ def _question(inquiry: Inquiry, finding: Finding, move: Move) -> Consent:
     del finding
     left = inquiry.budget - inquiry.spent
     text = f"Measure for {move.minutes:.1f} min more ({left:.1f} of {inquiry.budget:.1f} min are left)?"
-    return "go" if typer.confirm(text, default=True, err=True) else "stop"
+    return "go" if agreed(text) else "stop"
 
 
 def _inquired(

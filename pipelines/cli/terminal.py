@@ -15,6 +15,7 @@ if TYPE_CHECKING:
 
     from pipelines.operator import Answer, Prompt
 
+YES = frozenset({"", "y", "yes", "go", "ok"})
 STOP = frozenset({"stop", "s", "q", "quit", "no", "n"})
 TITLES = {"load": "Load", "confirm": "Seats", "trouble": "Trouble", "unload": "Unload", "approve": "Approve"}
 
@@ -47,6 +48,20 @@ def scanned(slots: int) -> Seating:
         message = "scan: no unit was scanned, one is needed at least; give the command again"
         raise WrongUse(message)
     return found
+
+
+def agreed(question: str) -> bool:
+    """Whether whoever sits at the terminal says yes; Enter alone is yes, anything that is neither is asked again."""
+    while True:
+        answer = _line(f"{question} [Y/n] ").lower()
+        if answer in YES:
+            return True
+        if answer in STOP:
+            return False
+        words = (
+            f"'{answer}' is neither: y or Enter measures it, n leaves it; Ctrl-C stops here, and the same command goes on later"
+        )
+        error_console().print(words, style="yellow", markup=False, soft_wrap=True)
 
 
 def attended() -> bool:
