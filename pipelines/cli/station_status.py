@@ -11,6 +11,7 @@ from pipelines.cli.station_lot import DeviceOption, UnitsOption, made_up
 
 if TYPE_CHECKING:
     from rich.console import Group
+    from rich.text import Text
 
     from stations.overview import Overview
 
@@ -103,6 +104,7 @@ def driven_by(now: Overview) -> str:
     return f"the watchdog of {who}" if lease["role"] == "watchdog" else who
 
 
-def _word(found: str, good: str) -> str:
-    style = GOOD if found == good else BAD
-    return f"[{style}]{found or '—'}[/{style}]"
+def _word(found: str, good: str) -> Text:
+    from rich.text import Text
+
+    return Text(found or "—", style=GOOD if found == good else BAD)

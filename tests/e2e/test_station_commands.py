@@ -50,6 +50,12 @@ def test_status_tells_angles_temperatures_states_and_units():
     assert [slot["serial"] for slot in now["slots"]] == ["SIM0000", "SIM0001", "SIM0002"]
 
 
+def test_status_for_people_is_words():
+    shown = CliRunner().invoke(app, ["station", "status", "--units", "1"]).stdout
+    assert "closed" in shown
+    assert "[" not in shown
+
+
 def test_status_of_a_station_that_is_driven_says_by_whom_and_disturbs_nothing(tmp_path):
     with served() as port:
         config = modbus_station(port)
