@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -17,6 +17,7 @@ from pipelines.audit.statistics.drift import (
     kind_of,
     last_reliable,
     leaves,
+    prudent,
     standing,
 )
 
@@ -53,13 +54,15 @@ class Pairs:
 class KindDrift:
     """How one parameter of one kind of device drifts, and how the last changes compare with the uncertainty of both.
 
+    ahead : what forecasts take for it, see :func:`~pipelines.audit.statistics.drift.prudent`
     beyond : share of the pairs with |E_n| > 1; out : share that moved further than the tolerance; median : of |change|
-    reliable_months : for how long a unit of the kind stays in tolerance with the target's probability; NaN without a tolerance
+    reliable_months : for how long a unit of the kind stays in all its tolerances with the target's probability; NaN without one
     """
 
     device: str
     parameter: str
     kind: Kind
+    ahead: Kind
     beyond: float
     out: float
     median: float
@@ -73,7 +76,7 @@ class UnitDrift:
 
     leaves, soonest, latest : day when it is expected to leave its tolerance and the 95 % interval of it; infinite for never
     limit, limit_day : the product's limit of the value itself, and day (expected, soonest, latest) when it leaves that
-    reliable_day : until when it stays in tolerance with the target's probability
+    reliable_day : until when the unit stays in tolerance with the target's probability, in all its parameters together
     odd : distance of its slope from its kind's, in σ; calibrations : that this rests on
     """
 
@@ -113,6 +116,7 @@ def kind_drifts(all_: Calibrations, good: Flags, rules: Rules, since: float) -> 
         of_kind = all_.device[pairs.later] == device
         if of_kind.sum() < FEWEST_PAIRS:
             continue
+        own: list[KindDrift] = []
         for name in OWN:
             change, known = _changes(all_, pairs, name)
             longer, longer_known = _changes(all_, spans, name)
@@ -125,36 +129,46 @@ def kind_drifts(all_: Calibrations, good: Flags, rules: Rules, since: float) -> 
                 (pairs.years[kept], spans.years[whole]),
                 (known[kept], longer_known[whole]),
             )
-            kind = kind_of(*(np.concatenate(parts) for parts in both))
+            together = tuple(np.concatenate(parts) for parts in both)
+            kind = kind_of(*together)
             recent = kept & (all_.day[pairs.later] >= since)
-            out.append(_kind_drift(all_, pairs, recent, device, name, kind, rules))
+            own.append(_kind_drift(all_, pairs, recent, device, name, (kind, prudent(kind, *together)), rules))
+        months = _reliable_months(all_, pairs, own, rules.reliability_target)
+        out += [replace(one, reliable_months=months if np.isfinite(one.tolerance) else float("nan")) for one in own]
     return out
 
 
+def _reliable_months(all_: Calibrations, pairs: Pairs, kinds: list[KindDrift], target: float) -> float:
+    """For how long a new unit stays in all tolerances of its kind with the target's probability, months."""
+    probability = np.ones((1, AHEAD.size))
+    for one in kinds:
+        if np.isfinite(one.tolerance):
+            of_kind = all_.device[pairs.later] == one.device
+            sigma = float(np.nanmedian(all_.error(one.parameter)[pairs.later[of_kind]]))
+            start, fresh = np.array([0.0]), np.array([sigma**2 + one.ahead.mount_sd**2])
+            slope, spread = np.array([one.ahead.mean_slope]), np.array([one.ahead.slope_sd**2])
+            new = Standing(start, slope, fresh, start, spread, start, start)
+            probability *= in_tolerance(*forecast(new, one.ahead, AHEAD, origin=0.0), one.tolerance)
+    return 12.0 * float(last_reliable(probability, target, AHEAD)[0])
+
+
 def _kind_drift(
-    all_: Calibrations, pairs: Pairs, recent: Flags, device: str, name: str, kind: Kind, rules: Rules
+    all_: Calibrations, pairs: Pairs, recent: Flags, device: str, name: str, kinds: tuple[Kind, Kind], rules: Rules
 ) -> KindDrift:
     tolerance = rules.tolerance_of(device, FAMILY_OF[name])
+    kind, ahead = kinds
     change, _ = _changes(all_, pairs, name)
     numbers = _e_n(all_, pairs, name, kind)[recent]
-    sigma = float(np.nanmedian(all_.error(name)[pairs.later[recent]])) if recent.any() else 0.0
-    start = np.array([0.0])
-    fresh = np.array([sigma**2 + kind.mount_sd**2])
-    new = Standing(start, np.array([kind.mean_slope]), fresh, start, np.array([kind.slope_sd**2]), start, start)
-    mean, deviation = forecast(new, kind, AHEAD, origin=0.0)
-    months = float("nan")
-    if np.isfinite(tolerance):
-        probability = in_tolerance(mean, deviation, tolerance)
-        months = 12.0 * float(last_reliable(probability, rules.reliability_target, AHEAD)[0])
     return KindDrift(
         device=device,
         parameter=name,
         kind=kind,
+        ahead=ahead,
         beyond=float(np.mean(np.abs(numbers) > 1.0)) if numbers.size else 0.0,
         out=float(np.mean(np.abs(change[recent]) > tolerance)) if recent.any() else 0.0,
         median=float(np.median(np.abs(change[recent]))) if recent.any() else 0.0,
         tolerance=tolerance,
-        reliable_months=months,
+        reliable_months=float("nan"),
     )
 
 
@@ -171,36 +185,66 @@ def unit_drifts(
     last = _last_of_each(all_.histories[pairs.later])
     final = Pairs(pairs.later[last], pairs.earlier[last], pairs.years[last])
     out: dict[str, list[UnitDrift]] = {}
-    for found in kinds:
-        own = np.flatnonzero(all_.device[final.later] == found.device)
+    for device in dict.fromkeys(found.device for found in kinds):
+        own = np.flatnonzero(all_.device[final.later] == device)
         rows = Pairs(final.later[own], final.earlier[own], final.years[own])
-        limit = limits.get((found.device, FAMILY_OF[found.parameter]), float("inf"))
-        for drift in _unit_drifts(all_, good, rows, found, rules.reliability_target, limit):
-            out.setdefault(f"{drift.device} {drift.unit}", []).append(drift)
+        # of all parameters together, as if each moved by itself
+        probability = np.ones((own.size, AHEAD.size), dtype=np.float32)
+        courses = [
+            _course(all_, good, rows, found, limits.get((device, FAMILY_OF[found.parameter]), np.inf), probability)
+            for found in kinds
+            if found.device == device
+        ]
+        bounded = any(np.isfinite(course.found.tolerance) for course in courses)
+        years = last_reliable(probability, rules.reliability_target, AHEAD) if bounded else np.inf
+        until = all_.day[rows.later] + YEAR_D * years
+        for course in courses:
+            for drift in _unit_drifts(all_, rows, course, until):
+                out.setdefault(f"{drift.device} {drift.unit}", []).append(drift)
     return out
 
 
-def _unit_drifts(
-    all_: Calibrations, good: Flags, rows: Pairs, found: KindDrift, target: float, limit: float
-) -> list[UnitDrift]:
-    name, kind = found.parameter, found.kind
-    change, _ = _changes(all_, rows, name)
-    numbers = _e_n(all_, rows, name, kind)
-    padded = _padded(all_, good, rows, name)
-    now, counts = standing(*padded, kind), np.isfinite(padded[0]).sum(axis=1)
-    mean, deviation = forecast(now, kind, AHEAD, origin=now.last)
+class _Course(NamedTuple):
+    """Where the units of a kind stand in one parameter, (units,), and when they leave its tolerance and its limit."""
+
+    found: KindDrift
+    now: Standing
+    counts: Index
+    times: tuple[Array, Array, Array]
+    limit: float
+    beyond: tuple[Array, Array, Array]
+
+
+def _course(
+    all_: Calibrations,
+    good: Flags,
+    rows: Pairs,
+    found: KindDrift,
+    limit: float,
+    probability: NDArray[np.float32],
+) -> _Course:
+    """The course of the last calibrations given; ``probability`` (units, times) is multiplied by that of being in tolerance."""
+    padded = _padded(all_, good, rows, found.parameter)
+    now, counts = standing(*padded, found.ahead), np.isfinite(padded[0]).sum(axis=1)
+    mean, deviation = forecast(now, found.ahead, AHEAD, origin=now.last)
     day = all_.day[rows.later]
-    until = np.full(day.size, np.inf)
     if np.isfinite(found.tolerance):
-        until = day + YEAR_D * last_reliable(in_tolerance(mean, deviation, found.tolerance), target, AHEAD)
+        known = np.isfinite(now.last)
+        probability[known] *= in_tolerance(mean[known], deviation[known], found.tolerance).astype(np.float32)
     times = _leaving(mean, deviation, found.tolerance, day)
-    beyond = _leaving(mean + now.last[:, None], deviation, limit, day)
+    return _Course(found, now, counts, times, limit, _leaving(mean + now.last[:, None], deviation, limit, day))
+
+
+def _unit_drifts(all_: Calibrations, rows: Pairs, course: _Course, until: Array) -> list[UnitDrift]:
+    found, now, times, beyond = course.found, course.now, course.times, course.beyond
+    change, _ = _changes(all_, rows, found.parameter)
+    numbers = _e_n(all_, rows, found.parameter, found.kind)
     return [
         UnitDrift(
             unit=str(all_.unit[row]),
             device=found.device,
-            parameter=name,
-            day=float(day[k]),
+            parameter=found.parameter,
+            day=float(all_.day[row]),
             run=str(all_.run[row]),
             change=float(change[k]),
             years=float(rows.years[k]),
@@ -210,11 +254,11 @@ def _unit_drifts(
             leaves=float(times[0][k]),
             soonest=float(times[1][k]),
             latest=float(times[2][k]),
-            limit=limit,
+            limit=course.limit,
             limit_day=(float(beyond[0][k]), float(beyond[1][k]), float(beyond[2][k])),
             reliable_day=float(until[k]),
             odd=float(now.odd[k]),
-            calibrations=int(counts[k]),
+            calibrations=int(course.counts[k]),
         )
         for k, row in enumerate(rows.later)
         if np.isfinite(change[k])

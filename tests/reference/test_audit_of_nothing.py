@@ -4,7 +4,9 @@ import numpy as np
 import pytest
 
 from pipelines.audit.calibrations import Calibrations
+from pipelines.audit.drifts import OWN, kind_drifts, unit_drifts
 from pipelines.audit.parameters import NAMES
+from pipelines.audit.rules import load_rules
 from pipelines.audit.swaps import strangers
 
 DEVICE, YEAR_D = "adxl355", 365.25
@@ -84,3 +86,29 @@ def test_a_broken_unit_among_many_alike_is_not_taken_for_another(rng, ratio):
         strange = [s for s in strangers(found) if found.unit[s.row] == "U00100"]
         wrong += any(s.looks_like for s in strange)
     assert wrong <= 2
+
+
+TOLERANCE = np.repeat([1500.0, 1000.0, 1.0, 1.0, 60.0, 60.0], 3)
+
+
+@pytest.mark.parametrize(("slope", "walk"), [(0.25, 0.0), (0.0, 0.3), (0.15, 0.2)], ids=["slope", "walk", "both"])
+@pytest.mark.parametrize("times", [2, 4])
+def test_units_are_in_tolerance_when_their_reliability_ends(rng, slope, walk, times):
+    """Units that come back once a year: in every parameter by itself, or taken for mounting, two in five had left it by then."""
+    units, seating = 300, 0.05
+    slopes = slope * rng.standard_normal((units, 1, len(NAMES)))
+    steps = walk * rng.standard_normal((units, times, len(NAMES))) * (np.arange(times) > 0)[:, None]
+    level = slopes * np.arange(times)[:, None] + np.cumsum(steps, axis=1)
+    values = TOLERANCE * (level + np.hypot(seating, seating) * rng.standard_normal(level.shape))
+    serials = np.repeat([f"U{u:05d}" for u in range(units)], times)
+    days = np.tile(200.0 + YEAR_D * np.arange(times), units)
+    found = calibrations(serials, days, values.reshape(-1, len(NAMES)), errors=seating * TOLERANCE)
+    every, rules = np.ones(len(found), dtype=bool), load_rules()
+    drifts = unit_drifts(found, every, kind_drifts(found, every, rules, 0.0), rules, {})
+    last = {d.unit: d.reliable_day for own in drifts.values() for d in own}
+    ahead = (np.array([last[f"U{u:05d}"] for u in range(units)]) - days[-1]) / YEAR_D
+    walked = walk * np.sqrt(ahead)[:, None] * rng.standard_normal((units, len(NAMES)))
+    then = level[:, -1] + slopes[:, 0] * ahead[:, None] + walked
+    off = np.abs(then - values[:, -1] / TOLERANCE)[:, [NAMES.index(name) for name in OWN]]
+    assert np.mean(np.all(off <= 1.0, axis=1)) > 0.92
+    assert np.median(ahead) > 0.5

@@ -9,13 +9,15 @@ as far as it tells something (a Kalman filter, which here is the best linear unb
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from scipy.optimize import nnls
 from scipy.stats import norm
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from numpy.typing import NDArray
 
     Array = NDArray[np.float64]
@@ -25,6 +27,8 @@ ROUNDS = 4
 CLIP = 4.0  # pairs further out than so many σ tell of a unit, not of its kind
 ODD = 3.0  # a unit whose own slope is so many σ from its kind's is no longer judged by its kind
 TWO_SIDED_95 = 1.959964
+LIKELY = 2.71  # χ² of one degree of freedom that nine in ten stay below: no worse an explanation
+SPREAD_OF_SQUARES = 2.0  # variance of the square of a normal value of variance one
 
 
 @dataclass(frozen=True)
@@ -54,19 +58,63 @@ def kind_of(change: Array, years: Array, known: Array) -> Kind:
     if change.size == 0:
         return Kind(0.0, 0.0, 0.0, 0.0, 0)
     expected = known + np.median((change**2 - known).clip(0.0)) + 1e-12
-    keep, mean, parts = np.ones(change.size, dtype=bool), 0.0, np.zeros(3)
+    mean, parts, keep = 0.0, np.zeros(3), np.ones(change.size, dtype=bool)
     for _ in range(ROUNDS):
-        weight = years / expected
-        mean = float(np.sum(weight[keep] * change[keep]) / max(float(np.sum((weight * years)[keep])), 1e-300))
-        left = change - mean * years
-        keep = left**2 <= CLIP**2 * expected
-        columns = np.column_stack([np.full(years.size, 2.0), years, years**2]) / expected[:, None]
-        target = (left**2 - known) / expected
-        scale = np.sqrt(np.sum(columns[keep] ** 2, axis=0)) + 1e-300
-        parts = nnls(columns[keep] / scale, target[keep])[0] / scale
-        expected = known + 2.0 * parts[0] + parts[1] * years + parts[2] * years**2 + 1e-12
+        mean, keep, columns, target = _moments(change, years, known, expected, keep)
+        parts = _parts(columns, target)
+        expected = known + _spread_of(parts, years) + 1e-12
     mount, walk, slope = np.sqrt(parts)
     return Kind(mean, float(slope), float(walk), float(mount), int(keep.sum()))
+
+
+def prudent(kind: Kind, change: Array, years: Array, known: Array) -> Kind:
+    """The kind as forecasts should take it: walk and slope alike where these explain the changes as well as mounting does.
+
+    Pairs of one length do not tell mounting, walk and slope apart; drift that was taken for mounting was forecast to stand still.
+    What the mean slope itself is uncertain by belongs to the slopes' spread.
+    """
+    if change.size == 0:
+        return kind
+    best = np.array([kind.mount_sd**2, kind.walk_sd**2, kind.slope_sd**2])
+    expected = known + _spread_of(best, years) + 1e-12
+    _, keep, columns, target = _moments(change, years, known, expected, np.ones(change.size, dtype=bool))
+    alike = 0.5 * (_parts(columns, target, [1]) + _parts(columns, target, [2]))
+    bearable = _left(columns, target, best) + SPREAD_OF_SQUARES * LIKELY
+    tried = (alike, _parts(columns, target, [1, 2]), best)
+    parts = next(found for found in tried if found is best or _left(columns, target, found) < bearable)
+    mount, walk, slope = np.sqrt(parts)
+    error = 1.0 / np.sqrt(np.sum((years**2 / expected)[keep]) + 1e-300)
+    return replace(kind, slope_sd=float(np.hypot(slope, error)), walk_sd=float(walk), mount_sd=float(mount))
+
+
+def _moments(
+    change: Array, years: Array, known: Array, expected: Array, keep: NDArray[np.bool_]
+) -> tuple[float, NDArray[np.bool_], Array, Array]:
+    """Mean slope, pairs that are no outliers, and their weighted squares with the columns that make them."""
+    weight = years / expected
+    mean = float(np.sum(weight[keep] * change[keep]) / max(float(np.sum((weight * years)[keep])), 1e-300))
+    left = change - mean * years
+    keep = left**2 <= CLIP**2 * expected
+    columns = np.column_stack([np.full(years.size, 2.0), years, years**2]) / expected[:, None]
+    return mean, keep, columns[keep], ((left**2 - known) / expected)[keep]
+
+
+def _parts(columns: Array, target: Array, kinds: Sequence[int] = (0, 1, 2)) -> Array:
+    """Variances (3,) of mounting, walk and slope, none negative; those not asked for are zero."""
+    own = columns[:, list(kinds)]
+    scale = np.sqrt(np.sum(own**2, axis=0)) + 1e-300
+    parts = np.zeros(3)
+    parts[list(kinds)] = nnls(own / scale, target)[0] / scale
+    return parts
+
+
+def _left(columns: Array, target: Array, parts: Array) -> float:
+    return float(np.sum((target - columns @ parts) ** 2))
+
+
+def _spread_of(parts: Array, years: Array) -> Array:
+    """Variance of a change over some years."""
+    return 2.0 * parts[0] + parts[1] * years + parts[2] * years**2
 
 
 @dataclass(frozen=True)
@@ -161,7 +209,7 @@ def leaves(mean: Array, deviation: Array, tolerance: float, ahead: Array) -> tup
     )
 
 
-def last_reliable(probability: Array, target: float, ahead: Array) -> Array:
+def last_reliable(probability: NDArray[np.floating[Any]], target: float, ahead: Array) -> Array:
     """The longest time for which the probability (units, times) of being in tolerance stays at the target, (units,), years.
 
     The reliability target of an interval (NCSL RP-1, chapter 2): the interval ends where the probability falls to it.
