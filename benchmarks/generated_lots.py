@@ -12,7 +12,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from stations.plant.device import Devices, Truth, draw_truth, rotate, rotation, stream
-from stations.plant.hidden import LevelError
+from stations.plant.hidden.table import LevelError
 from stations.plant.preset import Preset, load_preset
 
 YEAR_D = 365.25

@@ -1,6 +1,6 @@
 """Closes the loop on runs that begin ambiguous: `python benchmarks/investigate.py --seeds 3 --jobs 2`.
 
-An effect is hidden in the simulated station by its mechanism (stations/plant/hidden.py, no column of the fit), and the recipe
+An effect is hidden in the simulated station by its mechanism (stations/plant/hidden/, no column of the fit), and the recipe
 has a blind spot: edges without directions between, one wait, soaks one way, one temperature. Counted are the runs whose first
 diagnosis had the truth in a class with others, or among what it could not see; printed is in how many of them the truth stood
 alone in its class at the end, what station time the follow-ups took beside the first run, and what became of the rest: an

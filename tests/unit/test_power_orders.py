@@ -15,7 +15,8 @@ from schemas.errors import OperatorNeeded, StationRefused
 from schemas.event import MemoryLog
 from schemas.recipe import Recipe, SoakPart
 from stations.opening import make_plant, open_station, serve_plant
-from stations.plant.hidden import StressRelaxation, WarmUp
+from stations.plant.hidden.age import StressRelaxation
+from stations.plant.hidden.heat import WarmUp
 
 READER = 10
 OFF_S = 600.0

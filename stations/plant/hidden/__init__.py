@@ -1,0 +1,49 @@
+"""Hidden effects: physics that a station or a device may have and that no client is told of.
+
+Each is written from its mechanism, independently of the columns in ``inertial.effects``: a truth that is made of the
+fit's own columns would prove nothing. A new one is a class with the methods of :class:`HiddenEffect`, entered here; what
+it does not touch it inherits from :class:`Untouched`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import fields
+
+from schemas.errors import RecipeInvalid, did_you_mean
+from stations.plant.hidden.age import StepChange, StressRelaxation
+from stations.plant.hidden.base import Block, HiddenEffect, Untouched
+from stations.plant.hidden.heat import ElementLag, HysteresisPlay, WarmUp
+from stations.plant.hidden.springs import Creep, CubicTransfer, PendulousMass, VibrationRectification
+from stations.plant.hidden.table import EncoderHarmonic, LevelError, SlotRotation
+
+__all__ = ["HIDDEN", "Block", "HiddenEffect", "Untouched", "hidden_effect"]
+
+HIDDEN: Mapping[str, Callable[..., HiddenEffect]] = {
+    "cubic_transfer": CubicTransfer,
+    "pendulous_mass": PendulousMass,
+    "hysteresis_play": HysteresisPlay,
+    "element_lag": ElementLag,
+    "creep": Creep,
+    "level_error": LevelError,
+    "encoder_harmonic": EncoderHarmonic,
+    "slot_rotation": SlotRotation,
+    "vibration_rectification": VibrationRectification,
+    "warm_up": WarmUp,
+    "stress_relaxation": StressRelaxation,
+    "step_change": StepChange,
+}
+
+
+def hidden_effect(kind: str, figures: Mapping[str, float]) -> HiddenEffect:
+    """The hidden effect of that kind with these figures; unknown kinds and figures are refused."""
+    if kind not in HIDDEN:
+        message = f"simulation.hidden: no effect '{kind}'; {did_you_mean(kind, HIDDEN)}"
+        raise RecipeInvalid(message, key="simulation.hidden")
+    make = HIDDEN[kind]
+    known = [f.name for f in fields(make) if f.init] if isinstance(make, type) else list(figures)  # pyright: ignore[reportArgumentType]
+    for name in figures:
+        if name not in known:
+            message = f"simulation.hidden: {kind} has no '{name}'; {did_you_mean(name, known)}"
+            raise RecipeInvalid(message, key=f"simulation.hidden.{name}")
+    return make(**figures)
