@@ -136,7 +136,10 @@ def _map(place: Axes, poses: Array, means: Array, largest: float) -> None:
         edgecolors="#888888", linewidths=0.5, zorder=3,
     )  # fmt: skip
     for name, (x, y) in {"+x": (0.0, 0.0), "+y": (0.5 * np.pi, 0.0), "−y": (-0.5 * np.pi, 0.0)}.items():
-        place.annotate(name, (x, y), fontsize=8, color="#666666", ha="center", va="center", zorder=2)
+        place.annotate(
+            name, (x, y), xytext=(9, 6), textcoords="offset points", fontsize=8, color="#666666", ha="center",
+            va="center", zorder=2,
+        )  # fmt: skip
     for name, y in (("+z", 1.0), ("−z", 0.0)):
         place.annotate(
             name, (0.5, y), xycoords="axes fraction", xytext=(0, 6 if y else -7), textcoords="offset points", fontsize=8,
