@@ -15,7 +15,7 @@ from pipelines.rerun.selection import entry_of
 from pipelines.rerun.steps import archived_job
 from pipelines.stages.arrays import lot_arrays
 from pipelines.stages.calibration import Calibration, read_calibration
-from pipelines.stages.fit import fit
+from pipelines.stages.fit import KINDS, fit
 from pipelines.stages.grade import Evidence, grade
 from pipelines.stages.unit_rows import ByUnit
 from pipelines.stages.verify import verify
@@ -161,7 +161,7 @@ def applied(calibration: Calibration, units: Sequence[str], dwells: pd.DataFrame
     The norm needs no angle, so a unit that sits in another slot of another station is judged by it, too.
     """
     known = [unit for unit in units if unit in calibration.units]
-    lot = lot_arrays(dwells[dwells["unit"].isin(known) & dwells["kind"].isin(["dwell", "verification"])], history)
+    lot = lot_arrays(dwells[dwells["unit"].isin(known)], history, KINDS)
     order = [calibration.units.index(unit) for unit in lot.units]
     state = replace(lot.state, memory={})
     force = correct(calibration.effects, state, lot.output, calibration.coefficients[order], calibration.nonlinear)

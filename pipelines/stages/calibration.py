@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from itertools import groupby
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 import pandas as pd
@@ -13,10 +14,11 @@ from inertial import design, effects
 from inertial.effects import SensorEffect, StationEffect
 from inertial.fits.linear import response_matrix
 from inertial.state import State
+from pipelines.stages.texts import picked
 from schemas.errors import DataRejected
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Iterator, Mapping, Sequence
 
     from numpy.typing import NDArray
 
@@ -80,36 +82,54 @@ def coefficient_rows(
 ) -> pd.DataFrame:
     """The long table of coefficients: one row per unit, axis and coefficient; what all axes share has axis ``*``."""
     errors = np.sqrt(np.diagonal(covariance, axis1=-2, axis2=-1))
+    common = _common_rows(fit, nonlinear_error)
     texts = {effect.id: unit_texts(effect, out_unit) for effect in design.split(fit.effects)[0]}
-    rows: list[dict[str, Any]] = []
-    for u, unit in enumerate(units):
-        for axis, letter in enumerate(AXES):
-            seen: dict[str, int] = {}
-            for column, (effect, name) in enumerate(fit.names[axis]):
-                place = seen.setdefault(effect, 0)
-                seen[effect] += 1
-                value, error = fit.coefficients[u, axis, column], errors[u, axis, column]
-                rows.append(_row(unit, letter, effect, name, (value, error), texts[effect][place]))
-        rows += _shared_rows(unit, fit, nonlinear_error)
-    return pd.DataFrame(rows)
+    own = [(letter, *row) for letter, names in zip(AXES, fit.names, strict=True) for row in _with_units(names, texts)]
+    axis, effect, name, text = zip(
+        *own, *((row.axis, row.effect, row.name, row.unit_text) for row in common), strict=True
+    )
+    u, k = (index.ravel() for index in np.indices((len(units), len(axis))))
+    return pd.DataFrame(
+        {
+            "unit": picked(units, u),
+            "axis": picked(axis, k),
+            "effect": picked(effect, k),
+            "name": picked(name, k),
+            "value": _beside(fit.coefficients, [row.value for row in common]),
+            "standard_error": _beside(errors, [row.standard_error for row in common]),
+            "unit_text": picked(text, k),
+        }
+    )
 
 
-def _row(unit: str, axis: str, effect: str, name: str, value: tuple[float, float], text: str) -> dict[str, Any]:
-    return {
-        "unit": unit,
-        "axis": axis,
-        "effect": effect,
-        "name": name,
-        "value": float(value[0]),
-        "standard_error": float(value[1]),
-        "unit_text": text,
-    }
+class _Row(NamedTuple):
+    """A coefficient that all units share."""
+
+    axis: str
+    effect: str
+    name: str
+    value: float
+    standard_error: float
+    unit_text: str
 
 
-def _shared_rows(unit: str, fit: LotFit, nonlinear_error: Mapping[str, Mapping[str, float]]) -> list[dict[str, Any]]:
+def _with_units(names: Sequence[tuple[str, str]], texts: Mapping[str, Sequence[str]]) -> Iterator[tuple[str, str, str]]:
+    """Effect, name and unit of every column of an axis."""
+    for effect, columns in groupby(names, key=lambda pair: pair[0]):
+        yield from ((effect, name, text) for (_, name), text in zip(columns, texts[effect], strict=True))
+
+
+def _beside(own: NDArray[np.float64], common: Sequence[float]) -> NDArray[np.float64]:
+    """Values of every unit, (units, 3, p), and behind them those that all share, in one row."""
+    flat = own.reshape(len(own), -1)
+    return np.concatenate([flat, np.broadcast_to(np.array(common), (len(own), len(common)))], axis=1).ravel()
+
+
+def _common_rows(fit: LotFit, nonlinear_error: Mapping[str, Mapping[str, float]]) -> list[_Row]:
+    """Parameters of the station, and nonlinear parameters and constants: one for all axes, or one each."""
     errors = np.sqrt(np.diagonal(fit.shared_covariance)) if fit.shared.size else np.zeros(0)
     rows = [
-        _row(unit, ALL_AXES, effect, name, (fit.shared[q], errors[q]), "rad")
+        _Row(ALL_AXES, effect, name, float(fit.shared[q]), float(errors[q]), "rad")
         for q, (effect, name) in enumerate(fit.shared_names)
     ]
     for effect, values in fit.nonlinear.items():
@@ -117,7 +137,7 @@ def _shared_rows(unit: str, fit: LotFit, nonlinear_error: Mapping[str, Mapping[s
         for name, value in values.items():
             error, text = nonlinear_error.get(effect, {}).get(name, 0.0), known.get(name, "")
             by_axis = zip(AXES, value, strict=True) if isinstance(value, tuple) else ((ALL_AXES, value),)
-            rows += [_row(unit, axis, effect, name, (one, error), text) for axis, one in by_axis]
+            rows += [_Row(axis, effect, name, float(one), float(error), text) for axis, one in by_axis]
     return rows
 
 
@@ -128,8 +148,8 @@ def covariance_rows(units: Sequence[str], covariance: NDArray[np.float64]) -> pd
     u, a, k = np.meshgrid(np.arange(len(units)), np.arange(3), np.arange(row.size), indexing="ij")
     return pd.DataFrame(
         {
-            "unit": np.asarray(units, dtype=object)[u.ravel()],
-            "axis": np.asarray(AXES, dtype=object)[a.ravel()],
+            "unit": picked(units, u.ravel()),
+            "axis": picked(AXES, a.ravel()),
             "row": row[k.ravel()],
             "column": column[k.ravel()],
             "value": covariance[:, :, row, column].ravel(),

@@ -120,7 +120,7 @@ def _noise(rows: UnitRows) -> Iterator[Figure]:
     """Noise figures of the worst axis; a term that is not identified counts with its upper limit."""
     terms = (("velocity_random_walk_ug_rtHz", "N"), ("bias_instability_ug", "B"), ("rate_random_walk_ug_rts", "K"))
     for name, symbol in terms:
-        found = [_noise_term(name, place, rows) for place in np.flatnonzero(rows["term"] == symbol)]
+        found = [_noise_term(name, place, rows) for place in np.flatnonzero(rows["term"] == symbol).tolist()]
         yield max(found, key=lambda figure: figure.value)
 
 

@@ -16,6 +16,7 @@ from pipelines.stages.arrays import AXES, LotArrays, lot_arrays
 from pipelines.stages.calibration import coefficient_rows, covariance_rows
 from pipelines.stages.empty import empty_table
 from pipelines.stages.profile import profiled
+from pipelines.stages.texts import picked
 from schemas.errors import DataRejected
 
 if TYPE_CHECKING:
@@ -156,10 +157,10 @@ def _residual_rows(lot: LotArrays, found: _Noisy) -> pd.DataFrame:
     temperature = lot.state.temperature
     return pd.DataFrame(
         {
-            "unit": np.asarray(lot.units, dtype=object)[u],
+            "unit": picked(lot.units, u),
             "dwell": lot.dwells[used][n],
-            "axis": np.asarray(AXES, dtype=object)[a],
-            "pose": np.asarray(lot.poses, dtype=object)[used][n],
+            "axis": picked(AXES, a),
+            "pose": picked(lot.poses, np.flatnonzero(used)[n]),
             "force_g": force.ravel(),
             "residual_ug": (MICRO * found.fit.residuals / scale)[:, used].ravel(),
             "standard_error_ug": (MICRO * found.noise / scale)[:, used].ravel(),
@@ -180,8 +181,8 @@ def _prediction_rows(lot: LotArrays, found: _Noisy) -> pd.DataFrame:
     values = found.predicted * (MICRO / scale[..., None, None]) ** 2
     return pd.DataFrame(
         {
-            "unit": np.asarray(lot.units, dtype=object)[u],
-            "axis": np.asarray(AXES, dtype=object)[a],
+            "unit": picked(lot.units, u),
+            "axis": picked(AXES, a),
             "dwell": dwells[row][k],
             "other": dwells[column][k],
             "covariance_ug2": values[..., row, column].ravel(),
@@ -196,9 +197,9 @@ def _wander_rows(lot: LotArrays, found: _Noisy) -> pd.DataFrame:
     parts = {"white_ug": found.white, "flicker_ug": found.flicker, "walk_ug": found.walk}
     return pd.DataFrame(
         {
-            "unit": np.asarray(lot.units, dtype=object)[u],
-            "axis": np.asarray(AXES, dtype=object)[a],
-            "method": found.method,
+            "unit": picked(lot.units, u),
+            "axis": picked(AXES, a),
+            "method": picked([found.method], np.zeros(u.size, dtype=np.intp)),
             **{name: (MICRO * values / scale).ravel() for name, values in parts.items()},
             "lack_of_fit": found.lack_of_fit.ravel(),
             "dof": found.fit.dof.ravel(),

@@ -11,6 +11,7 @@ from inertial.correction import correct, station_change
 from pipelines.stages.arrays import AXES, LotArrays, lot_arrays
 from pipelines.stages.calibration import read_calibration
 from pipelines.stages.empty import empty_table
+from pipelines.stages.texts import picked
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -99,9 +100,9 @@ def _rows(lot: LotArrays, unseen: NDArray[np.bool_], columns: dict[str, Array], 
     temperature = lot.state.temperature
     return pd.DataFrame(
         {
-            "unit": np.asarray(lot.units, dtype=object)[u],
+            "unit": picked(lot.units, u),
             "dwell": lot.dwells[unseen][n],
-            "pose": np.asarray(lot.poses, dtype=object)[unseen][n],
+            "pose": picked(lot.poses, np.flatnonzero(unseen)[n]),
             **{name: values.ravel() for name, values in columns.items()},
             **{f"error_{letter}_ug": by_axis[..., axis].ravel() for axis, letter in enumerate(AXES)},
             "unit_C": np.full(u.size, np.nan) if temperature is None else temperature[:, unseen][u, n],
