@@ -10,8 +10,8 @@ import numpy as np
 from pipelines.audit.calibrations import codes, date_of
 from pipelines.audit.drifts import OWN
 from pipelines.audit.statistics.capability import Index as Capability
-from pipelines.audit.statistics.capability import cpk, fraction_interval, sigma_within
-from pipelines.audit.statistics.comparison import Comparison, compare, holm, outlier_limit, robust_z
+from pipelines.audit.statistics.capability import cpk, fraction_interval, independent, sigma_within
+from pipelines.audit.statistics.comparison import TO_SIGMA, Comparison, compare, holm, outlier_limit, robust_z, unlike
 from pipelines.audit.statistics.two_way import group_medians
 
 if TYPE_CHECKING:
@@ -28,6 +28,7 @@ if TYPE_CHECKING:
 
 FEWEST = 20
 FEWEST_OF_LOT = 3
+MEDIAN_OVER_MEAN = 1.2533  # standard error of a median over that of a mean, normal values: √(π/2)
 
 
 @dataclass(frozen=True)
@@ -137,7 +138,11 @@ def _numbers_in(column: pd.Series, known: NDArray[np.str_]) -> Numbers:
 
 
 def abilities(all_: Calibrations, figures: Figures) -> tuple[list[Ability], list[Difference]]:
-    """Capability of every figure with a limit, and whether stations, slots and lots differ in it."""
+    """Capability of every figure with a limit, and whether stations, slots and lots differ in it.
+
+    Every unit counts once, as it first was: one that comes back to its station again and again is no new evidence of it.
+    """
+    figures = _first_of_each(all_, figures)
     device, lot = all_.device[figures.row].astype(str), codes(all_.run[figures.row])
     groups = {"station": codes(all_.station[figures.row]), "slot": all_.slot[figures.row], "lot": lot}
     able: list[Ability] = []
@@ -151,11 +156,30 @@ def abilities(all_: Calibrations, figures: Figures) -> tuple[list[Ability], list
             if np.isfinite(limit).any():
                 able.append(_ability(kind, name, figures, own[np.isfinite(limit)], lot))
             for by, numbers in groups.items():
-                found = compare(figures.value[own], numbers[own] - numbers[own].min())
+                found = _compared(figures.value[own], numbers[own] - numbers[own].min(), lot[own], by)
                 if found is not None:
                     differences.append(Difference(kind, name, by, found, found.rank_p))
     adjusted = holm(np.array([d.p for d in differences])) if differences else []
     return able, [replace(d, p=float(p)) for d, p in zip(differences, adjusted, strict=True)]
+
+
+def _compared(values: Array, groups: Numbers, lot: Numbers, by: str) -> Comparison | None:
+    """Groups of values compared; stations by the means of their lots: lots differ, and each is on one station."""
+    found = compare(values, groups)
+    if found is None or by != "station":
+        return found
+    _, first, number = np.unique(lot, return_index=True, return_inverse=True)
+    means = compare(np.bincount(number, values) / np.bincount(number), groups[first])
+    return None if means is None else replace(found, f_p=means.f_p, rank_p=means.rank_p)
+
+
+def _first_of_each(all_: Calibrations, figures: Figures) -> Figures:
+    """The figures of every unit's first calibration among those given."""
+    rows = np.unique(figures.row)
+    unit = all_.histories[rows]
+    first = rows[np.concatenate([[True], unit[1:] != unit[:-1]])] if rows.size else rows
+    kept = np.isin(figures.row, first)
+    return Figures(*(getattr(figures, name)[kept] for name in Figures.__dataclass_fields__))
 
 
 def _ability(device: str, figure: str, figures: Figures, own: Numbers, lot: Numbers) -> Ability:
@@ -167,7 +191,7 @@ def _ability(device: str, figure: str, figures: Figures, own: Numbers, lot: Numb
     outside = int(np.count_nonzero(np.abs(values) > figures.limit[own]))
     return Ability(
         device, figure, str(figures.unit_text[own[0]]), limit, two_sided, own.size, float(np.median(values)),
-        cpk(mean, sigma, low, limit, own.size),
+        cpk(mean, sigma, low, limit, *independent(values, lot[own])),
         cpk(mean, within, low, limit, dof + 1) if dof >= FEWEST and within > 0.0 else None,
         fraction_interval(outside, own.size),
     )  # fmt: skip
@@ -224,6 +248,15 @@ def _odd_units(all_: Calibrations, device: str, rows: Numbers, values: Array, od
     return found
 
 
+def _error_of_lots(values: Array, lot: Numbers) -> Array:
+    """Standard error of the median of every lot, (lots, p), from the spread inside the lots."""
+    counts = np.bincount(lot)
+    middles = np.stack([group_medians(column, lot) for column in values.T], axis=1)
+    freed = (values - middles[lot]) * np.sqrt(counts / np.maximum(counts - 1, 1))[lot, None]
+    inside = TO_SIGMA * np.nanmedian(np.abs(freed[counts[lot] > 1]), axis=0)
+    return MEDIAN_OVER_MEAN * inside / np.sqrt(counts)[:, None]
+
+
 def _odd_lots(all_: Calibrations, device: str, rows: Numbers, values: Array) -> list[Odd]:
     runs, lot = np.unique(all_.run[rows].astype(str), return_inverse=True)
     counts = np.bincount(lot)
@@ -232,7 +265,7 @@ def _odd_lots(all_: Calibrations, device: str, rows: Numbers, values: Array) -> 
         return []
     # medians: one wild unit is told as a unit, not as its lot
     means = np.stack([group_medians(values[:, c], lot) for c in range(values.shape[1])], axis=1)[large]
-    z = np.nan_to_num(robust_z(means) * np.sqrt(counts[large] / np.median(counts[large]))[:, None])
+    z = np.nan_to_num(unlike(means, _error_of_lots(values, lot)[large]))
     worst = np.argmax(np.abs(z), axis=1)
     size = np.abs(z[np.arange(large.size), worst])
     out: list[Odd] = []

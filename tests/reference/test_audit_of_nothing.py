@@ -6,6 +6,7 @@ import pytest
 from pipelines.audit.calibrations import Calibrations
 from pipelines.audit.drifts import OWN, kind_drifts, unit_drifts
 from pipelines.audit.parameters import NAMES
+from pipelines.audit.population import Figures, abilities, odd_ones
 from pipelines.audit.rules import load_rules
 from pipelines.audit.swaps import strangers
 
@@ -112,3 +113,68 @@ def test_units_are_in_tolerance_when_their_reliability_ends(rng, slope, walk, ti
     off = np.abs(then - values[:, -1] / TOLERANCE)[:, [NAMES.index(name) for name in OWN]]
     assert np.mean(np.all(off <= 1.0, axis=1)) > 0.92
     assert np.median(ahead) > 0.5
+
+
+FIGURES, LIMIT = 7, 4.0  # as many figures, normal with σ = 1 and limits of ± 4: Ppk is 4/3
+
+
+def told_different(all_, columns):
+    """Whether stations or slots are said to differ (p below 10⁻³, 2 % of the variance), and the share of Ppk that hold."""
+    n = len(all_)
+    names = np.repeat(np.array([f"figure_{k}" for k in range(len(columns))], dtype=object), n)
+    texts = np.full(names.size, "1", dtype=object)
+    rows = np.tile(np.arange(n), len(columns))
+    able, found = abilities(all_, Figures(rows, names, np.concatenate(columns), np.full(names.size, LIMIT), texts))
+    held = np.mean([one.ppk.low <= LIMIT / 3.0 <= one.ppk.high for one in able])
+    return any(one.by != "lot" and one.p < 1e-3 and one.found.effect > 0.02 for one in found), held
+
+
+def test_units_that_come_back_to_their_station_are_no_evidence_against_it(rng):
+    """Every calibration counted as a new unit: each such archive had stations that differed, and Ppk held in 60 %."""
+    wrong, held = 0, []
+    for _ in range(25):
+        units, times = 60, 5
+        seat = np.repeat(rng.integers(0, 24, units), times)
+        serials = np.repeat([f"U{u:05d}" for u in range(units)], times)
+        days, nothing = np.tile(180.0 * np.arange(times), units), np.zeros((units * times, len(NAMES)))
+        stations = [f"line-{one}" for one in seat // 8]
+        all_ = calibrations(serials, days, nothing, stations=stations, slots=seat % 8)
+        columns = [
+            np.repeat(rng.standard_normal(units), times) + 0.05 * rng.standard_normal(300) for _ in range(FIGURES)
+        ]
+        told, share = told_different(all_, columns)
+        wrong, held = wrong + told, [*held, share]
+    assert wrong <= 1
+    assert np.mean(held) == pytest.approx(0.95, abs=0.05)
+
+
+def test_lots_that_differ_are_no_evidence_against_their_stations(rng):
+    """Units of a lot counted one by one: seven archives in ten had stations that differed, and Ppk held in 76 %."""
+    wrong, held, lots, size = 0, [], 30, 8
+    for _ in range(25):
+        lot = np.repeat(np.arange(lots), size)
+        serials = [f"U{u:05d}" for u in range(lot.size)]
+        stations = np.array([f"line-{one}" for one in rng.integers(0, 3, lots)])[lot]
+        nothing = np.zeros((lot.size, len(NAMES)))
+        runs = [f"r{one:03d}" for one in lot]
+        all_ = calibrations(serials, lot, nothing, stations=stations, slots=np.tile(np.arange(size), lots), runs=runs)
+        columns = [
+            (rng.standard_normal(lot.size) + rng.standard_normal(lots)[lot]) / np.sqrt(2.0) for _ in range(FIGURES)
+        ]
+        told, share = told_different(all_, columns)
+        wrong, held = wrong + told, [*held, share]
+    assert wrong <= 1
+    assert np.mean(held) == pytest.approx(0.94, abs=0.05)
+
+
+@pytest.mark.parametrize("differing", [0.0, 1.0])
+def test_large_lots_stand_out_no_more_than_small_ones(rng, differing):
+    """Distances multiplied by the root of a lot's size made four odd lots of 150, where lots differ as much as units do."""
+    found = 0
+    for _ in range(4):
+        lot = np.repeat(np.arange(150), rng.choice([4, 8, 32], 150, p=[0.2, 0.6, 0.2]))
+        values = rng.standard_normal((lot.size, len(NAMES))) + differing * rng.standard_normal((150, len(NAMES)))[lot]
+        serials, runs = [f"U{u:05d}" for u in range(lot.size)], [f"r{one:03d}" for one in lot]
+        all_ = calibrations(serials, lot, values, runs=runs)
+        found += sum(odd.kind == "lot" for odd in odd_ones(all_, np.ones(len(all_), dtype=bool)))
+    assert found <= 1

@@ -83,6 +83,17 @@ def robust_z(values: Array) -> Array:
     return (values - middle) / np.where(spread > 0.0, spread, np.inf)
 
 
+def unlike(values: Array, errors: Array) -> Array:
+    """Distance of every value from the median, in σ of what the values themselves differ by and of their own errors; (n, p).
+
+    Averages of many scatter less than those of few only by their errors: what lots differ by does not shrink with their size.
+    """
+    middle = np.nanmedian(values, axis=0)
+    spread2 = (TO_SIGMA * np.nanmedian(np.abs(values - middle), axis=0)) ** 2
+    sigma2 = np.maximum(spread2 - np.nanmedian(errors**2, axis=0), 0.0) + errors**2
+    return (values - middle) / np.sqrt(np.where(sigma2 > 0.0, sigma2, np.inf))
+
+
 def outlier_limit(n: int, known_from: int | None = None, level: float = 0.01) -> float:
     """|z| that none of n normal values exceeds but with probability ``level``.
 
