@@ -48,18 +48,23 @@ class Restricted:
 
     def on_grid(self, first: Array, second: Array) -> Array:
         """Restricted deviance, (k, l), for shares (k,) of the first kernel and (l,) of the second."""
-        shrink = 1.0 / np.sqrt(1.0 + np.outer(second, self._second))
-        values, vectors = np.linalg.eigh(shrink[:, :, None] * self._first * shrink[:, None, :])
-        spread = 1.0 + first[:, None] * np.maximum(values, 0.0)[:, None, :]
-        volumes = self._volume - 2.0 * np.log(shrink).sum(axis=1)[:, None] + np.log(spread).sum(axis=-1)
-        turns = np.swapaxes(vectors * shrink[:, :, None], -1, -2)
+        bases = [self._basis(share) for share in second.tolist()]
+        weights = [1.0 / (1.0 + np.outer(first, values)) for values, _, _ in bases]
+        volumes = np.stack([one - np.log(weight).sum(axis=1) for (*_, one), weight in zip(bases, weights, strict=True)])
         squares, own = np.zeros((2, len(second), len(first)))
         for start in range(0, self.blocks, _PIECE):
             piece = np.ascontiguousarray(self._columns[..., start : start + _PIECE])
-            pivots = self._pivots([self._products(piece, *one) for one in zip(turns, 1.0 / spread, strict=True)])
+            rows = [self._products(piece, turn, weight) for (_, turn, _), weight in zip(bases, weights, strict=True)]
+            pivots = self._pivots(rows)
             squares += pivots[-1].sum(axis=-1)
             own += np.log(pivots[:-1]).sum(axis=(0, -1))
         return (self._dof * np.log(np.maximum(squares / self._dof, 1e-300)) + self.blocks * volumes + own).T
+
+    def _basis(self, share: float) -> tuple[Array, Array, float]:
+        """At a share of the second kernel λ (m,) of the first, the turn (m, m) to its vectors, and ln|W + t·K₂|."""
+        shrink = 1.0 / np.sqrt(1.0 + share * self._second)
+        values, vectors = np.linalg.eigh(shrink[:, None] * self._first * shrink)
+        return np.maximum(values, 0.0), (shrink[:, None] * vectors).T, self._volume - 2.0 * float(np.log(shrink).sum())
 
     def _products(self, piece: Array, turn: Array, weight: Array) -> Array:
         """Products (k, pairs, b) of the columns (m, p + 1, b) of some blocks, weighted for every share."""

@@ -68,3 +68,13 @@ def test_shares_that_made_the_series_are_found(rng: np.random.Generator) -> None
     flicker, walk = own.best_shares()
     assert walk > 10.0 * max(flicker, 0.01)  # what was added is a random walk: 40 steps of 0.3
     assert walk == pytest.approx(40 * 0.09, rel=0.5)
+
+
+def test_shares_are_those_of_the_likelihood_worked_out_pair_by_pair(
+    rng: np.random.Generator, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    own = series(rng)
+    shares = own.best_shares()
+    monkeypatch.setattr(Series, "_likelihood", lambda self: self._pair_by_pair)
+    assert own.best_shares() == pytest.approx(shares, rel=1e-8)
+    assert min(shares) > 0.0
