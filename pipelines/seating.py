@@ -33,7 +33,7 @@ def read_seating(text: str) -> Seating:
     """The seating in a slot map's file, or in a comma-separated list of serial numbers; empty where the text is."""
     path = Path(text)
     if text and path.suffix.lower() in {".csv", ".toml"}:
-        content = read_text(path, "slot map")
+        content = read_text(path, "slot map", "CSV or TOML")
         rows = _toml_rows(content, path) if path.suffix.lower() == ".toml" else _csv_rows(content, path)
         return _checked(rows, f"slot map {path.name}")
     return Seating(tuple(serial.strip() for serial in text.split(",")) if text else ())

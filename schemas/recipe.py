@@ -284,13 +284,13 @@ def parse_recipe(text: str, source: str) -> RecipeFile:
         raise explain(problem, source, RecipeFile) from None
 
 
-def read_text(path: Path, what: str) -> str:
+def read_text(path: Path, what: str, form: str = "TOML") -> str:
     """The content of a text file; the message names the file and what it should have been."""
     try:
         return path.read_text(encoding="utf-8")
     except (OSError, UnicodeDecodeError) as problem:
         reason = problem.strerror if isinstance(problem, OSError) else "not UTF-8 text"
-        message = f"{what}: {path} cannot be read ({reason}); give the path of a {what} file in TOML"
+        message = f"{what}: {path} cannot be read ({reason}); give the path of a {what} file in {form}"
         raise RecipeInvalid(message) from None
 
 

@@ -37,6 +37,7 @@ class _RecipeFirst(TyperGroup):
 
     def parse_args(self, ctx: Context, args: list[str]) -> list[str]:
         """The arguments, with the name of the command that is meant where none is given."""
+        args = ["optimise", *args[1:]] if args[:1] == ["optimize"] else args  # as it is spelled elsewhere
         if not args or args[0] not in {*self.commands, "--help", "-h"}:
             args = [self.usual, *args]
         return super().parse_args(ctx, args)

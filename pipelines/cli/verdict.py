@@ -12,6 +12,10 @@ if TYPE_CHECKING:
     from rich.console import Console
 
 
+SMALL = 1.1
+"""Errors below so many times the floor look like noise to whoever compares the two numbers."""
+
+
 def print_diagnosis(document: dict[str, Any], *, source: str, model: Path | None) -> None:
     """Print a diagnosis.
 
@@ -46,6 +50,8 @@ def verdict(document: dict[str, Any]) -> str:
     left = f"{short(error['rms_ug'])} µg rms are left in {sound} unit{'s' if sound != 1 else ''}, {floor}"
     if document["adequate"]:
         return f"ADEQUATE: {left}."
+    if error["rms_ug"] < SMALL * error["floor_ug"]:
+        left += "; what is wrong is small beside it, but no noise"
     named = [" or ".join(group["effects"]) for group in document["classes"]]
     if named:
         return f"NOT ADEQUATE: {left}; missing: {', and '.join(named)}."

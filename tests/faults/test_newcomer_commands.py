@@ -9,6 +9,7 @@ from typer.testing import CliRunner
 
 from pipelines.archive import Archive
 from pipelines.cli import COMMANDS, app, main
+from pipelines.cli.verdict import verdict
 from pipelines.trace import Ledger
 
 
@@ -58,3 +59,22 @@ def test_a_serial_number_alone_shows_what_holds_today(monkeypatch, capsys, tmp_p
     assert (status, "certificate A1/1 holds on" in out) == (0, True)
     status, out, _ = told(monkeypatch, capsys, "show", "B1", "--archive", tmp_path)
     assert (status, "no calibration holds on" in out) == (1, True)
+
+
+def test_a_slot_map_that_is_not_there_is_asked_for_in_both_its_forms(monkeypatch, capsys, tmp_path: Path) -> None:
+    status, _, err = told(monkeypatch, capsys, "run", "--units", tmp_path / "lot.csv", "--archive", tmp_path)
+    assert (status, "give the path of a slot map file in CSV or TOML" in err) == (2, True)
+
+
+def test_optimise_may_be_spelled_with_a_z(monkeypatch, capsys) -> None:
+    status, _, err = told(monkeypatch, capsys, "plan", "optimize", "nosuch.toml")
+    assert (status, "'nosuch.toml'" in err) == (2, True)
+
+
+@pytest.mark.parametrize(("rms", "told_so"), [(432.0, True), (441.0, True), (882.0, False)])
+def test_an_error_below_the_noise_that_is_no_noise_is_said_to_be_small(rms, told_so) -> None:
+    error = {"rms_ug": rms, "floor_ug": 441.0, "p_value": 4e-190}
+    document = {"adequate": False, "error": error, "blocked_by": [], "units": ["U1"], "unexplained": None}
+    said = verdict({**document, "classes": [{"effects": ["scale_temperature_quadratic"]}]})
+    assert said.startswith("NOT ADEQUATE")
+    assert ("small beside it" in said) == told_so
