@@ -49,6 +49,11 @@ class Archive:
         """By what another process opens the same archive."""
         return address_of(self.root)
 
+    @property
+    def mark(self) -> bytes:
+        """Content of the file that makes a folder an archive."""
+        return files.json_bytes({"product": "tumbleline", "format": FORMAT})
+
     def prepare(self) -> None:
         """Make sure that the folder is an archive that can be written; refuse a folder of something else."""
         self._refuse_key_within()
@@ -64,7 +69,7 @@ class Archive:
         if self.root.is_dir() and any(self.root.iterdir()):
             message = f"archive: {self.root} holds other files and no archive; give an empty or new folder"
             raise ArchiveUnusable(message)
-        files.publish(mark, files.json_bytes({"product": "tumbleline", "format": FORMAT}))
+        files.publish(mark, self.mark)
 
     def refuse_none(self) -> None:
         """Refuse a place that holds no archive, or one of another format."""

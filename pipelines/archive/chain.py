@@ -49,12 +49,17 @@ def append(root: Place, kind: str, sealed: Mapping[str, str], about: Mapping[str
             number += 1
 
 
+def is_number(name: str) -> bool:
+    """Whether a name is a number as the archive writes it; digits of other scripts and signs like ² are none."""
+    return name.isascii() and name.isdigit()
+
+
 def last_number(root: Place) -> int:
     """The number of the last entry; 0 where there is none."""
     top = root / FOLDER
-    shards = sorted((int(one.name) for one in _below(top) if one.name.isdigit()), reverse=True)
+    shards = sorted((int(one.name) for one in _below(top) if is_number(one.name)), reverse=True)
     for shard in shards:
-        numbers = [int(one.stem) for one in _below(top / f"{shard:06d}") if one.stem.isdigit()]
+        numbers = [int(one.stem) for one in _below(top / f"{shard:06d}") if is_number(one.stem)]
         if numbers:
             return max(numbers)
     return 0

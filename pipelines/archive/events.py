@@ -6,6 +6,7 @@ from datetime import UTC, datetime
 from typing import TYPE_CHECKING, Any
 
 from pipelines.archive import files
+from pipelines.archive.chain import is_number
 from schemas.event import Event
 
 if TYPE_CHECKING:
@@ -63,10 +64,14 @@ class Events:
         columns = {"time_s": float, "record": "int64", **dict.fromkeys(SOAK_FIGURES, float)}
         return pd.DataFrame(rows, columns=list(columns)).astype(columns)
 
+    def hashes(self) -> dict[str, str]:
+        """The hash of every event's file by its name."""
+        return {path.name: files.sha256(path) for path in self._files()}
+
     def _files(self) -> list[Place]:
         if not self.path.is_dir():
             return []
-        return sorted((path for path in self.path.glob("*.json") if path.stem.isdigit()), key=lambda path: path.name)
+        return sorted((path for path in self.path.glob("*.json") if is_number(path.stem)), key=lambda path: path.name)
 
 
 def _event(content: dict[str, Any]) -> Event:

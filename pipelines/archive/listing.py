@@ -49,7 +49,9 @@ def stages_of(run: Run, names: set[str] | None = None) -> list[str]:
     """The stages that made the run's tables."""
     names = _names(run.path) if names is None else names
     tables = sorted(name.removesuffix(".parquet") for name in names if name.endswith(".parquet"))
-    made = (files.read_json(run.path / f"{name}.json").get("stage", "") for name in tables if f"{name}.json" in names)
+    made = (
+        str(files.read_json(run.path / f"{name}.json").get("stage", "")) for name in tables if f"{name}.json" in names
+    )
     return list(dict.fromkeys(made))
 
 

@@ -5,9 +5,11 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from pipelines.archive import files, parquet
+from pipelines.archive.chain import is_number
 from pipelines.archive.events import Events
 from pipelines.archive.keys import digest
 from pipelines.archive.store import ObjectPath
+from schemas.errors import ArchiveUnusable
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterator
@@ -45,7 +47,7 @@ class Records:
 
     def complete(self) -> None:
         """Note that capture came to its end."""
-        content = {"records": len(self.finished()), "previous": self._head()}
+        content = {"records": len(self.finished()), "previous": self._head(), "events": self.events.hashes()}
         files.publish(self.path / COMPLETE, files.manifest_bytes(content))
 
     def finished(self) -> set[int]:
@@ -95,6 +97,7 @@ class Records:
         state = self._state_path(record)
         files.publish(state, station_state)
         about = {"record": record, "order": order, "schema": tables.VERSION, "previous": self._head()}
+        about["state"] = files.hash_of(station_state)
         hashes = {name: files.hash_of(data) for name, data in content.items()}
         manifest = files.manifest_bytes({**about, "content": {**self._ahead, **hashes}})
         files.publish_folder(self.path / f"{record:05d}", {**content, "record.json": manifest})
@@ -115,7 +118,16 @@ class Records:
         if last is None:
             return None
         state = self._state_path(int(last.name))
-        return state.read_bytes() if state.is_file() else None
+        if not state.is_file():
+            return None
+        content = state.read_bytes()
+        if files.read_json(last / "record.json").get("state", files.hash_of(content)) != files.hash_of(content):
+            message = (
+                f"archive: {state} is not the station's state that record {last.name} was stored with; restore it from a copy, "
+                "or measure the lot anew"
+            )
+            raise ArchiveUnusable(message)
+        return content
 
     def hash(self) -> str:
         """Hash of everything captured, in order of record."""
@@ -146,7 +158,7 @@ class Records:
             whole = [one.parent for one in self.path.walk() if one.name == "record.json"]
         else:
             whole = list(self.path.iterdir()) if self.path.is_dir() else []
-        return sorted((folder for folder in whole if folder.name.isdigit()), key=lambda folder: folder.name)
+        return sorted((folder for folder in whole if is_number(folder.name)), key=lambda folder: folder.name)
 
     def _last(self) -> Place | None:
         """Folder of the record stored last; None before the first."""

@@ -73,6 +73,12 @@ def key(
             raise WrongUse(message)
         made = signatures.private_key(place).public_key()
     else:
+        within = next((one for one in place.resolve().parents if (one / "archive.json").is_file()), None)
+        if within is not None:
+            message = (
+                f"archive key: {place} lies in archive {within}, a place outside is needed; name another with --output"
+            )
+            raise WrongUse(message)
         made = signatures.make_key(place)
     hexadecimal = made.public_bytes_raw().hex()
     if as_json:

@@ -270,8 +270,12 @@ def test_a_run_that_was_cut_off_tells_how_to_go_on_everywhere(root: Path, monkey
 
 def test_a_run_json_that_was_lost_hides_no_other_run(root: Path, monkeypatch, capsys) -> None:
     (root / "runs" / "empty").mkdir()
+    (root / "runs" / "lost").mkdir()
+    (root / "runs" / "lost" / "dwells.json").write_text("{}", encoding="utf-8")
     status, out, _ = told(monkeypatch, capsys, "list", "--json", "--archive", root)
     assert status == 0
     assert len(json.loads(out)["runs"]) == 1
     status, out, _ = told(monkeypatch, capsys, "verify", "--json", "--archive", root)
-    assert [(f["kind"], f["path"]) for f in json.loads(out)["findings"]] == [("missing", "runs/empty/run.json")]
+    told_of = json.loads(out)
+    assert [(f["kind"], f["path"]) for f in told_of["findings"]] == [("missing", "runs/lost/run.json")]
+    assert told_of["remarks"] == ["runs/empty holds no run: its writer was killed, or has just begun"]

@@ -3,6 +3,7 @@
 import json
 import shutil
 from collections.abc import Callable
+from datetime import timedelta
 from pathlib import Path
 
 import pandas as pd
@@ -10,12 +11,12 @@ import pytest
 from capture_double import CaptureDouble, PulledPlug, small_job
 from typer.testing import CliRunner
 
-from pipelines.archive import Archive, Run
+from pipelines.archive import Archive, Run, files
 from pipelines.archive.signatures import VARIABLE, make_key, name_of, public_keys
 from pipelines.cli import app
 from pipelines.runner import Runner
 from pipelines.trace import Ledger
-from pipelines.trace.checks import Report, verify
+from pipelines.trace.checks import Report, seals, verify
 from schemas.errors import ArchiveUnusable, WrongUse
 
 
@@ -251,7 +252,7 @@ def test_an_unsigned_archive_is_wrong_where_a_key_is_demanded(copy: Path, key: P
     keys = public_keys()
     report = verify(Archive(copy), keys=keys, demanded=True)
     assert [f.kind for f in report.checked.findings] == ["signature"]
-    assert "manifests are not signed" in report.checked.findings[0].message
+    assert "manifests: each is not signed" in report.checked.findings[0].message
 
 
 def test_signatures_change_no_table(signed: Path, whole: Path) -> None:
@@ -296,3 +297,168 @@ def test_the_command_leaves_with_status_1_where_something_is_wrong(copy: Path) -
 def test_a_folder_without_an_archive_is_told(tmp_path: Path) -> None:
     result = CliRunner().invoke(app, ["verify", "--archive", str(tmp_path)])
     assert "holds no archive, one is needed" in str(result.exception)
+
+
+def test_a_file_of_every_kind_that_was_changed_cut_or_taken_away_is_named(copy: Path) -> None:
+    """One byte, half of the file, the whole of it: nothing that the archive wrote can be without it."""
+    kinds = [
+        "archive.json", "captures/*/complete.json", "captures/*/state/*.bin", "captures/*/00001/record.json",
+        "captures/*/00001/samples.parquet", "runs/*/run.json", "runs/*/sealed.json", "runs/*/report.html", "runs/*/soaks.json",
+        "runs/*/coefficients.json", "runs/*/noise.parquet", "calibrations/*/*/000001.json", "chain/*/000000001.json",
+    ]  # fmt: skip
+    for pattern in kinds:
+        path = one(copy, pattern)
+        data, name = path.read_bytes(), str(path.relative_to(copy))
+        broken = bytes([*data[: len(data) // 2], data[len(data) // 2] ^ 1, *data[len(data) // 2 + 1 :]])
+        for content in (broken, data[: len(data) // 2], b""):
+            path.write_bytes(content)
+            assert name in {f.path for f in verified(copy).checked.findings}, (name, len(content))
+        path.unlink()
+        found = {f.path for f in verified(copy).checked.findings}
+        assert any(name.startswith(place) for place in found), (name, found)
+        path.write_bytes(data)
+    assert verified(copy).whole
+
+
+@pytest.mark.parametrize("change", ["edited", "removed", "added"])
+def test_the_journal_of_a_capture_is_held_against_its_end(tmp_path: Path, change: str) -> None:
+    from schemas.event import Event
+
+    def noting(job, records, progress) -> None:
+        records.events.note(Event(1.0, "suspended", 3, "the door was open", "measured again"))
+        CaptureDouble()(job, records, progress)
+
+    list(Runner(small_job(tmp_path), Archive(tmp_path / "archive"), measure=noting).all())
+    path = one(tmp_path / "archive", "captures/*/events/00000.json")
+    if change == "edited":
+        edit(path, lambda content: content.update(reason="nothing"))
+    elif change == "removed":
+        path.unlink()
+    else:
+        path = path.with_name("00001.json")
+        path.write_text("{}")
+    kind = {"edited": "changed", "removed": "missing", "added": "foreign"}[change]
+    assert [(f.kind, Path(f.path).name) for f in verified(tmp_path / "archive").checked.findings] == [(kind, path.name)]
+
+
+def test_a_link_of_the_chain_that_was_taken_off_its_end_is_missed(copy: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(seals, "JUST_NOW", timedelta(0))
+    for count in (1, 2):
+        max(copy.glob("chain/*/*.json")).unlink()
+        found = {(f.kind, f.path) for f in verified(copy).checked.findings}
+        assert {kind for kind, _ in found} == {"unchained"}
+        assert len({path for _, path in found}) == (1, 4)[count - 1]
+    max(copy.glob("chain/*/*.json")).unlink()
+    assert ("missing", "chain/000000/000000001.json") in {(f.kind, f.path) for f in verified(copy).checked.findings}
+
+
+def test_a_writer_that_is_at_work_is_not_accused(copy: Path) -> None:
+    max(copy.glob("chain/*/*.json")).unlink()
+    report = verified(copy)
+    assert report.whole
+    assert any("is not in the chain yet: its writer is at work" in remark for remark in report.checked.remarks)
+
+
+@pytest.mark.parametrize("marked", [True, False])
+def test_a_run_that_was_copied_here_is_named(copy: Path, tmp_path: Path, monkeypatch, *, marked: bool) -> None:
+    monkeypatch.setattr(seals, "JUST_NOW", timedelta(0))
+    other = Runner(small_job(tmp_path, ("seed = 5", "seed = 6")), Archive(tmp_path / "b"), measure=CaptureDouble())
+    list(other.all())
+    shutil.copytree(other.run.path, copy / "runs" / other.run.id)
+    shutil.copytree(other.run.records.path, copy / "captures" / other.run.records.path.name)
+    if marked:
+        assert [(f.kind, Path(f.path).name) for f in verified(copy).checked.findings] == [("edited", "sealed.json")]
+        return
+    (copy / "runs" / other.run.id / "sealed.json").unlink()
+    assert [(f.kind, Path(f.path).name) for f in verified(copy).checked.findings] == [("unchained", "report.json")]
+
+
+def test_a_capture_whose_run_was_never_here_is_named(copy: Path) -> None:
+    [capture] = (copy / "captures").iterdir()
+    shutil.copytree(capture, copy / "captures" / "f00")
+    assert [(f.kind, f.path) for f in verified(copy).checked.findings] == [("missing", "captures/f00")]
+
+
+def test_two_records_that_were_exchanged_are_named(copy: Path) -> None:
+    first, second = one(copy, "captures/*/00003"), one(copy, "captures/*/00004")
+    first.rename(first.with_name("aside"))
+    second.rename(first)
+    first.with_name("aside").rename(second)
+    assert {f.path.rpartition("/")[2] for f in verified(copy).checked.findings} == {"00003", "00004"}
+
+
+@pytest.mark.parametrize("pattern", ["runs/*/dwells.parquet", "runs/*/grades.json", "runs/*", "captures/*/00002"])
+def test_a_link_in_place_of_a_file_or_folder_is_named(copy: Path, tmp_path: Path, pattern: str) -> None:
+    path = one(copy, pattern)
+    path.rename(tmp_path / "elsewhere")
+    path.symlink_to(tmp_path / "elsewhere")
+    assert ("foreign", str(path.relative_to(copy))) in {(f.kind, f.path) for f in verified(copy).checked.findings}
+
+
+def test_a_folder_of_the_archive_may_lie_on_another_disk(copy: Path, tmp_path: Path) -> None:
+    (copy / "captures").rename(tmp_path / "disk")
+    (copy / "captures").symlink_to(tmp_path / "disk")
+    assert verified(copy).whole
+
+
+def test_a_key_in_the_archive_is_named_and_none_is_made_there(copy: Path, key: Path) -> None:
+    shutil.copy(key, run_of(copy).path / "notes.txt")
+    report = verified(copy)
+    assert [(f.kind, Path(f.path).name) for f in report.checked.findings] == [("signature", "notes.txt")]
+    assert "nothing of the archive put that there" in report.checked.remarks[0]
+    result = CliRunner().invoke(app, ["archive", "key", "--output", str(copy / "runs" / "signing.key")])
+    assert "lies in archive" in str(result.exception)
+
+
+def test_files_of_the_desktop_disturb_nothing_and_are_told(copy: Path) -> None:
+    for folder in (copy, *(path for path in copy.rglob("*") if path.is_dir())):
+        (folder / ".DS_Store").write_bytes(b"\0\0\0\1Bud1")
+    [event] = copy.glob("calibrations/*/*/000002.json")
+    (event.parent / "._000001.json").write_bytes(b"\0\5\26\7")
+    (copy / "chain" / "²").mkdir()
+    (copy / "chain" / "²" / "².json").write_text("{}")
+    report = verified(copy)
+    assert report.checked.findings == []
+    assert ".DS_Store" in report.checked.remarks[0]
+    assert len(Ledger(Archive(copy)).calibrations("A2")) == 1
+    assert len(Archive(copy).runs()) == 1
+
+
+def test_who_did_not_sign_is_named(signed_copy: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    make_key(tmp_path / "other.key")
+    for path, place in (
+        (one(signed_copy, "runs/*/report.json"), ""),
+        (max(signed_copy.glob("chain/*/*.json")), "other.key"),
+    ):
+        with monkeypatch.context() as patch:
+            patch.setenv(VARIABLE, str(tmp_path / place) if place else "")
+            path.write_bytes(files.manifest_bytes(json.loads(path.read_text())))
+    report = verified(signed_copy)
+    assert any("report.json is not signed" in remark for remark in report.checked.remarks)
+    assert any("is signed with a key that is not known here" in remark for remark in report.checked.remarks)
+    demanded = {(f.kind, Path(f.path).name) for f in verified(signed_copy, demanded=True).checked.findings}
+    assert {("signature", "report.json"), ("signature", max(signed_copy.glob("chain/*/*.json")).name)} <= demanded
+
+
+@pytest.mark.parametrize(
+    "pattern",
+    ["runs/*/dwells.json", "runs/*/sealed.json", "captures/*/00003/record.json", "captures/*/complete.json",
+     "calibrations/*/*/000001.json", "chain/*/000000001.json"],
+)  # fmt: skip
+def test_an_entry_of_another_kind_in_a_manifest_is_found_and_stops_nothing(copy: Path, pattern: str) -> None:
+    path = one(copy, pattern)
+    data = path.read_bytes()
+    for name in json.loads(data):
+        for value in (5, None, "x", ["a"], {"a": 5}):
+            path.write_bytes(files.json_bytes({**json.loads(data), name: value}))
+            assert verified(copy).checked.findings, (name, value)
+
+
+def test_a_state_of_the_station_that_was_changed_is_not_gone_on_from(tmp_path: Path) -> None:
+    archive = Archive(tmp_path / "archive")
+    with pytest.raises(PulledPlug):
+        list(Runner(small_job(tmp_path), archive, measure=CaptureDouble(stop_after=4)).all())
+    flip(one(tmp_path / "archive", "captures/*/state/*.bin"))
+    [capture] = (tmp_path / "archive" / "captures").iterdir()
+    with pytest.raises(ArchiveUnusable, match=r"is not the station's state that record 00003 was stored with"):
+        archive.capture(capture.name).last_state()

@@ -14,8 +14,11 @@ from pipelines.archive.store import ObjectPath
 from pipelines.trace.checks.calibrations import check_shard
 from pipelines.trace.checks.captures import check_capture, check_strangers
 from pipelines.trace.checks.chain import check_chain
-from pipelines.trace.checks.findings import SIGNATURE, Checked
+from pipelines.trace.checks.findings import MISSING, SIGNATURE, Checked
 from pipelines.trace.checks.runs import check_run
+from pipelines.trace.checks.seals import check_seals
+from pipelines.trace.checks.surroundings import SHOWN, check_mark, check_surroundings
+from schemas.errors import ArchiveUnusable
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
@@ -91,8 +94,9 @@ def verify(
     from schemas import tables
 
     start, total = time.perf_counter(), Checked(archive.root, keys)
+    there = _below(archive.root / "captures")  # before the runs: each run is there before its capture
     chosen = [archive.run(name) for name in runs] or [Run(archive, one.name) for one in _below(archive.root / "runs")]
-    captures = _captures(archive, chosen, only=bool(runs))
+    captures = _captures(archive, chosen) if runs else there
     shards = [] if runs else _below(archive.root / "calibrations")
     tasks: list[Callable[[], Checked]] = [
         *(lambda run=run: check_run(run, total.blank(), tables.VERSION) for run in chosen),
@@ -106,18 +110,34 @@ def verify(
             progress(done, len(tasks))
     for folder in () if runs else ("", "runs", "captures", *(f"captures/{path.name}" for path in captures)):
         check_strangers(archive.root / folder if folder else archive.root, set(), total)
-    last = check_chain(archive.root, total, only={run.id for run in chosen} if runs else None, head=head)
-    if demanded:
-        _demand(total)
+    told = check_chain(archive.root, total, only={run.id for run in chosen} if runs else None, head=head)
+    check_seals(archive.root, chosen, told, total, everything=not runs)
+    check_mark(archive, total)
+    if not runs:
+        _check_owners(chosen, captures, total)
+        check_surroundings(archive, total)
+    _tell_untrusted(total, demanded=demanded)
     total.findings = list(dict.fromkeys(total.findings))  # a manifest may be missed by several that name it
-    return Report(total, last, _trust(total), len(chosen), len(captures), time.perf_counter() - start)
+    return Report(total, told.head, _trust(total), len(chosen), len(captures), time.perf_counter() - start)
 
 
-def _captures(archive: Archive, runs: Sequence[Run], *, only: bool) -> list[Place]:
-    if not only:
-        return _below(archive.root / "captures")
+def _captures(archive: Archive, runs: Sequence[Run]) -> list[Place]:
+    """Folders of the captures that runs were made from."""
     named = dict.fromkeys(str(run.about.get("capture") or "") for run in runs)
     return [archive.root / "captures" / name for name in named if name and (archive.root / "captures" / name).is_dir()]
+
+
+def _check_owners(runs: Sequence[Run], captures: Sequence[Place], total: Checked) -> None:
+    """Every capture has a run that it was measured for."""
+    named: set[str] = set()
+    for run in runs:
+        try:
+            named.add(str(run.about.get("capture") or ""))
+        except ArchiveUnusable:  # told where the run is checked
+            return
+    for path in captures:
+        if path.name not in named:
+            total.wrong(MISSING, path, "has no run in this archive: its run was taken away, or it was copied here")
 
 
 def _below(folder: Place) -> list[Place]:
@@ -127,13 +147,19 @@ def _below(folder: Place) -> list[Place]:
     return sorted((place for place in folder.iterdir() if place.is_dir()), key=lambda place: place.name)
 
 
-def _demand(total: Checked) -> None:
-    missing = {state: total.signatures[state] for state in (UNSIGNED, UNKNOWN) if total.signatures[state]}
-    for state, count in missing.items():
-        what = "are not signed" if state == UNSIGNED else "are signed with another key"
-        total.wrong(
-            SIGNATURE, total.root, f"{count} of {total.manifests} manifests {what}; a signature by --key is demanded"
-        )
+def _tell_untrusted(total: Checked, *, demanded: bool) -> None:
+    """Name the manifests that nobody known signed: wrong where a signature is demanded, said where others are signed."""
+    for state, names in total.untrusted.items():
+        what = "is not signed" if state == UNSIGNED else "is signed with a key that is not known here"
+        if demanded and len(names) == total.manifests:
+            all_of_them = f"{len(names)} of {total.manifests} manifests: each {what}; a signature by --key is demanded"
+            total.wrong(SIGNATURE, total.root, all_of_them)
+        elif demanded:
+            for name in names:
+                total.wrong(SIGNATURE, total.root / name, f"{what}; a signature by --key is demanded")
+        elif len(names) < total.manifests:
+            shown = f"{', '.join(names[:SHOWN])}{f' and {len(names) - SHOWN} more' if len(names) > SHOWN else ''}"
+            total.remarks += [f"{shown} {what.replace('is', 'are', 1) if len(names) > 1 else what}"] if names else []
 
 
 def _trust(total: Checked) -> str:

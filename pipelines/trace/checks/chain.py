@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass, field
 from pathlib import PurePosixPath
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from pipelines.archive import chain, files
 from pipelines.trace.checks.findings import EDITED, MISSING, Checked
@@ -12,26 +13,45 @@ if TYPE_CHECKING:
     from pipelines.archive.store import Place
 
 
-def check_chain(root: Place, checked: Checked, *, only: set[str] | None = None, head: str = "") -> str:
-    """The hash of the chain's last entry; what is wrong goes into ``checked``.
+@dataclass
+class Chain:
+    """What the chain says.
+
+    Parameters
+    ----------
+    head : hash of its last entry.
+    sealed : the files that it names, with the hash that the last entry to name them gives.
+    entries : what each entry seals, by its number.
+    """
+
+    head: str = ""
+    sealed: dict[str, str] = field(default_factory=dict[str, str])
+    entries: dict[int, dict[str, str]] = field(default_factory=dict[int, "dict[str, str]"])
+
+
+def check_chain(root: Place, checked: Checked, *, only: set[str] | None = None, head: str = "") -> Chain:
+    """What the chain says; what is wrong goes into ``checked``.
 
     Parameters
     ----------
     only : runs whose sealed files are looked at; all where None.
     head : hash of an entry that was noted elsewhere; it must be there.
     """
-    before, seen, sealed, latest = "", set[str](), dict[str, str](), ""
+    before, seen, told, latest = "", set[str](), Chain(), ""
     for number, place in chain.entries(root):
         found = checked.manifest(place, 1)
         if found is None:
             before = ""
             continue
         content, own = found
+        if content.get("number") != number:
+            checked.wrong(EDITED, place, f"says that it is entry {content.get('number')!r}")
         if before and content.get("previous") != before:
             earlier = chain.place_of_entry(root, number - 1)
             checked.wrong(EDITED, earlier, f"is not the entry that number {number} followed")
+        told.entries[number] = _files(checked.named(content, "files", place))
         if only is None or content.get("run") in only:
-            sealed |= _files(content)
+            told.sealed |= told.entries[number]
         when = str(content.get("when", ""))
         if when < latest:
             checked.remarks.append(
@@ -43,19 +63,15 @@ def check_chain(root: Place, checked: Checked, *, only: set[str] | None = None, 
         checked.wrong(
             MISSING, root / chain.FOLDER, f"has no entry with hash {head}: entries were taken away or written anew"
         )
-    for name, wanted in sealed.items():
+    for name, wanted in told.sealed.items():
         _check_sealed(root, name, wanted, checked)
-    return before
+    told.head = before
+    return told
 
 
-def _files(content: dict[str, Any]) -> dict[str, str]:
+def _files(named: dict[str, str]) -> dict[str, str]:
     """What an entry seals; names that lead out of the archive do not count."""
-    named = content.get("files", {})
-    return {
-        str(k): str(v)
-        for k, v in named.items()
-        if ".." not in PurePosixPath(str(k)).parts and not str(k).startswith("/")
-    }
+    return {k: v for k, v in named.items() if ".." not in PurePosixPath(k).parts and not k.startswith("/")}
 
 
 def _check_sealed(root: Place, name: str, wanted: str, checked: Checked) -> None:

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 from pipelines.archive import files
-from pipelines.archive.signatures import BAD, check
+from pipelines.archive.signatures import BAD, UNKNOWN, UNSIGNED, check
 from pipelines.archive.store import ObjectPath, first_line
 from schemas.errors import ArchiveUnusable
 
@@ -18,8 +18,8 @@ if TYPE_CHECKING:
 
     from pipelines.archive.store import Place
 
-CHANGED, MISSING, EDITED, FOREIGN, NEWER, UNREADABLE, SIGNATURE = (
-    "changed", "missing", "edited", "foreign", "newer", "unreadable", "signature",
+CHANGED, MISSING, EDITED, FOREIGN, NEWER, UNREADABLE, SIGNATURE, UNCHAINED = (
+    "changed", "missing", "edited", "foreign", "newer", "unreadable", "signature", "unchained",
 )  # fmt: skip
 
 
@@ -29,7 +29,7 @@ class Finding:
 
     Parameters
     ----------
-    kind : ``changed``, ``missing``, ``edited``, ``foreign``, ``newer``, ``unreadable`` or ``signature``.
+    kind : ``changed``, ``missing``, ``edited``, ``foreign``, ``newer``, ``unreadable``, ``signature`` or ``unchained``.
     path : the file, below the archive's root.
     """
 
@@ -46,6 +46,7 @@ class Checked:
     ----------
     remarks : what a reader should know and is not wrong.
     signatures : how many manifests have a signature that is good, unknown, bad or not there.
+    untrusted : names of the manifests whose signature is unknown or not there, by which of the two.
     """
 
     root: Place
@@ -53,6 +54,7 @@ class Checked:
     findings: list[Finding] = field(default_factory=list[Finding])
     remarks: list[str] = field(default_factory=list[str])
     signatures: Counter[str] = field(default_factory=Counter[str])
+    untrusted: dict[str, list[str]] = field(default_factory=lambda: {UNSIGNED: [], UNKNOWN: []})
     tables: int = 0
     manifests: int = 0
     rows: int = 0
@@ -67,6 +69,8 @@ class Checked:
         self.findings += other.findings
         self.remarks += other.remarks
         self.signatures += other.signatures
+        for state, names in other.untrusted.items():
+            self.untrusted[state] += names
         for name in ("tables", "manifests", "rows", "bytes"):
             setattr(self, name, getattr(self, name) + getattr(other, name))
 
@@ -99,9 +103,19 @@ class Checked:
             return None
         state = check(content, self.keys)
         self.signatures[state] += 1
+        if state in self.untrusted:
+            self.untrusted[state].append(self.name(place))
         if state == BAD:
             self.wrong(SIGNATURE, place, "was edited after it was signed, or signed with another key than it names")
         return content, files.hash_of(data)
+
+    def named(self, content: Mapping[str, Any], entry: str, place: Place) -> dict[str, str]:
+        """What an entry of a manifest names, with a hash each; one of another shape was edited."""
+        found = content.get(entry, {})
+        if isinstance(found, dict) and all(isinstance(value, str) for value in found.values()):
+            return found
+        self.wrong(EDITED, place, f"was edited: '{entry}' are no names with a hash each")
+        return {}
 
     def table(self, place: Place, wanted: str, rows: int | None = None) -> None:
         """Hold a table's bytes against a hash, and its rows against a count."""

@@ -20,6 +20,9 @@ KEYED = ("stage", "inputs", "parameters", "code", "key")
 def check_run(run: Run, checked: Checked, schema: int) -> Checked:
     """What is wrong with a run."""
     names = {place.name: place for place in run.path.iterdir()}
+    if all(name == "lock" or name.startswith(files.TEMPORARY) for name in names):
+        checked.remarks.append(f"{checked.name(run.path)} holds no run: its writer was killed, or has just begun")
+        return checked
     start = checked.manifest(run.path / "run.json", schema)
     if start is None:
         return checked
@@ -33,6 +36,8 @@ def check_run(run: Run, checked: Checked, schema: int) -> Checked:
     for name, content in manifests.items():
         data = run.path / ("report.html" if name == "report" else f"{name}.parquet")
         checked.table(data, str(content.get("sha256")), content.get("rows"))
+        if name != "report" and "stage" not in content:
+            checked.wrong(EDITED, run.path / f"{name}.json", "was edited: it does not say which stage made its table")
         _check_links(run.path / f"{name}.json", content, manifests, hashes, checked)
     capture = str(about.get("capture") or "")
     _check_capture_link(run, capture, manifests, checked)
@@ -50,14 +55,18 @@ def _check_links(
     checked: Checked,
 ) -> None:
     """Hold a manifest against its own key, and against the manifests that it names."""
-    if all(name in content for name in KEYED):
+    if all(name in content for name in KEYED) and all(
+        isinstance(content[name], dict) for name in ("inputs", "parameters")
+    ):
         key = stage_key(*(content[name] for name in KEYED[:4]))
         if key != content["key"]:
             checked.wrong(EDITED, place, "was edited: stage, inputs, parameters and code do not make its key")
-    for name, wanted in content.get("inputs", {}).items():
+    elif not isinstance(content.get("parameters", {}), dict):
+        checked.wrong(EDITED, place, "was edited: its parameters are no names with values")
+    for name, wanted in checked.named(content, "inputs", place).items():
         if name in manifests and manifests[name].get("sha256") != wanted:
             checked.wrong(EDITED, place, f"names another table {name} than the run has")
-    for name, wanted in content.get("manifests", {}).items():
+    for name, wanted in checked.named(content, "manifests", place).items():
         if name in hashes and hashes[name] != wanted:
             edited = place.parent / f"{name}.json"
             checked.wrong(
@@ -78,7 +87,8 @@ def _check_capture_link(run: Run, capture: str, manifests: dict[str, dict[str, A
         return
     found = files.sha256(end)
     for name, content in manifests.items():
-        if content.get("manifests", {}).get("records", found) != found:
+        named = content.get("manifests", {})
+        if isinstance(named, dict) and named.get("records", found) != found:
             checked.wrong(EDITED, end, f"is not the end of the capture that {name} of run {run.id} was made from")
             return
 
