@@ -12,8 +12,8 @@ from inertial.state import History, State
 from pipelines.stages.arrays import HISTORY_POINTS
 from pipelines.stages.capture import steps
 from pipelines.stages.minutes import itinerary, temperatures
-from pipelines.stages.reduce import STANDARD_GRAVITY_M_S2
 from schemas.station import load_station
+from schemas.units import STANDARD_GRAVITY_M_S2
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

@@ -19,6 +19,7 @@ from pipelines.models import read_model, refuse_unknown_effects
 from schemas.errors import RecipeInvalid, WrongUse, close_matches, did_you_mean
 from schemas.limits import Limits, parse_limits, unknown_limits
 from schemas.recipe import Lot, Pose, Recipe, RecipeFile, Unit, explain, parse_recipe, read_text
+from schemas.units import AXES
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -27,7 +28,6 @@ if TYPE_CHECKING:
 
 MAIN_JOB = "production"
 SAME_POSE_DEG = 1.0
-AXES = ("x", "y", "z")
 LINE = "line"
 """What a recipe says in place of a model file for the model that is released to the line."""
 LineModel = Callable[[str], dict[str, Any]]

@@ -17,12 +17,12 @@ from pandera.errors import SchemaError
 from schemas import version
 from schemas.columns import Seen, all_different
 from schemas.errors import DataRejected
+from schemas.units import AXES
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
 VERSION = version.VERSION
-AXES = ("x", "y", "z")
 KINDS = ("dwell", "verification", "allan")
 OUTPUT_UNITS = ("V", "LSB", "g", "m/s^2")
 OUTCOMES = ("pass", "fail", "refused")

@@ -16,10 +16,11 @@ import pyarrow.parquet as pq
 
 from pipelines.archive.parquet import SCHEMA_MARK, TABLE_MARK
 from pipelines.archive.store import first_line
-from pipelines.audit.parameters import AXES, NAMES, parameters_of
+from pipelines.audit.parameters import NAMES, parameters_of
 from pipelines.audit.run_files import START
 from pipelines.audit.station_effects import station_values
 from schemas.errors import ArchiveUnusable
+from schemas.units import AXES
 from schemas.upgrades import upgraded
 from schemas.version import VERSION
 

@@ -27,7 +27,6 @@ if TYPE_CHECKING:
 FEWEST_UNITS = 3  # below, one odd unit passes for the station
 SEEN = 0.02  # share of an effect's columns that the units' model leaves; less cannot be told from the units
 ALIKE = 0.98  # correlation of what is left of two effects, above which they are one
-MICRO = 1e6
 
 
 class StationValue(NamedTuple):

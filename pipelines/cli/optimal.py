@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any, cast, get_args
 
 from pipelines.cli.options import console, error_console, print_table, short
 from schemas.errors import WrongUse, did_you_mean
+from schemas.units import MICRO
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -16,8 +17,6 @@ if TYPE_CHECKING:
     from pipelines.stages.plan import Planned
     from schemas.recipe import Recipe
     from schemas.station import StationConfig
-
-MICRO = 1e6
 
 
 @dataclass(frozen=True)

@@ -12,14 +12,13 @@ import numpy as np
 
 from pipelines.export.polynomials import ORDER
 from schemas.errors import WrongUse
+from schemas.units import AXES, STANDARD_GRAVITY_M_S2
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
     from pipelines.export.polynomials import UnitCalibration
 
-STANDARD_GRAVITY_M_S2 = 9.80665
-AXES = ("x", "y", "z")
 
 C_HEAD = """\
 /* Accelerometer calibration, run {run}.

@@ -13,8 +13,9 @@ from inertial.fits.ellipsoid import EllipsoidFit, fit_ellipsoid
 from inertial.fits.ferraris import Faces, faces, ferraris
 from inertial.fits.polynomial import fit_temperature_curve
 from inertial.state import T_REFERENCE
-from pipelines.importers.mapping import FACES, STANDARD_GRAVITY, Mapping
+from pipelines.importers.mapping import FACES, Mapping
 from schemas.errors import DataRejected, WrongUse
+from schemas.units import AXES, MICRO, STANDARD_GRAVITY_M_S2
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -23,8 +24,6 @@ if TYPE_CHECKING:
 
     from pipelines.importers.record import Imported
 
-AXES = ("x", "y", "z")
-MICRO = 1e6
 NORM_LIMIT = 1e-3
 """| |f| - g | over g at every dwell: the validation limit of the method."""
 _UNLIKELY = 0.01
@@ -74,7 +73,7 @@ def norm(data: Imported, mapping: Mapping) -> Judged:
         "error": error,
         "bias": fit.bias.tolist(),
         "response_per_g": fit.response.tolist(),
-        "scale_per_m_s2": (fit.scale / STANDARD_GRAVITY).tolist(),
+        "scale_per_m_s2": (fit.scale / STANDARD_GRAVITY_M_S2).tolist(),
         "temperature_offset_per_C": None if heat is None else fit.temperature_offset.tolist(),
         "reference_C": None if heat is None else float(fit.reference_temperature),
     }
@@ -110,7 +109,7 @@ def six_faces(data: Imported, mapping: Mapping) -> Judged:
             "p_value": found.p_value.tolist(),
         },
         "published": {
-            "scale_per_m_s2": (np.diagonal(published.scale) / STANDARD_GRAVITY).tolist(),
+            "scale_per_m_s2": (np.diagonal(published.scale) / STANDARD_GRAVITY_M_S2).tolist(),
             "rotation": published.rotation.tolist(),
             "bias": published.bias.tolist(),
         },
@@ -136,7 +135,7 @@ def ramp(data: Imported, mapping: Mapping) -> Judged:
     output = data.samples[list(AXES)].to_numpy(dtype=np.float64)
     fit = fit_temperature_curve(output, data.samples["unit_C"].to_numpy(dtype=np.float64))
     gravity = mapping.norm_g or 1.0
-    per_g = {"g": 1.0, "m/s^2": STANDARD_GRAVITY}.get(
+    per_g = {"g": 1.0, "m/s^2": STANDARD_GRAVITY_M_S2}.get(
         data.out_unit, float(np.mean(np.linalg.norm(output, axis=1))) / gravity
     )
     ratio = fit.rms / fit.noise
@@ -232,7 +231,8 @@ def _floor_line(floor: float | None, p_value: float | None) -> str:
 
 def _axis_line(k: int, fit: EllipsoidFit, unit: str) -> str:
     error = float(np.sqrt(fit.covariance[k, k]))
-    return f"{AXES[k]}: bias {fit.bias[k]:.7g} ± {error:.2g} {unit}, scale {fit.scale[k] / STANDARD_GRAVITY:.6g} {unit} per m/s²"
+    scale = fit.scale[k] / STANDARD_GRAVITY_M_S2
+    return f"{AXES[k]}: bias {fit.bias[k]:.7g} ± {error:.2g} {unit}, scale {scale:.6g} {unit} per m/s²"
 
 
 def _face_line(k: int, found: Faces, published: float, unit: str) -> str:

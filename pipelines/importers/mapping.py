@@ -9,9 +9,7 @@ from typing import Annotated, Any, Literal
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator
 
 from schemas.errors import RecipeInvalid, WrongUse, close_matches, did_you_mean
-
-STANDARD_GRAVITY = 9.80665
-"""m/s² in one g: the unit of specific force in tables, everywhere; the local value is another matter."""
+from schemas.units import STANDARD_GRAVITY_M_S2
 
 NEEDED = ("x", "y", "z")
 MEANINGS: dict[str, str] = {
@@ -129,7 +127,7 @@ class Mapping(BaseModel):
     @property
     def norm_g(self) -> float | None:
         """Local gravity in g; None where it was not given."""
-        return None if self.local_gravity_m_s2 is None else self.local_gravity_m_s2 / STANDARD_GRAVITY
+        return None if self.local_gravity_m_s2 is None else self.local_gravity_m_s2 / STANDARD_GRAVITY_M_S2
 
 
 def build(content: dict[str, Any], where: str) -> Mapping:

@@ -10,14 +10,14 @@ import pandas as pd
 
 from inertial import static_intervals
 from pipelines.importers import exchange
-from pipelines.importers.mapping import FACES, MEANINGS, OUTPUT_UNITS, STANDARD_GRAVITY, TIME_UNITS, Mapping
+from pipelines.importers.mapping import FACES, MEANINGS, OUTPUT_UNITS, TIME_UNITS, Mapping
 from schemas.errors import DataRejected, WrongUse, did_you_mean
 from schemas.serials import refuse_unprintable
+from schemas.units import AXES, STANDARD_GRAVITY_M_S2
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-AXES = ("x", "y", "z")
 _LIKELY = (0.5, 2.0)
 """Median norm over gravity of a record in the unit claimed: bias and hand shaking stay well inside."""
 _SURE = 0.05
@@ -108,7 +108,7 @@ def _output(columns: dict[str, pd.Series], mapping: Mapping) -> NDArray[np.float
 
 def _refuse_other_unit(output: NDArray[np.float64], out_unit: str, where: str) -> None:
     size = float(np.median(np.linalg.norm(output, axis=1)))
-    gravity = {"g": 1.0, "m/s^2": STANDARD_GRAVITY}
+    gravity = {"g": 1.0, "m/s^2": STANDARD_GRAVITY_M_S2}
     if out_unit in gravity:
         if _LIKELY[0] < size / gravity[out_unit] < _LIKELY[1]:
             return

@@ -11,6 +11,7 @@ from pipelines.report.diagnosis_plots import driver_plots, model_plot, pose_maps
 from pipelines.report.numbers import plain
 from pipelines.report.residuals import drivers_shown, left_by
 from pipelines.report.templates import template
+from schemas.units import MICRO
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -18,7 +19,6 @@ if TYPE_CHECKING:
     from inertial.criticism.diagnosis import Diagnosis
     from pipelines.stages.measured import Measured
 
-MICRO = 1e6
 FEWEST_POSES = 4  # fewer make no map
 
 

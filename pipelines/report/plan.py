@@ -11,8 +11,6 @@ from pipelines.report.templates import template
 if TYPE_CHECKING:
     from pipelines.stages.plan import Planned
 
-MICRO = 1e6
-
 
 def render_plan(document: dict[str, Any], course: Planned) -> str:
     """The page as one HTML text that needs no other file.

@@ -10,12 +10,13 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.ticker import EngFormatter, FuncFormatter, MaxNLocator, NullLocator
 
+from schemas.units import AXES
+
 if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.axes import Axes
     from numpy.typing import NDArray
 
-AXES = ("x", "y", "z")
 COLOURS = {"x": "#0072b2", "y": "#d55e00", "z": "#009e73"}  # told apart by the colour-blind too (Okabe and Ito)
 WIDTH_IN = 11.5
 STYLE: dict[Any, Any] = {

@@ -10,13 +10,13 @@ from numpy.typing import NDArray
 
 from inertial.criticism.comparison import estimate, residuals_of
 from inertial.criticism.drivers import curve, drivers_of
+from schemas.units import MICRO
 
 if TYPE_CHECKING:
     from inertial.criticism.diagnosis import Diagnosis
 
 Array = NDArray[np.float64]
 
-MICRO = 1e6
 ALWAYS = ("unit_C", "time_s", "temperature_rate", "since_move_s")
 STILL = {"unit_C": 1.0, "temperature_rate": 0.1, "since_move_s": 0.5}
 """Ranges below which a driver is not worth a picture, unless the model fails along it."""

@@ -20,6 +20,7 @@ from pipelines.stages.grade import Evidence, grade
 from pipelines.stages.unit_rows import ByUnit
 from pipelines.stages.verify import verify
 from schemas.errors import DataRejected, TumblelineError
+from schemas.units import MICRO
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -30,7 +31,6 @@ if TYPE_CHECKING:
     from pipelines.rerun.selection import Entry
     from pipelines.rerun.wanted import Wanted
 
-MICRO = 1e6
 Sums = dict[str, tuple[float, int]]
 """Sum of squared errors, µg², and their number, by unit."""
 

@@ -9,6 +9,7 @@ import numpy as np
 
 from inertial.state import History, State
 from schemas.errors import DataRejected
+from schemas.units import AXES
 
 if TYPE_CHECKING:
     from collections.abc import Collection
@@ -16,7 +17,6 @@ if TYPE_CHECKING:
     import pandas as pd
     from numpy.typing import NDArray
 
-AXES = ("x", "y", "z")
 HISTORY_POINTS = 4000
 FEWEST_POINTS = 2
 

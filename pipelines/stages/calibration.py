@@ -16,6 +16,7 @@ from inertial.fits.linear import response_matrix
 from inertial.state import State
 from pipelines.stages.texts import picked
 from schemas.errors import DataRejected
+from schemas.units import AXES
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
@@ -24,7 +25,6 @@ if TYPE_CHECKING:
 
     from inertial.fits.linear import LotFit
 
-AXES = ("x", "y", "z")
 ALL_AXES = "*"
 PROBE_T_C = 31.0
 

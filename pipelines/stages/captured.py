@@ -9,6 +9,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pandas as pd
 
+from schemas.units import AXES
+
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
@@ -18,7 +20,6 @@ if TYPE_CHECKING:
     from stations.devices.reader import Instruments
     from stations.devices.slot import Identity, Samples
 
-AXES = ("x", "y", "z")
 POWER_OFF = "power_off_s"
 STRAY_SIGMA = 20.0
 STRAY_PART = 1e-3  # of the full scale: what is less moves a mean of a hundred samples by no more than a part in 100 000

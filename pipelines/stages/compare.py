@@ -16,6 +16,7 @@ from inertial.effects import StationEffect
 from inertial.errors import InertialError
 from pipelines.stages.measured import Measured, lot_of, measured
 from schemas.errors import DataRejected
+from schemas.units import MICRO
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -26,8 +27,6 @@ if TYPE_CHECKING:
     from inertial.criticism.comparison import Estimate
 
     Array = NDArray[np.float64]
-
-MICRO = 1e6
 
 
 def compare(

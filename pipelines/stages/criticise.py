@@ -16,6 +16,7 @@ from pipelines.stages.condense import condense
 from pipelines.stages.measured import Measured, lot_of, measured
 from pipelines.stages.next_measurement import proposed
 from schemas.errors import DataRejected
+from schemas.units import MICRO
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -26,7 +27,6 @@ if TYPE_CHECKING:
 
 __all__ = ["compare", "default_model", "diagnose", "document", "examined"]
 
-MICRO = 1e6
 DEFAULT = ("bias", "scale", "misalignment")
 THERMAL = ("bias_temperature", "scale_temperature")
 _WARM = 5.0

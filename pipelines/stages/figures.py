@@ -8,6 +8,7 @@ import numpy as np
 from scipy.special import ndtri
 
 from pipelines.stages.noise import B_BOUND
+from schemas.units import AXES
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -17,7 +18,6 @@ if TYPE_CHECKING:
     from pipelines.stages.calibration import Calibration
     from pipelines.stages.unit_rows import UnitRows
 
-AXES = ("x", "y", "z")
 NORMAL_95 = 1.959964
 GUARD = 2.0
 ALARM = 0.01  # probability that a good unit shows an error beyond what the uncertainty allows

@@ -14,14 +14,13 @@ from pipelines.stages.calibration import read_calibration
 from pipelines.stages.empty import empty_table
 from pipelines.stages.pieces import by_record
 from schemas.errors import DataRejected
+from schemas.units import AXES, MICRO
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
 
     from numpy.typing import NDArray
 
-AXES = ("x", "y", "z")
-MICRO = 1e6
 MOST_SAMPLES = (
     2**18
 )  # of a channel that lie in memory: 24 h at 100 Hz are means of 33 samples, and tau begins at 0.33 s

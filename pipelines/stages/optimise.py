@@ -17,10 +17,10 @@ from inertial.state import State
 from pipelines.planned import planned_state
 from pipelines.stages.minutes import Standing, move_seconds, soaked, spent
 from pipelines.stages.plan import identified, planned
-from pipelines.stages.reduce import STANDARD_GRAVITY_M_S2
 from pipelines.stages.soak_orders import orders, soak_seconds
 from schemas.errors import RecipeInvalid
 from schemas.recipe import FEWEST_SAMPLES, Pose, SoakPart
+from schemas.units import STANDARD_GRAVITY_M_S2
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence

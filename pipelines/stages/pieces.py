@@ -13,7 +13,6 @@ import pandas as pd
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-AXES = ("x", "y", "z")
 STATIC = "allan"
 
 

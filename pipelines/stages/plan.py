@@ -18,6 +18,7 @@ from pipelines.planned import state_of
 from pipelines.stages.calibration import unit_texts
 from pipelines.stages.capture import steps
 from pipelines.stages.minutes import itinerary, spent
+from schemas.units import AXES, MICRO
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -31,9 +32,6 @@ if TYPE_CHECKING:
     from pipelines.stages.minutes import Stretch
     from schemas.recipe import Recipe
     from schemas.station import StationConfig
-
-MICRO = 1e6
-AXES = ("x", "y", "z")
 
 
 @dataclass(frozen=True)

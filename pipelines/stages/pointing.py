@@ -13,7 +13,8 @@ import numpy as np
 import pandas as pd
 
 from inertial.frames import force_from_angles
-from pipelines.stages.pieces import AXES, STATIC
+from pipelines.stages.pieces import STATIC
+from schemas.units import AXES
 
 if TYPE_CHECKING:
     from collections.abc import Mapping

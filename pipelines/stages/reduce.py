@@ -9,12 +9,11 @@ import pandas as pd
 
 from inertial.frames import force_from_angles
 from pipelines.stages.pieces import dwells_whole
+from schemas.units import AXES, STANDARD_GRAVITY_M_S2
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
-STANDARD_GRAVITY_M_S2 = 9.80665  # CGPM 1901: the g in which specific force is stated
-AXES = ("x", "y", "z")
 KEPT = (
     *(
         "unit",

@@ -14,6 +14,7 @@ import pandas as pd
 from inertial.frames import force_from_angles
 from pipelines.stages.pieces import STATIC, Signal, by_record
 from pipelines.stages.pointing import contradicts, pointing_of
+from schemas.units import AXES
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
@@ -28,7 +29,6 @@ FOLLOWED_SHARE = 0.2  # a sensor that shows less than a fifth of the chamber's c
 FORCE_EXPLAINS = 0.5  # of an axis' variance over the poses; a live channel has more than 0.99
 TURNED_G = 0.5  # a follow-up may stay in a few poses: an axis that they hardly turn has nothing to show
 SAMPLES_KEPT = 0.99
-AXES = ("x", "y", "z")
 
 
 class Fault(NamedTuple):

@@ -8,17 +8,16 @@ import numpy as np
 import pandas as pd
 
 from inertial.correction import correct, station_change
-from pipelines.stages.arrays import AXES, LotArrays, lot_arrays
+from pipelines.stages.arrays import LotArrays, lot_arrays
 from pipelines.stages.calibration import read_calibration
 from pipelines.stages.empty import empty_table
 from pipelines.stages.texts import picked
+from schemas.units import AXES, MICRO
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     Array = NDArray[np.float64]
-
-MICRO = 1e6
 
 
 def verify(
