@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from pipelines.archive.archive import Archive
     from pipelines.archive.store import Place
 
-FOLDERS = ("runs", "captures", "calibrations", chain.FOLDER)
+FOLDERS = ("runs", "captures", "calibrations", chain.FOLDER, "index")
 AT_ONCE = 1000  # calibrations named by one entry of the chain
 
 

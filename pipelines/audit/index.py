@@ -7,11 +7,14 @@ runs make new parts. So it is never a second truth.
 
 from __future__ import annotations
 
+import fcntl
 import hashlib
 import os
+import re
 import shutil
 from collections.abc import Mapping
-from dataclasses import dataclass
+from contextlib import nullcontext, suppress
+from dataclasses import dataclass, replace
 from pathlib import Path
 from tempfile import mkdtemp
 from typing import TYPE_CHECKING, NamedTuple
@@ -22,14 +25,14 @@ import pyarrow.parquet as pq
 
 from pipelines.archive import files
 from pipelines.archive.locks import alone
-from pipelines.archive.store import ObjectPath, address_of, place_of
+from pipelines.archive.store import ObjectPath, address_of, first_line, place_of
 from pipelines.audit.run_files import read_runs, stamps_of
 from pipelines.audit.run_rows import SCHEMAS, TABLES, rows_of_runs
 from pipelines.flows.partitions import map_partitions
 from schemas.errors import ArchiveUnusable
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Collection, Sequence
 
     from pipelines.archive import Archive
     from pipelines.archive.store import Place
@@ -39,6 +42,7 @@ RUNS_PER_PART = 500
 MOST_SMALL = 24  # parts with less than half of that, before they are put together
 SOURCES = ("run_files.py", "run_rows.py", "parameters.py", "station_effects.py")
 VERSION = b"tumbleline.index"
+NAME = re.compile("[0-9a-f]{16}")
 
 
 class Portion(NamedTuple):
@@ -62,26 +66,42 @@ class _Fleeting:
         finalize(self, shutil.rmtree, self.path, ignore_errors=True)
 
 
+class _Reading:
+    """Parts of a folder are not taken away as long as somebody holds this; the system ends it when a process dies."""
+
+    def __init__(self, place: Path) -> None:
+        handle = os.open(place, os.O_RDONLY)
+        finalize(self, os.close, handle)
+        with suppress(OSError):  # a file system without locks
+            fcntl.flock(handle, fcntl.LOCK_SH)
+
+
 @dataclass(frozen=True)
 class Index:
     """The parts of an index that is up to date, and what had to be done for that.
 
     made, kept : numbers of runs that were read anew, and whose rows were there
+    holder : keeps the parts there for as long as they may be read
     """
 
     parts: tuple[Place, ...]
     made: int
     kept: int
-    holder: _Fleeting | None = None
+    holder: _Fleeting | _Reading | None = None
 
     def table(self, name: str, columns: Sequence[str] | None = None) -> pa.Table:
         """All rows of one of :data:`TABLES`; texts as dictionaries."""
         chosen = list(columns) if columns is not None else SCHEMAS[name].names
         texts = [field.name for field in SCHEMAS[name] if pa.types.is_string(field.type) and field.name in chosen]
-        found = [
-            pq.read_table(_opened(part / f"{name}.parquet"), columns=chosen, read_dictionary=texts)
-            for part in self.parts
-        ]
+        try:
+            found = [
+                pq.read_table(_opened(part / f"{name}.parquet"), columns=chosen, read_dictionary=texts)
+                for part in self.parts
+            ]
+        except (OSError, pa.ArrowInvalid) as problem:
+            where = self.parts[0].parent
+            message = f"archive: index {where} cannot be read ({first_line(problem)}); remove {where}, it is made again by itself"
+            raise ArchiveUnusable(message) from None
         if not found:
             return pa.table({n: pa.array([], SCHEMAS[name].field(n).type) for n in chosen})
         return pa.concat_tables(found).unify_dictionaries()
@@ -101,23 +121,23 @@ def up_to_date(archive: Archive, dask: str | None = None, workers: int = 1) -> I
     dask, workers : where parts are made, see :func:`pipelines.flows.partitions.map_partitions`
     """
     place = archive.root / FOLDER
-    stamps = stamps_of(archive.root)
-    if not stamps:  # an address with a slip of the pen is not made into a folder
+    if not (archive.root / "runs").is_dir():  # an address with a slip of the pen is not made into a folder
         return Index((), 0, 0)
     try:
         with alone(place, wait=True):
-            return _refreshed(archive, place, stamps, dask, workers)
+            found = _refreshed(archive, place, dask, workers)
+            return replace(found, holder=_Reading(place)) if isinstance(place, Path) else found
     except ArchiveUnusable:
         if isinstance(archive.root, Path) and os.access(archive.root, os.W_OK):
             raise
         holder = _Fleeting()
-        found = _refreshed(archive, holder.path, stamps, dask, workers)
-        return Index(found.parts, found.made, found.kept, holder)
+        return replace(_refreshed(archive, holder.path, dask, workers), holder=holder)
 
 
-def _refreshed(archive: Archive, place: Place, stamps: Mapping[str, str], dask: str | None, workers: int) -> Index:
-    version = _version()
+def _refreshed(archive: Archive, place: Place, dask: str | None, workers: int) -> Index:
+    stamps, version = stamps_of(archive.root), _version()
     parts = {part: _runs_of(part, version) for part in _folders(place)}
+    _remove(place, [part for part, runs in parts.items() if not runs])  # one that is made anew may have its name
     good = {part: runs for part, runs in parts.items() if runs and runs.items() <= stamps.items()}
     good = _without_doubles(good)
     small = [part for part, runs in good.items() if len(runs) < RUNS_PER_PART // 2]
@@ -130,8 +150,7 @@ def _refreshed(archive: Archive, place: Place, stamps: Mapping[str, str], dask: 
     own = "" if place == archive.root / FOLDER else str(place)
     portions = [Portion(root, own, tuple((r, stamps[r]) for r in chunk), version) for chunk in chunks]
     new = [place / name for name in map_partitions(make_part, portions, dask, workers=workers, name="audit index")]
-    for part in set(parts) - set(good) - set(new):
-        _remove(part)
+    _remove(place, set(parts) - set(good) - set(new))
     return Index(tuple(sorted([*good, *new], key=str)), len(missing), len(there))
 
 
@@ -166,14 +185,16 @@ def _version() -> str:
 def _folders(place: Place) -> list[Place]:
     if not place.is_dir():
         return []
-    return sorted((p for p in place.iterdir() if len(p.name) == 16 and (p / "runs.parquet").is_file()), key=str)
+    return sorted((part for part in place.iterdir() if NAME.fullmatch(part.name)), key=str)
 
 
 def _runs_of(part: Place, version: str) -> dict[str, str]:
-    """Runs of a part with their stamps; empty where it is not of this version or cannot be read."""
+    """Runs of a part with their stamps; empty where it is not of this version, lacks a table or cannot be read."""
+    if not all((part / f"{name}.parquet").is_file() for name in TABLES):
+        return {}
     try:
         table = pq.read_table(_opened(part / "runs.parquet"), columns=["run", "stamp"])
-    except (OSError, pa.ArrowInvalid):
+    except (OSError, pa.ArrowInvalid, KeyError):
         return {}
     if (table.schema.metadata or {}).get(VERSION, b"").decode() != version:
         return {}
@@ -195,8 +216,12 @@ def _opened(file: Place) -> pa.BufferReader | str:
     return pa.BufferReader(file.read_bytes()) if isinstance(file, ObjectPath) else str(file)
 
 
-def _remove(part: Place) -> None:
-    if isinstance(part, ObjectPath):
-        part.remove_all()
-    else:
-        shutil.rmtree(part, ignore_errors=True)
+def _remove(place: Place, parts: Collection[Place]) -> None:
+    """Take parts away that are of no use any more, unless somebody may still be reading them: then the next one does."""
+    if isinstance(place, ObjectPath):
+        for part in parts:
+            (place / part.name).remove_all()
+        return
+    with files.writers_of(place, fcntl.LOCK_EX | fcntl.LOCK_NB) if parts else nullcontext(enter_result=False) as mine:
+        for part in parts if mine else ():
+            shutil.rmtree(place / part.name, ignore_errors=True)

@@ -1,0 +1,194 @@
+"""The audit's index in trouble: readers while others write, a writer that is killed, parts that are foreign or incomplete."""
+
+import hashlib
+import json
+import os
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pyarrow as pa
+import pyarrow.parquet as pq
+import pytest
+
+ROOT = Path(__file__).resolve().parents[2]
+sys.path.insert(0, str(ROOT))
+
+from benchmarks.generated_archive import write_archive
+from pipelines.archive import Archive
+from pipelines.archive.cleaning import clean
+from pipelines.audit import index
+from pipelines.audit.index import Index, up_to_date
+from pipelines.audit.run_rows import TABLES
+from schemas.errors import ArchiveUnusable
+
+READER = """
+import sys
+sys.path.insert(0, {root!r})
+from pathlib import Path
+from pipelines.archive import Archive
+from pipelines.audit import index
+index.RUNS_PER_PART, index.MOST_SMALL = 2, 1
+seen, end = 0, Path(sys.argv[1]) / "end"
+while not end.exists():
+    found = index.up_to_date(Archive(sys.argv[1]))
+    runs = found.table("runs").column("run").to_pylist()
+    assert len(runs) == len(set(runs)), "a run twice"
+    for name in ("units", "parameters", "figures", "coefficients"):
+        assert set(found.table(name).column("run").to_pylist()) == set(runs), name
+    assert len(runs) >= seen, "a run is lost"
+    seen = len(runs)
+print(seen)
+"""
+
+KILLED = """
+import sys
+sys.path.insert(0, {root!r})
+from pipelines.archive import Archive, files
+from pipelines.audit import index
+index.RUNS_PER_PART = 2
+write = files._write_durably
+def slowly(path, data):
+    write(path, data)
+    if "figures" in path.name:
+        print("writing", flush=True)
+        sys.stdin.readline()
+files._write_durably = slowly
+index.up_to_date(Archive(sys.argv[1]))
+"""
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("factory") / "archive"
+    write_archive(folder, 12, years=1.0, seed=5, workers=1)
+    return folder
+
+
+@pytest.fixture
+def archive(made: Path, tmp_path: Path) -> Archive:
+    shutil.copytree(made, tmp_path / "archive", ignore=shutil.ignore_patterns("index"))
+    return Archive(tmp_path / "archive")
+
+
+def rows(found: Index) -> dict[str, list]:
+    """All rows of an index, without what only tells how it came to be."""
+    tables = {name: found.table(name) for name in TABLES}
+    tables["runs"] = tables["runs"].drop_columns(["stamp"])
+    return {name: sorted(map(repr, table.to_pylist())) for name, table in tables.items()}
+
+
+def start(text: str, root: Path) -> subprocess.Popen[str]:
+    command = [sys.executable, "-c", text.format(root=str(ROOT)), str(root)]
+    environment = {**os.environ, "OMP_NUM_THREADS": "1"}
+    pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE, "stderr": subprocess.PIPE}
+    return subprocess.Popen(command, text=True, env=environment, **pipes)
+
+
+@pytest.mark.slow
+def test_readers_see_whole_runs_while_runs_come_and_parts_are_put_together(made: Path, tmp_path: Path) -> None:
+    root = tmp_path / "archive"
+    (root / "runs").mkdir(parents=True)
+    shutil.copy2(made / "archive.json", root)
+    runs = sorted((made / "runs").iterdir())
+    shutil.copytree(runs[0], root / "runs" / runs[0].name)
+    readers = [start(READER, root) for _ in range(3)]
+    for run in runs[1:]:
+        time.sleep(0.2)
+        begun = root / f"{run.name}.begun"
+        shutil.copytree(run, begun)
+        begun.rename(root / "runs" / run.name)
+    time.sleep(1.0)
+    (root / "end").touch()
+    told = [reader.communicate(timeout=120) for reader in readers]
+    assert [err for _, err in told] == ["", "", ""]
+    shutil.rmtree(root / "runs" / "none", ignore_errors=True)
+    assert rows(up_to_date(Archive(root))) == rows(up_to_date(Archive(made)))
+
+
+def test_a_part_that_somebody_reads_is_not_taken_away(archive: Archive, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(index, "RUNS_PER_PART", 4)
+    monkeypatch.setattr(index, "MOST_SMALL", 0)
+    reading = up_to_date(archive)
+    before = rows(reading)
+    run = min((archive.root / "runs").iterdir())
+    os.utime(run / "run.json", ns=(1, 1))  # its part is made again
+    assert up_to_date(archive).made == 4
+    assert rows(reading) == before
+    parts = len(list((archive.root / "index").glob("*/runs.parquet")))
+    del reading
+    assert up_to_date(archive).made == 0
+    assert len(list((archive.root / "index").glob("*/runs.parquet"))) < parts
+
+
+def test_a_kill_in_the_middle_leaves_an_index_that_is_gone_on_with(archive: Archive, made: Path) -> None:
+    process = start(KILLED, archive.root)
+    assert process.stdout is not None
+    assert process.stdin is not None
+    process.stdout.readline()
+    process.stdin.write("on\n")  # the first part is written, the second one is not
+    process.stdin.flush()
+    process.stdout.readline()
+    process.send_signal(signal.SIGKILL)
+    process.wait()
+    for pipe in (process.stdin, process.stdout, process.stderr):
+        pipe.close()
+    found = up_to_date(archive)
+    assert (found.kept, found.made) == (2, 10)
+    assert rows(found) == rows(up_to_date(Archive(made)))
+    del found
+    left = [place.name for place in (archive.root / "index").iterdir() if place.name.startswith(".tmp-")]
+    assert len(left) == 1
+    assert [Path(name).name for name in clean(archive).removed] == left
+
+
+@pytest.mark.parametrize("name", ["runs", "figures"])
+def test_a_part_without_one_of_its_tables_is_made_again(archive: Archive, made: Path, name: str) -> None:
+    [part] = up_to_date(archive).parts
+    (part / f"{name}.parquet").unlink()
+    shutil.copytree(part, part.parent / "0123456789abcdef")
+    found = up_to_date(archive)
+    assert found.made == 12
+    assert rows(found) == rows(up_to_date(Archive(made)))
+
+
+def test_foreign_files_in_the_index_are_passed_over(archive: Archive, made: Path) -> None:
+    up_to_date(archive)
+    foreign = archive.root / "index" / "fedcba9876543210"
+    foreign.mkdir()
+    for name in TABLES:
+        pq.write_table(pa.table({"a": [1]}), foreign / f"{name}.parquet")
+    (archive.root / "index" / "note.txt").write_text("mine", encoding="utf-8")
+    assert rows(up_to_date(archive)) == rows(up_to_date(Archive(made)))
+
+
+def test_a_table_of_the_index_that_is_cut_off_is_told_with_what_to_do(archive: Archive) -> None:
+    found = up_to_date(archive)
+    place = found.parts[0] / "figures.parquet"
+    place.write_bytes(place.read_bytes()[:1000])
+    with pytest.raises(ArchiveUnusable, match=r"index .* cannot be read .*; remove .*, it is made again"):
+        found.table("figures")
+
+
+def test_a_foreign_table_a_newer_one_and_a_manifest_that_is_none_leave_out_their_runs_alone(archive: Archive) -> None:
+    foreign, newer, broken, cut, *_ = sorted((archive.root / "runs").iterdir())
+    pq.write_table(pa.table({"unit": ["A"]}), foreign / "grades.parquet")
+    (foreign / "grades.json").unlink()
+    table = pq.read_table(newer / "figures.parquet")
+    marks = {**table.schema.metadata, b"tumbleline.schema": b"99"}
+    pq.write_table(table.replace_schema_metadata(marks), newer / "figures.parquet")
+    manifest = json.loads((newer / "figures.json").read_bytes())
+    manifest["sha256"] = hashlib.sha256((newer / "figures.parquet").read_bytes()).hexdigest()
+    (newer / "figures.json").write_text(json.dumps(manifest), encoding="utf-8")
+    (broken / "run.json").write_text("[]", encoding="utf-8")
+    (cut / "residuals.json").unlink()
+    lines = up_to_date(archive).table("runs", ["run", "problem"]).to_pylist()
+    told = {line["run"]: line["problem"] for line in lines if line["problem"]}
+    assert told[foreign.name] == "grades.parquet has no manifest"
+    assert "has schema 99, this version knows up to" in told[newer.name]
+    assert told[broken.name] == "run.json holds no manifest"
+    assert told[cut.name] == "residuals.parquet has no manifest"
+    assert set(told) == {foreign.name, newer.name, broken.name, cut.name}
