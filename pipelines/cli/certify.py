@@ -28,10 +28,12 @@ def command(
 ) -> None:
     """Certify the units of a run that passed: from when until when their calibration holds.
 
-    A calibration that began earlier ends where the new one begins; of one unit no two hold on one day. Exit status 1: some
+    A calibration that began earlier ends where the new one begins; of one unit no two hold on one day. The run's report is made
+    again and names the certificates. Exit status 1: some
     units of the run did not pass and got no certificate.
     """
     from pipelines.archive import Archive
+    from pipelines.report import renew_report
     from pipelines.trace import Ledger
     from schemas.errors import DONE, PART_FAILED
 
@@ -41,6 +43,7 @@ def command(
     done = Ledger(store).certify(
         found, serials, start, until, months=months, reason=reason, supersede=supersede
     )  # fmt: skip
+    renew_report(found)
     if as_json:
         print_json(_document(found.id, done))
     else:

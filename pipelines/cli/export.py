@@ -3,11 +3,17 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from pipelines.cli.options import ArchiveOption, JsonOption, RunArgument
+from pipelines.cli.options import ArchiveOption, JsonOption, RunArgument, error_console
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from pipelines.archive import Run
+    from pipelines.export import UnitCalibration
 
 
 def command(
@@ -23,6 +29,9 @@ def command(
     archive: ArchiveOption = None,
     *,
     failed: Annotated[bool, typer.Option("--failed", help="Hand out units that failed their limits, too.")] = False,
+    revoked: Annotated[
+        bool, typer.Option("--revoked", help="Hand out units whose calibration was revoked, too.")
+    ] = False,
     as_json: JsonOption = False,
 ) -> None:
     """Write coefficients: bias b and response K as polynomials in temperature, to apply as a = K⁻¹(ã − b)."""
@@ -38,7 +47,9 @@ def command(
     found = Archive(archive).run(run)
     use_formulas_of(found)
     serials = tuple(serial.strip() for serial in units.split(",")) if units else ()
-    text = export_text(form, unit_calibrations(found, serials, failed=failed), found.id, nominal)
+    chosen = unit_calibrations(found, serials, failed=failed, revoked=revoked)
+    text = export_text(form, chosen, found.id, nominal)
+    _tell_certificates(found, chosen)
     if output is None:
         typer.echo(text, nl=False)
         return
@@ -47,3 +58,20 @@ def command(
     except OSError as problem:
         message = f"export: {output} cannot be written ({problem.strerror}); give another file with --output"
         raise WrongUse(message) from None
+
+
+def _tell_certificates(run: Run, chosen: Sequence[UnitCalibration]) -> None:
+    """Say on the error stream what whoever loads these coefficients must know of their certificates."""
+    from pipelines.export import revoked_units
+    from pipelines.trace.days import today
+
+    given, day = {c.unit for c in chosen}, today()
+    lines = [f"left out: {unit}, {one.words()}" for unit, one in revoked_units(run).items() if unit not in given]
+    lines += [f"{c.unit}: {c.certified}" for c in chosen if c.certificate is not None and not c.certificate.holds(day)]
+    bare = [c.unit for c in chosen if c.certificate is None]
+    if bare:
+        lines.append(
+            f"not certified: {', '.join(bare)}; 'tumbleline certify {run.id}' says from when until when they hold"
+        )
+    for line in lines:
+        error_console().print(f"export: {line}", markup=False, soft_wrap=True)

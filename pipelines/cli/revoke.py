@@ -27,13 +27,17 @@ def command(
     as_json: JsonOption = False,
 ) -> None:
     """Revoke a unit's calibration, with the reason. Nothing is erased: the event is added to the unit's."""
-    from pipelines.archive import Archive
+    from pipelines.archive import Archive, Run
+    from pipelines.report import renew_report
     from pipelines.trace import Ledger
     from pipelines.trace.days import day_of
 
-    ledger = Ledger(Archive(archive))
+    store = Archive(archive)
+    ledger = Ledger(store)
     event = ledger.revoke(serial, reason, day=day_of(day, "--from") if day else "", certificate=certificate)
     ended = [f"{serial}/{number}" for number in event.ends]
+    for run in dict.fromkeys(one.run for one in ledger.calibrations(serial) if one.certificate in ended):
+        renew_report(Run(store, run))
     if as_json:
         print_json({"unit": serial, "revoked": ended, **event.document()})
     else:

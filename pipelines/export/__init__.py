@@ -1,6 +1,6 @@
 """Coefficients for those who apply them: firmware, autopilots, spreadsheets. a = K(θ)⁻¹·(ã − b(θ)), θ = T − 25 °C."""
 
 from pipelines.export.formats import FORMATS, export_text
-from pipelines.export.polynomials import UnitCalibration, unit_calibrations
+from pipelines.export.polynomials import UnitCalibration, revoked_units, unit_calibrations
 
-__all__ = ["FORMATS", "UnitCalibration", "export_text", "unit_calibrations"]
+__all__ = ["FORMATS", "UnitCalibration", "export_text", "revoked_units", "unit_calibrations"]

@@ -94,6 +94,7 @@ def _json(units: Sequence[UnitCalibration], run: str, nominal: float | None) -> 
                 "unit": c.unit, "outcome": c.outcome, "grade": c.grade, "out_unit": c.out_unit,
                 "temperatures_C": list(c.temperatures), "bias": c.bias.tolist(), "response": c.response.tolist(),
                 "not_included": list(c.left_out),
+                "certificate": None if c.certificate is None else c.certificate.document(),
             }
             for c in units
         ],
@@ -105,16 +106,17 @@ def _csv(units: Sequence[UnitCalibration], run: str, nominal: float | None) -> s
     del run, nominal
     sink = io.StringIO()
     writer = csv.writer(sink, lineterminator="\n")
-    writer.writerow(["unit", "quantity", "power_of_theta", "row", "column", "value", "unit_text"])
+    writer.writerow(["unit", "quantity", "power_of_theta", "row", "column", "value", "unit_text", "certificate"])
     for c in units:
+        said = c.certified
         for k in range(ORDER):
             per = "" if k == 0 else f"/K^{k}"
             for i, row in enumerate(AXES):
-                writer.writerow([c.unit, "bias", k, row, "", repr(float(c.bias[k, i])), c.out_unit + per])
+                writer.writerow([c.unit, "bias", k, row, "", repr(float(c.bias[k, i])), c.out_unit + per, said])
             for i, row in enumerate(AXES):
                 for j, column in enumerate(AXES):
                     value = repr(float(c.response[k, i, j]))
-                    writer.writerow([c.unit, "response", k, row, column, value, f"{c.out_unit}/g{per}"])
+                    writer.writerow([c.unit, "response", k, row, column, value, f"{c.out_unit}/g{per}", said])
     return sink.getvalue()
 
 
@@ -125,10 +127,16 @@ def _c(units: Sequence[UnitCalibration], run: str, nominal: float | None) -> str
         symbol = re.sub(r"\W", "_", c.unit)
         low, high = c.temperatures
         parts.append(
-            f"\nstatic const tumbleline_calibration tumbleline_{symbol} = {{\n"
+            f"\n/* {c.unit}: {_comment(c.certified)} */\n"
+            f"static const tumbleline_calibration tumbleline_{symbol} = {{\n"
             f'    "{c.unit}", {low:.2f}, {high:.2f},\n    {_braces(c.bias)},\n    {_braces(c.response)}\n}};\n'
         )
     return "".join(parts) + C_TAIL
+
+
+def _comment(text: str) -> str:
+    """Text that ends no comment of C and no line."""
+    return " ".join(text.replace("*/", "* /").split())
 
 
 def _braces(values: Any) -> str:
@@ -163,6 +171,7 @@ def _parameters(
         low, high = c.temperatures
         lines += [
             f"# unit {c.unit}, run {run}, at 25 °C; the driver is assumed to give {nominal:g} {c.out_unit} as 1 g",
+            f"# {_comment(c.certified)}",
             (
                 f"# left out, as these parameters have no place for it: misalignment to {coupling:.2g} mrad, "
                 f"temperature terms from {low:.0f} to {high:.0f} °C"

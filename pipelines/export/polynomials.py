@@ -2,20 +2,24 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from pipelines.stages.calibration import read_calibration
+from pipelines.trace.stated import stated
 from schemas.errors import WrongUse
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+
     import pandas as pd
     from numpy.typing import NDArray
 
     from pipelines.archive import Run
     from pipelines.stages.calibration import Calibration
+    from pipelines.trace.stated import Stated
 
 BIAS = ("bias", "bias_temperature", "bias_temperature_quadratic", "bias_temperature_cubic")
 SCALE = ("scale", "scale_temperature", "scale_temperature_quadratic")
@@ -31,6 +35,7 @@ class UnitCalibration:
     bias : (4, 3), output unit per K^k, coefficients of θ⁰ … θ³
     response : (4, 3, 3), output unit per g and K^k
     left_out : effects of the model that have no place in this form
+    certificate : that the unit has for this run; None where it was not certified
     """
 
     unit: str
@@ -41,6 +46,12 @@ class UnitCalibration:
     response: NDArray[np.float64]
     temperatures: tuple[float, float]
     left_out: tuple[str, ...]
+    certificate: Stated | None = None
+
+    @property
+    def certified(self) -> str:
+        """What is said of the certificate, in a line."""
+        return "not certified" if self.certificate is None else self.certificate.words()
 
     def correct(self, output: NDArray[np.float64], temperature: float) -> NDArray[np.float64]:
         """Specific force (n, 3) in g for outputs (n, 3), as firmware computes it."""
@@ -50,12 +61,15 @@ class UnitCalibration:
         return np.linalg.solve(matrix, (output - bias).T).T
 
 
-def unit_calibrations(run: Run, serials: tuple[str, ...], *, failed: bool) -> list[UnitCalibration]:
-    """Calibrations of the units that passed, or of those named.
+def unit_calibrations(
+    run: Run, serials: tuple[str, ...], *, failed: bool, revoked: bool = False
+) -> list[UnitCalibration]:
+    """Calibrations of the units that passed and were not revoked, or of those named.
 
     Parameters
     ----------
     failed : hand out units that failed their limits too; units whose data were refused have none.
+    revoked : hand out units whose calibration was revoked, too.
     """
     grades = run.table("grades").set_index("unit")
     _refuse(grades, serials, failed=failed)
@@ -64,14 +78,38 @@ def unit_calibrations(run: Run, serials: tuple[str, ...], *, failed: bool) -> li
     if not chosen:
         message = f"export: no unit of run {run.id} passed, at least one is needed; --failed hands out failed ones too"
         raise WrongUse(message)
+    certificates = stated(run, chosen)
+    if not revoked:
+        chosen = _not_revoked(run, chosen, certificates, named=bool(serials))
     calibration = read_calibration(run.table("coefficients"), run.table("covariance"))
     dwells = run.table("dwells")
     out_unit = str(dwells["out_unit"].iloc[0])
     measured = {unit: dwells.loc[dwells["unit"] == unit, "unit_C"].to_numpy(dtype=float) for unit in chosen}
     return [
-        _one(calibration, unit, grades.loc[unit].to_dict(), out_unit, (measured[unit].min(), measured[unit].max()))
+        replace(
+            _one(calibration, unit, grades.loc[unit].to_dict(), out_unit, (measured[unit].min(), measured[unit].max())),
+            certificate=certificates.get(unit),
+        )
         for unit in chosen
     ]
+
+
+def revoked_units(run: Run) -> dict[str, Stated]:
+    """Units of a run whose calibration was revoked: they are left out, unless they are asked for."""
+    found = stated(run, tuple(run.table("grades")["unit"]))
+    return {unit: one for unit, one in found.items() if one.state == "revoked"}
+
+
+def _not_revoked(run: Run, chosen: list[str], certificates: Mapping[str, Stated], *, named: bool) -> list[str]:
+    """Units whose calibration was not revoked; refused where one is named, or none is left."""
+    gone = [unit for unit in chosen if unit in certificates and certificates[unit].state == "revoked"]
+    if gone and (named or len(gone) == len(chosen)):
+        message = (
+            f"export: the calibration of unit {gone[0]} in run {run.id} was revoked ({certificates[gone[0]].reason}), one that "
+            "was not is needed; measure the unit again, or hand the old coefficients out all the same with --revoked"
+        )
+        raise WrongUse(message)
+    return [unit for unit in chosen if unit not in gone]
 
 
 def _refuse(grades: pd.DataFrame, serials: tuple[str, ...], *, failed: bool) -> None:

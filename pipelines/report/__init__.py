@@ -6,12 +6,13 @@ from typing import TYPE_CHECKING
 
 from pipelines.archive import code_hash, stage_key
 from pipelines.report.page import render
+from pipelines.trace.stated import stated
 from schemas.errors import WrongUse
 
 if TYPE_CHECKING:
     from pipelines.archive import Run
 
-__all__ = ["INPUTS", "make_report", "render"]
+__all__ = ["INPUTS", "make_report", "render", "renew_report"]
 
 INPUTS = (
     *("verdicts", "dwells", "coefficients", "residuals", "verification", "verification_poses"),
@@ -26,12 +27,22 @@ def make_report(run: Run) -> bool:
         return True  # a follow-up has no decisions: its report is the diagnosis of all runs together
     _refuse_unfinished(run)
     inputs, code = {name: run.manifest(name)["sha256"] for name in INPUTS}, code_hash(MODULES)
-    key = stage_key("report", inputs, {}, code)
+    certificates = stated(run, run.table("grades")["unit"])
+    parameters = (
+        {"certificates": {unit: list(one) for unit, one in sorted(certificates.items())}} if certificates else {}
+    )
+    key = stage_key("report", inputs, parameters, code)
     if run.has_report(key):
         run.seal()  # a writer that was killed may have left it out
         return True
-    run.save_report(key, render(run), {"inputs": inputs, "parameters": {}, "code": code})
+    run.save_report(key, render(run, certificates), {"inputs": inputs, "parameters": parameters, "code": code})
     return False
+
+
+def renew_report(run: Run) -> None:
+    """Make a report that is there again, now that the ledger says something else of its units."""
+    if (run.path / "report.json").is_file() and all(name in run.tables() for name in INPUTS):
+        make_report(run)
 
 
 def _refuse_unfinished(run: Run) -> None:

@@ -12,9 +12,12 @@ from pipelines.report.templates import template
 from pipelines.rows import rows_of
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+
     import pandas as pd
 
     from pipelines.archive import Run
+    from pipelines.trace.stated import Stated
 
 COVERAGE = 2.0
 TITLES = {
@@ -33,13 +36,21 @@ TITLES = {
 }
 
 
-def render(run: Run) -> str:
-    """The report of a run as one HTML text that needs no other file."""
+def render(run: Run, certificates: Mapping[str, Stated] | None = None) -> str:
+    """The report of a run as one HTML text that needs no other file.
+
+    Parameters
+    ----------
+    certificates : of its units, as the ledger has them now
+    """
     tables = {name: run.table(name) for name in ("verdicts", "dwells", "coefficients", "residuals", "verification")}
     tables |= {name: run.table(name) for name in ("verification_poses", "allan", "noise", "figures", "grades")}
     grades = tables["grades"].sort_values("slot")
     limit = _limit(run, "verification_norm_ug")
-    units = [_unit(row, tables) for row in rows_of(grades)]
+    known = certificates or {}
+    units: list[dict[str, Any]] = [
+        {**_unit(row, tables), "certificate": known.get(str(row["unit"]))} for row in rows_of(grades)
+    ]
     calibrated = [unit["unit"] for unit in units if unit["outcome"] != "refused"]
     return template("page.html").render(
         run=run.id,

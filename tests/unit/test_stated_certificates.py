@@ -1,0 +1,112 @@
+"""What is handed out names its certificate: exports and reports say whether one holds, was revoked, or never was given."""
+
+import json
+import re
+import shutil
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+from capture_double import small_run
+from typer.testing import CliRunner, Result
+
+from pipelines.archive import Archive, Run
+from pipelines.cli import app
+from pipelines.report import make_report
+from pipelines.trace.checks import verify
+
+FROM = ("--from", "2026-01-01", "--until", "2099-01-01")
+Typed = Callable[..., Result]
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory: pytest.TempPathFactory) -> Run:
+    run = small_run(tmp_path_factory.mktemp("run"), {"A3": "silent"})
+    make_report(run)
+    return run
+
+
+@pytest.fixture
+def run(made: Run, tmp_path: Path) -> Run:
+    shutil.copytree(made.archive.root, tmp_path / "archive")
+    return Archive(tmp_path / "archive").run(made.id)
+
+
+@pytest.fixture
+def typed(run: Run) -> Typed:
+    def type_(*words: str) -> Result:
+        return CliRunner().invoke(app, [*words, "--archive", str(run.archive.root)])
+
+    return type_
+
+
+def units(typed: Typed, run: Run, *words: str) -> dict[str, dict]:
+    return {one["unit"]: one for one in json.loads(typed("export", run.id, *words).stdout)["units"]}
+
+
+def test_an_export_without_a_certificate_says_so(run: Run, typed: Typed) -> None:
+    done = typed("export", run.id)
+    assert {one["certificate"] for one in json.loads(done.stdout)["units"]} == {None}
+    assert "not certified: A1, A2; 'tumbleline certify" in done.stderr
+
+
+def test_an_export_names_the_certificate_and_whether_it_holds(run: Run, typed: Typed) -> None:
+    typed("certify", run.id, *FROM)
+    done = typed("export", run.id)
+    assert done.stderr == ""
+    wanted = {
+        "certificate": "A1/1", "from": "2026-01-01", "until": "2099-01-01", "state": "valid", "reason": "", "valid_now": True,
+    }  # fmt: skip
+    assert units(typed, run)["A1"]["certificate"] == wanted
+    line = "certificate A1/1, valid from 2026-01-01 until 2099-01-01"
+    assert f"/* A1: {line} */" in typed("export", run.id, "--format", "c").stdout
+    assert f"# {line}\n" in typed("export", run.id, "--format", "px4", "--nominal", "256000").stdout
+    assert line in typed("export", run.id, "--format", "csv").stdout.splitlines()[1]
+
+
+def test_a_certificate_that_has_ended_is_told(run: Run, typed: Typed) -> None:
+    typed("certify", run.id, "--from", "2020-01-01", "--until", "2021-01-01")
+    assert units(typed, run)["A1"]["certificate"]["valid_now"] is False
+    assert "A1: certificate A1/1, valid from 2020-01-01 until 2021-01-01" in typed("export", run.id).stderr
+
+
+def test_revoked_coefficients_leave_the_house_only_when_they_are_asked_for(run: Run, typed: Typed) -> None:
+    typed("certify", run.id, *FROM)
+    typed("revoke", "A1", "--reason", "dropped */ on the floor")
+    done = typed("export", run.id)
+    assert [one["unit"] for one in json.loads(done.stdout)["units"]] == ["A2"]
+    assert "left out: A1, certificate A1/1 REVOKED (dropped */ on the floor)" in done.stderr
+    refused = typed("export", run.id, "--units", "A1")
+    assert "the calibration of unit A1" in str(refused.exception)
+    given = typed("export", run.id, "--units", "A1", "--revoked")
+    assert json.loads(given.stdout)["units"][0]["certificate"]["state"] == "revoked"
+    assert "A1: certificate A1/1 REVOKED" in given.stderr
+    header = typed("export", run.id, "--units", "A1", "--revoked", "--format", "c").stdout
+    assert "REVOKED (dropped * / on the floor) */" in header
+
+
+def test_where_every_calibration_was_revoked_nothing_is_exported(run: Run, typed: Typed) -> None:
+    typed("certify", run.id, *FROM)
+    for unit in ("A1", "A2"):
+        typed("revoke", unit, "--reason", "wrong reference")
+    assert "was revoked (wrong reference)" in str(typed("export", run.id).exception)
+
+
+def test_a_unit_that_is_certified_again_after_a_revocation_is_exported(run: Run, typed: Typed) -> None:
+    typed("certify", run.id, *FROM)
+    typed("revoke", "A1", "--reason", "by mistake")
+    typed("certify", run.id, "--units", "A1", *FROM)
+    assert units(typed, run)["A1"]["certificate"]["certificate"] == "A1/3"
+
+
+def test_the_report_names_the_certificates_and_follows_the_ledger(run: Run, typed: Typed) -> None:
+    assert "No unit of this run was certified" in run.report.read_text(encoding="utf-8")
+    typed("certify", run.id, *FROM)
+    page = re.sub(r"<[^>]*>", " ", run.report.read_text(encoding="utf-8"))
+    assert re.search(r"A1\s+A1/1\s+2026-01-01\s+2099-01-01\s+valid", page)
+    assert re.search(r"A3\s+not certified", page)
+    typed("revoke", "A1", "--reason", "dropped")
+    page = re.sub(r"<[^>]*>", " ", run.report.read_text(encoding="utf-8"))
+    assert re.search(r"A1\s+A1/1\s+2026-01-01\s+2026-01-01\s+revoked\s+dropped", page)
+    assert verify(run.archive, keys={}).checked.findings == []
+    assert make_report(run)
