@@ -65,8 +65,8 @@ _BINARY: Mapping[type[ast.operator], Callable[[Array, Array], Array]] = {
     ast.Div: np.divide,
     ast.Pow: np.power,
 }
-_LONGEST = 500
-_LARGEST = 1e100
+_LONGEST = 500  # characters of a formula
+_LARGEST = 1e100  # number in it: its powers stay finite
 
 
 class FormulaInvalid(InertialError):

@@ -10,7 +10,7 @@ Array = NDArray[np.float64]
 
 UP: tuple[float, float, float] = (0.0, 0.0, 1.0)
 
-_ROUNDING = 1e-14
+_ROUNDING = 1e-14  # g; smaller components are rounding of sines and cosines
 
 
 def rotation_x(angle: ArrayLike) -> Array:

@@ -7,7 +7,7 @@ from numpy.typing import ArrayLike, NDArray
 
 Array = NDArray[np.float64]
 
-_BINS = 256
+_BINS = 256  # of the histogram of log scatter (Otsu's threshold)
 
 
 @dataclass(frozen=True)

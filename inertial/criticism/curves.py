@@ -11,7 +11,7 @@ from inertial.criticism.space import Candidate, Space
 
 Array = NDArray[np.float64]
 
-_TURNS = 8
+_TURNS = 8  # of sizes and shape, each found for the other
 
 
 @dataclass(frozen=True)

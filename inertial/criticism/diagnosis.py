@@ -32,8 +32,8 @@ from inertial.effects.covariate import COVARIATE_PREFIX, Covariate
 STEEPER = 0.0
 """Penalised chi-square by which a random walk beside the 1/f wander must beat the effects found without it."""
 
-_MANY = 32
-_ENOUGH = 24
+_MANY = 32  # units of a lot that is searched whole
+_ENOUGH = 24  # units, spread over the lot, that a larger one is searched in
 
 DECISIVE = 0.2
 """Share of what a curve brings by which it must beat the effects chosen so far to end the search for more."""

@@ -8,10 +8,12 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
-STANDARD_GRAVITY = 9.80665
-_TURNED = 0.05
-_ROUNDS = 12
-_TUKEY = 4.685
+STANDARD_GRAVITY = 9.80665  # m/s² in one g
+_TURNED = 0.05  # singular value, per root of a dwell, below which poses do not tell a response from a bias
+_ROUNDS = 12  # of reweighting
+_TUKEY = (
+    4.685  # widths of the biweight: 95 % efficiency under normal noise (Holland & Welsch, Commun. Stat. A6 (1977) 813)
+)
 
 
 @dataclass(frozen=True)
@@ -129,8 +131,8 @@ class Split:
         return two / max(one, 1e-300)
 
 
-_LEAST = 6
-_BETTER = 0.05
+_LEAST = 6  # dwells on either side of a split: a response and a bias need four
+_BETTER = 0.05  # share of the squares that two fits may leave of what one leaves
 
 
 def find_split(force: Array, output: Array) -> Split | None:

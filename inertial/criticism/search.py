@@ -22,10 +22,10 @@ NAMED_BELOW = 1e-4
 MATERIAL = 0.2
 """Share of the floor below which a significant effect is not named: remainders of imperfect drivers are of that size."""
 
-_FINALISTS = 6
-_AGAIN = 3
-_MOST = 6
-_SHARES_TRIED = (1.0, 0.15, 0.01)
+_FINALISTS = 6  # rivals for which the noise is estimated anew
+_AGAIN = 3  # the same where an effect is examined again
+_MOST = 6  # effects that one search may add
+_SHARES_TRIED = (1.0, 0.15, 0.01)  # of the wander: with the effect inside there is less of it
 
 
 @dataclass(frozen=True)

@@ -17,15 +17,15 @@ from inertial.effects.covariate import COVARIATE_PREFIX
 
 Array = NDArray[np.float64]
 
-_KNOTS = 9
-_TIME_KNOTS = 12
-_HARMONICS = 5
-_CYCLES = np.arange(1.0, 14.1, 0.5)
-_LEVELS = 14
-_VISITS = 1.5
-_CENTRES = np.linspace(0.0, 1.0, 21)
-_WIDTHS = (0.02, 0.05, 0.1)
-_SHARPEST = 3
+_KNOTS = 9  # of a smooth curve over a driver
+_TIME_KNOTS = 12  # the same over time
+_HARMONICS = 5  # of a table angle
+_CYCLES = np.arange(1.0, 14.1, 0.5)  # of a swing within the run
+_LEVELS = 14  # groups of values from which on a driver counts as continuous
+_VISITS = 1.5  # how often each level is met at least, in the mean
+_CENTRES = np.linspace(0.0, 1.0, 21)  # of bumps and hinges, over the driver's range
+_WIDTHS = (0.02, 0.05, 0.1)  # of bumps, of that range
+_SHARPEST = 3  # suspects that are tried with bumps and hinges
 
 OTHERS = 60.0
 """Penalised chi-square that an effect must bring beside a curve to stay."""

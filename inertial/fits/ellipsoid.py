@@ -11,9 +11,9 @@ from inertial.errors import NotIdentified
 Array = NDArray[np.float64]
 Shape = Literal["nine", "six"]
 
-_STEPS = 60
-_SETTLED = 1e-12
-_SINGULAR = 1e-10
+_STEPS = 60  # of Gauss-Newton, and halvings of one
+_SETTLED = 1e-12  # share of the cost that a step no longer takes off
+_SINGULAR = 1e-10  # eigenvalue of the scaled normal matrix below which a parameter is not determined
 _UPPER = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
 
 

@@ -12,10 +12,10 @@ from inertial.state import T_REFERENCE
 
 Array = NDArray[np.float64]
 
-_SINGULAR = 1e-12
-_FEWEST = 3
-_BLOCKS = 20
-_TIMES_NOISE = 1.25
+_SINGULAR = 1e-12  # eigenvalue of the scaled normal matrix below which a power is not determined
+_FEWEST = 3  # samples in a block
+_BLOCKS = 20  # whose means show what is slower than the noise of a sample
+_TIMES_NOISE = 1.25  # that may always be left: in a long record the means of blocks see any trifle
 
 
 @dataclass(frozen=True)

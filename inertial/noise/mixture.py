@@ -13,9 +13,9 @@ from inertial.noise.covariance import Sums, sums
 Array = NDArray[np.float64]
 
 TERMS = ("Q", "N", "B", "K", "R")
-_ROUNDS = 4
-_STEPS = 12
-_SETTLED = 1e-6
+_ROUNDS = 4  # of weights from the strengths before
+_STEPS = 12  # of Gauss-Newton, and halvings of one
+_SETTLED = 1e-6  # chi-square that a step no longer takes off
 _FEWEST_DOF = 1.0
 
 

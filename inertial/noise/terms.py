@@ -40,9 +40,9 @@ _KEPT_AT = 6.635
 _ONE_SIDED_95 = 2.706
 _NEGLIGIBLE = 1e-6
 """Share of the curve, as a variance, below which a term makes no difference."""
-_WIDEST = 40.0
-_RESOLUTION = 2e-3
-_ROUNDS = 3
+_WIDEST = 40.0  # natural logarithm: how far above a strength its upper limit is looked for
+_RESOLUTION = 2e-3  # of an end of an interval, relative
+_ROUNDS = 3  # of the covariance, which depends on the strengths
 
 
 @dataclass(frozen=True)
