@@ -16,7 +16,6 @@ from pipelines.audit.statistics.control_charts import (
     alarms,
     baseline,
     false_alarms,
-    p_of_alarms,
     signals,
 )
 from pipelines.audit.statistics.two_way import unit_and_place
@@ -167,8 +166,8 @@ def _chart(
     day = all_.day[own]
     counted = (np.arange(values.size) >= rules.baseline_points) & (day >= since)
     number = alarms(found, moving.outside, counted)
-    mean, variance = false_alarms(values.size, rules.baseline_points, int(counted.sum()))
+    chance = false_alarms(values.size, rules.baseline_points, int(counted.sum()))
     return Chart(
         *key, unit_text(key[2]), day, values, all_.run[own], chart, found & counted, moving.average, moving.half_width,
-        moving.outside & counted, number, mean, p_of_alarms(number, mean, variance), in_control=True,
+        moving.outside & counted, number, chance.mean, chance.p_value(number), in_control=True,
     )  # fmt: skip

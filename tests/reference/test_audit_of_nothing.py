@@ -8,6 +8,8 @@ from pipelines.audit.drifts import OWN, kind_drifts, unit_drifts
 from pipelines.audit.parameters import NAMES
 from pipelines.audit.population import Figures, abilities, odd_ones
 from pipelines.audit.rules import load_rules
+from pipelines.audit.statistics.change_points import change_points
+from pipelines.audit.statistics.control_charts import alarms, baseline, false_alarms, signals
 from pipelines.audit.swaps import strangers
 
 DEVICE, YEAR_D = "adxl355", 365.25
@@ -178,3 +180,32 @@ def test_large_lots_stand_out_no_more_than_small_ones(rng, differing):
         all_ = calibrations(serials, lot, values, runs=runs)
         found += sum(odd.kind == "lot" for odd in odd_ones(all_, np.ones(len(all_), dtype=bool)))
     assert found <= 1
+
+
+@pytest.mark.parametrize(("n", "counted"), [(60, 20), (200, 160)])
+def test_charts_in_control_are_found_out_of_it_as_rarely_as_is_said(rng, n, counted):
+    """By mean and variance of the number of alarms a p-value of 6·10⁻⁴, that of eighteen charts, came up 16 times as often."""
+    chance, which = false_alarms(n, 40, counted), np.arange(n) >= n - counted
+    found = []
+    for values in rng.standard_normal((2000, n)):
+        rules, moving = signals(values, baseline(values, 40))
+        found.append(chance.p_value(alarms(rules, moving.outside, which)))
+    assert np.mean(np.array(found) < 0.01) == pytest.approx(0.01, abs=0.007)
+    assert np.sum(np.array(found) < 0.01 / 18.0) <= 6  # 1.1 are expected
+    assert chance.p_value(0) == 1.0
+
+
+def test_a_number_of_alarms_is_the_less_likely_the_larger():
+    chance = false_alarms(100, 40, 60)
+    found = [chance.p_value(number) for number in range(61)]
+    assert np.all(np.diff(found) <= 0.0)
+    assert found[-1] > 0.0
+
+
+@pytest.mark.parametrize("n", [8, 16, 60])
+def test_short_series_change_their_level_no_oftener_than_is_said(rng, n):
+    """With σ from a few differences and the normal tail a p-value of 10⁻⁴ came up 30 times as often in eight points."""
+    found = [change_points(values, 1e-2) for values in rng.standard_normal((4000, n))]
+    p = np.array([min((change.p_value for change in own), default=1.0) for own in found])
+    assert np.mean(p < 1e-2) < 0.01
+    assert np.sum(p < 1e-4) <= 2

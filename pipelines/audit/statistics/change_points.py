@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.stats import norm
+from scipy.stats import t as student
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -16,6 +16,9 @@ if TYPE_CHECKING:
 FEWEST = 4  # points on either side
 LIKELY = 7.35  # −2·ln(1 − √0.95): twice the log-likelihood within which the place lies with 95 % (Hansen 2000, table 1)
 DRAWN_IN = 4.0
+DOF_OF_DIFFERENCES = (
+    2.0 / 3.0
+)  # degrees of freedom per difference of neighbours (von Neumann 1941, Ann. Math. Stat. 12, 367)
 TO_SIGMA = 1.4826  # σ over the median absolute deviation of a normal value
 
 
@@ -25,7 +28,8 @@ class Change:
 
     first : index of the first point after it; low, high : earliest and latest that ``first`` may be, 95 %
     shift, error : level after minus level before and its standard error, the values' unit
-    p_value : that white noise of this length shows as large a change anywhere (Bonferroni over the places)
+    p_value : that white noise of this length shows as large a change anywhere (Bonferroni over the places), σ known as from
+        the series' own differences
     """
 
     first: int
@@ -49,16 +53,16 @@ def change_points(values: Array, level: float = 1e-3) -> list[Change]:
     sigma = noise_of(values)
     if n < 2 * FEWEST or sigma == 0.0:
         return []
-    places = sorted(_segment(values, 0, n, sigma, level))
+    places = sorted(_segment(values, (0, n), sigma, level))
     out: list[Change] = []
     for number, place in enumerate(places):
         low = places[number - 1] if number else 0
         high = places[number + 1] if number + 1 < len(places) else n
         found = _best(values[low:high])
         if found is not None:
-            out.append(_described(values[low:high], low, found, sigma))
+            out.append(_described(values[low:high], low, found, (sigma, n)))
         else:
-            out.append(_described(values[low:high], low, place - low, sigma))
+            out.append(_described(values[low:high], low, place - low, (sigma, n)))
     return out
 
 
@@ -75,15 +79,16 @@ def noise_of(values: Array) -> float:
     return max(middle, drawn_in) / np.sqrt(2.0)
 
 
-def _segment(values: Array, start: int, stop: int, sigma: float, level: float) -> list[int]:
+def _segment(values: Array, ends: tuple[int, int], sigma: float, level: float) -> list[int]:
+    start, stop = ends
     place = _best(values[start:stop])
     if place is None:
         return []
     part = values[start:stop]
-    if _p_value(_statistic(part)[place - 1] / sigma, part.size) > level:
+    if _p_value(_statistic(part)[place - 1] / sigma, part.size, values.size) > level:
         return []
     split = start + place
-    return [split, *_segment(values, start, split, sigma, level), *_segment(values, split, stop, sigma, level)]
+    return [split, *_segment(values, (start, split), sigma, level), *_segment(values, (split, stop), sigma, level)]
 
 
 def _statistic(values: Array) -> Array:
@@ -103,11 +108,15 @@ def _best(values: Array) -> int | None:
     return int(np.argmax(allowed)) + FEWEST
 
 
-def _p_value(statistic: float, n: int) -> float:
-    return float(min(1.0, 2.0 * norm.sf(statistic) * max(n - 2 * FEWEST + 1, 1)))
+def _p_value(statistic: float, n: int, whole: int) -> float:
+    """Of a statistic in n values; σ comes from the differences of the whole series."""
+    places = max(n - 2 * FEWEST + 1, 1)
+    return float(min(1.0, 2.0 * student.sf(statistic, DOF_OF_DIFFERENCES * (whole - 1)) * places))
 
 
-def _described(values: Array, offset: int, place: int, sigma: float) -> Change:
+def _described(values: Array, offset: int, place: int, noise: tuple[float, int]) -> Change:
+    """The change at a place of a part of a series; noise : σ, and of how many values."""
+    sigma, whole = noise
     statistic = _statistic(values) / sigma
     best = statistic[place - 1]
     likely = np.flatnonzero(best**2 - statistic**2 <= LIKELY) + 1
@@ -115,4 +124,4 @@ def _described(values: Array, offset: int, place: int, sigma: float) -> Change:
     shift = float(values[place:].mean() - values[:place].mean())
     error = float(sigma * np.sqrt(1.0 / place + 1.0 / (n - place)))
     low, high = int(likely.min()), int(likely.max())
-    return Change(offset + place, offset + low, offset + high, shift, error, _p_value(float(best), n))
+    return Change(offset + place, offset + low, offset + high, shift, error, _p_value(float(best), n, whole))
