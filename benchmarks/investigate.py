@@ -113,6 +113,7 @@ class Outcome:
     alone: bool
     lost: bool
     wrong: bool
+    beside: bool
     first_minutes: float
     extra_minutes: float
     rounds: int
@@ -208,6 +209,7 @@ def outcome(scene: Scene, seed: int, looks: list[Any], document: dict[str, Any],
         alone=any(len(group) == 1 and group[0] in scene.truths for group in last),
         lost=not kept,
         wrong=not kept and any(len(group) == 1 for group in last),
+        beside=kept and any(len(group) == 1 and group[0] not in scene.truths for group in last),
         first_minutes=minutes["first_run"],
         extra_minutes=minutes["follow_ups"],
         rounds=len(document["rounds"]),
@@ -241,9 +243,10 @@ def show(found: list[Outcome]) -> None:
     )
     still = sum(not o.alone and not o.lost for o in begun)
     wrong, lost = sum(o.wrong for o in begun), sum(o.lost and not o.wrong for o in begun)
+    beside = sum(o.beside for o in begun)
     print(
         f"of the others: {still} with the truth in a class that is open, {lost} with the truth in none and nothing named alone, "
-        f"{wrong} with another effect named in its place"
+        f"{wrong} with another effect named in its place; another is named beside the truth in {beside}"
     )
 
 

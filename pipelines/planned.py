@@ -68,6 +68,7 @@ def state_of(stretches: Sequence[Stretch], station: StationConfig, recipe: Recip
         temperature=unit,
         chamber=chamber,
         since_power=_since_power(stretches, time),
+        power_off=off if (off := np.array([s.step.off_s for s in dwells])).any() else None,
         since_move=(waits + 0.5 * recipe.dwell_s) * (1.0 + 0.01 * wander[0]),
         supply=NOMINAL_SUPPLY_V + SUPPLY_WANDER_V * wander[1],
         vibration=QUIET_G * (1.0 + 0.1 * np.abs(wander[0])),

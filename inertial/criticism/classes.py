@@ -8,12 +8,17 @@ from inertial.criticism.model import Model, Term
 from inertial.criticism.penalty import cost_in, freedom, log_p_value
 from inertial.criticism.refinement import refine
 from inertial.criticism.search import Field, size_of
+from inertial.criticism.shared_noise import shared_factor
 from inertial.criticism.space import Space
 
-TOLD_APART = 15.0
-"""Difference of penalised chi-square that parts two effects.
+LEAD = 10.0
+"""Penalised chi-square by which the wrong one of two leads with probability Φ(−√10) = 8e-4, where units are independent."""
 
-The wrong one leads by ten with probability Φ(−√10) = 8e-4; the rest is room for readings of the drivers that are not exact."""
+ROOM = 5.0
+"""Chi-square for readings of the drivers that are not exact."""
+
+TOLD_APART = LEAD + ROOM
+"""Difference of penalised chi-square that parts two effects; what noise the units share makes of the lead comes on top."""
 
 _NEAR = 80.0
 """Rivals further off on the grid of their nonlinear parameters are not refined."""
@@ -65,7 +70,9 @@ def class_of(field: Field, model: Model, term: Term) -> EffectClass:
     for score, found in sorted([*refined, (own, term)], key=lambda pair: pair[0]):
         by_id.setdefault(found.effect.id, Member(found, score))
     least = min(m.score for m in by_id.values())
-    members = [Member(m.term, m.score - least) for m in by_id.values() if m.score < least + TOLD_APART]
+    first = min(by_id.values(), key=lambda m: m.score).term
+    apart = LEAD * shared_factor(rest.with_term(first), first) + ROOM
+    members = [Member(m.term, m.score - least) for m in by_id.values() if m.score < least + apart]
     best_term = members[0].term
     gain = space.gain(best_term.candidate(field.problem))
     log_p = log_p_value(space, float(gain.drop[0]), int(gain.rank[0]))

@@ -14,14 +14,16 @@ from numpy.typing import NDArray
 from inertial.criticism.comparison import estimate
 from inertial.criticism.model import Model, Term
 from inertial.criticism.problem import Lot, Problem
+from inertial.criticism.shared_noise import shared_factor
 from inertial.criticism.space import Space
 from inertial.criticism.turn_on import with_turn_on
+from inertial.effects.base import Nonlinear
 from inertial.sequences import Pace, Step, extended
 
 Array = NDArray[np.float64]
 
-_STEP = 1.6
-"""Factor by which the nonlinear parameters of a rival may move when it is fitted to what is measured next."""
+_STEPS = (0.25, 0.625, 1.6, 4.0)
+"""Factors by which the nonlinear parameters of a rival may move when it is fitted to what is measured next."""
 
 _FEW = 3
 """Units that stand for the lot: all go through the same steps."""
@@ -34,7 +36,7 @@ class Rivals:
     lot : a few units of it; weight : units of the whole lot over these
     rest : the terms of the model beside the rivals
     predicted : per rival, its coefficients (blocks, p) or (p,) for a station's effect
-    share, variance : of the noise
+    share, variance : of the noise; what units share of it makes the variance larger
     steep : whether the wander has a random walk in it
     """
 
@@ -66,6 +68,7 @@ def rivals_of(model: Model, terms: Sequence[Term], others: Sequence[Term]) -> Ri
     pick = np.unique(np.linspace(0, units - 1, min(units, _FEW)).round().astype(int)).tolist()
     blocks = pick if model.problem.lot.radial else [3 * u + a for u in pick for a in range(3)]
     predicted = tuple(_coefficients(Model(model.problem, [t, *others], near=model.share), t, blocks) for t in terms)
+    widened_by = shared_factor(Model(model.problem, [terms[0], *others], near=model.share), terms[0]) if terms else 1.0
     return Rivals(
         lot=model.problem.lot.units(pick),
         weight=units / len(pick),
@@ -73,7 +76,7 @@ def rivals_of(model: Model, terms: Sequence[Term], others: Sequence[Term]) -> Ri
         terms=tuple(terms),
         predicted=predicted,
         share=model.share,
-        variance=model.space.variance,
+        variance=model.space.variance * widened_by,
         steep=model.problem.steep,
     )
 
@@ -111,14 +114,22 @@ def _neighbours(problem: Problem, term: Term) -> list[Term]:
     """
     found = [term]
     for parameter in term.effect.parameters(problem.lot.state):
-        if parameter.choices and parameter.name not in term.keywords:
+        if parameter.name not in term.keywords:
             found += [Term(term.effect, (*term.values, (parameter.name, c)), term.first) for c in parameter.choices]
-        if parameter.choices or isinstance(value := term.keywords[parameter.name], tuple):
-            continue
-        for factor in (1.0 / _STEP, _STEP):
-            moved = float(np.clip(value * factor, parameter.low, parameter.high))
-            found.append(Term(term.effect, tuple({**term.keywords, parameter.name: moved}.items()), term.first))
+        elif not parameter.choices:
+            values = [_moved(term.keywords[parameter.name], factor, parameter) for factor in _STEPS]
+            found += [
+                Term(term.effect, tuple({**term.keywords, parameter.name: v}.items()), term.first)
+                for v in dict.fromkeys(values)
+            ]
     return found
+
+
+def _moved(value: float | tuple[float, ...], factor: float, parameter: Nonlinear) -> float | tuple[float, ...]:
+    """A nonlinear parameter, or that of each axis, moved within its bounds."""
+    if isinstance(value, tuple):
+        return tuple(float(np.clip(v * factor, parameter.low, parameter.high)) for v in value)
+    return float(np.clip(value * factor, parameter.low, parameter.high))
 
 
 def smallest(left: Array) -> Array:

@@ -142,7 +142,12 @@ def _inquired(
     from pipelines.inquiry.play import Table, directly, play
 
     with shown() as (progress, told, quiet):
-        table: Table = Table(directly, consent(quiet), progress, told, _tell)
+
+        def looked(finding: Finding) -> None:
+            with quiet():
+                _tell(finding)
+
+        table: Table = Table(directly, consent(quiet), progress, told, looked)
         if direct:
             return play(request.job(archive), archive, terms, table)
         from pipelines.flows.investigate_locally import investigate_locally

@@ -168,7 +168,8 @@ def _power_off(table: _Table) -> Array | None:
     """
     if "power_off_s" not in table.frame.columns or not table.has("since_power_s"):
         return None
-    return np.nan_to_num(_filled(table.raw(("power_off_s",)))[..., 0], nan=0.0)
+    known = np.nan_to_num(table.raw(("power_off_s",))[..., 0], nan=0.0)
+    return np.broadcast_to(known.max(axis=0), known.shape).copy()  # one relay for all
 
 
 def _history(history: pd.DataFrame, units: tuple[str, ...], time: Array) -> History | None:

@@ -1,0 +1,64 @@
+"""Noise that all units of a lot share: where the table stands is off by the same for every unit, dwell by dwell.
+
+Blocks are whitened one by one, as if units were independent. What they share does not average out over the units: a
+difference of chi-square between two effects that are alike in all units scatters by more than its own root, and is worth less.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from inertial.criticism.comparison import estimate
+from inertial.criticism.heldout import residuals
+from inertial.criticism.model import Model, Term
+
+Array = NDArray[np.float64]
+
+_SURE = 3.0
+"""Standard errors by which units must go together before they are taken to."""
+
+
+def shared_factor(model: Model, term: Term) -> float:
+    """Factor, 1 at least, by which noise that units share widens the scatter of what tells a term of a model from its rivals.
+
+    One for an effect whose size differs in sign from unit to unit, as much as the number of units for one that is alike in all.
+
+    Parameters
+    ----------
+    model : with the term in it; what it leaves is the noise
+    """
+    problem = model.problem
+    units = problem.lot.state.time.shape[0]
+    if units < 2 or problem.lot.radial:
+        return 1.0
+    together = _together(model, units)
+    return 1.0 + (units - 1) * together * (1.0 if term.effect.scope == "station" else _alike(model, term, units))
+
+
+def _together(model: Model, units: int) -> float:
+    """Correlation of what a model leaves between units, on the same axis; zero where chance would do as much."""
+    problem = model.problem
+    left = np.nan_to_num(residuals(problem, model.terms, np.ones(problem.n, dtype=bool)) / problem.error)
+    found = _pairwise(left.reshape(units, -1))
+    chance = 1.0 / np.sqrt(left.size / units * units * (units - 1) / 2.0)
+    return found if found > _SURE * chance else 0.0
+
+
+def _alike(model: Model, term: Term, units: int) -> float:
+    """How far a term adds the same to every unit, 0 … 1."""
+    found = estimate(model)
+    at = 0
+    for other in (t for t in model.terms if t.effect.scope != "station"):
+        columns = model.problem.columns(other.effect, other.keywords)[..., : other.first]
+        if other.effect.id == term.effect.id:
+            series = np.einsum("bnp,bp->bn", columns, found.local[:, at : at + columns.shape[-1]])
+            series = (series - series.mean(axis=1, keepdims=True)) / model.problem.error
+            return max(_pairwise(series.reshape(units, -1)), 0.0)
+        at += columns.shape[-1]
+    return 1.0
+
+
+def _pairwise(series: Array) -> float:
+    """Mean correlation between the rows (units, m), by their common size."""
+    units = len(series)
+    whole = float(np.sum(series**2))
+    return 0.0 if whole <= 0.0 else (float(np.sum(series.sum(axis=0) ** 2)) / whole - 1.0) / (units - 1)
