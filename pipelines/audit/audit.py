@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from pipelines.audit.calibrations import Calibrations, captures_of, load, runs_of
+from pipelines.audit.calibrations import Calibrations, captures_of, later, load, runs_of, undated
 from pipelines.audit.certificates import Certificates, certificates_of
 from pipelines.audit.drifts import KindDrift, UnitDrift, kind_drifts, unit_drifts
-from pipelines.audit.due import Due, due
+from pipelines.audit.due import Due, due, last_measured
 from pipelines.audit.gauge_mounts import Study, studies
 from pipelines.audit.index import up_to_date
 from pipelines.audit.population import (
@@ -44,12 +44,16 @@ LIMITED = {  # families whose value itself has a limit: figure, and the paramete
 
 @dataclass(frozen=True)
 class Scope:
-    """What is looked at: days since 1970 (from ``since`` up to before ``until``), and a device or a station where named."""
+    """What is looked at: days since 1970 (from ``since`` up to before ``until``), and a device or a station where named.
+
+    tomorrow : the day after the one on which the audit is made; infinite where nobody says which that is
+    """
 
     since: float
     until: float
     device: str = ""
     station: str = ""
+    tomorrow: float = float("inf")
 
 
 @dataclass(frozen=True)
@@ -58,6 +62,7 @@ class Audit:
 
     good : calibrations that are of the unit their serial names; product : those of no check standard
     period : those of the product that the scope chooses
+    problems : runs that cannot be used, and why; later : runs that say that they were measured after today
     """
 
     scope: Scope
@@ -67,6 +72,7 @@ class Audit:
     product: Flags
     period: Flags
     problems: tuple[tuple[str, str], ...]
+    later: tuple[tuple[str, float], ...]
     strangers: tuple[Stranger, ...]
     kinds: tuple[KindDrift, ...]
     units: dict[str, list[UnitDrift]]
@@ -95,7 +101,7 @@ def audit(archive: Archive, rules: Rules, scope: Scope, *, dask: str | None = No
     index = up_to_date(archive, dask, workers)
     runs = runs_of(index, scope.until)
     all_ = load(index, runs)
-    found = tuple(strangers(all_))
+    found = tuple(strangers(all_, rules))
     good = np.ones(len(all_), dtype=bool)
     good[[one.row for one in found]] = False
     product = ~np.array([rules.is_standard(str(unit)) for unit in all_.unit], dtype=bool)
@@ -118,11 +124,14 @@ def audit(archive: Archive, rules: Rules, scope: Scope, *, dask: str | None = No
         good=good,
         product=product,
         period=period,
-        problems=_problems(index.table("runs", ["run", "problem"]).to_pydict()),
+        problems=(*_problems(index.table("runs", ["run", "problem"]).to_pydict()), *undated(index)),
+        later=tuple(later(index, scope.tomorrow)),
         strangers=tuple(one for one in found if all_.day[one.row] >= scope.since),
         kinds=tuple(kinds),
         units=units,
-        due=due(all_, good & inside, rules, kinds, units, ledger),
+        due=last_measured(
+            all_, due(all_, good & product & _of_device(all_, scope), rules, kinds, units, ledger), scope.station
+        ),
         certificates=ledger,
         stations=tuple(station_series(station, runs)),
         slots=tuple(slots),
@@ -137,8 +146,11 @@ def audit(archive: Archive, rules: Rules, scope: Scope, *, dask: str | None = No
 
 
 def _named(all_: Calibrations, scope: Scope) -> Flags:
-    kind = np.array([not scope.device or str(d) == scope.device.upper() for d in all_.device], dtype=bool)
-    return kind & _at(all_, scope)
+    return _of_device(all_, scope) & _at(all_, scope)
+
+
+def _of_device(all_: Calibrations, scope: Scope) -> Flags:
+    return np.array([not scope.device or str(d) == scope.device.upper() for d in all_.device], dtype=bool)
 
 
 def _at(all_: Calibrations, scope: Scope) -> Flags:

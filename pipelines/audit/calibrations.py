@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     Flags = NDArray[np.bool_]
 
 DAY_S = 86400.0
+CLOCK_SET_D = 366.0  # a clock that was never set says 1970
 
 
 @dataclass(frozen=True)
@@ -91,11 +92,40 @@ def runs_of(index: Index, until: float) -> pd.DataFrame:
     """
     runs = index.table("runs").to_pandas()
     runs = runs[(runs["rerun_of"].astype(str) == "") & (runs["measured"].astype(str) != "")].astype({"run": str})
-    runs = runs.assign(day=[day_of(str(moment)) for moment in runs["measured"]])
-    runs = runs.sort_values(["day", "run"], kind="stable")
+    runs = runs.assign(day=[_day_or_nan(str(moment)) for moment in runs["measured"]])
+    runs = runs[runs["day"].notna()].sort_values(["day", "run"], kind="stable")
     own = runs["capture"].astype(str).where(runs["capture"].astype(str) != "", runs["run"])
     chosen = runs[~own.duplicated() & (runs["day"] < until)]
     return chosen[["run", "day", "device", "station"]].astype({"device": str, "station": str})
+
+
+def undated(index: Index) -> list[tuple[str, str]]:
+    """Runs whose date cannot be read, and what is wrong with each."""
+    runs = index.table("runs", ["run", "measured"]).to_pydict()
+    return [
+        (
+            run,
+            f"its date {moment!r} is none, or that of a clock that was never set; one such as 2026-05-01T09:30:00Z is needed",
+        )
+        for run, moment in zip(runs["run"], runs["measured"], strict=True)
+        if moment and np.isnan(_day_or_nan(moment))
+    ]
+
+
+def later(index: Index, day: float) -> list[tuple[str, float]]:
+    """Runs that say that they were measured on a day or after it, with their days."""
+    runs = index.table("runs", ["run", "measured"]).to_pydict()
+    found = ((run, _day_or_nan(moment)) for run, moment in zip(runs["run"], runs["measured"], strict=True) if moment)
+    return sorted((one for one in found if one[1] >= day), key=lambda one: (one[1], one[0]))
+
+
+def _day_or_nan(moment: str) -> float:
+    """Days since 1970; NaN for what is no date, or that of a clock that was never set."""
+    try:
+        day = day_of(moment)
+    except ValueError:
+        return float("nan")
+    return day if day >= CLOCK_SET_D else float("nan")
 
 
 def captures_of(index: Index) -> dict[str, str]:

@@ -81,6 +81,14 @@ def due(
     return found
 
 
+def last_measured(all_: Calibrations, found: Due, station: str) -> Due:
+    """The units that a station measured last; all where none is named. What others measured before counts for their history."""
+    if not station:
+        return found
+    own = all_.station[found.row] == station
+    return Due(*(getattr(found, name)[own] for name in Due.__dataclass_fields__))
+
+
 def uncertified(all_: Calibrations, found: Due, certificates: Certificates) -> NDArray[np.int64]:
     """Units that passed last and were not certified for it, as places among those that are due; none without a ledger."""
     if not len(certificates):

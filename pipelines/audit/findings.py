@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from pipelines.audit.calibrations import date_of
 from pipelines.audit.due_findings import of_certificates, of_what_is_due
 from pipelines.audit.finding import WHO, Finding
 from pipelines.audit.population_findings import of_population
@@ -23,6 +24,7 @@ def findings(audit: Audit) -> list[Finding]:
         *of_what_is_due(audit),
         *of_population(audit),
         *(_unreadable(run, text) for run, text in audit.problems),
+        *(_later(run, day) for run, day in audit.later),
         *(_broken(folder, text) for folder, text in audit.certificates.problems.items()),
     ]
     order = list(WHO)
@@ -32,6 +34,14 @@ def findings(audit: Audit) -> list[Finding]:
 def _unreadable(run: str, text: str) -> Finding:
     message = f"run {run} was left out: {text}; see 'tumbleline verify', then restore it from a copy"
     return Finding("archive", "unreadable", run, message)
+
+
+def _later(run: str, day: float) -> Finding:
+    message = (
+        f"run {run} says that it was measured on {date_of(day)}, which is yet to come: it was left out; set the clock of the "
+        "host that wrote it, and measure the units again"
+    )
+    return Finding("archive", "clock", run, message, (), {"date": date_of(day)})
 
 
 def _broken(folder: str, text: str) -> Finding:

@@ -12,6 +12,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from pipelines.audit.audit import Audit
+    from pipelines.audit.population import Ability
 
 TELLING_EFFECT = 0.02  # share of the variance between groups, below which a difference matters to nobody
 DIFFERENT_P = 1e-3
@@ -43,7 +44,7 @@ def _incapable(audit: Audit) -> Iterator[Finding]:
         if able.ppk.low < audit.rules.ppk_least:
             message = (
                 f"{able.device}: {able.figure} has Ppk {able.ppk.value:.2f} ({able.ppk.low:.2f} to {able.ppk.high:.2f}) "
-                f"against {able.limit:g} {able.unit_text}, at least {audit.rules.ppk_least:g} is needed; "
+                f"against {_limit(able)}, at least {audit.rules.ppk_least:g} is needed; "
                 f"{100 * able.outside.value:.2g} % are outside: narrow the spread, or widen the limit"
             )
             evidence = {
@@ -66,3 +67,7 @@ def _different(audit: Audit) -> Iterator[Finding]:
             who = "station" if one.by in {"station", "slot"} else "product"
             evidence = {"figure": one.figure, "by": one.by, "share": one.found.effect, "p_value": one.p}
             yield Finding(who, f"differs_by_{one.by}", one.device, message, (), evidence)
+
+
+def _limit(able: Ability) -> str:
+    return f"{able.limit:g}" if able.unit_text == "1" else f"{able.limit:g} {able.unit_text}"

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from pipelines.audit.few_units import exchanged_pairs
 from pipelines.audit.parameters import FAMILY_OF
 from pipelines.audit.parameters import NAMES as PARAMETERS
 from pipelines.audit.statistics.fingerprints import (
@@ -22,6 +23,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from pipelines.audit.calibrations import Calibrations
+    from pipelines.audit.rules import Rules
 
     Array = NDArray[np.float64]
     Flags = NDArray[np.bool_]
@@ -48,10 +50,14 @@ class Stranger:
     exchanged: bool
 
 
-def strangers(all_: Calibrations) -> list[Stranger]:
+def strangers(all_: Calibrations, rules: Rules | None = None) -> list[Stranger]:
     """The calibrations that are not of their unit, in order; each kind of device is judged by itself.
 
     A stranger is no part of its unit's past: the next calibration is compared with the one before the stranger.
+
+    Parameters
+    ----------
+    rules : whose tolerances judge a kind of which there are too few calibrations to know its usual change
     """
     out: list[Stranger] = []
     for device in np.unique(all_.device.astype(str)):
@@ -60,6 +66,8 @@ def strangers(all_: Calibrations) -> list[Stranger]:
         before = _before(all_.histories[own], np.ones(own.size, dtype=bool))
         pairs = np.flatnonzero(before >= 0)
         if pairs.size < FEWEST_PAIRS:
+            found = exchanged_pairs(all_, own, before, rules) if rules is not None else []
+            out += [Stranger(int(own[k]), far, str(all_.unit[own[other]]), exchanged=True) for k, other, far in found]
             continue
         years = (all_.day[own] - all_.day[own][before]) / YEAR_D
         scale = change_scale(values[pairs], values[before[pairs]], years[pairs], values[before < 0])

@@ -9,21 +9,41 @@ import numpy as np
 from pipelines.audit.calibrations import date_of
 from pipelines.audit.finding import Finding, date_or_never
 from pipelines.audit.parameters import unit_text
+from pipelines.audit.serials import twice
 from pipelines.audit.statistics.comparison import outlier_limit
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Iterator, Sequence
 
     from pipelines.audit.audit import Audit
+    from pipelines.audit.calibrations import Calibrations
     from pipelines.audit.drifts import UnitDrift
 
 
 def of_units(audit: Audit) -> Iterator[Finding]:
     """All of them, the weightiest kind first."""
+    yield from _two_units(audit)
     yield from _exchanged(audit)
     yield from _out_of_tolerance(audit)
     yield from _leaving(audit)
     yield from _unlike_their_kind(audit)
+
+
+def _two_units(audit: Audit) -> Iterator[Finding]:
+    for one in twice(audit.all):
+        if audit.all.day[one.second] < audit.scope.since:
+            continue
+        first, second = (_where(audit.all, row) for row in (one.first, one.second))
+        message = (
+            f"{one.serial}: measured as {first} and as {second}, one unit cannot be both: two units have one serial; find "
+            "out which is which, give one another, and revoke what was certified under the wrong one"
+        )
+        evidence = {"runs": [str(audit.all.run[row]) for row in (one.first, one.second)]}
+        yield Finding("quality", "two_units", one.serial, message, (one.serial,), evidence)
+
+
+def _where(all_: Calibrations, row: int) -> str:
+    return f"{all_.device[row]} on {all_.station[row]}, {date_of(float(all_.day[row]))} (run {all_.run[row]})"
 
 
 def _exchanged(audit: Audit) -> Iterator[Finding]:
@@ -47,38 +67,59 @@ def _exchanged(audit: Audit) -> Iterator[Finding]:
 
 def _out_of_tolerance(audit: Audit) -> Iterator[Finding]:
     """Units found outside at their re-calibration, by more than the uncertainty of both: what they measured is in doubt."""
-    for drift in _each(audit):
-        expanded = abs(drift.change / drift.e_n) if drift.e_n else np.inf
-        if drift.day >= audit.scope.since and abs(drift.change) - expanded > drift.tolerance:
-            text = unit_text(drift.parameter)
-            message = (
-                f"{drift.unit}: {drift.parameter} was {drift.change:+.4g} {text} off after {12 * drift.years:.0f} months, "
-                f"tolerance {drift.tolerance:g} {text}, U {expanded:.3g}, E_n {drift.e_n:+.1f}; what it measured since "
-                f"{_before(drift)} is in doubt: tell whoever used it"
-            )
-            yield Finding("quality", "found_outside", drift.unit, message, (drift.unit,), _numbers(drift))
+    for drifts in audit.units.values():
+        outside = [d for d in drifts if d.day >= audit.scope.since and abs(d.change) - _expanded(d) > d.tolerance]
+        if not outside:
+            continue
+        drift = max(outside, key=lambda d: (abs(d.change) - _expanded(d)) / d.tolerance)
+        text = unit_text(drift.parameter)
+        message = (
+            f"{drift.unit}: {drift.parameter} was {drift.change:+.4g} {text} off after {12 * drift.years:.0f} months, "
+            f"tolerance {drift.tolerance:g} {text}, U {_expanded(drift):.3g}, E_n {drift.e_n:+.1f}{_besides(outside)}; what it "
+            f"measured since {_before(drift)} is in doubt: tell whoever used it"
+        )
+        evidence = {**_numbers(drift), "parameters": [d.parameter for d in outside]}
+        yield Finding("quality", "found_outside", drift.unit, message, (drift.unit,), evidence)
 
 
 def _leaving(audit: Audit) -> Iterator[Finding]:
-    """Units that are expected to leave their tolerance or limit before they are due."""
+    """Units that are expected to leave their tolerance or limit before they are due: each by what it leaves first."""
     due_day = {
         f"{audit.all.device[row]} {audit.all.unit[row]}": float(day)
         for row, day in zip(audit.due.row, audit.due.day, strict=True)
     }
-    for drift in _each(audit):
-        due = due_day.get(f"{drift.device} {drift.unit}", np.inf)
-        for what, bound, days in (
-            ("tolerance", drift.tolerance, (drift.leaves, drift.soonest, drift.latest)),
-            ("limit", drift.limit, drift.limit_day),
-        ):
-            if days[0] < due and days[0] > drift.day:
-                text = unit_text(drift.parameter)
-                message = (
-                    f"{drift.unit}: {drift.parameter} moves {drift.slope:+.3g} {text} a year and leaves its {what} of "
-                    f"{bound:g} {text} about {date_or_never(days[0])} "
-                    f"({date_or_never(days[1])} to {date_or_never(days[2])}), before it is due on {date_of(due)}; call it in"
-                )
-                yield Finding("quality", "leaves", drift.unit, message, (drift.unit,), _numbers(drift))
+    for unit, drifts in audit.units.items():
+        due = due_day.get(unit, np.inf)
+        found = [one for drift in drifts for one in _leavings(drift) if drift.day < one[0][0] < due]
+        if not found:
+            continue
+        days, what, bound, drift = min(found, key=lambda one: one[0][0])
+        text, others = unit_text(drift.parameter), list(dict.fromkeys(one[3].parameter for one in found))
+        message = (
+            f"{drift.unit}: {drift.parameter} moves {drift.slope:+.3g} {text} a year and leaves its {what} of {bound:g} {text} "
+            f"about {date_or_never(days[0])} ({date_or_never(days[1])} to {date_or_never(days[2])})"
+            f"{_besides(others)}, before it is due on {date_of(due)}; call it in"
+        )
+        yield Finding(
+            "quality", "leaves", drift.unit, message, (drift.unit,), {**_numbers(drift), "parameters": others}
+        )
+
+
+def _leavings(drift: UnitDrift) -> list[tuple[tuple[float, float, float], str, float, UnitDrift]]:
+    """Days (expected, soonest, latest) when a parameter leaves its tolerance, and the product's limit."""
+    tolerance = (drift.leaves, drift.soonest, drift.latest)
+    return [(tolerance, "tolerance", drift.tolerance, drift), (drift.limit_day, "limit", drift.limit, drift)]
+
+
+def _expanded(drift: UnitDrift) -> float:
+    """Expanded uncertainty of a change."""
+    return abs(drift.change / drift.e_n) if drift.e_n else np.inf
+
+
+def _besides(found: Sequence[object]) -> str:
+    """How many other parameters of a unit do the same."""
+    more = len(found) - 1
+    return f", and {more} more parameter{'s' if more > 1 else ''}" if more else ""
 
 
 def _unlike_their_kind(audit: Audit) -> Iterator[Finding]:
@@ -95,11 +136,6 @@ def _unlike_their_kind(audit: Audit) -> Iterator[Finding]:
                 f"{date_or_never(worst.latest)}): give it a shorter interval, or take it out of use"
             )
             yield Finding("quality", "drifts", worst.unit, message, (worst.unit,), _numbers(worst))
-
-
-def _each(audit: Audit) -> Iterator[UnitDrift]:
-    for drifts in audit.units.values():
-        yield from drifts
 
 
 def _numbers(drift: UnitDrift) -> dict[str, Any]:

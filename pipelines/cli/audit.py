@@ -78,7 +78,7 @@ def scope_of(since: str, until: str, device: str, station: str) -> Scope:
     if first >= last:
         message = f"audit: --since {since} is after --until {until or today()}, a period is needed; exchange the two"
         raise WrongUse(message)
-    return Scope(first, last, device, station)
+    return Scope(first, last, device, station, day_of(today()) + 1.0)
 
 
 def _refuse_nothing(found: Audit, root: str) -> None:

@@ -33,7 +33,7 @@ MOST_ROWS = 500  # of the table of findings; the page and the document have all
 @task(task_run_name="audit until {until}", cache_policy=NO_CACHE, persist_result=False)
 def look(archive: Archive, rules: Path | None, since: str, until: str, dask: str | None, workers: int) -> Audit:
     """What the archive tells, up to the end of a day."""
-    scope = Scope(day_of(since or "0001-01-01"), day_of(until) + 1.0)
+    scope = Scope(day_of(since or "0001-01-01"), day_of(until) + 1.0, tomorrow=day_of(today()) + 1.0)
     return audit(archive, load_rules(rules), scope, dask=dask, workers=workers)
 
 
