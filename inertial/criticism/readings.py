@@ -11,9 +11,8 @@ Array = NDArray[np.float64]
 STANDARD_GRAVITY = 9.80665  # m/s² in one g
 _TURNED = 0.05  # singular value, per root of a dwell, below which poses do not tell a response from a bias
 _ROUNDS = 12  # of reweighting
-_TUKEY = (
-    4.685  # widths of the biweight: 95 % efficiency under normal noise (Holland & Welsch, Commun. Stat. A6 (1977) 813)
-)
+_TUKEY = 4.685
+"""Widths of the biweight: 95 % efficiency under normal noise (Holland & Welsch, Commun. Stat. A6 (1977) 813)."""
 
 
 @dataclass(frozen=True)

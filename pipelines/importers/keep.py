@@ -11,7 +11,7 @@ from pipelines.archive import Archive, code_hash, stage_key
 if TYPE_CHECKING:
     from pipelines.archive import Run
     from pipelines.importers.files import Source
-    from pipelines.importers.judge import Judged
+    from pipelines.importers.judged import Judged
     from pipelines.importers.mapping import Mapping
     from pipelines.importers.record import Imported
 

@@ -1,0 +1,94 @@
+"""Six labelled faces: the published method beside least squares of all eighteen means."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from inertial.fits.ferraris import Faces, faces, ferraris
+from pipelines.importers.judged import Judged, coefficient, dwells_of, gravity_of
+from pipelines.importers.mapping import FACES
+from schemas.errors import DataRejected
+from schemas.units import AXES, MICRO, STANDARD_GRAVITY_M_S2
+
+if TYPE_CHECKING:
+    import pandas as pd
+    from numpy.typing import NDArray
+
+    from pipelines.importers.mapping import Mapping
+    from pipelines.importers.record import Imported
+
+UNLIKELY = 0.01
+"""Probability of a lack of fit below which six faces are not adequate."""
+
+
+def six_faces(data: Imported, mapping: Mapping) -> Judged:
+    """Six labelled faces: the published method, and least squares of all eighteen means with its lack of fit."""
+    dwells = dwells_of(data)
+    gravity = gravity_of(mapping)
+    up, down, error = _by_face(dwells, mapping)
+    published, found = ferraris(up, down, gravity), faces(up, down, gravity, error)
+    adequate = not bool(np.any(found.p_value < UNLIKELY))
+    per_g = np.linalg.norm(found.response, axis=1)
+    document = {
+        "adequate": adequate,
+        "error": {
+            "rms_ug": (MICRO * found.rms / per_g).tolist(),
+            "floor_ug": (MICRO * found.pure_error / per_g).tolist(),
+            "p_value": found.p_value.tolist(),
+        },
+        "published": {
+            "scale_per_m_s2": (np.diagonal(published.scale) / STANDARD_GRAVITY_M_S2).tolist(),
+            "rotation": published.rotation.tolist(),
+            "bias": published.bias.tolist(),
+        },
+        "least_squares": {
+            "bias": found.bias.tolist(),
+            "bias_error": found.bias_error.tolist(),
+            "response_per_g": found.response.tolist(),
+            "response_error": found.response_error.tolist(),
+            "residuals": found.residuals.tolist(),
+        },
+    }
+    lines = tuple(_face_line(k, found, float(published.bias[k]), data.out_unit) for k in range(3))
+    return Judged("faces", adequate, document, lines, _face_coefficients(str(dwells["unit"].iloc[0]), found, data))
+
+
+def _by_face(
+    dwells: pd.DataFrame, mapping: Mapping
+) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+    """Means (3, 3) with each axis up and down, and the standard error of a mean by output."""
+    faces_there = {mapping.poses.get(str(label), ""): k for k, label in enumerate(dwells["pose"])}
+    missing = [face for face in FACES if face not in faces_there]
+    if missing or len(dwells) != len(FACES):
+        message = (
+            f"import: {len(dwells)} dwells, faces {', '.join(missing) or 'none'} missing; each of {', '.join(FACES)} is needed "
+            "once; name them with --poses LABEL=+x,…"
+        )
+        raise DataRejected(message)
+    means = dwells[["out_x", "out_y", "out_z"]].to_numpy(dtype=np.float64)
+    up, down = (means[[faces_there[f"{sign}{axis}"] for axis in AXES]] for sign in "+-")
+    if not {"sd_x", "sd_y", "sd_z", "n"} <= set(dwells.columns):
+        return up, down, np.full(3, np.nan)
+    variance = dwells[["sd_x", "sd_y", "sd_z"]].to_numpy(dtype=np.float64) ** 2
+    return up, down, np.sqrt(np.mean(variance / dwells["n"].to_numpy(dtype=np.float64)[:, None], axis=0))
+
+
+def _face_line(k: int, found: Faces, published: float, unit: str) -> str:
+    bias = f"{AXES[k]}: bias {found.bias[k]:.5g} ± {found.bias_error[k]:.2g} {unit} (published method {published:.5g})"
+    misfit = f"lack of fit {found.rms[k]:.3g}, the samples allow {found.pure_error[k]:.2g} {unit}"
+    return f"{bias}; {misfit} (p = {found.p_value[k]:.1g})"
+
+
+def _face_coefficients(unit: str, found: Faces, data: Imported) -> list[dict[str, Any]]:
+    per_g, rows = f"{data.out_unit}/g", []
+    for i in range(3):
+        rows.append(coefficient(unit, i, "bias", "K0", found.bias[i], found.bias_error[i], data.out_unit))
+        rows.append(coefficient(unit, i, "scale", "K1", found.response[i, i], found.response_error[i, i], per_g))
+        for j in ((i + 1) % 3, (i + 2) % 3):
+            name = f"K{AXES[i]}{AXES[j]}"
+            rows.append(
+                coefficient(unit, i, "misalignment", name, found.response[i, j], found.response_error[i, j], per_g)
+            )
+    return rows

@@ -1,0 +1,54 @@
+"""What a fit at import answers, and what every such fit needs: dwells of one unit, and gravity where it was measured."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+from schemas.errors import DataRejected, WrongUse
+from schemas.units import AXES
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+    from pipelines.importers.mapping import Mapping
+    from pipelines.importers.record import Imported
+
+
+@dataclass(frozen=True)
+class Judged:
+    """A fit's answer: a document for JSON, lines for people, and coefficients for the archive."""
+
+    method: str
+    adequate: bool
+    document: dict[str, Any]
+    lines: tuple[str, ...]
+    coefficients: list[dict[str, Any]] = field(default_factory=list[dict[str, Any]])
+
+
+def dwells_of(data: Imported) -> pd.DataFrame:
+    """The dwells of an import of one unit."""
+    if data.dwells is None:
+        message = "import: nothing stands still in this record, dwells are needed for a fit; record static positions"
+        raise DataRejected(message)
+    units = len(set(data.dwells["unit"]))
+    if units > 1:
+        message = f"import: {units} units, a fit at import takes one; use 'tumbleline fit'"
+        raise WrongUse(message)
+    return data.dwells
+
+
+def gravity_of(mapping: Mapping) -> float:
+    """Gravity where it was measured, g."""
+    if mapping.norm_g is None:
+        message = (
+            "import: gravity at the place of measurement is needed for this fit and has no default; give --local-g M/S2"
+        )
+        raise WrongUse(message)
+    return mapping.norm_g
+
+
+def coefficient(unit: str, axis: int, effect: str, name: str, value: float, error: float, text: str) -> dict[str, Any]:
+    """A row of the archive's table of coefficients."""
+    row = {"unit": unit, "axis": AXES[axis], "effect": effect, "name": name}
+    return {**row, "value": float(value), "standard_error": float(error), "unit_text": text}

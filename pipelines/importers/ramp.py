@@ -1,0 +1,52 @@
+"""A temperature ramp in one pose: a cubic against the noise from sample to sample."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from inertial.fits.polynomial import fit_temperature_curve
+from pipelines.importers.judged import Judged
+from schemas.errors import WrongUse
+from schemas.units import AXES, MICRO, STANDARD_GRAVITY_M_S2
+
+if TYPE_CHECKING:
+    from pipelines.importers.mapping import Mapping
+    from pipelines.importers.record import Imported
+
+
+def ramp(data: Imported, mapping: Mapping) -> Judged:
+    """A cubic in temperature of a record in one pose; adequate only if what is left is sample noise."""
+    if data.samples is None or "unit_C" not in data.samples.columns:
+        message = (
+            "import: --fit temperature works on samples with a temperature; map temperature=…, without --rows dwells"
+        )
+        raise WrongUse(message)
+    output = data.samples[list(AXES)].to_numpy(dtype=np.float64)
+    fit = fit_temperature_curve(output, data.samples["unit_C"].to_numpy(dtype=np.float64))
+    gravity = mapping.norm_g or 1.0
+    per_g = {"g": 1.0, "m/s^2": STANDARD_GRAVITY_M_S2}.get(
+        data.out_unit, float(np.mean(np.linalg.norm(output, axis=1))) / gravity
+    )
+    ratio = fit.rms / fit.noise
+    document = {
+        "adequate": fit.adequate,
+        "error": {
+            "rms_ug": (MICRO * fit.rms / per_g).tolist(),
+            "floor_ug": (MICRO * fit.noise / per_g).tolist(),
+            "ratio": ratio.tolist(),
+            "p_value": fit.p_value.tolist(),
+        },
+        "coefficients": fit.coefficients.tolist(),
+        "reference_C": fit.reference_temperature,
+        "residual_rms": fit.rms.tolist(),
+        "noise": fit.noise.tolist(),
+    }
+    lines = tuple(
+        f"{AXES[k]}: a cubic in temperature leaves {fit.rms[k]:.3g} {data.out_unit}, {ratio[k]:.1f} times the noise of a sample "
+        f"({fit.noise[k]:.3g}, from first differences)"
+        for k in range(3)
+    )
+    advice = "something other than temperature itself drives this output; look at its rate and lag with 'tumbleline diagnose'"
+    return Judged("temperature", fit.adequate, document, lines if fit.adequate else (*lines, advice))
