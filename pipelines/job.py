@@ -145,7 +145,10 @@ def job_of_run(run: Run, *, effects: Sequence[str] = (), model: Path | None = No
     """The job of an archived run, with another model or other limits where they are given."""
     about = run.about
     if not about.get("capture"):
-        message = f"run {run.id}: its data were imported, not captured; fit them with 'tumbleline import'"
+        message = (
+            f"run {run.id}: its data were imported, a captured run is needed; fit them with 'tumbleline rerun {run.id} "
+            "--effects a,b,c', or at import with --fit"
+        )
         raise WrongUse(message)
     if about.get("parents"):
         message = (

@@ -33,7 +33,10 @@ def dwells_of(data: Imported) -> pd.DataFrame:
         raise DataRejected(message)
     units = len(set(data.dwells["unit"]))
     if units > 1:
-        message = f"import: {units} units, a fit at import takes one; use 'tumbleline fit'"
+        message = (
+            f"import: {units} units, a fit at import takes one; import them one by one, or without --fit and then "
+            "'tumbleline rerun RUN --effects a,b,c'"
+        )
         raise WrongUse(message)
     return data.dwells
 
