@@ -16,6 +16,7 @@ STYLES = {
     "suspended": "yellow",
     "resumed": "green",
     "unit_lost": "magenta",
+    "power": "yellow",
     "emergency_stop": "bold red",
     "stopped": "red",
     "not_safe": "bold red",
