@@ -101,16 +101,6 @@ class State:
         """Change of specific force at the move before each dwell, (..., n, 3), g; zero for the first dwell."""
         return _step(self.force, axis=-2)
 
-    @cached_property
-    def outer_step(self) -> Array | None:
-        """Change of the outer angle at the move before each dwell, (..., n), rad."""
-        return None if self.outer is None else _step(self.outer, axis=-1)
-
-    @cached_property
-    def inner_step(self) -> Array | None:
-        """Change of the inner angle at the move before each dwell, (..., n), rad."""
-        return None if self.inner is None else _step(self.inner, axis=-1)
-
     @property
     def batch(self) -> tuple[int, ...]:
         """Batch dimensions."""

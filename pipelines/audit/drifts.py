@@ -38,7 +38,6 @@ MONTH_D = YEAR_D / 12.0
 OWN = tuple(name for name in NAMES if FAMILIES[FAMILY_OF[name]].own)
 FEWEST_PAIRS = 8
 AHEAD = np.arange(0.0, 10.0 + 1e-9, 1.0 / 24.0)  # years, in steps of half a month
-LEAST_PAIR_D = 1.0
 
 
 @dataclass(frozen=True)

@@ -16,7 +16,6 @@ if TYPE_CHECKING:
 FALLS = 0.005
 """Share by which an error must change to count."""
 BETTER, WORSE, EQUAL, NOTHING = "better", "worse", "no better", "nothing to judge"
-SIDES = ("old", "new")
 
 
 def fresh_tasks(found: Sequence[Judged], archive: str, wanted: Wanted) -> list[FreshTask]:

@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Literal
 
-from schemas.errors import OperatorNeeded, StationRefused
+from schemas.errors import StationRefused
 from stations.codec import named
 
 if TYPE_CHECKING:
@@ -154,12 +154,6 @@ class Reader:
         """Switches the supply of all devices: an absolute state, written once and read back; given twice it changes nothing."""
         self.require_switch()
         self._registers.set("power", wanted)
-
-    def require_closed_door(self) -> None:
-        """Stops the run while the chamber's door is open."""
-        if self._registers.text("door") != "closed":
-            message = f"{self._registers.name}: the chamber's door is open, closed is needed; close it and start again"
-            raise OperatorNeeded(message)
 
 
 def _possible(celsius: float, volts: float) -> bool:

@@ -14,7 +14,6 @@ if TYPE_CHECKING:
     Array = NDArray[np.float64]
 
 POOL_ABOVE = 0.25  # p-value above which the interaction is pooled with repeatability (AIAG MSA, 4th ed., appendix A)
-SPREADS = 6.0
 
 
 @dataclass(frozen=True)
