@@ -1,0 +1,90 @@
+"""Dwells and temperatures of a lot as arrays, whatever the order of the rows they come in."""
+
+import numpy as np
+import pandas as pd
+
+from pipelines.stages.arrays import lot_arrays
+from pipelines.stages.unit_rows import ByUnit
+
+UNITS, DWELLS = ("A1", "B2", "C3"), 5
+
+
+def dwells(rng: np.random.Generator) -> pd.DataFrame:
+    unit, dwell = (index.ravel() for index in np.indices((len(UNITS), DWELLS)))
+    numbers = ("time_s", "out_x", "out_y", "out_z", "force_x", "force_y", "force_z", "unit_C")
+    return pd.DataFrame(
+        {
+            "unit": np.array(UNITS, dtype=object)[unit],
+            "dwell": dwell,
+            "kind": np.where(dwell < 3, "dwell", np.where(dwell < 4, "verification", "allan")),
+            "pose": [f"p{one}" for one in dwell],
+            "out_unit": "V",
+            "slot": unit,
+            **{name: rng.normal(size=unit.size) for name in numbers},
+            **{name: rng.uniform(1.0, 2.0, unit.size) for name in ("sd_x", "sd_y", "sd_z")},
+            "n": 100,
+        }
+    )
+
+
+def history(rng: np.random.Generator) -> pd.DataFrame:
+    time, unit = (index.ravel() for index in np.indices((6, len(UNITS))))
+    frame = pd.DataFrame(
+        {"time_s": 10.0 * time, "unit": np.array(UNITS, dtype=object)[unit], "unit_C": rng.normal(size=time.size)}
+    )
+    frame.loc[4, "unit_C"] = np.nan
+    return frame
+
+
+def test_the_order_of_the_rows_does_not_matter(rng: np.random.Generator) -> None:
+    table, temperatures = dwells(rng), history(rng)
+    lot = lot_arrays(table, temperatures)
+    mixed = lot_arrays(table.sample(frac=1.0, random_state=1), temperatures.sample(frac=1.0, random_state=2))
+    assert mixed.units == lot.units == UNITS
+    assert (mixed.poses, mixed.kinds.tolist()) == (lot.poses, lot.kinds.tolist())
+    for name in ("force", "time", "temperature", "slot"):
+        np.testing.assert_array_equal(getattr(mixed.state, name), getattr(lot.state, name))
+    np.testing.assert_array_equal(mixed.output, lot.output)
+    np.testing.assert_array_equal(mixed.standard_error, lot.standard_error)
+    assert lot.state.history is not None
+    assert mixed.state.history is not None
+    np.testing.assert_array_equal(mixed.state.history.temperature, lot.state.history.temperature)
+
+
+def test_arrays_hold_the_rows_of_every_unit(rng: np.random.Generator) -> None:
+    table, temperatures = dwells(rng), history(rng)
+    lot = lot_arrays(table, temperatures)
+    own, told = table[table["unit"] == "B2"], temperatures[temperatures["unit"] == "B2"].dropna()
+    np.testing.assert_array_equal(lot.output[1], own[["out_x", "out_y", "out_z"]])
+    np.testing.assert_allclose(lot.standard_error[1], own[["sd_x", "sd_y", "sd_z"]] / 10.0)
+    assert lot.state.history is not None
+    expected = np.interp(lot.state.history.time, told["time_s"], told["unit_C"])
+    np.testing.assert_array_equal(lot.state.history.temperature[1], expected)
+
+
+def test_only_dwells_of_the_kinds_that_are_wanted_are_there(rng: np.random.Generator) -> None:
+    table = dwells(rng)
+    lot = lot_arrays(table, kinds=("dwell", "verification"))
+    chosen = lot_arrays(table[table["kind"] != "allan"])
+    assert lot.dwells.tolist() == [0, 1, 2, 3]
+    np.testing.assert_array_equal(lot.output, chosen.output)
+    assert lot.kinds.tolist() == chosen.kinds.tolist()
+
+
+def test_a_unit_without_temperatures_leaves_the_lot_without_a_history(rng: np.random.Generator) -> None:
+    temperatures = history(rng)
+    for missing in (temperatures[temperatures["unit"] != "C3"], temperatures.iloc[:0]):
+        assert lot_arrays(dwells(rng), missing).state.history is None
+    more = lot_arrays(dwells(rng).query("unit != 'A1'"), temperatures).state.history
+    assert more is not None
+    assert more.temperature.shape[0] == 2
+
+
+def test_rows_of_a_unit_are_found_together_and_scattered(rng: np.random.Generator) -> None:
+    table = dwells(rng)
+    mixed = table.sample(frac=1.0, random_state=3)
+    for unit in UNITS:
+        np.testing.assert_array_equal(ByUnit(table).of(unit)["out_x"], table[table["unit"] == unit]["out_x"])
+        np.testing.assert_array_equal(ByUnit(mixed).of(unit)["out_x"], mixed[mixed["unit"] == unit]["out_x"])
+    assert ByUnit(table).units == list(UNITS)
+    assert len(ByUnit(table).of("elsewhere")) == len(ByUnit(table.iloc[:0]).of("A1")) == 0
