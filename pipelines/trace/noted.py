@@ -12,7 +12,7 @@ from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
 from dataclasses import dataclass, field, fields
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from pipelines.archive import files
 from pipelines.archive.store import ObjectPath, first_line
@@ -144,11 +144,17 @@ def _noted(place: Place) -> dict[str, Noted]:
         columns = {name: table.column(name).to_pylist() for name in ("place", "stamp", *NAMES)}
     except (OSError, ArchiveUnusable, pa.ArrowInvalid, KeyError):
         return {}
-    columns["ends"] = [tuple(json.loads(text)) for text in columns["ends"]]
-    columns["evidence"] = [tuple(map(tuple, json.loads(text))) for text in columns["evidence"]]
-    events = (Event(**dict(zip(NAMES, row, strict=True))) for row in zip(*(columns[n] for n in NAMES), strict=True))
+    for name in ("ends", "evidence"):  # of which many are the same
+        known = {text: _tuples(json.loads(text)) for text in set(columns[name])}
+        columns[name] = [known[text] for text in columns[name]]
+    events = (Event(*row) for row in zip(*(columns[name] for name in NAMES), strict=True))
     rows = zip(columns["place"], columns["stamp"], events, strict=True)
     return {name: Noted(stamp, event) for name, stamp, event in rows}
+
+
+def _tuples(value: Any) -> Any:
+    """Lists as tuples, at any depth."""
+    return tuple(_tuples(one) for one in value) if isinstance(value, list) else value
 
 
 def _encoded(known: Mapping[str, Noted]) -> bytes:

@@ -1,0 +1,79 @@
+"""The ledger's noted events: the same as the files tell, whatever was noted before."""
+
+import shutil
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+from ledger_events import event
+
+from pipelines.trace import Ledger
+from pipelines.trace import noted as module
+from pipelines.trace.noted import NOTED, histories_of
+from schemas.errors import ArchiveUnusable
+
+
+@pytest.fixture
+def ledger(tmp_path: Path) -> Ledger:
+    found = Ledger(tmp_path)
+    evidence = (("coefficients", "1" * 64), ("grades", "2" * 64))
+    for number in range(200):
+        one = event(serial=f"A{number:03d}", sequence=1, evidence=evidence, when="2026-01-01T00:00:00+00:00")
+        found.write_bulk([one, replace(one, sequence=2, action="supersede", run="r-2", start="2026-06-01", ends=(1,))])
+    return found
+
+
+def told(root: Path) -> list[str]:
+    return sorted(map(repr, histories_of(root).units))
+
+
+def test_what_was_noted_is_what_the_files_tell(ledger: Ledger, tmp_path: Path) -> None:
+    first, files = told(tmp_path), histories_of(tmp_path)
+    assert (tmp_path / NOTED).is_dir()
+    assert files.read == 0
+    assert told(tmp_path) == first
+    assert sorted(map(repr, [ledger.events(f"A{n:03d}") for n in range(200)])) == first
+    shutil.rmtree(tmp_path / NOTED)
+    assert told(tmp_path) == first
+
+
+def test_only_events_that_are_new_or_changed_are_read(ledger: Ledger, tmp_path: Path) -> None:
+    told(tmp_path)
+    ledger.revoke("A007", "dropped", day="2026-07-01")
+    place = next((tmp_path / "calibrations").glob("*/*/000002.json"))
+    place.write_text(place.read_text(encoding="utf-8").replace('"bench"', '"bench-2"'), encoding="utf-8")
+    found = histories_of(tmp_path)
+    assert found.read == 2
+    assert sum(len(own) for own in found.units) == 401
+    assert sum("bench-2" in one for one in told(tmp_path)) == 1
+
+
+def test_events_that_are_gone_are_not_told_from_what_was_noted(ledger: Ledger, tmp_path: Path) -> None:
+    told(tmp_path)
+    shutil.rmtree(next((tmp_path / "calibrations").glob("*/*")))
+    assert len(told(tmp_path)) == 199
+    next((tmp_path / "calibrations").glob("*/*/000001.json")).unlink()
+    assert len(histories_of(tmp_path).problems) == 1
+    with pytest.raises(ArchiveUnusable, match=r"has event 000002\.json where number 1 is due"):
+        list(ledger.all())
+
+
+def test_a_noted_file_that_is_foreign_or_cut_off_is_made_again(ledger: Ledger, tmp_path: Path) -> None:
+    first = told(tmp_path)
+    ours = sorted((tmp_path / NOTED).iterdir())
+    ours[0].write_bytes(ours[0].read_bytes()[:100])
+    ours[1].write_bytes(b"foreign")
+    assert told(tmp_path) == first
+    assert histories_of(tmp_path).read == 0
+
+
+def test_a_ledger_that_may_only_be_read_is_told_all_the_same(
+    ledger: Ledger, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def refuse(*_args: object) -> None:
+        message = "archive: read-only"
+        raise ArchiveUnusable(message)
+
+    monkeypatch.setattr(module.files, "publish", refuse)
+    assert len(list(ledger.all())) == 400
+    assert not (tmp_path / NOTED).exists()
