@@ -3,32 +3,15 @@
 import json
 import os
 import sqlite3
-import subprocess
 import sys
-from pathlib import Path
 
 import pytest
+from root_process import ROOT, python
 
-ROOT = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT))
 
 from benchmarks.generated_archive import write_archive
 from pipelines.flows.local import local_server
-
-
-def python(environment: dict[str, str], *arguments: str) -> str:
-    """Output of a module, run in the project's root."""
-    done = subprocess.run(
-        [sys.executable, *arguments],
-        cwd=ROOT,
-        env=environment,
-        capture_output=True,
-        text=True,
-        timeout=240,
-        check=False,
-    )
-    assert done.returncode == 0, done.stdout + done.stderr
-    return done.stdout
 
 
 @pytest.mark.slow

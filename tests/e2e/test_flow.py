@@ -8,27 +8,11 @@ from pathlib import Path
 
 import pytest
 from capture_double import recipe_file
+from root_process import ROOT, python
 
 from pipelines.archive import Archive
 from pipelines.chain import ORDER
 from pipelines.flows.local import local_server
-
-ROOT = Path(__file__).resolve().parents[2]
-
-
-def python(environment: dict[str, str], *arguments: str) -> str:
-    """Output of a module, run in the project's root."""
-    done = subprocess.run(
-        [sys.executable, *arguments],
-        cwd=ROOT,
-        env=environment,
-        capture_output=True,
-        text=True,
-        timeout=240,
-        check=False,
-    )
-    assert done.returncode == 0, done.stdout + done.stderr
-    return done.stdout
 
 
 def history(home: Path, query: str) -> list[tuple[str, ...]]:
