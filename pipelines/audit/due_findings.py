@@ -41,17 +41,17 @@ def of_what_is_due(audit: Audit) -> Iterator[Finding]:
 
 
 def _held_but_failed(audit: Audit) -> Iterator[Finding]:
-    """Units that did not pass when they were measured last, and have a certificate that holds."""
+    """Units that did not pass when they were measured last, and have a certificate that holds; by kind of device."""
     own = audit.due
-    for k in np.flatnonzero(own.valid & (own.because == "did not pass")):
-        row = own.row[k]
-        unit, run, day = str(audit.all.unit[row]), str(audit.all.run[row]), date_of(float(audit.all.day[row]))
+    for device, chosen in _by_device(audit, np.flatnonzero(own.valid & (own.because == "did not pass"))):
+        units, certificates = _units(audit, chosen), tuple(str(one) for one in own.certificate[chosen])
         message = (
-            f"{unit} did not pass on {day} (run {run}), certificate {own.certificate[k]} holds all the same; revoke it from "
-            "the day on which the unit is no longer to be relied on, and measure the unit again"
+            f"{device}: {len(units)} units did not pass when they were measured last, their certificates hold all the same; "
+            f"revoke each from the day on which its unit is no longer to be relied on, and measure it again ({some(certificates)})"
         )
-        evidence = {"run": run, "date": day, "certificate": str(own.certificate[k])}
-        yield Finding("quality", "held_but_failed", unit, message, (unit,), evidence)
+        runs = [str(run) for run in audit.all.run[own.row[chosen]]]
+        evidence = {"certificates": list(certificates), "runs": runs}
+        yield Finding("quality", "held_but_failed", device, message, units, evidence)
 
 
 def _uncertified(audit: Audit) -> Iterator[Finding]:

@@ -12,7 +12,7 @@ from pipelines.audit.finding import WHO
 from pipelines.audit.parameters import unit_text
 from pipelines.audit.pictures import chart_plot, drift_plot, due_plot, series_plot, yield_plot
 from pipelines.report.diagnosis import chance
-from pipelines.report.numbers import plain
+from pipelines.report.numbers import THIN, plain
 from pipelines.report.templates import template
 
 if TYPE_CHECKING:
@@ -38,6 +38,7 @@ def render(audit: Audit, found: list[Finding], archive: str) -> str:
         total=len(found),
         passed=next((share for share in audit.yields if share.of == "all"), None),
         overdue=int(np.count_nonzero(audit.due.day < audit.scope.until)),
+        valid=int(audit.due.valid.sum()),
         rules=audit.rules,
         series_svg=series_plot(series) if series else "",
         charts_svg=chart_plot(charts) if charts else "",
@@ -60,6 +61,7 @@ def render(audit: Audit, found: list[Finding], archive: str) -> str:
         chance=chance,
         date=_date,
         percent=_percent,
+        whole=_whole,
     )
 
 
@@ -113,6 +115,10 @@ def _telling_drifts(audit: Audit) -> list[UnitDrift]:
 
 def _date(day: float) -> str:
     return date_of(day) if np.isfinite(day) else "–"
+
+
+def _whole(count: int) -> str:
+    return f"{count:,}".replace(",", THIN)
 
 
 def _percent(share: float) -> str:

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 from pipelines.audit.calibrations import date_of
 from pipelines.audit.finding import Finding
 from pipelines.audit.parameters import unit_text
+from pipelines.report.numbers import plain
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -30,7 +31,7 @@ def _odd(audit: Audit) -> Iterator[Finding]:
         what = f"lot of run {odd.run} ({odd.units} units)" if odd.kind == "lot" else f"unit {odd.name}"
         text = unit_text(odd.parameter)
         message = (
-            f"{odd.device}: {what} of {date_of(odd.day)} stands out in {odd.parameter}: {odd.value:.4g} {text}, "
+            f"{odd.device}: {what} of {date_of(odd.day)} stands out in {odd.parameter}: {plain(odd.value, 4)} {text}, "
             f"{odd.z:+.1f} σ from its kind; look for what was different in making it"
         )
         evidence = {"run": odd.run, "station": odd.station, "parameter": odd.parameter, "value": odd.value, "z": odd.z}

@@ -55,11 +55,16 @@ def _moved(audit: Audit, series: Series, change: Change, kind: str, what: str) -
     later = [c.first for c in series.changes if c.first > change.first]
     end = float(series.day[later[0]]) if later else np.inf
     units, runs = _measured(audit, series, low, end)
+    remedy = (
+        "look how its fixture sits; what units say of their seat there is off by this"
+        if kind == "slot_moved"
+        else "level it and measure them again, or run them again with this effect in the model"
+    )
     until = f" until {date_of(end)}" if np.isfinite(end) else ""
     message = (
         f"{series.station}: {what} moved by {change.shift:+.0f} ± {2 * change.error:.0f} {series.unit_text} on "
         f"{date_of(first)} (between {date_of(low)} and {date_of(high)}, 95 %); {len(units)} units in {runs} runs were "
-        f"measured there since{until}: level it and measure them again, or run them again with this effect in the model"
+        f"measured there since{until}: {remedy}"
     )
     evidence = {
         "station": series.station, "where": series.where, "parameter": series.parameter, "date": date_of(first),

@@ -111,6 +111,19 @@ def _leavings(drift: UnitDrift) -> list[tuple[tuple[float, float, float], str, f
     return [(tolerance, "tolerance", drift.tolerance, drift), (drift.limit_day, "limit", drift.limit, drift)]
 
 
+def _when(drift: UnitDrift) -> str:
+    """When a parameter leaves its tolerance, as a sentence goes on."""
+    if not np.isfinite(drift.tolerance):
+        return "has no tolerance"
+    bound = f"its tolerance of {drift.tolerance:g} {unit_text(drift.parameter)}"
+    if np.isfinite(drift.leaves):
+        days = f"({date_or_never(drift.soonest)} to {date_or_never(drift.latest)})"
+        return f"leaves {bound} about {date_of(drift.leaves)} {days}"
+    if np.isfinite(drift.soonest):
+        return f"may leave {bound} from {date_of(drift.soonest)} on"
+    return f"stays in {bound} for the next ten years"
+
+
 def _expanded(drift: UnitDrift) -> float:
     """Expanded uncertainty of a change."""
     return abs(drift.change / drift.e_n) if drift.e_n else np.inf
@@ -129,11 +142,10 @@ def _unlike_their_kind(audit: Audit) -> Iterator[Finding]:
         worst = max(drifts, key=lambda drift: abs(drift.odd), default=None)
         if worst is not None and abs(worst.odd) > outlier_limit(count) and worst.day >= audit.scope.since:
             text = unit_text(worst.parameter)
-            when = f"leaves its tolerance of {worst.tolerance:g} {text} about {date_or_never(worst.leaves)}"
+            when = f"{_when(worst)}: give it a shorter interval, or take it out of use"
             message = (
                 f"{worst.unit}: {worst.parameter} moves {worst.slope:+.3g} {text} a year over {worst.calibrations} calibrations, "
-                f"{abs(worst.odd):.1f} σ from its kind, and {when} ({date_or_never(worst.soonest)} to "
-                f"{date_or_never(worst.latest)}): give it a shorter interval, or take it out of use"
+                f"{abs(worst.odd):.1f} σ from its kind, and {when}"
             )
             yield Finding("quality", "drifts", worst.unit, message, (worst.unit,), _numbers(worst))
 

@@ -13,6 +13,7 @@ ROOT = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT))
 
 from benchmarks.generated_archive import write_archive
+from benchmarks.generated_ledger import write_ledger
 from pipelines.archive import Archive
 from pipelines.audit.audit import Scope, audit
 from pipelines.audit.calibrations import Calibrations, date_of, day_of
@@ -120,3 +121,21 @@ def test_a_serial_that_two_runs_have_at_once_is_told_with_both_runs(made: Path) 
     [finding] = [one for one in told if one.kind == "two_units"]
     assert finding.units == (str(unit[a]),)
     assert set(finding.evidence["runs"]) == {str(found.all.run[a]), str(found.all.run[b])}
+
+
+def test_units_that_failed_under_a_valid_certificate_make_one_finding_for_their_kind(
+    made: Path, tmp_path: Path
+) -> None:
+    shutil.copytree(made, tmp_path / "archive", ignore=shutil.ignore_patterns("index"))
+    archive, scope = Archive(tmp_path / "archive"), Scope(day_of("2021-01-01"), day_of("2022-02-01"))
+    first = audit(archive, RULES, scope)
+    failed = [int(row) for row in first.due.row[first.due.because == "did not pass"]]
+    assert failed
+    all_ = first.all
+    columns = (all_.unit, all_.device, all_.run, all_.station)
+    write_ledger(archive.root, [(*(str(column[row]) for column in columns), "2021-12-01") for row in failed])
+    found = audit(archive, RULES, scope)
+    told = {finding.subject: finding for finding in findings(found) if finding.kind == "held_but_failed"}
+    assert {unit for finding in told.values() for unit in finding.units} == {str(first.all.unit[row]) for row in failed}
+    assert set(told) == {str(first.all.device[row]) for row in failed}
+    assert "uncertified" in {finding.kind for finding in findings(found)}
