@@ -47,7 +47,8 @@ def _held_but_failed(audit: Audit) -> Iterator[Finding]:
         units, certificates = _units(audit, chosen), tuple(str(one) for one in own.certificate[chosen])
         message = (
             f"{device}: {len(units)} units did not pass when they were measured last, their certificates hold all the same; "
-            f"revoke each from the day on which its unit is no longer to be relied on, and measure it again ({some(certificates)})"
+            "revoke each from the day on which its unit is no longer to be relied on, and measure it again "
+            f"({some(certificates)})"
         )
         runs = [str(run) for run in audit.all.run[own.row[chosen]]]
         evidence = {"certificates": list(certificates), "runs": runs}
