@@ -6,7 +6,8 @@ serials, a table that went out of level on a day, a knocked slot, a bad lot, a g
 archive, as FOLDER.truth.json.
 
 Files are written without fsync and without the product's stages: plain least squares stands for an earlier version of
-the code. Records (raw samples) are not made: re-runs begin at the fit.
+the code. Records (raw samples) are not made: re-runs begin at the fit, and `tumbleline verify` rightly says of every run that
+its capture is missing and that it has no report.
 """
 
 from __future__ import annotations
