@@ -3,18 +3,28 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cache
 from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Hashable, Sequence
 
     import pandas as pd
     import pandera.pandas as pa
     from numpy.typing import NDArray
 
 DIFFERENT = 2**62
+
+
+_NONE = np.zeros(0, dtype=np.intp)
+
+
+@cache
+def _named(kind: Hashable) -> str:
+    """The name of a type; the libraries put it together anew whenever they are asked."""
+    return str(kind)
 
 
 @dataclass(frozen=True)
@@ -34,13 +44,13 @@ class Seen:
     def of(cls, values: pd.Series) -> Self:
         """What a column holds."""
         if isinstance(values.dtype, np.dtype) and values.dtype.kind in "fiub":
-            return cls(str(values.dtype), values.to_numpy(), np.zeros(0, dtype=np.intp))
+            return cls(_named(values.dtype), values.to_numpy(), _NONE)
         codes, texts = values.factorize()
-        return cls(str(values.dtype), None, codes, tuple(texts))
+        return cls(str(values.dtype), None, codes, tuple(texts.tolist()))
 
     def is_right(self, column: pa.Column) -> bool:
         """Whether the column has its type and passes its checks."""
-        kind = str(column.dtype).split("[", maxsplit=1)[0].replace("string", "str")
+        kind = _named(column.dtype).split("[", maxsplit=1)[0].replace("string", "str")
         if self.kind != kind or (not column.nullable and self._has_gaps()):
             return False
         return all(self._passes(check) for check in column.checks or [])

@@ -20,11 +20,22 @@ SCHEMA_MARK = b"tumbleline.schema"
 
 def table_bytes(name: str, frame: pd.DataFrame, version: int) -> bytes:
     """A table as Parquet: zstd, no index, no library notes, the table's name and schema version in the metadata."""
+    return encoded(columns_of(name, frame, version))
+
+
+def columns_of(name: str, frame: pd.DataFrame, version: int) -> pa.Table:
+    """The columns of a table with its name and schema version, as they are encoded."""
     import pyarrow as pa  # a quarter of a second, which commands without a table need not spend
-    import pyarrow.parquet as pq
 
     columns = {str(column): pa.array(frame[column], from_pandas=True) for column in frame.columns}
-    table = pa.table(columns, metadata={TABLE_MARK: name.encode(), SCHEMA_MARK: str(version).encode()})
+    return pa.table(columns, metadata={TABLE_MARK: name.encode(), SCHEMA_MARK: str(version).encode()})
+
+
+def encoded(table: pa.Table) -> bytes:
+    """A table's bytes as Parquet."""
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
     sink = pa.BufferOutputStream()
     pq.write_table(table, sink, compression="zstd", compression_level=3)
     return sink.getvalue().to_pybytes()

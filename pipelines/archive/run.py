@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 from pipelines.archive import chain, files
 from pipelines.archive.listing import SEALED, stages_of
-from pipelines.archive.parquet import read_table, table_bytes
+from pipelines.archive.parquet import columns_of, encoded, read_table
 from pipelines.archive.provenance import provenance
 from pipelines.archive.records import COMPLETE, PARTS, Records
 from pipelines.archive.signatures import ENTRY
@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
 
     import pandas as pd
+    import pyarrow as pa
 
     from pipelines.archive.archive import Archive
     from pipelines.archive.store import Place
@@ -68,8 +69,8 @@ class Run:
 
         by, follows = provenance(), self._manifests(about.get("inputs", {}))
         for name, frame in outputs.items():
-            data = table_bytes(name, tables.check(name, frame, where=f"{stage} → {name}"), tables.VERSION)
-            self._put(f"{name}.parquet", data)
+            checked = tables.check(name, frame, where=f"{stage} → {name}")
+            data = self._put_table(name, columns_of(name, checked, tables.VERSION))
             content = {
                 "stage": stage,
                 "key": key,
@@ -154,6 +155,12 @@ class Run:
         if records is not None and (records.path / COMPLETE).is_file():
             found["records"] = files.sha256(records.path / COMPLETE)
         return {name: value for name, value in sorted(found.items()) if value}
+
+    def _put_table(self, name: str, table: pa.Table) -> bytes:
+        """The bytes of a table, which is published."""
+        data = encoded(table)
+        self._put(f"{name}.parquet", data)
+        return data
 
     def _put(self, name: str, data: bytes) -> None:
         """Publish a file of the run."""

@@ -11,6 +11,7 @@ from pipelines.archive.parquet import decoded
 
 if TYPE_CHECKING:
     import pandas as pd
+    import pyarrow as pa
 
     from pipelines.archive import Archive
 
@@ -22,6 +23,7 @@ class Remembering(Run):
         super().__init__(archive, run_id)
         self._known: dict[str, pd.DataFrame] = {}
         self._waiting: dict[str, bytes] = {}
+        self._made: dict[str, pa.Table] = {}
 
     @cached_property
     def about(self) -> dict[str, Any]:  # pyright: ignore[reportIncompatibleMethodOverride]  # it does not change
@@ -31,14 +33,12 @@ class Remembering(Run):
     def table(self, name: str) -> pd.DataFrame:
         """A table of the run; whoever is given it may change it.
 
-        What was made here is decoded from its bytes, too: a table in memory may lie there otherwise than one from a file, and
-        sums over it end in other last digits.
+        What was made here goes through the columns that its bytes are encoded from, too: a stage's table may lie in memory
+        otherwise than one from a file, and sums over it end in other last digits.
         """
         if name not in self._known:
-            waiting = self._waiting.get(f"{name}.parquet")
-            self._known[name] = (
-                super().table(name) if waiting is None else decoded(waiting).to_pandas(use_threads=False)
-            )
+            made = self._made.pop(name, None) or self._adopted(name)
+            self._known[name] = super().table(name) if made is None else made.to_pandas(use_threads=False)
         return self._known[name].copy(deep=False)
 
     def manifest(self, name: str) -> dict[str, Any]:
@@ -51,6 +51,15 @@ class Remembering(Run):
         if self._waiting:
             files.publish_all(self.path, self._waiting)
             self._waiting = {}
+
+    def _adopted(self, name: str) -> pa.Table | None:
+        """A table that was taken over and is not flushed."""
+        waiting = self._waiting.get(f"{name}.parquet")
+        return None if waiting is None else decoded(waiting)
+
+    def _put_table(self, name: str, table: pa.Table) -> bytes:
+        self._made[name] = table
+        return super()._put_table(name, table)
 
     def _put(self, name: str, data: bytes) -> None:
         self._waiting[name] = data
