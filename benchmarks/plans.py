@@ -27,9 +27,12 @@ from inertial.noise.dwells import DwellNoise  # noqa: E402
 from inertial.state import State  # noqa: E402
 from pipelines.models import STARTING_MODEL  # noqa: E402
 from pipelines.recipes import load_recipe  # noqa: E402
+from pipelines.stages.least import least  # noqa: E402
 from pipelines.stages.minutes import spent  # noqa: E402
-from pipelines.stages.optimise import Wish, candidates, optimise, seen_by, textbook  # noqa: E402
+from pipelines.stages.optimise import optimise  # noqa: E402
 from pipelines.stages.plan import Planned, identified, planned  # noqa: E402
+from pipelines.stages.textbook import seen_by, textbook  # noqa: E402
+from pipelines.stages.wish import Wish, between, candidates  # noqa: E402
 from schemas.errors import TumblelineError  # noqa: E402
 from schemas.station import load_station  # noqa: E402
 from stations.plant.device import Devices, Truth, draw_truth, rotation, stream  # noqa: E402
@@ -145,7 +148,14 @@ def compared(name: str, options: argparse.Namespace) -> None:
     if options.bias_factor != 1.0:
         wanted[:, 0] *= options.bias_factor
     begun = time.perf_counter()
-    wish = Wish(wanted, seen_by(against, levels), levels, candidates(station), verification=options.verification)
+    wish = Wish(
+        wanted,
+        seen_by(against, levels),
+        (min(levels), max(levels)),
+        candidates(station),
+        legal=between(levels),
+        verification=options.verification,
+    )
     try:
         best = optimise(base, against, wish, lambda _: None)
     except TumblelineError as refusal:
@@ -162,6 +172,9 @@ def compared(name: str, options: argparse.Namespace) -> None:
         parts = spent(course.stretches).document()
         spread = ", ".join(f"{part} {parts[part]:.0f}" for part in ("soaks", "moves", "dwells"))
         print(f"  {title:<9}{parts['total']:6.0f} min: {spread}")
+    bound = least(base, against, wish)
+    if bound is not None:
+        print(f"  dwells without end would take {100.0 * bound.share:.0f} %, for {bound.effect}")
     print(f"  station time {100.0 * best.share:.1f} %; errors expected at most {best.worst:.3f} of those wanted")
     names, before = squared_errors(against, preset, options)
     _, after = squared_errors(best.planned, preset, options)

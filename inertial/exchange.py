@@ -100,16 +100,16 @@ def _worst(matrix: Array) -> Array:
 CRITERIA: dict[Criterion, Callable[[Array], Array]] = {"D": _d, "A": _a, "worst": _worst}
 
 
-def exchanged(slots: Slots, choice: Choice, criterion: Criterion = "worst") -> Choice:
+def exchanged(slots: Slots, choice: Choice, criterion: Criterion | Callable[[Array], Array] = "worst") -> Choice:
     """A plan (n,) from which no exchange of one pose, and no swap of two within a soak, gains information per station time.
 
     Parameters
     ----------
     choice : (n,), the plan to begin with
     criterion : what is to become small: "D" the volume of the errors' ellipsoid, "A" their mean square over those wanted,
-        "worst" the largest of them
+        "worst" the largest of them; or a function of normal matrices (..., 3, p, p) like theirs, log of a variance
     """
-    value = CRITERIA[criterion]
+    value = criterion if callable(criterion) else CRITERIA[criterion]
     best = choice.copy()
     for _ in range(_PASSES):
         before = _cost(slots, best, value)

@@ -9,6 +9,7 @@ import typer
 from typer.core import TyperGroup
 
 from pipelines.cli.options import (
+    ArchiveOption,
     JsonOption,
     ModelOption,
     RecipeArgument,
@@ -84,6 +85,7 @@ def command(
     noise: NoiseOption = None,
     wander: WanderOption = None,
     page: PageOption = None,
+    archive: ArchiveOption = None,
     pictures: Annotated[
         Path | None,
         typer.Option("--pictures", metavar="DIR", help="Also write the page's pictures there, as RECIPE-NAME.svg."),
@@ -98,8 +100,8 @@ def command(
     from pipelines.stages.plan import plan, planned
     from schemas.station import load_station
 
-    found = with_model(recipe, effects, model)
     config = load_station(station)
+    found = with_model(recipe, effects, model, archive, config.name)
     course = planned(found, config, noise_of(found, device or found.device, noise, wander))
     document = plan(course)
     if page is not None:
@@ -143,15 +145,41 @@ def optimise(
         float, typer.Option("--factor", min=0.01, help="Errors wanted over those of the textbook plan.")
     ] = 1.0,
     temperatures: Annotated[
-        str, typer.Option("--temperatures", metavar="a,b,c", help="Temperatures to meet, °C; the recipe's by default.")
+        str,
+        typer.Option(
+            "--temperatures",
+            metavar="a,b,c",
+            help="Temperatures to meet, °C; by default the ends of the recipe's range, and any between where it pays.",
+        ),
     ] = "",
     poses: Annotated[
         str,
         typer.Option("--poses", metavar="PLAN", help="Named plan to choose poses from; spread directions by default."),
     ] = "",
     criterion: Annotated[
-        str, typer.Option("--criterion", help="worst (coefficient), A (mean variance) or D (volume).")
+        str,
+        typer.Option(
+            "--criterion",
+            help="worst (coefficient), A (mean variance), D (volume), or T (rivals told apart, see --part).",
+        ),
     ] = "worst",
+    part: Annotated[
+        str, typer.Option("--part", metavar="a,b", help="With --criterion T: effects that are to be told apart.")
+    ] = "",
+    size: Annotated[
+        float | None,
+        typer.Option(
+            "--size", min=1e-3, help="With --criterion T: what each of them adds at most, µg; 100 by default."
+        ),
+    ] = None,
+    separation: Annotated[
+        float | None,
+        typer.Option(
+            "--separation",
+            min=1.0,
+            help="With --criterion T: χ² that the wrong one must leave in the lot; 50 by default.",
+        ),
+    ] = None,
     verification: Annotated[
         int | None,
         typer.Option(
@@ -161,20 +189,26 @@ def optimise(
     noise: NoiseOption = None,
     wander: WanderOption = None,
     page: PageOption = None,
+    archive: ArchiveOption = None,
     *,
     as_json: JsonOption = False,
 ) -> None:
     """Write the cheapest recipe that knows every coefficient as well as is wanted.
 
     By default: as well as the textbook plan does (24 orthogonal poses at nine soaks up and down, 15 min each, dwells of 10 s)
-    over the same temperatures, and blind to no effect that it sees.
+    over the same temperatures, and blind to no effect that it sees. With --criterion T --part a,b: the cheapest that tells these
+    effects apart.
     """
-    from pipelines.cli.optimal import Asked, found, print_optimum, written
+    from pipelines.cli.asked import Asked
+    from pipelines.cli.optimal import found, print_optimum, written
     from schemas.station import load_station
 
-    base = with_model(recipe, effects, model)
-    asked = Asked(see, tuple(wanted or ()), factor, temperatures, poses, criterion, verification)
-    optimum, document = found(base, load_station(station), noise_of(base, device or base.device, noise, wander), asked)
+    config = load_station(station)
+    base = with_model(recipe, effects, model, archive, config.name)
+    asked = Asked(
+        see, tuple(wanted or ()), factor, temperatures, poses, criterion, verification, part, size, separation
+    )
+    optimum, document = found(base, config, noise_of(base, device or base.device, noise, wander), asked)
     target = output or Path(f"{optimum.planned.recipe.name}.toml")
     document["file"] = str(target)
     _save(target, written(optimum, target, Path(recipe).parent))
@@ -198,12 +232,24 @@ def _save(path: Path, text: str) -> None:
         raise WrongUse(message) from None
 
 
-def with_model(recipe: str, effects: str, model: Path | None) -> Recipe:
-    """The recipe, with another model where one is given."""
-    from pipelines.models import chosen_effects
+def with_model(recipe: str, effects: str, model: Path | None, archive: str | None, station: str) -> Recipe:
+    """The recipe, with another model where one is given; the line's is asked of the archive only where it is needed."""
+    from pipelines.models import chosen_effects, use_formulas
     from pipelines.recipes import load_recipe
 
-    found, chosen = load_recipe(recipe), chosen_effects(effects, model, "plan")
+    chosen = chosen_effects(effects, model, "plan")
+
+    def line(device: str) -> dict[str, Any]:
+        from pipelines.archive import Archive
+        from pipelines.rerun.releases import line_model
+
+        if chosen:
+            return {"effects": chosen}
+        keys = line_model(Archive(archive), device, station)
+        use_formulas(keys["formulas"], "the line's model")
+        return keys
+
+    found = load_recipe(recipe, line)
     return found.model_copy(update={"effects": list(chosen)}) if chosen else found
 
 
@@ -243,7 +289,7 @@ def _print(document: dict[str, Any]) -> None:
     out = console()
     out.print(
         f"{document['recipe']} with {document['device']} on station {document['station']}: "
-        f"{document['dwells']} dwells in {document['poses']} poses at {len(document['temperatures_C'])} soaks"
+        f"{document['dwells']} dwells in {document['poses']} poses at {_soaks(len(document['temperatures_C']))}"
     )
     parts = " + ".join(f"{name.replace('_', ' ')} {minutes[name]:.0f}" for name in minutes if name != "total")
     out.print(f"{minutes['total']:.0f} min of station time: {parts}")
@@ -261,6 +307,10 @@ def _print(document: dict[str, Any]) -> None:
     print_table(["not seen", "why, and what to add"], [[r["effect"], r["why"] or r["breaker"]] for r in blind])
     if "page" in document:
         out.print(f"page: {document['page']}")
+
+
+def _soaks(count: int) -> str:
+    return f"{count} soak{'' if count == 1 else 's'}"
 
 
 def _longer(dwell: dict[str, float]) -> str:

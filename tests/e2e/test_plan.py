@@ -2,14 +2,18 @@
 
 import json
 import re
+from datetime import UTC, datetime
 from pathlib import Path
 
 import pytest
 from typer.testing import CliRunner
 
 from inertial.errors import NotIdentified
+from pipelines.archive import Archive
 from pipelines.cli import app
-from schemas.errors import WrongUse
+from pipelines.rerun.releases import release
+from pipelines.rerun.wanted import wanted
+from schemas.errors import RecipeInvalid, WrongUse
 
 RECIPE = """
 name = "faces"
@@ -123,3 +127,23 @@ def test_a_page_in_a_folder_that_is_not_there_is_one_message(faces, tmp_path):
     done = CliRunner().invoke(app, ["plan", str(faces), "--page", str(tmp_path / "none" / "plan.html")])
     assert isinstance(done.exception, WrongUse)
     assert "cannot be written" in str(done.exception)
+
+
+def test_plan_of_a_recipe_with_the_lines_model_asks_the_archive_for_it(faces, tmp_path):
+    faces.write_text(RECIPE.replace('effects = ["bias", "scale", "misalignment"]', 'model = "line"'), encoding="utf-8")
+    asked = ["plan", str(faces), "--archive", str(tmp_path / "archive"), "--json"]
+    none = CliRunner().invoke(app, asked)
+    assert isinstance(none.exception, RecipeInvalid)
+    assert "for adxl355 on simulated no model is released" in str(none.exception)
+    own = Archive(tmp_path / "archive")
+    own.prepare()
+    model = tmp_path / "m.toml"
+    model.write_text(
+        '[model]\nname = "m"\nversion = 1\neffects = ["bias", "scale", "misalignment", "own_square"]\n\n'
+        '[[formula]]\nid = "own_square"\ncolumns = ["f**2"]\nwhy = "a trial"\n'
+    )
+    release(own, wanted("", model), datetime(2026, 1, 1, tzinfo=UTC), reason="test", force=True)
+    document = json.loads(CliRunner().invoke(app, asked).stdout)
+    assert document["model"] == ["bias", "scale", "misalignment", "own_square"]
+    other = CliRunner().invoke(app, ["plan", str(faces), "--effects", "bias,scale,misalignment", "--json"])
+    assert json.loads(other.stdout)["model"] == ["bias", "scale", "misalignment"]

@@ -2,19 +2,25 @@
 
 import json
 from collections import Counter
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from typer.testing import CliRunner
 
 from inertial.frames import force_from_angles
+from inertial.noise.dwells import DwellNoise
 from pipelines.cli import app
 from pipelines.recipe_text import limits_from, recipe_text
 from pipelines.recipes import load_recipe, sample_names
 from pipelines.stages.capture import steps
+from pipelines.stages.least import least
 from pipelines.stages.minutes import minutes
-from pipelines.stages.optimise import apart
+from pipelines.stages.plan import planned
 from pipelines.stages.soak_orders import orders, soak_seconds
+from pipelines.stages.textbook import reference_errors, textbook
+from pipelines.stages.verification import apart
+from pipelines.stages.wish import Wish, candidates
 from schemas.errors import RecipeInvalid, WrongUse
 from schemas.station import load_station
 
@@ -133,6 +139,16 @@ def test_limits_beside_the_first_recipe_are_found_from_the_new_ones_folder(tmp_p
         (("--wanted", "bais=50"), WrongUse, "did you mean bias"),
         (("--wanted", "bias=-3"), WrongUse, "positive error"),
         (("--see", "third_ordre"), RecipeInvalid, "third_order"),
+        (("--criterion", "T"), WrongUse, "write --part third_order,odd_quadratic"),
+        (("--criterion", "T", "--part", "third_order"), WrongUse, "two or more are needed"),
+        (("--criterion", "T", "--part", "third_order,odd_quadratics"), RecipeInvalid, "odd_quadratic"),
+        (("--criterion", "T", "--part", "third_order,level_error"), WrongUse, "an effect of the station"),
+        (
+            ("--criterion", "T", "--part", "third_order,odd_quadratic", "--factor", "2"),
+            WrongUse,
+            "--factor does not go",
+        ),
+        (("--part", "third_order,odd_quadratic"), WrongUse, "or write --criterion T"),
     ],
 )
 def test_what_cannot_be_asked_is_told_in_one_message(options, kind, said, tmp_path):
@@ -142,11 +158,50 @@ def test_what_cannot_be_asked_is_told_in_one_message(options, kind, said, tmp_pa
     assert not target.exists()
 
 
+def test_effects_that_may_be_mistaken_are_told_apart_by_the_cheapest_recipe(tmp_path):
+    rivals = ("--criterion", "t", "--part", "third_order,odd_quadratic", "--effects", "bias,scale,misalignment")
+    done, target = asked(tmp_path, *rivals, "--size", "400", "--verification", "1")
+    assert done.exit_code == 0, done.exception
+    document = json.loads(done.stdout)
+    assert [(r["true"], r["wrong"]) for r in document["rivals"]] == [
+        ("third_order", "odd_quadratic"),
+        ("odd_quadratic", "third_order"),
+    ]
+    assert all(r["chi_square"] >= 50.0 and r["textbook"] < 1e-3 for r in document["rivals"])
+    assert document["share"] < 0.6
+    recipe = load_recipe(str(target))
+    force = force_from_angles(
+        *np.radians([(p.outer_deg, p.inner_deg) for k in range(len(recipe.soaks)) for p in recipe.poses_at(k)]).T
+    )
+    seldom = np.abs(force)
+    assert np.mean((seldom > 0.1) & (seldom < 0.6), axis=0).min() > 0.3  # where the two curves are apart
+
+
+def test_both_ends_of_the_range_are_met(found):
+    recipe = load_recipe(str(found[1]))
+    assert {min(recipe.temperatures_C), max(recipe.temperatures_C)} == {-10.0, 60.0}
+
+
+def test_no_recipe_is_quicker_than_the_bound_of_dwells_without_end():
+    base = load_recipe().model_copy(update={"effects": THERMAL.split(","), "static_record_s": 0.0})
+    shares: dict[float, float] = {}
+    for bias in (30.0, 150.0):
+        against = planned(textbook(base, (-10.0, 60.0)), load_station(), DwellNoise(1e-7, bias * 1e-6))
+        wish = Wish(reference_errors(against, base), (), (-10.0, 60.0), candidates(against.station), legal=(25.0,))
+        shares[bias] = least(base, against, wish).share
+    # the errors wanted grow with the flicker: the same part of the time
+    assert shares[30.0] == pytest.approx(shares[150.0], abs=0.011)
+    assert 0.7 < shares[30.0] < 0.95
+    half = replace(wish, wanted=2.0 * wish.wanted)
+    assert least(base, against, half).share < 0.5
+
+
 @pytest.mark.slow
 def test_errors_that_no_recipe_reaches_are_refused_with_the_nearest(tmp_path):
     done, _ = asked(tmp_path, "--wanted", "bias=0.01")
     assert isinstance(done.exception, RecipeInvalid)
     assert "times those" in str(done.exception)
+    assert "% of the textbook plan's time, for bias" in str(done.exception) or "without end" in str(done.exception)
 
 
 @pytest.mark.slow

@@ -1,0 +1,82 @@
+"""Parts of the search for a cheaper recipe: how many dwells, how far the poses reach, and what the textbook plan is worth."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from inertial.frames import force_from_angles
+from inertial.noise.dwells import DwellNoise, dwell_covariance
+from pipelines.models import STARTING_MODEL
+from pipelines.recipes import load_recipe
+from pipelines.stages.counts import FEWEST, fewest, least
+from pipelines.stages.layout import Design, Layout, spanned
+from pipelines.stages.plan import identified, planned
+from pipelines.stages.soak_orders import mirrored, orders
+from pipelines.stages.textbook import reference_errors, textbook
+from pipelines.stages.wish import Wish, between, candidates
+from schemas.station import load_station
+
+STATION = load_station()
+NOISE = DwellNoise(25e-6, 300e-6, 4e-6)
+ANALOGUE = Path(__file__).resolve().parents[2] / "deploy" / "recipes" / "analogue.toml"
+
+
+@pytest.fixture(scope="module")
+def layout():
+    base = load_recipe().model_copy(update={"effects": list(STARTING_MODEL), "static_record_s": 0.0})
+    against = planned(textbook(base, (-10.0, 60.0)), STATION, NOISE)
+    wish = Wish(reference_errors(against, base), (), (-10.0, 60.0), candidates(STATION))
+    return Layout(base, STATION, NOISE, wish, slowest=float(against.state.time[-1]))
+
+
+def test_no_soak_has_a_dwell_too_many(layout):
+    made, allowed = Design((25.0, -10.0, 60.0, 25.0), (), 2.0), np.full((3, 6), 1.4)
+    found = fewest(layout, made, allowed)
+    assert found is not None
+    assert np.all(layout.shortfall(found)[0] <= allowed)
+    assert len(set(found.counts)) > 1
+    for soak, count in enumerate(found.counts):
+        fewer = list(found.counts)
+        fewer[soak] -= 1
+        assert count == FEWEST or np.any(layout.shortfall(replace(found, counts=tuple(fewer)))[0] > allowed)
+
+
+def test_no_number_of_dwells_is_given_where_none_is_enough(layout):
+    assert fewest(layout, Design((25.0, -10.0, 60.0, 25.0), (), 2.0), np.full((3, 6), 0.05)) is None
+    assert least(lambda n: n >= 7, 1, 20) == 7
+    assert least(lambda n: n >= 7, 1, 6) is None
+
+
+def test_the_table_of_flicker_gives_the_covariance_of_dwells(layout):
+    time = np.sort(np.random.default_rng(3).uniform(900.0, 8000.0, 40)).round(1) + 20.0 * np.arange(40)
+    exact = dwell_covariance(time, 2.0, NOISE, slowest=layout.slowest)
+    assert layout.covariance(time, 2.0) == pytest.approx(exact, rel=1e-4)
+
+
+def test_a_plan_that_reaches_too_little_is_widened_by_few_poses():
+    force = force_from_angles(*np.radians(candidates(STATION)).T)
+    flat = np.flatnonzero(np.abs(force[:, 2]) < 0.4)[:8].astype(np.intp)
+    fixed = np.zeros(8, dtype=bool)
+    fixed[[0, 7]] = True
+    found = spanned(force, flat, fixed, 1.4)
+    assert np.ptp(force[flat], axis=0).min() < 1.4 <= np.ptp(force[found], axis=0).min()
+    assert np.array_equal(found[fixed], flat[fixed])
+
+
+def test_what_the_textbook_plan_cannot_identify_is_wanted_as_the_recipe_knows_it():
+    recipe = load_recipe(str(ANALOGUE))
+    noise = DwellNoise(280e-6)
+    against = planned(textbook(recipe, recipe.temperatures_C), STATION, noise)
+    found = reference_errors(against, recipe)
+    own = identified(planned(recipe, STATION, noise)).errors
+    assert found[:, -1] == pytest.approx(own[:, -1])
+    assert np.all(found[:, :-1] < own[:, :-1])
+
+
+def test_orders_without_coming_back_may_be_one_soak_and_those_upside_down_are_known():
+    found = orders((), STATION, 900.0, legal=between((-10.0, 60.0)), back=False)
+    assert found[0] == (25.0,)
+    assert (-10.0, 60.0) in found
+    assert mirrored((25.0, -10.0, 60.0)) == (25.0, 60.0, -10.0)
