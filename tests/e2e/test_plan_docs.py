@@ -1,5 +1,6 @@
 """The page on identifiability says what is so, and its commands work."""
 
+import json
 import re
 import shlex
 from pathlib import Path
@@ -24,9 +25,25 @@ def test_commands_of_the_page_work(line, tmp_path, monkeypatch):
 
 def test_the_command_that_looks_for_a_recipe_has_the_options_of_the_page():
     said = CliRunner().invoke(app, ["plan", "optimise", "--help"], env={"COLUMNS": "200"}).stdout
-    (line,) = [c for c in COMMANDS if "optimise" in c]
-    for option in [*re.findall(r"--?[a-z]+", line.split("production")[1]), "--wanted", "--factor", "--criterion"]:
+    lines = [c for c in COMMANDS if "optimise" in c]
+    assert len(lines) == 2
+    for option in [*re.findall(r"(?<= )--?[a-z]+", " ".join(lines)), "--wanted", "--factor", "--criterion"]:
         assert option in said
+
+
+def test_the_command_of_the_page_that_tells_rivals_apart_finds_what_it_says(tmp_path, monkeypatch):
+    (line,) = [c for c in COMMANDS if "--criterion T" in c]
+    monkeypatch.chdir(tmp_path)
+    done = CliRunner().invoke(app, [*shlex.split(line)[1:], "--json"])
+    assert done.exit_code == 0, done.exception
+    document = json.loads(done.stdout)
+    assert min(row["chi_square"] for row in document["rivals"]) >= 50.0
+    assert max(row["textbook"] for row in document["rivals"]) < 1e-3
+    found = re.search(r"(\d+) dwells of 2 s at 25 °C, in (\d+) % of its time, leave χ² (\d+)", PAGE)
+    assert found is not None
+    assert document["dwells"] == pytest.approx(int(found[1]), abs=4)
+    assert 100.0 * document["share"] == pytest.approx(int(found[2]), abs=1.0)
+    assert min(row["chi_square"] for row in document["rivals"]) == pytest.approx(float(found[3]), rel=0.2)
 
 
 def test_every_picture_of_the_page_is_there_and_small():
