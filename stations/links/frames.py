@@ -17,6 +17,7 @@ READ = {"coil": 1, "discrete": 2, "holding": 3, "input": 4}
 WRITE_COIL, WRITE_COILS, WRITE_REGISTERS = 5, 15, 16
 WRITES = frozenset({WRITE_COIL, WRITE_COILS, WRITE_REGISTERS})
 ON, OFF = 0xFF00, 0x0000
+DIAGNOSTICS, ECHO = 8, 0  # return query data: on a serial line only (6.8)
 EXCEPTION = 0x80
 LONGEST_READ = 125  # registers in one request (6.3)
 BYTE = 8
@@ -81,6 +82,40 @@ def values_in(request: bytes, reply: bytes) -> list[int]:
     if function in {READ["holding"], READ["input"]}:
         return list(struct.unpack(f">{(size - 2) // 2}H", reply[2:]))
     return unpack_bits(reply[2:], int.from_bytes(request[3:5], "big"))
+
+
+def echo_request(data: bytes) -> bytes:
+    """The request that has a device on a serial line say the same two bytes; it changes nothing (6.8.1)."""
+    return struct.pack(">BH", DIAGNOSTICS, ECHO) + data
+
+
+def read_of_other_size(request: bytes) -> bytes:
+    """A read whose answer cannot be taken for that to a request: of one register or bit, or of more where it asks for one.
+
+    For a write it is a read of a register, which is another function.
+    """
+    if request[0] in WRITES:
+        return read_request("holding", int.from_bytes(request[1:3], "big"), 1)
+    function, address, count = struct.unpack(">BHH", request)
+    other = 1 if reply_size(request) != reply_size(struct.pack(">BHH", function, address, 1)) else BYTE + count
+    return struct.pack(">BHH", function, address, other)
+
+
+def ends_with_sign(heard: bytes, device_id: int, sign: bytes) -> bool:
+    """Whether what was heard on a serial line ends with a device's answer to an echo, or to a read of a size of its own.
+
+    An echo that a device does not know is answered with an exception of that function, which nothing else is. An exception to the
+    read might be one to an earlier read, and is no sign.
+    """
+    frame = bytes([device_id]) + sign
+    if sign[0] == DIAGNOSTICS:
+        refusal = heard[-5:]
+        refused = refusal[:2] == bytes([device_id, DIAGNOSTICS | EXCEPTION]) and crc16(refusal[:-2]) == refusal[-2:]
+        return heard.endswith(frame + crc16(frame)) or refused
+    size = reply_size(sign)
+    answer = heard[-(size + 3) :]
+    head = bytes([device_id, sign[0], size - 2])
+    return len(answer) == size + 3 and answer.startswith(head) and crc16(answer[:-2]) == answer[-2:]
 
 
 def pack_bits(values: Sequence[int]) -> bytes:

@@ -11,7 +11,8 @@ from schemas.station import Devices
 from stations.links.gate import GatedLines, GatedLink
 from stations.links.lines import LineLink
 from stations.links.modbus import WireLink
-from stations.links.wires import SerialWire, TcpWire, tls_context
+from stations.links.serial_wire import SerialWire
+from stations.links.wires import TcpWire, tls_context
 from stations.profile_files import load_profile
 
 if TYPE_CHECKING:

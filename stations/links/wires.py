@@ -1,4 +1,4 @@
-"""What carries Modbus: TCP, TCP with TLS, a serial line. A wire sends a request once and gives the answer, or says why not.
+"""What carries Modbus: TCP and TCP with TLS. A wire sends a request once and gives the answer, or says why not.
 
 Whatever goes wrong, the connection is closed: an answer that comes late must not meet the next question. On TCP the transaction's
 number tells too, and it goes on counting over connections, because a gateway may answer the next one with the last one's answer.
@@ -13,14 +13,10 @@ import os
 import socket
 import ssl
 import struct
-import termios
 import time
 from typing import TYPE_CHECKING, Protocol
 
-import serial
-from serial import PARITY_EVEN, PARITY_NONE, PARITY_ODD, Serial
-
-from stations.links.frames import EXCEPTION, WRITES, Malformed, crc16, reply_size
+from stations.links.frames import WRITES, Malformed
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -28,10 +24,6 @@ if TYPE_CHECKING:
 HEADER = 7  # transaction, protocol, length, unit (Modbus Messaging on TCP/IP 1.0b, 3.1.3)
 LONGEST = 254  # unit and PDU
 CHUNK = 4096
-PARITIES = {"none": PARITY_NONE, "even": PARITY_EVEN, "odd": PARITY_ODD}
-EXCEPTION_FRAME = 5  # device, function, code, check
-QUIET_CHARACTERS = 3.5  # Modbus over serial line 1.02, 2.5.1.1
-QUIET_S = 0.00175  # above 19200 baud
 
 
 class Silence(Exception):
@@ -91,7 +83,7 @@ class TcpWire:
             raise Silence from None
         except OSError as problem:
             self.close()
-            raise Broken(_reason(problem)) from None
+            raise Broken(reason_of(problem)) from None
         except Malformed:
             self.close()
             raise
@@ -145,93 +137,6 @@ class TcpWire:
         return frame
 
 
-class SerialWire:
-    """Modbus RTU over a serial line.
-
-    A serial frame has no number. After a failure the line is therefore heard out for as long as an answer may take, before
-    anything else is asked.
-    """
-
-    def __init__(self, device: str, timeout_s: float, *, baud: int, parity: str, stop_bits: int) -> None:
-        self.where = device
-        self.timeout_s = timeout_s
-        self._baud, self._parity, self._stop_bits = baud, PARITIES[parity], stop_bits
-        self._port: Serial | None = None
-        self._late_until = 0.0
-        character = (10 if parity == "none" else 11) / baud
-        self._quiet = max(QUIET_S, QUIET_CHARACTERS * character)
-        self._heard = 0.0
-
-    def exchange(self, device_id: int, request: bytes) -> bytes:
-        """The answer to a request; its check must be right."""
-        frame = bytes([device_id]) + request
-        try:
-            port = self._opened()
-            self._hear_out(port)
-            port.write(frame + crc16(frame))
-            return self._answer(port, device_id, request)
-        except (Silence, Malformed):
-            self.close()
-            self._late_until = time.monotonic() + self.timeout_s
-            raise
-        except (serial.SerialException, OSError, termios.error) as problem:  # settings that the line cannot have
-            self.close()
-            raise Broken(_reason(problem)) from None
-
-    def close(self) -> None:
-        """Leaves the line."""
-        if self._port is not None:
-            self._port.close()
-        self._port = None
-
-    def _opened(self) -> Serial:
-        if self._port is None:
-            self._port = Serial(
-                self.where,
-                self._baud,
-                parity=self._parity,
-                stopbits=self._stop_bits,
-                timeout=self.timeout_s,
-                write_timeout=self.timeout_s,
-                exclusive=True,
-            )
-        return self._port
-
-    def _hear_out(self, port: Serial) -> None:
-        """Drops what comes late, and keeps the silence that ends a frame."""
-        while (left := self._late_until - time.monotonic()) > 0.0:
-            port.timeout = left
-            port.read(CHUNK)
-        time.sleep(max(0.0, self._heard + self._quiet - time.monotonic()))
-        port.reset_input_buffer()
-
-    def _answer(self, port: Serial, device_id: int, request: bytes) -> bytes:
-        deadline = time.monotonic() + self.timeout_s
-        data = _read(port, EXCEPTION_FRAME, deadline)
-        if data[0] != device_id or data[1] & ~EXCEPTION != request[0]:
-            message = f"device {data[0]}, function {data[1]}; device {device_id}, function {request[0]} are needed"
-            raise Malformed(message)
-        if not data[1] & EXCEPTION:
-            data += _read(port, 1 + reply_size(request) + 2 - EXCEPTION_FRAME, deadline)
-        self._heard = time.monotonic()
-        if crc16(data[:-2]) != data[-2:]:
-            message = f"check {data[-2:].hex()}; {crc16(data[:-2]).hex()} is needed"
-            raise Malformed(message)
-        if port.in_waiting:
-            message = f"{port.in_waiting} bytes behind an answer; silence is needed"
-            raise Malformed(message)
-        return data[1:-2]
-
-
-def _read(port: Serial, count: int, deadline: float) -> bytes:
-    """``count`` bytes, or :class:`Silence` at the deadline."""
-    port.timeout = max(0.0, deadline - time.monotonic())
-    data = port.read(count) if count else b""
-    if len(data) < count:
-        raise Silence
-    return data
-
-
 def tls_context(ca: Path, certificate: Path | None = None, key: Path | None = None) -> ssl.SSLContext:
     """A context that trusts this authority alone, checks the name, and shows a certificate where one is given."""
     context = ssl.SSLContext(ssl.PROTOCOL_TLS_CLIENT)
@@ -242,7 +147,8 @@ def tls_context(ca: Path, certificate: Path | None = None, key: Path | None = No
     return context
 
 
-def _reason(problem: Exception) -> str:
+def reason_of(problem: Exception) -> str:
+    """What a system says went wrong with a connection."""
     if isinstance(problem, ssl.SSLCertVerificationError):
         return f"its certificate does not hold: {problem.verify_message}"
     if isinstance(problem, OSError) and problem.strerror:

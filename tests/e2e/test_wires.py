@@ -68,7 +68,11 @@ def test_a_serial_answer_with_a_wrong_check_is_asked_for_again_and_never_believe
             station.chamber.temperature()
             line.to_host.append(corrupted)
             assert station.chamber.temperature() == pytest.approx(23.0, abs=0.2)  # the second attempt
-            line.to_host += [corrupted, corrupted]
+            line.to_host += [
+                corrupted,
+                lambda data: data,
+                corrupted,
+            ]  # between them the device's sign that it is heard again
             with pytest.raises(LinkLost, match=r"no answer to 'read chamber temperature .* but check"):
                 station.chamber.temperature()
 
@@ -85,6 +89,31 @@ def test_a_serial_answer_that_comes_late_is_heard_out_before_the_next_question()
             with pytest.raises(StationTimeout):
                 station.chamber.set_point()
             plant.fixture.chamber.set_point = 50.0
+            assert station.chamber.set_point() == 50.0
+
+
+def unheard(data):
+    del data
+    return b""
+
+
+@pytest.mark.parametrize("knows_echo", [True, False])
+def test_a_serial_answer_that_comes_after_two_time_outs_is_not_believed(knows_echo):
+    """It arrives when the question has been put again, in front of the answer to that: a frame has no number to tell them."""
+    config = station_with()
+    plant = plant_of(config, lot_of(1))
+    with serial_line() as line, SerialPlantServer(plant, line.device):
+        real = hardware(config, link="rtu", serial=line.host, baud=115200, parity="none")
+        real = real.model_copy(update={"link": real.link.model_copy(update={"read_attempts": 1, "timeout_s": 0.2})})
+        with open_devices(real, ()) as station:
+            assert station.chamber.set_point() == pytest.approx(23.0)
+            late = 0.5 if knows_echo else 0.9
+            line.to_host += [line.late(late), *([] if knows_echo else [unheard]), line.late(0.15)]
+            for _ in range(1 if knows_echo else 2):
+                with pytest.raises(StationTimeout):
+                    station.chamber.set_point()
+            plant.fixture.chamber.set_point = 50.0
+            assert station.chamber.set_point() == 50.0
             assert station.chamber.set_point() == 50.0
 
 

@@ -13,7 +13,8 @@ from schemas.errors import StationError
 from schemas.station import load_station
 from stations.links.frames import crc16
 from stations.links.modbus import ModbusLink, WireLink
-from stations.links.wires import SerialWire, TcpWire
+from stations.links.serial_wire import SerialWire
+from stations.links.wires import TcpWire
 from stations.plant.server import PlantServer
 
 TRUTH = [0x41B8, 0x0000, 0x1234, 0xFFFF]

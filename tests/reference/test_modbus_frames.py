@@ -2,6 +2,7 @@
 
 import pytest
 
+from stations.links import frames
 from stations.links.frames import (
     Malformed,
     Refused,
@@ -80,3 +81,26 @@ def test_bits_come_back():
     for n in (1, 7, 8, 9, 22):
         bits = [(i * 7 + n) % 3 % 2 for i in range(n)]
         assert unpack_bits(pack_bits(bits), n) == bits
+
+
+def test_the_sign_that_is_asked_for_on_a_serial_line_is_the_example_of_the_specification() -> None:
+    """Modbus Application Protocol 1.1b3, 6.8.1: return query data, A537."""
+    sign = frames.echo_request(bytes.fromhex("A537"))
+    assert sign == bytes.fromhex("080000A537")
+    answer = bytes([3]) + sign
+    assert frames.ends_with_sign(b"late" + answer + frames.crc16(answer), 3, sign)
+    assert not frames.ends_with_sign(answer + frames.crc16(answer), 4, sign)
+    assert not frames.ends_with_sign(answer + b"\0\0", 3, sign)
+    refusal = bytes([3, 0x88, 1])
+    assert frames.ends_with_sign(refusal + frames.crc16(refusal), 3, sign)
+    other = bytes([3, 0x83, 1])  # to an earlier read
+    assert not frames.ends_with_sign(other + frames.crc16(other), 3, sign)
+
+
+@pytest.mark.parametrize("space", ["holding", "input", "coil", "discrete"])
+@pytest.mark.parametrize("count", [1, 2, 8, 9, 125])
+def test_a_read_of_another_size_is_answered_by_nothing_that_answers_the_first(space: str, count: int) -> None:
+    request = frames.read_request(space, 100, count)
+    other = frames.read_of_other_size(request)
+    assert frames.reply_size(other) != frames.reply_size(request)
+    assert (other[0], other[1:3]) == (request[0], request[1:3])

@@ -1,0 +1,132 @@
+"""Modbus over a serial line: frames with a check and without a number, on a wire that several devices share."""
+
+from __future__ import annotations
+
+import os
+import termios
+import time
+
+import serial
+from serial import PARITY_EVEN, PARITY_NONE, PARITY_ODD, Serial
+
+from stations.links.frames import (
+    EXCEPTION,
+    Malformed,
+    crc16,
+    echo_request,
+    ends_with_sign,
+    read_of_other_size,
+    reply_size,
+)
+from stations.links.wires import CHUNK, Broken, Silence, reason_of
+
+PARITIES = {"none": PARITY_NONE, "even": PARITY_EVEN, "odd": PARITY_ODD}
+EXCEPTION_FRAME = 5  # device, function, code, check
+QUIET_CHARACTERS = 3.5  # Modbus over serial line 1.02, 2.5.1.1
+QUIET_S = 0.00175  # above 19200 baud
+
+
+class SerialWire:
+    """Modbus RTU over a serial line.
+
+    A serial frame has no number, so that an answer which comes late could be taken for that to the next question. After a failure
+    the line is therefore heard out for as long as an answer may take; then the device is asked for a sign that can be the answer
+    to nothing before it. A device answers in order: with the sign everything earlier has come, or never will.
+    """
+
+    def __init__(self, device: str, timeout_s: float, *, baud: int, parity: str, stop_bits: int) -> None:
+        self.where = device
+        self.timeout_s = timeout_s
+        self._baud, self._parity, self._stop_bits = baud, PARITIES[parity], stop_bits
+        self._port: Serial | None = None
+        self._late_until = 0.0
+        self._unsure: dict[int, int] = {}  # devices that owe an answer, and how often they were asked for a sign since
+        character = (10 if parity == "none" else 11) / baud
+        self._quiet = max(QUIET_S, QUIET_CHARACTERS * character)
+        self._heard = 0.0
+
+    def exchange(self, device_id: int, request: bytes) -> bytes:
+        """The answer to a request; its check must be right."""
+        frame = bytes([device_id]) + request
+        try:
+            port = self._opened()
+            self._hear_out(port)
+            if device_id in self._unsure:
+                self._await_sign(port, device_id, request)
+            port.write(frame + crc16(frame))
+            return self._answer(port, device_id, request)
+        except (Silence, Malformed):
+            self.close()
+            self._late_until = time.monotonic() + self.timeout_s
+            self._unsure.setdefault(device_id, 0)
+            raise
+        except (serial.SerialException, OSError, termios.error) as problem:  # settings that the line cannot have
+            self.close()
+            raise Broken(reason_of(problem)) from None
+
+    def close(self) -> None:
+        """Leaves the line."""
+        if self._port is not None:
+            self._port.close()
+        self._port = None
+
+    def _opened(self) -> Serial:
+        if self._port is None:
+            self._port = Serial(
+                self.where,
+                self._baud,
+                parity=self._parity,
+                stopbits=self._stop_bits,
+                timeout=self.timeout_s,
+                write_timeout=self.timeout_s,
+                exclusive=True,
+            )
+        return self._port
+
+    def _hear_out(self, port: Serial) -> None:
+        """Drops what comes late, and keeps the silence that ends a frame."""
+        while (left := self._late_until - time.monotonic()) > 0.0:
+            port.timeout = left
+            port.read(CHUNK)
+        time.sleep(max(0.0, self._heard + self._quiet - time.monotonic()))
+        port.reset_input_buffer()
+
+    def _await_sign(self, port: Serial, device_id: int, request: bytes) -> None:
+        """Drops everything until the device's sign comes; :class:`Silence` where it does not."""
+        tries = self._unsure[device_id]
+        self._unsure[device_id] = tries + 1
+        sign = echo_request(os.urandom(2)) if tries % 2 == 0 else read_of_other_size(request)
+        frame = bytes([device_id]) + sign
+        port.write(frame + crc16(frame))
+        deadline, heard = time.monotonic() + self.timeout_s, b""
+        while not ends_with_sign(heard, device_id, sign):
+            heard += _read(port, max(1, port.in_waiting), deadline)
+        self._heard = time.monotonic()
+        del self._unsure[device_id]
+        self._hear_out(port)
+
+    def _answer(self, port: Serial, device_id: int, request: bytes) -> bytes:
+        deadline = time.monotonic() + self.timeout_s
+        data = _read(port, EXCEPTION_FRAME, deadline)
+        if data[0] != device_id or data[1] & ~EXCEPTION != request[0]:
+            message = f"device {data[0]}, function {data[1]}; device {device_id}, function {request[0]} are needed"
+            raise Malformed(message)
+        if not data[1] & EXCEPTION:
+            data += _read(port, 1 + reply_size(request) + 2 - EXCEPTION_FRAME, deadline)
+        self._heard = time.monotonic()
+        if crc16(data[:-2]) != data[-2:]:
+            message = f"check {data[-2:].hex()}; {crc16(data[:-2]).hex()} is needed"
+            raise Malformed(message)
+        if port.in_waiting:
+            message = f"{port.in_waiting} bytes behind an answer; silence is needed"
+            raise Malformed(message)
+        return data[1:-2]
+
+
+def _read(port: Serial, count: int, deadline: float) -> bytes:
+    """``count`` bytes, or :class:`Silence` at the deadline."""
+    port.timeout = max(0.0, deadline - time.monotonic())
+    data = port.read(count) if count else b""
+    if len(data) < count:
+        raise Silence
+    return data
