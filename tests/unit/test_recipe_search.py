@@ -12,11 +12,13 @@ from pipelines.models import STARTING_MODEL
 from pipelines.recipes import load_recipe
 from pipelines.stages.counts import FEWEST, fewest, least
 from pipelines.stages.layout import Design, Layout, spanned
+from pipelines.stages.minutes import spent
 from pipelines.stages.plan import identified, planned
 from pipelines.stages.soak_orders import mirrored, orders
 from pipelines.stages.textbook import reference_errors, textbook
 from pipelines.stages.wish import Wish, between, candidates
 from schemas.station import load_station
+from stations.plant.preset import load_preset
 
 STATION = load_station()
 NOISE = DwellNoise(25e-6, 300e-6, 4e-6)
@@ -80,3 +82,16 @@ def test_orders_without_coming_back_may_be_one_soak_and_those_upside_down_are_kn
     assert found[0] == (25.0,)
     assert (-10.0, 60.0) in found
     assert mirrored((25.0, -10.0, 60.0)) == (25.0, 60.0, -10.0)
+
+
+def test_wander_alone_forbids_the_bias_of_a_qa700_in_six_tenths_of_the_textbooks_time():
+    """A device read without a pause from power-on, at one temperature, all else known: no recipe knows more."""
+    part = load_preset("qa700")
+    noise = DwellNoise(1e-6 * part.noise_density_ug, 1e-6 * part.bias_instability_ug, 1e-6 * part.rate_random_walk_ug)
+    base = load_recipe().model_copy(update={"effects": list(STARTING_MODEL), "static_record_s": 0.0})
+    against = planned(textbook(base, (-10.0, 60.0)), STATION, noise)
+    time = np.arange(6.0, 0.6 * 60.0 * spent(against.stretches).total, 12.0)
+    covariance = dwell_covariance(time, 12.0, noise, slowest=float(against.state.time[-1]))
+    best = 1e6 / np.sqrt(np.linalg.inv(covariance).sum())
+    assert best == pytest.approx(23.0, abs=0.1)
+    assert 1e6 * identified(against).errors[0, 0] == pytest.approx(22.1, abs=0.1)
