@@ -33,7 +33,7 @@ def layout():
     return Layout(base, STATION, NOISE, wish, slowest=float(against.state.time[-1]))
 
 
-def test_no_soak_has_a_dwell_too_many(layout):
+def test_no_soak_has_a_dwell_too_many(layout: Layout) -> None:
     made, allowed = Design((25.0, -10.0, 60.0, 25.0), (), 2.0), np.full((3, 6), 1.4)
     found = fewest(layout, made, allowed)
     assert found is not None
@@ -45,13 +45,13 @@ def test_no_soak_has_a_dwell_too_many(layout):
         assert count == FEWEST or np.any(layout.shortfall(replace(found, counts=tuple(fewer)))[0] > allowed)
 
 
-def test_no_number_of_dwells_is_given_where_none_is_enough(layout):
+def test_no_number_of_dwells_is_given_where_none_is_enough(layout: Layout) -> None:
     assert fewest(layout, Design((25.0, -10.0, 60.0, 25.0), (), 2.0), np.full((3, 6), 0.05)) is None
     assert least(lambda n: n >= 7, 1, 20) == 7
     assert least(lambda n: n >= 7, 1, 6) is None
 
 
-def test_the_table_of_flicker_gives_the_covariance_of_dwells(layout):
+def test_the_table_of_flicker_gives_the_covariance_of_dwells(layout: Layout) -> None:
     time = np.sort(np.random.default_rng(3).uniform(900.0, 8000.0, 40)).round(1) + 20.0 * np.arange(40)
     exact = dwell_covariance(time, 2.0, NOISE, slowest=layout.slowest)
     assert layout.covariance(time, 2.0) == pytest.approx(exact, rel=1e-4)
