@@ -93,9 +93,10 @@ def lot_of(
     if not named:
         message = "lot: no unit is named, at least one is needed; give serial numbers with --units, or in the recipe"
         raise WrongUse(message)
-    bad = [serial for serial in named if not serial or not set(serial) <= _SERIAL or not serial[0].isalnum()]
+    bad = [s for s in named if not 0 < len(s) <= LONGEST_SERIAL or not set(s) <= _SERIAL or not s[0].isalnum()]
     if bad:
-        message = f"lot: serial {bad[0]!r} is not usable, letters, digits and . _ + - are needed; correct it"
+        needed = f"1 to {LONGEST_SERIAL} letters, digits and . _ + - are needed"
+        message = f"lot: serial {bad[0]!r} is not usable, {needed}; correct it"
         raise WrongUse(message)
     twice = sorted({serial for serial in named if named.count(serial) > 1})
     if twice:
@@ -110,6 +111,7 @@ def lot_of(
     )
 
 
+LONGEST_SERIAL = 64
 _SERIAL = frozenset("ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789._+-")
 
 

@@ -143,7 +143,7 @@ def release(
 def _published(archive: Archive, content: dict[str, Any]) -> int:
     """The number under which a record is written, and sealed in the archive's chain."""
     with alone(archive.root / FOLDER, wait=True):
-        number = len(releases(archive)) + 1
+        number = max((one.number for one in releases(archive)), default=0) + 1  # one may have been taken away
         place = _place(archive, number)
         files.publish_first(place, files.manifest_bytes({**provenance(), **content, "number": number}))
         sealed = {f"{FOLDER}/{place.name}": files.sha256(place)}

@@ -20,10 +20,11 @@ def day_of(text: str, where: str) -> str:
     """
     try:
         moment = datetime.fromisoformat(text)
-    except ValueError:
+        utc = moment.astimezone(UTC) if moment.tzinfo else moment
+    except (ValueError, OverflowError):  # a zone can lead out of the calendar
         message = f"{where}: found {text!r}, a date such as 2026-05-01 is needed; correct it"
         raise WrongUse(message) from None
-    return (moment.astimezone(UTC) if moment.tzinfo else moment).date().isoformat()
+    return utc.date().isoformat()
 
 
 def today() -> str:

@@ -157,7 +157,16 @@ def test_a_clock_that_goes_backwards_loses_nothing_and_is_told(tmp_path: Path, m
     assert chain.last_number(store.root) == 2
 
 
-@pytest.mark.parametrize("serial", ["../../etc/passwd", "a/b", "A\n1", "A\\1", "\x1b[31mred"])
+@pytest.mark.parametrize("day", ["0001-01-01T00:00:00+02:00", "9999-12-31T23:00:00-05:00", "2026-13-01", "tomorrow"])
+def test_a_day_that_no_calendar_has_is_told(root: Path, monkeypatch, capsys, day: str) -> None:
+    status, _, err = told(monkeypatch, capsys, "show", "A1", "--at", day, "--archive", root)
+    assert status == 2
+    assert "a date such as 2026-05-01 is needed" in err
+
+
+@pytest.mark.parametrize(
+    "serial", ["../../etc/passwd", "a/b", "A\n1", "A\\1", "\x1b[31mred", "A" * 65, "..", "\u0410\u0031", "A1\u200b"]
+)
 def test_a_serial_that_could_be_a_path_or_a_line_is_refused_by_a_run(
     tmp_path: Path, monkeypatch, capsys, serial: str
 ) -> None:
