@@ -12,6 +12,7 @@ import numpy as np
 import pandas as pd
 
 from inertial.frames import force_from_angles
+from pipelines.stages.frozen import frozen
 from pipelines.stages.pieces import STATIC, Signal, by_record
 from pipelines.stages.pointing import contradicts, pointing_of
 from schemas.units import AXES
@@ -63,6 +64,7 @@ def validate(
         faults += _sample_faults(here, signals)
     answered = readings[readings["status"] == "ok"]
     faults += _stale_temperatures(answered)
+    faults += _frozen_temperatures(answered)
     if means:
         output = _means(pd.concat(means))
         faults += _dead_channels(output, answered)
@@ -182,6 +184,18 @@ def _stale_temperatures(readings: pd.DataFrame) -> list[Fault]:
             f"{FOLLOWED_SHARE * chamber:.1f} K is needed; check the temperature sensor",
         )
         for unit, chamber, own in zip(stale.index, stale["chamber_C"], stale["unit_C"], strict=True)
+    ]
+
+
+def _frozen_temperatures(readings: pd.DataFrame) -> list[Fault]:
+    return [
+        Fault(
+            unit,
+            "frozen_temperature",
+            f"the unit's temperature is {value:.6g} °C to the last digit in the last {count} records, one that moves as before "
+            "and as the other units' is needed; check the temperature sensor",
+        )
+        for unit, count, value in frozen(readings)
     ]
 
 

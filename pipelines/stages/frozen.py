@@ -1,0 +1,69 @@
+"""Thermometers that froze: one that keeps saying the same to the last digit while, by all that is known of it, it should not.
+
+While the chamber stands at one temperature nothing else gives it away. How often the mean of a sound thermometer changes from one
+record to the next, by its resolution, is told by its own records before and by the others of the lot at the same time; the
+smaller share is believed.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    import pandas as pd
+    from numpy.typing import NDArray
+
+SAME_K = 1e-9  # means of equal looks differ by their rounding
+BY_CHANCE = 1e-6  # a sound thermometer is refused so seldom
+
+
+def frozen(readings: pd.DataFrame) -> Iterator[tuple[str, int, float]]:
+    """Units whose thermometer froze before the end, with the number of records that say the same and the temperature, °C.
+
+    Parameters
+    ----------
+    readings : of the units that answered
+    """
+    table = readings.pivot_table(index="record", columns="unit", values="unit_C").sort_index()
+    soak = readings.drop_duplicates("record").set_index("record")["soak"].reindex(table.index).to_numpy()
+    values = table.to_numpy(dtype=float)
+    changed = np.abs(np.diff(values, axis=0)) > SAME_K
+    known = np.isfinite(values[1:]) & np.isfinite(values[:-1])
+    within = soak[1:] == soak[:-1]
+    for column, unit in enumerate(table.columns):
+        if not known[:, column].all():
+            continue
+        still = _unchanged_at_the_end(changed[:, column])
+        if still and _by_chance(changed & known, known & within[:, None], column, still) < BY_CHANCE:
+            yield str(unit), still + 1, float(values[-1, column])
+
+
+def _unchanged_at_the_end(changed: NDArray[np.bool_]) -> int:
+    """Steps from record to record, counted from the end, in which nothing changed."""
+    moved = np.flatnonzero(changed)
+    return len(changed) - (int(moved[-1]) + 1 if moved.size else 0)
+
+
+def _by_chance(changed: NDArray[np.bool_], counted: NDArray[np.bool_], column: int, still: int) -> float:
+    """Probability that a sound thermometer says the same for so long; 1 where nothing is known of it.
+
+    Parameters
+    ----------
+    changed, counted : (steps, units); a step within one soak is counted
+    """
+    steps = len(changed)
+    own = counted[: steps - still, column]
+    others = np.delete(counted[steps - still :], column, axis=1)
+    rates = [
+        float(np.sum(moved & there)) / (float(np.sum(there)) + 1.0)
+        for moved, there in (
+            (changed[: steps - still, column], own),
+            (np.delete(changed[steps - still :], column, axis=1), others),
+        )
+        if there.any()
+    ]
+    return (1.0 - min(rates)) ** still if rates else 1.0

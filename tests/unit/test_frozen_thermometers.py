@@ -1,0 +1,66 @@
+"""A thermometer that freezes while the chamber stands at one temperature is found, and no sound one is."""
+
+import numpy as np
+import pandas as pd
+import pytest
+from small_station import lot_of
+
+from pipelines.stages.frozen import frozen
+from pipelines.stages.validate import validate
+
+SOAKS, DWELLS = 3, 11
+
+
+def readings(units: int = 4, resolution: float = 0.01, noise: float = 0.02, seed: int = 0) -> pd.DataFrame:
+    """Means of five looks at thermometers of a resolution, in three soaks that settle slowly."""
+    rng = np.random.default_rng(seed)
+    rows = []
+    for record in range(SOAKS * DWELLS):
+        soak, place = divmod(record, DWELLS)
+        for unit in range(units):
+            true = -20.0 + 40.0 * soak + 0.1 * unit + 0.2 * np.exp(-place / 3.0)
+            looks = np.round((true + noise * rng.normal(size=5)) / resolution) * resolution
+            rows.append({"unit": f"U{unit}", "record": record, "soak": soak, "unit_C": looks.mean()})
+    return pd.DataFrame(rows)
+
+
+def freeze(table: pd.DataFrame, unit: str, first: int) -> pd.DataFrame:
+    meant = (table["unit"] == unit) & (table["record"] >= first)
+    value = table.loc[meant, "unit_C"].iloc[0]
+    return table.assign(unit_C=table["unit_C"].mask(meant, value))
+
+
+@pytest.mark.parametrize("units", [1, 4, 8])
+def test_one_that_freezes_in_the_last_soak_is_found(units: int) -> None:
+    [(unit, count, value)] = frozen(freeze(readings(units), "U0", 2 * DWELLS + 2))
+    assert (unit, count) == ("U0", DWELLS - 2)
+    assert value == pytest.approx(60.0, abs=0.3)
+
+
+def test_one_that_was_frozen_all_along_is_found_by_its_neighbours() -> None:
+    assert [unit for unit, *_ in frozen(freeze(readings(), "U1", 0))] == ["U1"]
+
+
+@pytest.mark.parametrize("resolution", [1e-4, 0.01, 0.1, 1.0])
+@pytest.mark.parametrize("noise", [0.0, 1e-3, 0.02])
+@pytest.mark.parametrize("units", [1, 8])
+def test_no_sound_one_is_accused_however_coarse_it_is(resolution: float, noise: float, units: int) -> None:
+    assert [list(frozen(readings(units, resolution, noise, seed))) for seed in range(20)] == [[]] * 20
+
+
+def test_the_last_few_records_alone_say_nothing() -> None:
+    assert list(frozen(freeze(readings(), "U0", SOAKS * DWELLS - 3))) == []
+
+
+def test_its_unit_is_refused_with_the_reason() -> None:
+    lot = lot_of(2)
+    table = freeze(readings(2), "U0", 2 * DWELLS).replace(
+        {"unit": {"U0": lot.units[0].serial, "U1": lot.units[1].serial}}
+    )
+    full = table.assign(
+        kind="dwell", pose="up", status="ok", overflow=False, chamber_C=table["unit_C"], full_scale=1.0, n=0
+    )
+    verdicts = validate([], full, lot.units).set_index("unit")
+    assert verdicts.loc[lot.units[0].serial, "fault"] == "frozen_temperature"
+    assert "to the last digit in the last 11 records" in verdicts.loc[lot.units[0].serial, "reason"]
+    assert not verdicts.loc[lot.units[1].serial, "refused"]
