@@ -103,6 +103,7 @@ class _Work(Taking):
     def run(self, plan: list[Step]) -> None:
         """Every step that is not done; whatever the station ends the run with is noted, and leaves it safe."""
         done = self.sink.finished()
+        self.soundness.refuse_contradicted(self.guard.events.noted())
         self.power.require_on()
         self.identify()
         try:

@@ -25,6 +25,7 @@ if TYPE_CHECKING:
 
 SPARE = 2  # degrees of freedom per axis before anything is said
 POINTING_DEG = 0.1  # 1.7 mg; what a model of the table's imperfections is for is far smaller
+TURNED_AWAY = "the outputs of all units turn"
 
 
 def pointing_error(force: Array, output: Array) -> float:
@@ -59,8 +60,8 @@ def contradicts(turned: float) -> str:
     if turned <= POINTING_DEG:
         return ""
     return (
-        f"the outputs of all units turn {turned:.2f}° rms away from the encoders' angles, {POINTING_DEG:g}° is allowed; check "
-        "zero and gears of the table's axes, and measure the lot anew"
+        f"{TURNED_AWAY} {turned:.2f}° rms away from the encoders' angles, {POINTING_DEG:g}° is allowed; check zero and gears of "
+        "the table's axes, and measure the lot anew (run with --repeat)"
     )
 
 

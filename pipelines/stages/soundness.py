@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
-from pipelines.stages.pointing import Pointing, contradicts
+from pipelines.stages.pointing import TURNED_AWAY, Pointing, contradicts
 from schemas.errors import OperatorNeeded, StationError
 from stations.safety.suspenders import Reason, Suspended
 
@@ -13,9 +13,14 @@ if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
 
     from pipelines.stages.captured import Record
+    from schemas.event import Event
     from schemas.recipe import Unit
     from stations.devices.reader import Reader
     from stations.devices.slot import Identity
+
+
+TABLE = "table: "
+TURNED = f"{TABLE}{TURNED_AWAY}"
 
 
 @dataclass
@@ -56,6 +61,13 @@ class Soundness:
             slot = min(found)
             raise Suspended([Reason("samples", f"slot {slot}: {found[slot]}", tuple(found))], spoilt=True)
 
+    @staticmethod
+    def refuse_contradicted(past: Sequence[Event]) -> None:
+        """Refuses to go on behind dwells that were stored before all units contradicted the table's encoders."""
+        for event in past:
+            if event.kind == "stopped" and event.reason.startswith(TURNED):
+                raise OperatorNeeded(event.reason)
+
     def refuse_contradiction(self, record: Record, units: Sequence[Unit]) -> None:
         """Ends the run where all units say that the table does not stand where its encoders say."""
         if not units:
@@ -63,4 +75,4 @@ class Soundness:
         seen = record.seen(units[0].slot)
         text = contradicts(self.pointing.add(record.soak, (seen["outer_deg"], seen["inner_deg"]), record.means(units)))
         if text:
-            raise OperatorNeeded(f"table: {text}")
+            raise OperatorNeeded(f"{TABLE}{text}")

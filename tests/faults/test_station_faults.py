@@ -20,7 +20,9 @@ from schemas.errors import (
     StationTimeout,
     WrongUse,
 )
+from schemas.event import MemoryLog
 from schemas.fault import Fault
+from schemas.recipe import Pose
 from schemas.station import load_station
 from stations.links.modbus import ModbusLink
 from stations.opening import make_plant, open_station, serve_plant
@@ -33,6 +35,22 @@ def run(config, lot, recipe=None, sink=None):
     with open_station(config, lot, resume=sink.last_state()) as station:
         capture(station, recipe or short_recipe(), lot, sink, progress=quiet_progress)
     return sink
+
+
+def test_a_capture_that_holds_dwells_of_a_worn_table_is_not_gone_on_with():
+    """The table is mended, the same command given again: dwells that were stored before the play was seen would stay in it."""
+    sink, events = MemorySink(), MemoryLog()
+    poses = [Pose(name=f"p{i}", outer_deg=(-1) ** i * (20.0 + 20.0 * i), inner_deg=25.0 * i) for i in range(8)]
+    recipe = short_recipe().model_copy(update={"poses": poses})
+    worn = station_of(faults=[{"kind": "backlash", "device": "outer", "at_s": 0.0, "figures": {"play_deg": 2.0}}])
+    for config in (worn, station_of()):
+        with (
+            open_station(config, lot_of()) as station,
+            pytest.raises(OperatorNeeded, match=r"table: the outputs of all units turn .* measure the lot anew"),
+        ):
+            capture(station, recipe, lot_of(), sink, progress=quiet_progress, events=events)
+        stored = len(sink.finished())
+        assert 0 < stored < 8
 
 
 def test_a_unit_that_falls_silent_is_reported_and_the_others_go_on():
