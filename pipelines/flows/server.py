@@ -34,14 +34,27 @@ def serve(home: Path, port: int) -> None:
 def _leave_when_alone(home: Path, server: uvicorn.Server) -> None:
     while True:
         time.sleep(LOOK_S)
-        if any_client(home):
-            continue
-        with (home / START_LOCK).open("w") as lock:
-            fcntl.flock(lock, fcntl.LOCK_EX)
-            if not any_client(home):  # a client that came meanwhile has its file already
-                (home / ADDRESS).unlink(missing_ok=True)
-                server.should_exit = True
-                return
+        try:
+            left = _left(home)
+        except (
+            FileNotFoundError
+        ):  # its folder is gone, as that of a server for one command is: nobody finds it any more
+            left = True
+        if left:
+            server.should_exit = True
+            return
+
+
+def _left(home: Path) -> bool:
+    """Whether no client is left, and none can come any more."""
+    if any_client(home):
+        return False
+    with (home / START_LOCK).open("w") as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        if any_client(home):  # it came meanwhile
+            return False
+        (home / ADDRESS).unlink(missing_ok=True)
+        return True
 
 
 def any_client(home: Path) -> bool:
