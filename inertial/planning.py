@@ -35,6 +35,8 @@ class Sight:
     left : v, RMS of the column after the base model over its RMS, 0 … 1; the best of its columns, axes and nonlinear values
     by_axis : v per sensor axis, (3,)
     floor : three-sigma floor of the coefficient, g per unit of the coefficient; infinite where unseen
+    column : which of the effect's columns that coefficient belongs to
+    size : RMS over the dwells of what an effect of the floor's size adds, g; infinite where unseen
     alias : effects that it is not told from; exact : those of them with which it is one, to rounding
     """
 
@@ -46,6 +48,8 @@ class Sight:
     alias: tuple[str, ...]
     breaker: str
     exact: tuple[str, ...] = ()
+    column: int = 0
+    size: float = float("inf")
 
     @property
     def variance_inflation(self) -> float:
@@ -109,11 +113,11 @@ class _Noise:
         self._white = white
         self._span = _span(state, base, white)
 
-    def largest(self, columns: Array) -> float:
-        """Information that the best of columns (3, n, p) has beside the base model, square root, 1/g."""
+    def information(self, columns: Array) -> Array:
+        """Information (3, p) that columns (3, n, p) have beside the base model, square root, 1/g."""
         own = self._white @ columns
         left = own - self._span @ (np.swapaxes(self._span, -1, -2) @ own)
-        return float(np.max(np.linalg.norm(left, axis=-2)))
+        return np.linalg.norm(left, axis=-2)
 
 
 @dataclass(frozen=True)
@@ -205,10 +209,13 @@ def _sight(name: str, found: _Remainder | None, noise: float | _Noise, cosines: 
     if found is None or found.left <= SEEN:
         return Sight(name, False, 0.0 if found is None else found.left, (0.0, 0.0, 0.0), float("inf"), alias, breaker)
     if isinstance(noise, _Noise):
-        floor = 3.0 / noise.largest(found.columns)
+        information = noise.information(found.columns)
     else:
-        floor = 3.0 * noise / float(np.max(np.linalg.norm(found.columns, axis=-2)))
-    return Sight(name, True, found.left, found.by_axis, floor, alias, breaker, exact)
+        information = np.linalg.norm(found.columns, axis=-2) / noise
+    axis, column = np.unravel_index(int(np.argmax(information)), information.shape)
+    floor = 3.0 / float(information[axis, column])
+    size = floor * float(found.before[axis, column]) / float(np.sqrt(found.columns.shape[-2]))
+    return Sight(name, True, found.left, found.by_axis, floor, alias, breaker, exact, int(column), size)
 
 
 def alias_cosines(seen: Mapping[str, _Remainder]) -> dict[str, dict[str, float]]:

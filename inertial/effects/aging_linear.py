@@ -14,6 +14,7 @@ class AgingLinear(SensorEffect):
     equation: ClassVar[str] = "kt·t"
     source: ClassVar[str] = "mechanism: relaxation of stress; drift term of IEEE Std 1293-1998"
     typical_ug: ClassVar[tuple[float, float]] = (1.0, 1000.0)
+    per: ClassVar[tuple[str, ...]] = ("h",)
     hides_behind: ClassVar[tuple[str, ...]] = ("bias_temperature", "thermal_hysteresis", "warm_up")
     breaker: ClassVar[str] = "a reference pose measured again and again; soaks in mixed order"
     simplicity: ClassVar[int] = 27

@@ -54,6 +54,8 @@ class Effect(ABC):
     scope : "sensor" (coefficients per unit and axis), "station" (shared by all units of a run), "slot"
     source : where the term comes from
     typical_ug : range of plausible sizes at 1 g or over the usual range of its driver, µg
+    per : per column, what the coefficient's unit is divided by, as text ("V", "g·h"), where that does not follow from how the
+        column grows with force and temperature; empty where it does, or where the column has no unit
     hides_behind : effects that take its place under poor plans
     breaker : what to measure so that it shows
     simplicity : rank among effects that the data cannot tell apart; the lowest is recommended
@@ -70,6 +72,7 @@ class Effect(ABC):
     scope: ClassVar[Scope] = "sensor"
     source: ClassVar[str]
     typical_ug: ClassVar[tuple[float, float]]
+    per: ClassVar[tuple[str, ...]] = ()
     hides_behind: ClassVar[tuple[str, ...]] = ()
     breaker: ClassVar[str]
     simplicity: ClassVar[int] = 50

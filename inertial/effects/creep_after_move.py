@@ -17,6 +17,7 @@ class CreepAfterMove(SensorEffect):
     equation: ClassVar[str] = "kC·ΣΔfi·exp(−s/τ), over all moves so far"
     source: ClassVar[str] = "mechanism: viscoelastic hinge or adhesive (one Maxwell element)"
     typical_ug: ClassVar[tuple[float, float]] = (10.0, 5000.0)
+    per: ClassVar[tuple[str, ...]] = ("g",)
     hides_behind: ClassVar[tuple[str, ...]] = ("pose_hysteresis",)
     breaker: ClassVar[str] = "waits of different length after a move"
     simplicity: ClassVar[int] = 32

@@ -14,6 +14,7 @@ class ScaleAging(SensorEffect):
     equation: ClassVar[str] = "K1t·t·fi"
     source: ClassVar[str] = "mechanism: ageing of the reference or the magnet"
     typical_ug: ClassVar[tuple[float, float]] = (1.0, 1000.0)
+    per: ClassVar[tuple[str, ...]] = ("g·h",)
     hides_behind: ClassVar[tuple[str, ...]] = ("scale_temperature",)
     breaker: ClassVar[str] = "opposed poses at the beginning and at the end"
     simplicity: ClassVar[int] = 28

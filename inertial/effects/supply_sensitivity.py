@@ -17,6 +17,7 @@ class SupplySensitivity(SensorEffect):
     equation: ClassVar[str] = "kV·ΔV + K1V·ΔV·fi"
     source: ClassVar[str] = "mechanism: ratiometric output; power-supply rejection"
     typical_ug: ClassVar[tuple[float, float]] = (1.0, 5000.0)
+    per: ClassVar[tuple[str, ...]] = ("V", "g·V")
     hides_behind: ClassVar[tuple[str, ...]] = ("bias_temperature",)
     breaker: ClassVar[str] = "steps of the supply at constant temperature"
     simplicity: ClassVar[int] = 35

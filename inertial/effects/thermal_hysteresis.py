@@ -18,6 +18,7 @@ class ThermalHysteresis(SensorEffect):
     equation: ClassVar[str] = "kH·h(T; w) + kH2·h(T; 0.35·w), h the play operator of half width w"
     source: ClassVar[str] = "Visintin, Differential Models of Hysteresis; mechanism: friction in the die attach"
     typical_ug: ClassVar[tuple[float, float]] = (100.0, 10000.0)
+    per: ClassVar[tuple[str, ...]] = ("K", "K")
     hides_behind: ClassVar[tuple[str, ...]] = ("aging_linear", "bias_temperature_quadratic")
     breaker: ClassVar[str] = "a closed loop of temperature, and minor loops; a one-way soak holds no information"
     simplicity: ClassVar[int] = 24

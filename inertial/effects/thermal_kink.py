@@ -17,6 +17,7 @@ class ThermalKink(SensorEffect):
     equation: ClassVar[str] = "kK·w·softplus((T − Tc)/w)"
     source: ClassVar[str] = "mechanism: glass transition of an adhesive"
     typical_ug: ClassVar[tuple[float, float]] = (50.0, 5000.0)
+    per: ClassVar[tuple[str, ...]] = ("K",)
     hides_behind: ClassVar[tuple[str, ...]] = ("bias_temperature_cubic", "bias_temperature_quadratic")
     breaker: ClassVar[str] = "steps of 5 K about the kink"
     simplicity: ClassVar[int] = 25

@@ -17,6 +17,7 @@ class ThermalLag(SensorEffect):
     equation: ClassVar[str] = "(kL + kL2·θ)·(T_lag − T)"
     source: ClassVar[str] = "first-order heat conduction between thermometer and sensing element"
     typical_ug: ClassVar[tuple[float, float]] = (10.0, 10000.0)
+    per: ClassVar[tuple[str, ...]] = ("K", "K²")
     hides_behind: ClassVar[tuple[str, ...]] = ("thermal_rate", "bias_temperature")
     breaker: ClassVar[str] = "a fast step of temperature, read while it settles"
     simplicity: ClassVar[int] = 21

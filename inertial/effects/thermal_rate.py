@@ -15,6 +15,7 @@ class ThermalRate(SensorEffect):
     equation: ClassVar[str] = "kR·dT/dt, over a settling time τ"
     source: ClassVar[str] = "mechanism: gradient under a steady flow of heat"
     typical_ug: ClassVar[tuple[float, float]] = (10.0, 5000.0)
+    per: ClassVar[tuple[str, ...]] = ("(K/min)",)
     hides_behind: ClassVar[tuple[str, ...]] = ("thermal_lag",)
     breaker: ClassVar[str] = "ramps at two rates; soaked readings never see it"
     simplicity: ClassVar[int] = 20

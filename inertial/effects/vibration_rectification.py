@@ -14,6 +14,7 @@ class VibrationRectification(SensorEffect):
     equation: ClassVar[str] = "VRE·a_rms²"
     source: ClassVar[str] = "IEEE Std 1293-1998, vibration rectification"
     typical_ug: ClassVar[tuple[float, float]] = (1.0, 1000.0)
+    per: ClassVar[tuple[str, ...]] = ("g²",)
     hides_behind: ClassVar[tuple[str, ...]] = ("second_order", "bias_temperature")
     breaker: ClassVar[str] = "the compressor off; the vibration recorded"
     simplicity: ClassVar[int] = 34

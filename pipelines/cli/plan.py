@@ -299,10 +299,14 @@ def _print(document: dict[str, Any]) -> None:
     )
     print_table(["coefficient", "error 1σ: x", "y", "z", "unit"], _coefficient_lines(document["coefficients"]))
     seen = [row for row in document["effects"] if row["seen"]]
-    lines = [
-        [r["effect"], short(r["left"]), short(r["variance_inflation"]), short(r["floor_ug"]), _aliases(r)] for r in seen
-    ]
-    print_table(["seen", "left v", "1/v²", "floor 3σ, µg", "not told from (= exactly)"], lines)
+    print_table(
+        ["seen", "left v", "1/v²", "floor 3σ", "unit", "it adds, µg", "not told from (= exactly)"],
+        [_sight_line(row) for row in seen],
+    )
+    faint = [row["effect"] for row in seen if _faint(row)]
+    if faint:
+        names = ", ".join(faint)
+        out.print(f"* to be found here, it must add more than such effects do: {names}")
     blind = [row for row in document["effects"] if not row["seen"]]
     print_table(["not seen", "why, and what to add"], [[r["effect"], r["why"] or r["breaker"]] for r in blind])
     if "page" in document:
@@ -336,6 +340,17 @@ def _coefficient_lines(rows: list[dict[str, Any]]) -> list[list[str]]:
         line = lines.setdefault(key, [row["effect"] if place == 0 else "", "", "", "", row["unit"]])
         line[1 + max(0, "xyz".find(row["axis"]))] = short(row["uncertainty_ug"])
     return list(lines.values())
+
+
+def _sight_line(row: dict[str, Any]) -> list[str]:
+    size = short(row["floor_size_ug"]) + (" *" if _faint(row) else "")
+    figures = [short(row[key]) for key in ("left", "variance_inflation", "floor_ug")]
+    return [row["effect"], *figures, row["floor_unit"], size, _aliases(row)]
+
+
+def _faint(row: dict[str, Any]) -> bool:
+    """Whether an effect has to be larger than such effects are, to be found by this plan."""
+    return row["floor_size_ug"] > row["typical_ug"][1]
 
 
 def _aliases(row: dict[str, Any]) -> str:

@@ -58,7 +58,7 @@ def agreed(question: str) -> bool:
             return True
         if answer in STOP:
             return False
-        words = f"'{answer}' is neither: y or Enter measures it, n leaves it; Ctrl-C stops here, and the same command goes on later"
+        words = f"'{answer}' is neither: y or Enter measures it, n leaves it; Ctrl-C stops, and the same command goes on later"
         error_console().print(words, style="yellow", markup=False, soft_wrap=True)
 
 

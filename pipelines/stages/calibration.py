@@ -214,6 +214,8 @@ def unit_texts(effect: SensorEffect, out_unit: str) -> list[str]:
         values = design.starting_values([effect], state)
         return effect.columns(state, 0, **values.get(effect.id, {}))
 
+    if effect.per:
+        return [_per(out_unit, below) for below in effect.per]
     if effect.nonlinear or effect.id.startswith("covariate:"):
         return [out_unit] * len(effect.names(0))
     base, by_force, by_theta = columns(1.0, 1.0)[0], columns(2.0, 1.0)[0], columns(1.0, 2.0)[0]
@@ -230,10 +232,15 @@ def _degree(base: float, doubled: float) -> int:
 
 
 def _unit_text(out_unit: str, force: int, theta: int) -> str:
-    below = [name + _POWERS[degree] for name, degree in (("g", force), ("K", theta)) if degree > 0]
+    return _per(
+        out_unit, "·".join(name + _POWERS[degree] for name, degree in (("g", force), ("K", theta)) if degree > 0)
+    )
+
+
+def _per(out_unit: str, below: str) -> str:
     if not below:
         return out_unit
-    return f"{out_unit}/({'·'.join(below)})" if len(below) > 1 else f"{out_unit}/{below[0]}"
+    return f"{out_unit}/({below})" if "·" in below else f"{out_unit}/{below}"
 
 
 _POWERS = ("", "", "²", "³", "⁴", "⁵", "⁶")

@@ -138,8 +138,9 @@ def temperatures(stretches: Sequence[Stretch], station: StationConfig) -> list[t
             found.append((stretch.start + k * thermal.poll, air, device + (1.0 - part) * ends[0] + part * ends[1]))
             air, device = _followed(air, device, target, thermal.poll, thermal)
     last = stretches[-1]
-    end = (last.step.temperature,) * 2 if last.step.settled else (last.end.air, last.end.device)
-    return [*found, (last.start + last.seconds, *end)]
+    target = last.step.temperature
+    air, device = (target, target) if last.step.settled else (last.end.air, last.end.device)
+    return [*found, (last.start + last.seconds, air, device)]
 
 
 def move_seconds(now: Standing, pose: Pose, station: StationConfig) -> float:

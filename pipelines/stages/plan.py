@@ -123,9 +123,19 @@ def _coefficient_rows(expected: Expected) -> list[dict[str, Any]]:
 
 
 def _coefficient(effect: str, name: str, axis: str, error: float, place: int) -> dict[str, Any]:
+    return {
+        "effect": effect,
+        "name": name,
+        "axis": axis,
+        "uncertainty_ug": MICRO * error,
+        "unit": _unit(effect, place),
+    }
+
+
+def _unit(effect: str, place: int) -> str:
+    """Unit of an effect's coefficient."""
     known = catalogue.get(effect)
-    unit = unit_texts(known, "µg")[place] if isinstance(known, SensorEffect) else "µrad"
-    return {"effect": effect, "name": name, "axis": axis, "uncertainty_ug": MICRO * error, "unit": unit}
+    return unit_texts(known, "µg")[place] if isinstance(known, SensorEffect) else "µrad"
 
 
 def _row(sight: Sight, state: State, model: Sequence[str]) -> dict[str, Any]:
@@ -137,6 +147,9 @@ def _row(sight: Sight, state: State, model: Sequence[str]) -> dict[str, Any]:
         "left_by_axis": list(sight.by_axis),
         "variance_inflation": sight.variance_inflation if sight.left > 0.0 else None,
         "floor_ug": MICRO * sight.floor if finite else None,
+        "floor_unit": _unit(sight.effect, sight.column) if finite else None,
+        "floor_size_ug": MICRO * sight.size if finite else None,
+        "typical_ug": list(catalogue.get(sight.effect).typical_ug),
         "alias": list(sight.alias),
         "alias_exact": list(sight.exact),
         "breaker": sight.breaker,

@@ -103,6 +103,14 @@ def test_columns_have_a_name_each_and_are_finite(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", EVERY)
+def test_units_are_given_for_every_column_where_they_are_given(name: str) -> None:
+    effect = effects.get(name)
+    if effect.per:
+        assert isinstance(effect, SensorEffect)
+        assert {len(effect.per)} == {len(effect.names(axis)) for axis in range(3)}
+
+
+@pytest.mark.parametrize("name", EVERY)
 def test_start_columns_are_finite_and_fit_the_dwells(name: str) -> None:
     effect = effects.get(name)
     values = values_of(effect, RICH)

@@ -46,6 +46,27 @@ def test_plan_says_for_every_effect_whether_six_faces_see_it(faces):
     assert "45" in rows["cross_coupling"]["breaker"] or "90" in rows["cross_coupling"]["breaker"]
 
 
+def test_a_floor_comes_with_its_unit_and_with_what_an_effect_of_that_size_adds(faces):
+    done = CliRunner().invoke(app, ["plan", str(faces), "--json"])
+    rows = {row["effect"]: row for row in json.loads(done.stdout)["effects"]}
+    square, shaken = rows["second_order"], rows["vibration_rectification"]
+    assert square["floor_unit"] == "µg/g²"
+    # K2·fx² is 1 in two of six faces and 0 in the others
+    assert square["floor_size_ug"] == pytest.approx(square["floor_ug"] / 3**0.5, rel=1e-3)
+    assert shaken["floor_unit"] == "µg/g²"
+    assert shaken["floor_size_ug"] < 1e-3 * shaken["floor_ug"]
+
+
+def test_plan_marks_what_would_have_to_be_larger_than_it_ever_is():
+    done = CliRunner().invoke(app, ["plan", "production", "--json"])
+    faint = {
+        r["effect"] for r in json.loads(done.stdout)["effects"] if r["seen"] and r["floor_size_ug"] > r["typical_ug"][1]
+    }
+    told = " ".join(CliRunner().invoke(app, ["plan", "production"]).stdout.split())
+    assert "scale_aging" in faint
+    assert f"more than such effects do: {', '.join(sorted(faint))}" in told
+
+
 def test_plan_of_the_built_in_recipe_adds_up_its_minutes():
     done = CliRunner().invoke(app, ["plan", "--json"])
     minutes = json.loads(done.stdout)["minutes"]
