@@ -212,10 +212,14 @@ def _sight(name: str, found: _Remainder | None, noise: float | _Noise, cosines: 
         information = noise.information(found.columns)
     else:
         information = np.linalg.norm(found.columns, axis=-2) / noise
-    axis, column = np.unravel_index(int(np.argmax(information)), information.shape)
+    seen = information > 1e-9 * np.max(information, initial=0.0)
+    size = 3.0 * found.before / np.sqrt(found.columns.shape[-2]) / np.where(seen, information, 1.0)
+    # of columns in different units the one is meant of which the least has to be there
+    axis, column = np.unravel_index(int(np.argmin(np.where(seen, size, np.inf))), size.shape)
     floor = 3.0 / float(information[axis, column])
-    size = floor * float(found.before[axis, column]) / float(np.sqrt(found.columns.shape[-2]))
-    return Sight(name, True, found.left, found.by_axis, floor, alias, breaker, exact, int(column), size)
+    return Sight(
+        name, True, found.left, found.by_axis, floor, alias, breaker, exact, int(column), float(size[axis, column])
+    )
 
 
 def alias_cosines(seen: Mapping[str, _Remainder]) -> dict[str, dict[str, float]]:
