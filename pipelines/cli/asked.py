@@ -29,6 +29,11 @@ class Asked:
     size: float | None = None
     separation: float | None = None
 
+    @property
+    def errors_named(self) -> bool:
+        """Whether the errors wanted were given, rather than left at the textbook plan's."""
+        return bool(self.wanted) or self.factor != 1.0
+
 
 def wish_of(asked: Asked, base: Recipe, against: Planned, levels: tuple[float, ...]) -> Wish:
     """The wish of what was asked: errors as wanted, or rivals told apart."""

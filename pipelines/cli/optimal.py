@@ -19,6 +19,10 @@ if TYPE_CHECKING:
     from schemas.station import StationConfig
 
 
+LACK = 1.1
+"""Errors over the textbook plan's up to which the nearest recipe is offered where nobody said what errors are wanted."""
+
+
 def found(base: Recipe, station: StationConfig, noise: DwellNoise, asked: Asked) -> tuple[Optimum, dict[str, Any]]:
     """The cheapest recipe, and the document about it."""
     from pipelines.stages.optimise import optimise
@@ -32,7 +36,8 @@ def found(base: Recipe, station: StationConfig, noise: DwellNoise, asked: Asked)
     wish = replace(wish, verification=asked.verification or verified_in(base))
     progress = error_console()
     with progress.status("looking for the cheapest recipe") as status:
-        best = optimise(base, against, wish, lambda note: status.update(f"looking: {note}"))
+        lack = 1.0 if asked.errors_named else LACK
+        best = optimise(base, against, wish, lambda note: status.update(f"looking: {note}"), lack=lack)
     return best, document(best, plan(best.planned))
 
 
@@ -119,6 +124,12 @@ def print_optimum(document: dict[str, Any]) -> None:
         f"{document['verification_dwells']} dwells are for verification, of which the textbook plan has none",
         soft_wrap=True,
     )
+    if document["worst"] > 1.0:
+        out.print(
+            "No recipe was found that reaches the textbook plan's errors everywhere; this one comes nearest, with "
+            f"{document['worst']:.3f} of them at most. --factor asks for larger errors, --verification for fewer dwells.",
+            soft_wrap=True,
+        )
     if document["rivals"]:
         lines = [[r["true"], r["wrong"], short(r["chi_square"]), short(r["textbook"])] for r in document["rivals"]]
         print_table(["if true", "taken for", "χ² in the lot", "textbook plan"], lines, whole=2)

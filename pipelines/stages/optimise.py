@@ -80,8 +80,13 @@ def _busy(course: Planned) -> float:
     return own.total - own.static_record
 
 
-def optimise(recipe: Recipe, against: Planned, wish: Wish, progress: Progress) -> Optimum:
+def optimise(recipe: Recipe, against: Planned, wish: Wish, progress: Progress, *, lack: float = 1.0) -> Optimum:
     """The cheapest recipe that was found to fulfil a wish.
+
+    Parameters
+    ----------
+    lack : errors over those wanted up to which the nearest recipe is taken where none fulfils the wish, if it is quicker
+        than the one that it is held against
 
     Orders of soaks are ranked by the station time that a plain design needs in them, every soak with the dwells it needs; in
     the best, poses are exchanged (:mod:`inertial.exchange`), and dwells are added or taken away until the wish is just fulfilled.
@@ -98,6 +103,7 @@ def optimise(recipe: Recipe, against: Planned, wish: Wish, progress: Progress) -
         soaks = ", ".join(f"{t:g}" for t in made.order)
         progress(f"soaks at {soaks} °C ({number} of {len(ranked)})")
         best = search.best(made, best)
+    best = best or search.nearest_within(lack)
     if best is None:
         raise RecipeInvalid(_refusal(search))
     return Optimum(best, identified(best), against, wish, float(np.max(search.reached(best))))
@@ -128,6 +134,7 @@ class _Search:
         self.recipe, self.against, self.wish = recipe, against, wish
         self.layout = Layout(recipe, against.station, against.noise, wish, slowest=float(against.state.time[-1]))
         self.nearest = math.inf
+        self.near: tuple[float, Planned] | None = None
         self.unseen: list[str] = []
 
     def ranked(self) -> list[tuple[Design, float]]:
@@ -191,6 +198,8 @@ class _Search:
                 break
             worst = float(np.max(reached))
             self.nearest = min(self.nearest, worst)
+            if self.near is None or worst < self.near[0]:
+                self.near = (worst, found)
             if worst <= 1.0 and (best is None or _busy(found) < _busy(best)):
                 self.unseen = self.blind(found)
                 best = best if self.unseen else found
@@ -198,6 +207,13 @@ class _Search:
                 break
             now = fewest(self.layout, made, (1.0 - SPARE) * self.layout.shortfall(now)[0] / reached)
         return best
+
+    def nearest_within(self, lack: float) -> Planned | None:
+        """The recipe that lacks least of the wish, where that is little, it is quicker, and blind to nothing asked for."""
+        if self.near is None or self.near[0] > lack:
+            return None
+        found = self.near[1]
+        return None if _busy(found) >= _busy(self.against) or self.blind(found) else found
 
     def slower(self, made: Design, best: Planned | None) -> bool:
         """Whether a design takes clearly longer than the best recipe so far."""
