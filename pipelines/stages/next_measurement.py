@@ -80,6 +80,7 @@ def _breaker(group: EffectClass) -> dict[str, Any]:
 def rows_of(found: Proposal) -> list[dict[str, Any]]:
     """Rows of one proposal: equal steps in a row are one, with their number."""
     rows: list[dict[str, Any]] = []
+    before: dict[str, Any] | None = None
     about = " | ".join(found.pair) or f"not seen so far: {', '.join(found.ids)}"
     for step in found.steps:
         row = {
@@ -91,10 +92,11 @@ def rows_of(found: Proposal) -> list[dict[str, Any]]:
             "soaked": step.soaked,
             **({"off_s": round(step.off, 1)} if step.off > 0.0 else {}),
         }
-        if rows and {k: rows[-1][k] for k in row} == row:
+        if row == before:
             rows[-1]["repeats"] += 1
         else:
             rows.append({**row, "repeats": 1})
+        before = row
     whole = {
         "minutes": round(found.minutes, 1),
         "separation_before": round(found.before, 2),
