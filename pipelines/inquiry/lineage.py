@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING
 
 import pandas as pd
 
+from schemas.errors import DataRejected
+
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
@@ -30,7 +32,19 @@ class Lineage:
         """Dwells of all runs, numbered through; units that one of them refused are left out."""
         tables = [run.table("dwells") for run in self.runs]
         accepted = set.intersection(*(set(table["unit"].astype(str)) for table in tables))
+        if not accepted:
+            raise DataRejected(self._refused())
         return _numbered_through([table[table["unit"].isin(accepted)] for table in tables])
+
+    def _refused(self) -> str:
+        """Which run left no unit to be judged, and why."""
+        verdicts = self.runs[-1].table("verdicts")
+        reasons = verdicts.loc[verdicts["refused"], "reason"].astype(str).unique().tolist()
+        why = f" ({reasons[0]})" if reasons else ""
+        return (
+            f"investigate: no unit was accepted by all of {', '.join(self.ids)}, at least one is needed; the last refused "
+            f"{int(verdicts['refused'].sum())} of {len(verdicts)}{why}; mend that, and investigate a run measured after it"
+        )
 
     def history(self) -> pd.DataFrame:
         """Temperatures against time through all runs."""
