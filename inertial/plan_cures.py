@@ -4,11 +4,14 @@ from dataclasses import replace
 from itertools import product
 
 import numpy as np
+from numpy.typing import NDArray
 
 from inertial import poses
 from inertial.plan_features import levels
 from inertial.sequences import Pace, Step, extended, n_of
 from inertial.state import State
+
+Array = NDArray[np.float64]
 
 _STEPS_K = 20.0
 
@@ -95,24 +98,21 @@ def cycled(state: State) -> State:
 
 def supply_steps(state: State) -> State:
     """The plan with every pose again, every other one at 2 % more supply."""
-    if state.supply is None:
-        return state
     more = later(state)
-    if more.supply is None:
-        return state
-    stepped = more.supply.copy()
-    stepped[n_of(state) :: 2] *= 1.02
-    return replace(more, supply=stepped, memory={})
+    return state if more.supply is None else replace(more, supply=_raised(state, more.supply, 1.02), memory={})
 
 
 def shaken(state: State) -> State:
     """The plan with every pose again, every other one at ten times the vibration."""
     more = later(state)
-    if more.vibration is None:
-        return state
-    stronger = more.vibration.copy()
-    stronger[n_of(state) :: 2] *= 10.0
-    return replace(more, vibration=stronger, memory={})
+    return state if more.vibration is None else replace(more, vibration=_raised(state, more.vibration, 10.0), memory={})
+
+
+def _raised(state: State, values: Array, factor: float) -> Array:
+    """What was recorded over a plan and its repetition, every other dwell of the repetition times a factor."""
+    found = values.copy()
+    found[n_of(state) :: 2] *= factor
+    return found
 
 
 def up_down(state: State) -> list[float]:

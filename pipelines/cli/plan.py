@@ -303,7 +303,7 @@ def _print(document: dict[str, Any]) -> None:
         ["seen", "left v", "1/v²", "floor 3σ", "unit", "it adds, µg", "not told from (= exactly)"],
         [_sight_line(row) for row in seen],
     )
-    faint = [row["effect"] for row in seen if _faint(row)]
+    faint = [row["effect"] for row in seen if row["faint"]]
     if faint:
         names = ", ".join(faint)
         out.print(f"* to be found here, it must add more than such effects do: {names}")
@@ -343,14 +343,9 @@ def _coefficient_lines(rows: list[dict[str, Any]]) -> list[list[str]]:
 
 
 def _sight_line(row: dict[str, Any]) -> list[str]:
-    size = short(row["floor_size_ug"]) + (" *" if _faint(row) else "")
+    size = short(row["floor_size_ug"]) + (" *" if row["faint"] else "")
     figures = [short(row[key]) for key in ("left", "variance_inflation", "floor_ug")]
     return [row["effect"], *figures, row["floor_unit"], size, _aliases(row)]
-
-
-def _faint(row: dict[str, Any]) -> bool:
-    """Whether an effect has to be larger than such effects are, to be found by this plan."""
-    return row["floor_size_ug"] > row["typical_ug"][1]
 
 
 def _aliases(row: dict[str, Any]) -> str:

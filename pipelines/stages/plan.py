@@ -150,6 +150,7 @@ def _row(sight: Sight, state: State, model: Sequence[str]) -> dict[str, Any]:
         "floor_unit": _unit(sight.effect, sight.column) if finite else None,
         "floor_size_ug": MICRO * sight.size if finite else None,
         "typical_ug": list(catalogue.get(sight.effect).typical_ug),
+        "faint": finite and MICRO * sight.size > catalogue.get(sight.effect).typical_ug[1],
         "alias": list(sight.alias),
         "alias_exact": list(sight.exact),
         "breaker": sight.breaker,

@@ -1,6 +1,7 @@
 """Devices on serial lines and behind TLS, driven by the production adapters through a station's file."""
 
 import time
+from contextlib import contextmanager
 
 import pytest
 from other_devices import station_with
@@ -24,6 +25,19 @@ def hardware(config, **carried) -> StationConfig:
         tables["devices"][place] = {k: device[k] for k in ("profile", "device_id")} | carried
     tables |= {"kind": "modbus", "link": {"timeout_s": 1.0, "read_attempts": 2}}
     return StationConfig.model_validate(tables)
+
+
+@contextmanager
+def impatient():
+    """A plant, its serial line, and a station on it that asks once and waits for 0.2 s; the line is known to work."""
+    config = station_with()
+    plant = plant_of(config, lot_of(1))
+    with serial_line() as line, SerialPlantServer(plant, line.device):
+        real = hardware(config, link="rtu", serial=line.host, baud=115200, parity="none")
+        real = real.model_copy(update={"link": real.link.model_copy(update={"read_attempts": 1, "timeout_s": 0.2})})
+        with open_devices(real, ()) as station:
+            assert station.chamber.set_point() == pytest.approx(23.0)
+            yield plant, line, station
 
 
 @pytest.mark.parametrize("name", CHAMBERS)
@@ -78,18 +92,12 @@ def test_a_serial_answer_with_a_wrong_check_is_asked_for_again_and_never_believe
 
 
 def test_a_serial_answer_that_comes_late_is_heard_out_before_the_next_question():
-    config = station_with()
-    plant = plant_of(config, lot_of(1))
-    with serial_line() as line, SerialPlantServer(plant, line.device):
-        real = hardware(config, link="rtu", serial=line.host, baud=115200, parity="none")
-        real = real.model_copy(update={"link": real.link.model_copy(update={"read_attempts": 1, "timeout_s": 0.2})})
-        with open_devices(real, ()) as station:
-            assert station.chamber.set_point() == pytest.approx(23.0)
-            line.to_host.append(line.late(0.3))
-            with pytest.raises(StationTimeout):
-                station.chamber.set_point()
-            plant.fixture.chamber.set_point = 50.0
-            assert station.chamber.set_point() == 50.0
+    with impatient() as (plant, line, station):
+        line.to_host.append(line.late(0.3))
+        with pytest.raises(StationTimeout):
+            station.chamber.set_point()
+        plant.fixture.chamber.set_point = 50.0
+        assert station.chamber.set_point() == 50.0
 
 
 def unheard(data):
@@ -100,21 +108,15 @@ def unheard(data):
 @pytest.mark.parametrize("knows_echo", [True, False])
 def test_a_serial_answer_that_comes_after_two_time_outs_is_not_believed(knows_echo):
     """It arrives when the question has been put again, in front of the answer to that: a frame has no number to tell them."""
-    config = station_with()
-    plant = plant_of(config, lot_of(1))
-    with serial_line() as line, SerialPlantServer(plant, line.device):
-        real = hardware(config, link="rtu", serial=line.host, baud=115200, parity="none")
-        real = real.model_copy(update={"link": real.link.model_copy(update={"read_attempts": 1, "timeout_s": 0.2})})
-        with open_devices(real, ()) as station:
-            assert station.chamber.set_point() == pytest.approx(23.0)
-            late = 0.5 if knows_echo else 0.9
-            line.to_host += [line.late(late), *([] if knows_echo else [unheard]), line.late(0.15)]
-            for _ in range(1 if knows_echo else 2):
-                with pytest.raises(StationTimeout):
-                    station.chamber.set_point()
-            plant.fixture.chamber.set_point = 50.0
-            assert station.chamber.set_point() == 50.0
-            assert station.chamber.set_point() == 50.0
+    with impatient() as (plant, line, station):
+        late = 0.5 if knows_echo else 0.9
+        line.to_host += [line.late(late), *([] if knows_echo else [unheard]), line.late(0.15)]
+        for _ in range(1 if knows_echo else 2):
+            with pytest.raises(StationTimeout):
+                station.chamber.set_point()
+        plant.fixture.chamber.set_point = 50.0
+        assert station.chamber.set_point() == 50.0
+        assert station.chamber.set_point() == 50.0
 
 
 def test_a_serial_answer_with_more_behind_it_is_not_believed():
