@@ -56,8 +56,8 @@ Result = tuple[Job, Score, dict[str, Any], dict[str, Any]]  # with the document 
 
 def in_process(run: Run) -> Answer:
     """The product's diagnosis, called as a function."""
-    from pipelines.stages.compare import compare
-    from pipelines.stages.criticise import diagnose
+    from pipelines.diagnosis.compare import compare
+    from pipelines.diagnosis.diagnose import diagnose
 
     truth = run.sealed
     effects = list(truth.spec.base) if truth.spec.base else None

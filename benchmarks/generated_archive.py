@@ -35,7 +35,7 @@ from inertial import poses  # noqa: E402
 from pipelines.archive import files, parquet  # noqa: E402
 from pipelines.archive.archive import FORMAT  # noqa: E402
 from pipelines.archive.keys import digest, libraries, stage_key  # noqa: E402
-from pipelines.stages.calibration import column_names, unit_texts  # noqa: E402
+from pipelines.tables.calibration import column_names, unit_texts  # noqa: E402
 from schemas import tables  # noqa: E402
 from schemas.limits import Limits, describe_rule  # noqa: E402
 from schemas.recipe import Pose, Recipe  # noqa: E402

@@ -5,9 +5,9 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from pipelines.archive import Archive, files
-from pipelines.trace.days import months_after
-from pipelines.trace.events import Event
-from pipelines.trace.ledger import Ledger
+from pipelines.certificates.days import months_after
+from pipelines.certificates.entries import Event
+from pipelines.certificates.ledger import Ledger
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping

@@ -127,8 +127,8 @@ def job_of(scene: Scene, seed: int, units: int) -> Any:
     import numpy as np
 
     from inertial import poses
-    from pipelines.job import Job
-    from pipelines.recipes import load_limits, load_recipe
+    from pipelines.jobs.job import Job
+    from pipelines.jobs.recipes import load_limits, load_recipe
     from schemas.recipe import Lot, Recipe, Unit
     from schemas.station import Hidden, Simulation, load_station
 
@@ -169,7 +169,7 @@ def job_of(scene: Scene, seed: int, units: int) -> Any:
 def one(task: tuple[str, int, int, float]) -> Outcome:
     """One inquiry in an archive of its own."""
     from pipelines.archive import Archive
-    from pipelines.inquiry.play import Table, Terms, play
+    from pipelines.inquiry.loop import Table, Terms, play
 
     name, seed, units, share = task
     scene = next(s for s in SCENES if s.name == name)
@@ -184,7 +184,7 @@ def one(task: tuple[str, int, int, float]) -> Outcome:
 
 def quickly(name: str, runner: Any) -> Any:
     """A stage as a plain call; what the inquiry does not read is left out."""
-    from pipelines.runner import Done
+    from pipelines.chain.runner import Done
 
     if name in {"fit", "verify", "noise", "grade", "report"}:
         return Done(name, True, 0.0)

@@ -25,14 +25,14 @@ from inertial.fits.wander import fit_lot_with_wander  # noqa: E402
 from inertial.frames import force_from_angles  # noqa: E402
 from inertial.noise.dwells import DwellNoise  # noqa: E402
 from inertial.state import State  # noqa: E402
-from pipelines.models import STARTING_MODEL  # noqa: E402
-from pipelines.recipes import load_recipe  # noqa: E402
-from pipelines.stages.least import least  # noqa: E402
-from pipelines.stages.minutes import spent  # noqa: E402
-from pipelines.stages.optimise import optimise  # noqa: E402
-from pipelines.stages.plan import Planned, identified, planned  # noqa: E402
-from pipelines.stages.textbook import seen_by, textbook  # noqa: E402
-from pipelines.stages.wish import Wish, between, candidates  # noqa: E402
+from pipelines.jobs.model_files import STARTING_MODEL  # noqa: E402
+from pipelines.jobs.recipes import load_recipe  # noqa: E402
+from pipelines.planning.lower_bound import least  # noqa: E402
+from pipelines.planning.optimise import optimise  # noqa: E402
+from pipelines.planning.plan import Planned, identified, planned  # noqa: E402
+from pipelines.planning.requirement import Wish, between, candidates  # noqa: E402
+from pipelines.planning.textbook import seen_by, textbook  # noqa: E402
+from pipelines.schedule.timing import spent  # noqa: E402
 from schemas.errors import TumblelineError  # noqa: E402
 from schemas.station import load_station  # noqa: E402
 from stations.plant.device import Devices, Truth, draw_truth, rotation, stream  # noqa: E402

@@ -30,11 +30,11 @@ import numpy as np  # noqa: E402
 
 from inertial.fits.linear import fit_lot  # noqa: E402
 from pipelines.archive import Archive, Run  # noqa: E402
-from pipelines.flows.partitions import map_partitions  # noqa: E402
-from pipelines.rerun.judged import judged  # noqa: E402
+from pipelines.jobs.model_change import Wanted, wanted  # noqa: E402
+from pipelines.parallel import map_partitions  # noqa: E402
+from pipelines.rerun.lot_comparison import judged  # noqa: E402
 from pipelines.rerun.partition import Part, parts, run_again  # noqa: E402
-from pipelines.rerun.wanted import Wanted, wanted  # noqa: E402
-from pipelines.stages.arrays import lot_arrays  # noqa: E402
+from pipelines.tables.dwells import lot_arrays  # noqa: E402
 
 PER_LOT = 10
 MB = 1024.0

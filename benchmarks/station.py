@@ -65,9 +65,9 @@ def station_seconds(readings: object) -> float:
 def captured(path: str, archive: Path, station: Path | None = None, *, upto: str = "capture") -> tuple[object, float]:
     """The run of a recipe, direct, as far as a stage; and its wall time in s."""
     from pipelines.archive import Archive
-    from pipelines.chain import ORDER
-    from pipelines.job import Request
-    from pipelines.runner import Runner
+    from pipelines.chain.chain import ORDER
+    from pipelines.chain.runner import Runner
+    from pipelines.jobs.job import Request
 
     start = time.perf_counter()
     runner = Runner(Request(recipe=path, station=station).job(), Archive(archive))

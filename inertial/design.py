@@ -1,6 +1,9 @@
 """Design matrices of a model: the columns of its effects, and the names of their coefficients."""
 
+from __future__ import annotations
+
 from collections.abc import Mapping, Sequence
+from itertools import product
 from typing import Any
 
 import numpy as np
@@ -78,3 +81,14 @@ def local_names(effects: Sequence[SensorEffect], axis: int) -> tuple[tuple[str, 
 def shared_names(effects: Sequence[StationEffect]) -> tuple[tuple[str, str], ...]:
     """(effect id, parameter name) of every shared column."""
     return tuple((e.id, name) for e in effects for name in e.names())
+
+
+def grid_of(effect: AnyEffect, state: State) -> list[dict[str, float]]:
+    """Starting values of an effect's nonlinear parameters, with its constants, as a list of keyword sets."""
+    constants = dict(effect.constants(state))
+    parameters = effect.parameters(state)
+    if not parameters:
+        return [constants]
+    values = product(*(p.grid().tolist() for p in parameters))
+    names = [p.name for p in parameters]
+    return [{**constants, **dict(zip(names, v, strict=True))} for v in values]

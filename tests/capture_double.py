@@ -9,10 +9,10 @@ import pandas as pd
 
 from inertial.frames import force_from_angles
 from pipelines.archive import Archive, Records, Run
-from pipelines.chain import ORDER
-from pipelines.job import Job, Request
-from pipelines.progress import Progress
-from pipelines.runner import Runner
+from pipelines.chain.chain import ORDER
+from pipelines.chain.runner import Runner
+from pipelines.jobs.job import Job, Request
+from schemas.progress import Progress
 from schemas.recipe import Pose, Recipe
 
 LSB_PER_G = 256000.0

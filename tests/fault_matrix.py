@@ -13,7 +13,8 @@ import pandas as pd
 from small_station import QUIET, MemorySink, lot_of, quiet_progress
 
 from inertial import poses
-from pipelines.stages.capture import capture, steps
+from pipelines.capture.capture import capture
+from pipelines.schedule.steps import steps
 from pipelines.stages.reduce import reduce
 from pipelines.stages.validate import validate
 from schemas.errors import StationError

@@ -3,8 +3,8 @@
 from pathlib import Path
 
 from pipelines.archive import Records
-from pipelines.job import Job
-from pipelines.recipes import load_limits, load_recipe
+from pipelines.jobs.job import Job
+from pipelines.jobs.recipes import load_limits, load_recipe
 from schemas.recipe import Lot, Unit
 from schemas.station import Hidden, Simulation, load_station
 

@@ -2,7 +2,7 @@
 
 from dataclasses import replace
 
-from pipelines.trace import Event
+from pipelines.certificates import Event
 
 
 def event(serial: str = "A1", start: str = "2026-01-01", until: str = "2027-01-01", **more: object) -> Event:

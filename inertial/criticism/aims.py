@@ -13,7 +13,7 @@ from inertial.criticism.penalty import cost_of, freedom
 from inertial.criticism.problem import Lot, Problem
 from inertial.criticism.separation import Rivals, left_of, predictions, separations, smallest, widened
 from inertial.criticism.turn_on import with_turn_on
-from inertial.sequences import Pace, Step
+from inertial.planning.sequences import Pace, Step
 
 Array = NDArray[np.float64]
 

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inertial import frames, poses
-from inertial.sequences import Pace, Step, n_of, standing
+from inertial.planning.sequences import Pace, Step, n_of, standing
 from inertial.state import T_REFERENCE, State
 
 Array = NDArray[np.float64]

@@ -3,7 +3,6 @@
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from itertools import product
 
 import numpy as np
 from numpy.typing import NDArray
@@ -180,14 +179,3 @@ class Problem:
         size = max(1, _PIECE // width)
         for start in range(0, len(grid), size):
             yield self.candidate(effect, grid[start : start + size], first=first)
-
-
-def grid_of(effect: AnyEffect, state: State) -> list[dict[str, float]]:
-    """Starting values of an effect's nonlinear parameters, with its constants, as a list of keyword sets."""
-    constants = dict(effect.constants(state))
-    parameters = effect.parameters(state)
-    if not parameters:
-        return [constants]
-    values = product(*(p.grid().tolist() for p in parameters))
-    names = [p.name for p in parameters]
-    return [{**constants, **dict(zip(names, v, strict=True))} for v in values]

@@ -10,11 +10,11 @@ from inertial.criticism.aims import Aim, Parting, Sighting
 from inertial.criticism.classes import EffectClass
 from inertial.criticism.menus import Course, Kind, Reach, courses, pose_grid, present, reach_of, temperatures
 from inertial.criticism.model import Model, Term
-from inertial.criticism.problem import grid_of
 from inertial.criticism.separation import Rivals, rivals_of
+from inertial.design import grid_of
 from inertial.errors import MissingInput
-from inertial.reasons import drivers_of
-from inertial.sequences import Pace, Step, standing, timeline
+from inertial.planning.reasons import drivers_of
+from inertial.planning.sequences import Pace, Step, standing, timeline
 
 MICRO = 1e6
 

@@ -6,8 +6,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inertial.criticism.model import Model, Term
-from inertial.criticism.problem import Problem, grid_of
+from inertial.criticism.problem import Problem
 from inertial.criticism.space import Candidate, Space
+from inertial.design import grid_of
 from inertial.effects.base import AnyEffect, Nonlinear
 
 Array = NDArray[np.float64]

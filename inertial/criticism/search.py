@@ -8,9 +8,10 @@ from numpy.typing import NDArray
 
 from inertial.criticism.model import Model, Term
 from inertial.criticism.penalty import cost_in, cost_of_model, deviance, freedom, log_p_value
-from inertial.criticism.problem import Problem, grid_of
+from inertial.criticism.problem import Problem
 from inertial.criticism.refinement import refine
 from inertial.criticism.space import Candidate, Gain, Space
+from inertial.design import grid_of
 from inertial.effects.base import AnyEffect
 from inertial.errors import MissingInput
 

@@ -18,7 +18,7 @@ from inertial.criticism.shared_noise import shared_factor
 from inertial.criticism.space import Space
 from inertial.criticism.turn_on import with_turn_on
 from inertial.effects.base import Nonlinear
-from inertial.sequences import Pace, Step, extended
+from inertial.planning.sequences import Pace, Step, extended
 
 Array = NDArray[np.float64]
 

@@ -15,11 +15,11 @@ from numpy.typing import NDArray
 from scipy import stats
 
 from inertial import design
-from inertial.criticism.noise import flicker_kernel
 from inertial.design import Values
 from inertial.errors import NotIdentified
 from inertial.fits.generalised import Series, Solved
 from inertial.fits.linear import LotFit, fit_lot
+from inertial.noise.flicker import flicker_kernel
 from inertial.state import State
 
 Array = NDArray[np.float64]

@@ -125,7 +125,7 @@ class Archive:
 
     def runs(self) -> list[RunInfo]:
         """Every run, the one started first first."""
-        from pipelines.archive.noted import infos_of
+        from pipelines.archive.listing import infos_of
 
         infos = infos_of(self.root, [Run(self, run_id) for run_id in self.run_ids()])
         return sorted(infos, key=lambda info: (info.started, info.id))

@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from pipelines.archive import chain, files
+from pipelines.archive import files, hash_chain
 from pipelines.archive.locks import CLAIM, LEASE_S, alone
 from pipelines.archive.provenance import provenance
 from pipelines.archive.run import Run
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from pipelines.archive.archive import Archive
     from pipelines.archive.store import Place
 
-FOLDERS = ("runs", "captures", "calibrations", chain.FOLDER, "index")
+FOLDERS = ("runs", "captures", "calibrations", hash_chain.FOLDER, "index")
 AT_ONCE = 1000  # calibrations named by one entry of the chain
 
 
@@ -130,13 +130,13 @@ def _seal(archive: Archive, done: Cleaned) -> None:
 def _anchor(archive: Archive, done: Cleaned) -> None:
     """Put calibrations into the chain that a killed writer, or a bulk of them, left out."""
     known: set[str] = set()
-    for _, place in chain.entries(archive.root):
+    for _, place in hash_chain.entries(archive.root):
         if place.is_file():
             known |= files.read_json(place)["files"].keys()
     left = [name for name in _calibrations(archive.root) if name not in known]
     for start in range(0, len(left), AT_ONCE):
         part = {name: files.sha256(archive.root / name) for name in left[start : start + AT_ONCE]}
-        chain.append(archive.root, "calibrations", part, provenance())
+        hash_chain.append(archive.root, "calibrations", part, provenance())
     done.anchored = len(left)
 
 

@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
+import ast
 import hashlib
 import json
 from functools import cache
-from importlib.metadata import version
+from importlib.metadata import entry_points, version
+from importlib.util import find_spec
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from pipelines.archive.sources import sources
-
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Iterator, Mapping, Sequence
 
 LIBRARIES = ("numpy", "scipy", "pandas", "pyarrow", "pandera")
 
@@ -59,3 +60,81 @@ def code_hash(modules: Sequence[str]) -> str:
 def libraries() -> dict[str, str]:
     """Versions of the libraries that a number may depend on."""
     return {name: version(name) for name in LIBRARIES}
+
+
+OWN = ("inertial", "schemas", "stations", "pipelines")
+
+DISCOVERED = {"inertial.effects": "tumbleline.effects"}
+"""Packages whose modules are found and not named, with the entry points under which others add to them."""
+
+
+def sources(modules: Sequence[str]) -> dict[str, Path]:
+    """Files by name: those of modules, of everything below packages, and of all that they import from the product.
+
+    Parameters
+    ----------
+    modules : import names
+    """
+    left = [name for module in modules for name in _with_below(module)]
+    found: dict[str, Path] = {}
+    while left:
+        module = left.pop()
+        path = _file(module)
+        if module in found or path is None:
+            continue
+        found[module] = path
+        left += _imports(module, path)
+        if module in DISCOVERED:
+            left += _with_below(module)
+            found |= _added(DISCOVERED[module])
+    return dict(sorted(found.items()))
+
+
+def _with_below(module: str) -> list[str]:
+    """A module and, where it is a package, everything below it."""
+    path = _file(module)
+    if path is None or path.name != "__init__.py":
+        return [module]
+    folder = path.parent
+    below = (p.relative_to(folder).with_suffix("").parts for p in folder.rglob("*.py"))
+    return [module, *(".".join((module, *(part for part in parts if part != "__init__"))) for parts in below)]
+
+
+@cache
+def _file(module: str) -> Path | None:
+    """The source of a module of the product; None for what is none."""
+    if module.split(".", 1)[0] not in OWN:
+        return None
+    try:
+        spec = find_spec(module)
+    except ModuleNotFoundError:  # the name of something inside a module
+        return None
+    return None if spec is None or spec.origin is None else Path(spec.origin)
+
+
+@cache
+def _imports(module: str, path: Path) -> list[str]:
+    """Names that a module imports, with the packages they lie in; a name inside a module is dropped later."""
+    found: set[str] = set()
+    for node in _running(ast.parse(path.read_text("utf-8"))):
+        if isinstance(node, ast.Import):
+            found.update(alias.name for alias in node.names)
+        elif isinstance(node, ast.ImportFrom) and node.module and not node.level:
+            found.update({node.module, *(f"{node.module}.{alias.name}" for alias in node.names)})
+    parents = {name.rsplit(".", depth)[0] for name in {*found, module} for depth in range(1, name.count(".") + 1)}
+    return sorted(name for name in found | parents if name.split(".", 1)[0] in OWN)
+
+
+def _running(tree: ast.AST) -> Iterator[ast.AST]:
+    """Nodes of a source that run, blocks for type checkers left out."""
+    for node in ast.iter_child_nodes(tree):
+        if isinstance(node, ast.If) and isinstance(node.test, ast.Name) and node.test.id == "TYPE_CHECKING":
+            continue
+        yield node
+        yield from _running(node)
+
+
+def _added(group: str) -> dict[str, Path]:
+    """Sources of the modules that other packages add under an entry point."""
+    specs = {point.module: find_spec(point.module) for point in entry_points(group=group)}
+    return {name: Path(spec.origin) for name, spec in specs.items() if spec is not None and spec.origin is not None}

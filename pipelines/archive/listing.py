@@ -2,12 +2,18 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import TYPE_CHECKING
+import time
+from contextlib import suppress
+from dataclasses import astuple, dataclass
+from typing import TYPE_CHECKING, Any
 
 from pipelines.archive import files
+from pipelines.archive.store import ObjectPath
+from schemas.errors import ArchiveUnusable
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from pipelines.archive.run import Run
     from pipelines.archive.store import Place
 
@@ -67,3 +73,52 @@ def _sealed_stages(run: Run, names: set[str]) -> list[str]:
 
 def _names(folder: Place) -> set[str]:
     return {place.name for place in folder.iterdir()} if folder.is_dir() else set()
+
+
+FEWEST_NEW = 32  # fewer are read again sooner than they are written
+TICK_NS = 2_000_000_000
+FINISHED = 1  # the stamp of a finished run where folders have no time
+
+
+def infos_of(root: Place, runs: Sequence[Run]) -> list[RunInfo]:
+    """The lines of runs, read from their folders where they are not noted."""
+    place = root / "index" / "list.json"
+    known, noted, found, new = _noted(place), dict[str, Any](), list[RunInfo](), 0
+    for run in runs:
+        before, stamp = known.get(run.id), _stamp(run)
+        if before is not None and before[0] == stamp:
+            noted[run.id] = before
+            found.append(_line(before[1]))
+            continue
+        info = info_of(run)
+        if info is None:
+            continue
+        found.append(info)
+        if stamp is not None and (stamp != FINISHED or info.finished) and time.time_ns() - stamp > TICK_NS:
+            noted[run.id], new = [stamp, astuple(info)], new + 1
+    if new >= FEWEST_NEW:
+        with suppress(ArchiveUnusable):  # who may only read the archive reads it without
+            files.publish(place, files.json_bytes({"runs": noted}))
+    return found
+
+
+def _stamp(run: Run) -> int | None:
+    """When the run's folder was last written to, ns."""
+    if isinstance(run.path, ObjectPath):
+        return FINISHED
+    try:
+        return run.path.stat().st_mtime_ns
+    except FileNotFoundError:
+        return None
+
+
+def _noted(place: Place) -> dict[str, Any]:
+    try:
+        return files.read_json(place).get("runs", {}) if place.is_file() else {}
+    except ArchiveUnusable:  # half of something that nobody needs
+        return {}
+
+
+def _line(noted: Sequence[Any]) -> RunInfo:
+    run_id, recipe, device, units, started, finished, stages = noted
+    return RunInfo(run_id, recipe, device, tuple(units), started, finished, tuple(stages))

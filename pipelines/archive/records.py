@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from pipelines.archive import files, parquet
-from pipelines.archive.chain import is_number
-from pipelines.archive.events import Events
+from pipelines.archive.capture_journal import Events
+from pipelines.archive.hash_chain import is_number
 from pipelines.archive.keys import digest
 from pipelines.archive.store import ObjectPath
 from schemas.errors import ArchiveUnusable

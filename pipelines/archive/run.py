@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from pipelines.archive import chain, files
+from pipelines.archive import files, hash_chain
 from pipelines.archive.listing import SEALED, stages_of
 from pipelines.archive.parquet import columns_of, encoded, read_table
 from pipelines.archive.provenance import provenance
@@ -117,7 +117,7 @@ class Run:
         before = files.read_json(mark) if mark.is_file() else {}
         if before.get("files") == sealed:
             return int(before["entry"])
-        entry = chain.append(self.archive.root, "run", sealed, {**provenance(), "run": self.id})
+        entry = hash_chain.append(self.archive.root, "run", sealed, {**provenance(), "run": self.id})
         files.publish(mark, files.json_bytes({"entry": entry, "files": sealed, "stages": stages_of(self)}))
         return entry
 

@@ -96,7 +96,7 @@ def audit(archive: Archive, rules: Rules, scope: Scope, *, dask: str | None = No
 
     Parameters
     ----------
-    dask, workers : where the runs are read, see :func:`pipelines.flows.partitions.map_partitions`
+    dask, workers : where the runs are read, see :func:`pipelines.parallel.map_partitions`
     """
     index = up_to_date(archive, dask, workers)
     runs = runs_of(index, scope.until)

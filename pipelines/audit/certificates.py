@@ -6,14 +6,14 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, NamedTuple
 
 from pipelines.audit.calibrations import date_of, day_of
-from pipelines.trace.noted import histories_of
-from pipelines.trace.validity import calibrations_of
+from pipelines.certificates.ledger_index import histories_of
+from pipelines.certificates.validity import calibrations_of
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
     from pipelines.archive.store import Place
-    from pipelines.trace.validity import Calibration
+    from pipelines.certificates.validity import Calibration
 
 
 class Standing(NamedTuple):

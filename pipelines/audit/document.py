@@ -7,11 +7,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from inertial.population.control_charts import RULES
 from pipelines.audit.calibrations import date_of
 from pipelines.audit.due import uncertified
 from pipelines.audit.finding import WHO, Finding
 from pipelines.audit.parameters import unit_text
-from pipelines.audit.statistics.control_charts import RULES
 
 if TYPE_CHECKING:
     from pipelines.audit.audit import Audit

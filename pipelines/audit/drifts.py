@@ -7,9 +7,8 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from pipelines.audit.parameters import FAMILIES, FAMILY_OF, NAMES
-from pipelines.audit.statistics.agreement import e_n
-from pipelines.audit.statistics.drift import (
+from inertial.population.agreement import e_n
+from inertial.population.drift import (
     Kind,
     Standing,
     forecast,
@@ -20,6 +19,7 @@ from pipelines.audit.statistics.drift import (
     prudent,
     standing,
 )
+from pipelines.audit.parameters import FAMILIES, FAMILY_OF, NAMES
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -53,7 +53,7 @@ class Pairs:
 class KindDrift:
     """How one parameter of one kind of device drifts, and how the last changes compare with the uncertainty of both.
 
-    ahead : what forecasts take for it, see :func:`~pipelines.audit.statistics.drift.prudent`
+    ahead : what forecasts take for it, see :func:`~inertial.population.drift.prudent`
     beyond : share of the pairs with |E_n| > 1; out : share that moved further than the tolerance; median : of |change|
     reliable_months : for how long a unit of the kind stays in all its tolerances with the target's probability; NaN without one
     """

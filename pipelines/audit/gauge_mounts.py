@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from inertial.population.gauge import Gauge, gauge_study
 from pipelines.audit.drifts import OWN
 from pipelines.audit.parameters import FAMILY_OF
-from pipelines.audit.statistics.gauge import Gauge, gauge_study
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

@@ -28,7 +28,7 @@ from pipelines.archive.locks import alone
 from pipelines.archive.store import ObjectPath, address_of, first_line, place_of
 from pipelines.audit.run_files import read_runs, stamps_of
 from pipelines.audit.run_rows import SCHEMAS, TABLES, rows_of_runs
-from pipelines.flows.partitions import map_partitions
+from pipelines.parallel import map_partitions
 from schemas.errors import ArchiveUnusable
 
 if TYPE_CHECKING:
@@ -118,7 +118,7 @@ def up_to_date(archive: Archive, dask: str | None = None, workers: int = 1) -> I
 
     Parameters
     ----------
-    dask, workers : where parts are made, see :func:`pipelines.flows.partitions.map_partitions`
+    dask, workers : where parts are made, see :func:`pipelines.parallel.map_partitions`
     """
     place = archive.root / FOLDER
     if not (archive.root / "runs").is_dir():  # an address with a slip of the pen is not made into a folder

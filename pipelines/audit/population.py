@@ -7,12 +7,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from inertial.population.capability import Index as Capability
+from inertial.population.capability import cpk, fraction_interval, independent, sigma_within
+from inertial.population.comparison import TO_SIGMA, Comparison, compare, holm, outlier_limit, robust_z, unlike
+from inertial.population.two_way import group_medians
 from pipelines.audit.calibrations import codes, date_of
 from pipelines.audit.drifts import OWN
-from pipelines.audit.statistics.capability import Index as Capability
-from pipelines.audit.statistics.capability import cpk, fraction_interval, independent, sigma_within
-from pipelines.audit.statistics.comparison import TO_SIGMA, Comparison, compare, holm, outlier_limit, robust_z, unlike
-from pipelines.audit.statistics.two_way import group_medians
 
 if TYPE_CHECKING:
     import pandas as pd

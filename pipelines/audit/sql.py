@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     import pyarrow as pa
 
     from pipelines.archive import Archive
-    from pipelines.trace.validity import Calibration
+    from pipelines.certificates.validity import Calibration
 
 READING = {"SELECT", "EXPLAIN"}  # statements that change nothing; DESCRIBE, SHOW and WITH count as SELECT
 FILES: tuple[str, ...] = (  # tables of the runs that are read where they lie
@@ -178,7 +178,7 @@ def _of_ledger(archive: Archive) -> Callable[[duckdb.DuckDBPyConnection], None]:
     def make(connection: duckdb.DuckDBPyConnection) -> None:
         import pyarrow as pa
 
-        from pipelines.trace.ledger import Ledger
+        from pipelines.certificates.ledger import Ledger
 
         known = list(Ledger(archive).all())
         rows = {name: pa.array([of(one) for one in known], pa.string()) for name, of in LEDGER.items()}

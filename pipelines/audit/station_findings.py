@@ -12,9 +12,9 @@ from pipelines.audit.finding import Finding
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
+    from inertial.population.change_points import Change
     from pipelines.audit.audit import Audit
     from pipelines.audit.stations_over_time import Series
-    from pipelines.audit.statistics.change_points import Change
 
 
 def of_stations(audit: Audit) -> Iterator[Finding]:

@@ -7,18 +7,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from inertial.population.change_points import Change, change_points, noise_of
+from inertial.population.control_charts import Baseline, alarms, baseline, false_alarms, signals
+from inertial.population.two_way import unit_and_place
 from pipelines.audit.calibrations import codes
 from pipelines.audit.drifts import OWN
 from pipelines.audit.parameters import unit_text
-from pipelines.audit.statistics.change_points import Change, change_points, noise_of
-from pipelines.audit.statistics.control_charts import (
-    Baseline,
-    alarms,
-    baseline,
-    false_alarms,
-    signals,
-)
-from pipelines.audit.statistics.two_way import unit_and_place
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -7,17 +7,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from inertial.population.fingerprints import Scale, alike_below, change_scale, distance, foreign_above, nearest
 from pipelines.audit.few_units import exchanged_pairs
 from pipelines.audit.parameters import FAMILY_OF
 from pipelines.audit.parameters import NAMES as PARAMETERS
-from pipelines.audit.statistics.fingerprints import (
-    Scale,
-    alike_below,
-    change_scale,
-    distance,
-    foreign_above,
-    nearest,
-)
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

@@ -6,11 +6,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from inertial.population.comparison import outlier_limit
 from pipelines.audit.calibrations import date_of
 from pipelines.audit.finding import Finding, date_or_never
 from pipelines.audit.parameters import unit_text
 from pipelines.audit.serials import twice
-from pipelines.audit.statistics.comparison import outlier_limit
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence

@@ -51,7 +51,7 @@ def command(
     from pipelines.audit.document import document
     from pipelines.audit.findings import findings
     from pipelines.audit.rules import load_rules
-    from pipelines.flows.partitions import processors
+    from pipelines.parallel import processors
 
     store, scope = Archive(archive), scope_of(since, until, device, station)
     found = audit(store, load_rules(rules), scope, dask=dask or None, workers=workers or processors())
@@ -70,8 +70,8 @@ def scope_of(since: str, until: str, device: str, station: str) -> Scope:
     """What is looked at, from dates as texts; ``until`` holds its whole day."""
     from pipelines.audit.audit import Scope
     from pipelines.audit.calibrations import day_of
-    from pipelines.trace.days import FIRST, today
-    from pipelines.trace.days import day_of as checked
+    from pipelines.certificates.days import FIRST, today
+    from pipelines.certificates.days import day_of as checked
 
     first = day_of(checked(since or FIRST, "--since"))
     last = day_of(checked(until or today(), "--until")) + 1.0

@@ -9,7 +9,7 @@ import typer
 from pipelines.cli.options import ArchiveOption, JsonOption, RunArgument, console, print_json, print_table
 
 if TYPE_CHECKING:
-    from pipelines.trace.certifying import Certified
+    from pipelines.certificates.certify import Certified
 
 
 def command(
@@ -33,8 +33,8 @@ def command(
     units of the run did not pass and got no certificate.
     """
     from pipelines.archive import Archive
+    from pipelines.certificates import Ledger
     from pipelines.report import renew_report
-    from pipelines.trace import Ledger
     from schemas.errors import DONE, PART_FAILED
 
     store = Archive(archive)

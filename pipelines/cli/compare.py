@@ -42,7 +42,7 @@ def command(
 ) -> None:
     """Fit a model to dwells and tell its error there, on poses left out, and on a fresh run with the coefficients unchanged."""
     from pipelines.cli.inputs import add_effect_files, both_runs, judged_effects
-    from pipelines.stages.criticise import default_model
+    from pipelines.diagnosis.diagnose import default_model
 
     add_effect_files(effect_file)
     chosen = judged_effects(dwells, archive, effects, model, "compare")
@@ -64,7 +64,7 @@ def compared(
     """The comparison, worked out on one thread: the matrices are small."""
     from threadpoolctl import threadpool_limits
 
-    from pipelines.stages.criticise import compare
+    from pipelines.diagnosis.diagnose import compare
 
     with threadpool_limits(1), error_console().status("fitting"):
         return compare(dwells, effects, history, fresh, fresh_history)

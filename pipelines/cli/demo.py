@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
     from pipelines.demo.measure import Measured
     from pipelines.demo.scenes import Scene
-    from pipelines.progress import Progress
+    from schemas.progress import Progress
 
 
 def command(
@@ -145,7 +145,7 @@ class _Game:
 
     def _diagnose(self) -> dict[str, Any]:
         from pipelines.cli.diagnose import diagnosed, write_report
-        from pipelines.cli.verdict import print_diagnosis
+        from pipelines.cli.diagnosis_text import print_diagnosis
 
         self._step("2. What is missing?", _command("diagnose", self.folder, self.hidden.model))
         source = str(self.folder / "dwells.parquet")
@@ -168,7 +168,7 @@ class _Game:
 
     def _asked_for(self, recommended: list[str]) -> list[str]:
         """The effects the player wants to add: those recommended, or others."""
-        from pipelines.models import refuse_unknown_effects
+        from pipelines.jobs.model_files import refuse_unknown_effects
 
         if not self.asks:
             return recommended
@@ -224,7 +224,7 @@ def _write_model(file: Path, start: tuple[str, ...], chosen: list[str]) -> tuple
     """The model's file with one version per effect; its effects."""
     from datetime import UTC, datetime
 
-    from pipelines.models import Step, extended, new_model, publish_model
+    from pipelines.jobs.model_files import Step, extended, new_model, publish_model
 
     now = datetime.now(UTC).replace(microsecond=0)
     text = new_model(file, start, "demo", now)

@@ -57,7 +57,7 @@ def command(
     if as_json:
         print_json(document)
     else:
-        from pipelines.cli.verdict import print_diagnosis
+        from pipelines.cli.diagnosis_text import print_diagnosis
 
         print_diagnosis(document, source=dwells, model=model)
     raise typer.Exit(DONE if document["adequate"] else PART_FAILED)
@@ -69,7 +69,7 @@ def diagnosed(
     """The document of a diagnosis, and its report where one is wanted."""
     from threadpoolctl import threadpool_limits
 
-    from pipelines.stages.criticise import default_model, document, examined
+    from pipelines.diagnosis.diagnose import default_model, document, examined
 
     with threadpool_limits(1), error_console().status("looking for what is missing"):
         effects = judged or default_model(table)
@@ -86,8 +86,8 @@ def diagnosed(
 def _extras(units: tuple[str, ...], effects: list[str], diagnosis: Diagnosis | None) -> dict[str, Any]:
     """What the document says beyond its fixed keys: the model judged, breakers of what was unseen, the formula on offer."""
     from inertial import effects as catalogue
-    from inertial.reasons import reason
-    from pipelines.stages.offers import as_toml, offer
+    from inertial.planning.reasons import reason
+    from pipelines.diagnosis.suggested_formula import as_toml, offer
 
     extras: dict[str, Any] = {"effects": effects, "units": list(units), "breakers": {}, "offer": None}
     if diagnosis is None:

@@ -37,7 +37,7 @@ def command(
     """Write coefficients: bias b and response K as polynomials in temperature, to apply as a = K⁻¹(ã − b)."""
     from pipelines.archive import Archive
     from pipelines.export import FORMATS, export_text, unit_calibrations
-    from pipelines.models import use_formulas_of
+    from pipelines.jobs.model_files import use_formulas_of
     from schemas.errors import WrongUse, did_you_mean
 
     form = "json" if as_json else form
@@ -62,8 +62,8 @@ def command(
 
 def _tell_certificates(run: Run, chosen: Sequence[UnitCalibration]) -> None:
     """Say on the error stream what whoever loads these coefficients must know of their certificates."""
+    from pipelines.certificates.days import today
     from pipelines.export import revoked_units
-    from pipelines.trace.days import today
 
     given, day = {c.unit for c in chosen}, today()
     lines = [f"left out: {unit}, {one.words()}" for unit, one in revoked_units(run).items() if unit not in given]

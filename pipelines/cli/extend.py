@@ -41,7 +41,7 @@ def command(
     MODEL that is not there yet is begun: version 1 holds the starting model, version 2 the effect.
     """
     from pipelines.cli.inputs import add_effect_files
-    from pipelines.models import extended, publish_model
+    from pipelines.jobs.model_files import extended, publish_model
 
     add_effect_files(effect_file)
     step = _step(effect, why, by, run)
@@ -75,7 +75,7 @@ def _step(effect: str, why: str, by: str, run: str) -> Any:
     import getpass
     from datetime import UTC, datetime
 
-    from pipelines.models import Step
+    from pipelines.jobs.model_files import Step
 
     reason = why.strip() or (f"a diagnosis of {run} names it" if run else "no reason was given")
     at = datetime.now(UTC).replace(microsecond=0)
@@ -84,7 +84,7 @@ def _step(effect: str, why: str, by: str, run: str) -> Any:
 
 def _start(model: Path, effects: str, step: Any) -> tuple[str, bool]:
     """The text to extend, and whether it was begun just now."""
-    from pipelines.models import STARTING_MODEL, model_text, new_model
+    from pipelines.jobs.model_files import STARTING_MODEL, model_text, new_model
 
     if model.exists():
         if effects:

@@ -27,9 +27,9 @@ def command(
 ) -> None:
     """Fit a model to archived data again; the result is a run of its own beside the old one, on the same capture."""
     from pipelines.archive import Archive
+    from pipelines.chain.runner import Runner
     from pipelines.cli.summary import exit_status, print_summary, summary
-    from pipelines.job import job_of_run
-    from pipelines.runner import Runner
+    from pipelines.jobs.job import job_of_run
 
     store = Archive(archive)
     wanted = [name.strip() for name in effects.split(",")] if effects else []

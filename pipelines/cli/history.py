@@ -44,8 +44,8 @@ def command(
     """
     from pipelines.cli.compare import compared
     from pipelines.cli.inputs import add_effect_files, both_runs
-    from pipelines.models import read_model, versions
-    from pipelines.stages.evolution import FIGURES, evolution, told
+    from pipelines.diagnosis.model_history import FIGURES, evolution, told
+    from pipelines.jobs.model_files import read_model, versions
 
     add_effect_files(effect_file)
     found = read_model(model)

@@ -38,7 +38,7 @@ def judged_effects(source: str, archive: str | None, listed: str, model: Path | 
     """
     from pipelines.archive import Archive
     from pipelines.importers.exchange import is_file
-    from pipelines.models import chosen_effects, use_formulas_of
+    from pipelines.jobs.model_files import chosen_effects, use_formulas_of
 
     chosen = chosen_effects(listed, model, where)
     store = Archive(archive)

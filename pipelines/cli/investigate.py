@@ -15,8 +15,11 @@ from pipelines.cli.options import (
     RepeatOption,
     SeedOption,
     StationOption,
+    console,
     error_console,
     print_json,
+    print_table,
+    short,
 )
 from pipelines.cli.run import shown
 from schemas.errors import DONE, PART_FAILED
@@ -26,8 +29,8 @@ if TYPE_CHECKING:
     from contextlib import AbstractContextManager
 
     from pipelines.inquiry.inquiry import Finding, Inquiry, Move
-    from pipelines.inquiry.play import Approval, Consent, Table, Terms
-    from pipelines.job import Request
+    from pipelines.inquiry.loop import Approval, Consent, Table, Terms
+    from pipelines.jobs.job import Request
 
 SETTLED = frozenset({"adequate", "told_apart"})
 
@@ -73,12 +76,11 @@ def command(
     command, given again after it was stopped, goes on where it was. Exit status 0: that is so; 1: rivals are left.
     """
     from pipelines.archive import Archive
-    from pipelines.cli.investigated import print_inquiry
     from pipelines.cli.terminal import attended
-    from pipelines.inquiry.play import Terms
-    from pipelines.job import Request
-    from pipelines.models import chosen_effects
-    from pipelines.seating import read_seating
+    from pipelines.inquiry.loop import Terms
+    from pipelines.jobs.job import Request
+    from pipelines.jobs.model_files import chosen_effects
+    from pipelines.jobs.seating import read_seating
 
     seating = read_seating(units)
     request = Request(recipe, station, seating.units, seating.slots, seed, repeat)
@@ -96,7 +98,7 @@ def command(
 
 def _consent(*, yes: bool | None, here: bool) -> Callable[[Callable[[], AbstractContextManager[None]]], Approval]:
     """Who approves the extra minutes: nobody has to, whoever sits at the terminal, or nobody is there."""
-    from pipelines.inquiry.play import always
+    from pipelines.inquiry.loop import always
 
     def asked(quiet: Callable[[], AbstractContextManager[None]]) -> Approval:
         def ask(inquiry: Inquiry, finding: Finding, move: Move) -> Consent:
@@ -116,8 +118,8 @@ def _consent(*, yes: bool | None, here: bool) -> Callable[[Callable[[], Abstract
 
 def _question(inquiry: Inquiry, finding: Finding, move: Move) -> Consent:
     """What the person at the terminal says to a proposal."""
+    from pipelines.cli.diagnosis_text import measurements_table
     from pipelines.cli.terminal import agreed
-    from pipelines.cli.verdict import measurements_table
 
     out = error_console()
     for sentence in move.why:
@@ -139,7 +141,7 @@ def _inquired(
     paused: bool,
 ) -> dict[str, Any]:
     """The document of the inquiry."""
-    from pipelines.inquiry.play import Table, directly, play
+    from pipelines.inquiry.loop import Table, directly, play
 
     with shown() as (progress, told, quiet):
 
@@ -150,14 +152,14 @@ def _inquired(
         table: Table = Table(directly, consent(quiet), progress, told, looked)
         if direct:
             return play(request.job(archive), archive, terms, table)
-        from pipelines.flows.investigate_locally import investigate_locally
+        from pipelines.flows.investigate import investigate_locally
 
         return investigate_locally(request, archive, terms, table, ask=paused)
 
 
 def _tell(finding: Finding) -> None:
     """A line for each diagnosis on the way."""
-    from pipelines.cli.verdict import verdict
+    from pipelines.cli.diagnosis_text import verdict
 
     error_console().print(
         f"diagnosis of {len(finding.lineage.runs)}: {verdict(finding.told)}", markup=False, soft_wrap=True
@@ -169,3 +171,38 @@ def _again(document: dict[str, Any]) -> str:
     del document
     given = [a for a in sys.argv[1:] if a not in {"--ask", "--json"}]
     return shlex.join(["tumbleline", *given, "--yes"])
+
+
+def print_inquiry(document: dict[str, Any]) -> None:
+    """Print an inquiry."""
+    from pipelines.cli.diagnosis_text import measurements_table, print_findings, verdict
+
+    out = console()
+    good = document["ended"] in {"adequate", "told_apart"}
+    out.print(verdict(document), style="bold green" if document["adequate"] else "bold red", soft_wrap=True)
+    _rounds(document)
+    print_findings(document)
+    out.print(
+        f"{document['text'][:1].upper()}{document['text'][1:]}.", style="green" if good else "yellow", soft_wrap=True
+    )
+    if document["ended"] in {"asked", "declined"}:
+        measurements_table(document["next_measurements"])
+        out.print("\nNext:", style="bold")
+        out.print(f"  {document['command']}", markup=False, soft_wrap=True)
+    elif document["recommended"]:
+        out.print("\nNext:", style="bold")
+        for name in document["recommended"]:
+            out.print(f"  tumbleline extend model.toml {name}", markup=False, soft_wrap=True)
+
+
+def _rounds(document: dict[str, Any]) -> None:
+    minutes = document["minutes"]
+    first, further = short(minutes["first_run"]), short(minutes["follow_ups"]) or "0"
+    text = (
+        f"Station time: {first} min for the first run ({document['run']}), {further} min for follow-ups "
+        f"({100.0 * minutes['share']:.0f} %), {short(minutes['budget'])} min were allowed."
+    )
+    console().print(text, markup=False, soft_wrap=True)
+    if document["rounds"]:
+        lines = [[r["run"], short(r["minutes"]), "\n".join(r["why"])] for r in document["rounds"]]
+        print_table(["follow-up", "min", "why"], lines, title="What the station measured besides")

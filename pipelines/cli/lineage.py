@@ -29,10 +29,10 @@ def command(
 ) -> None:
     """Tell where certificates, tables and samples came from and what was made of them: who, when, with what code."""
     from pipelines.archive import Archive, files
-    from pipelines.trace.lineage import lineage
-    from pipelines.trace.lineage.crate import write_crate
-    from pipelines.trace.lineage.prov import prov_of
-    from pipelines.trace.lineage.tree import tree_of
+    from pipelines.lineage import lineage
+    from pipelines.lineage.prov import prov_of
+    from pipelines.lineage.ro_crate import write_crate
+    from pipelines.lineage.tree import tree_of
 
     store = Archive(archive)
     store.refuse_none()

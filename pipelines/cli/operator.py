@@ -9,8 +9,8 @@ import typer
 from pipelines.cli.options import ArchiveOption, JsonOption, console, print_json, print_table
 
 if TYPE_CHECKING:
+    from pipelines.chain.attendance import Answer
     from pipelines.flows.operator import Waiting
-    from pipelines.operator import Answer
 
 
 def command(

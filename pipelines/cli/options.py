@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from pipelines.plain import plain
+from pipelines.tables.json_values import plain
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from typer._click import Context
 
     from inertial.noise.dwells import DwellNoise
-    from pipelines.stages.plan import Planned
+    from pipelines.planning.plan import Planned
     from schemas.recipe import Recipe
 
 RECIPE = "recipe"
@@ -97,7 +97,7 @@ def command(
 
     With the minutes of station time and the error to be expected of every coefficient of the recipe's model.
     """
-    from pipelines.stages.plan import plan, planned
+    from pipelines.planning.plan import plan, planned
     from schemas.station import load_station
 
     config = load_station(station)
@@ -199,8 +199,7 @@ def optimise(
     over the same temperatures, and blind to no effect that it sees. With --criterion T --part a,b: the cheapest that tells these
     effects apart.
     """
-    from pipelines.cli.asked import Asked
-    from pipelines.cli.optimal import found, print_optimum, written
+    from pipelines.cli.optimal import Asked, found, print_optimum, written
     from schemas.station import load_station
 
     config = load_station(station)
@@ -234,14 +233,14 @@ def _save(path: Path, text: str) -> None:
 
 def with_model(recipe: str, effects: str, model: Path | None, archive: str | None, station: str) -> Recipe:
     """The recipe, with another model where one is given; the line's is asked of the archive only where it is needed."""
-    from pipelines.models import chosen_effects, use_formulas
-    from pipelines.recipes import load_recipe
+    from pipelines.jobs.model_files import chosen_effects, use_formulas
+    from pipelines.jobs.recipes import load_recipe
 
     chosen = chosen_effects(effects, model, "plan")
 
     def line(device: str) -> dict[str, Any]:
         from pipelines.archive import Archive
-        from pipelines.rerun.releases import line_model
+        from pipelines.jobs.releases import line_model
 
         if chosen:
             return {"effects": chosen}

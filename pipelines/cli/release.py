@@ -12,7 +12,7 @@ from schemas.errors import WrongUse
 
 if TYPE_CHECKING:
     from pipelines.archive import Archive
-    from pipelines.rerun.releases import Release
+    from pipelines.jobs.releases import Release
 
 
 def command(
@@ -58,9 +58,9 @@ def command(
 def _released(
     store: Archive, model: Path | None, since: str, effect_file: list[Path] | None, how: dict[str, Any]
 ) -> Release:
-    from pipelines.rerun.releases import release
+    from pipelines.jobs.model_change import wanted
+    from pipelines.jobs.releases import release
     from pipelines.rerun.selection import moment
-    from pipelines.rerun.wanted import wanted
 
     if model is None or not since:
         missing = "a model file" if model is None else "--from DATE"
@@ -78,7 +78,7 @@ def _refuse_both(model: Path | None) -> None:
 def _list(store: Archive, *, as_json: bool) -> None:
     from datetime import UTC, datetime
 
-    from pipelines.rerun.releases import released, releases
+    from pipelines.jobs.releases import released, releases
 
     records = releases(store)
     now = datetime.now(UTC)

@@ -27,9 +27,9 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
     from pipelines.archive import Archive
-    from pipelines.rerun.again import Outcome
-    from pipelines.rerun.check import Checked
-    from pipelines.rerun.wanted import Wanted
+    from pipelines.jobs.model_change import Wanted
+    from pipelines.rerun.reproduce import Checked
+    from pipelines.rerun.rerun import Outcome
 
 SHOWN = 40
 
@@ -56,9 +56,9 @@ def command(
     could not be run again, or with --check came out otherwise.
     """
     from pipelines.archive import Archive
-    from pipelines.flows.partitions import processors
+    from pipelines.jobs.model_change import wanted
+    from pipelines.parallel import processors
     from pipelines.rerun.selection import selected
-    from pipelines.rerun.wanted import wanted
 
     change = wanted(effects, model, limits, effect_file)
     _refuse_check_of_another(check and bool(effects or model or limits))
@@ -106,7 +106,7 @@ def _mapped(
     """What a function makes of the runs, in their order, wherever it is done."""
     from pathlib import Path as LocalPath
 
-    from pipelines.flows.partitions import map_partitions
+    from pipelines.parallel import map_partitions
     from pipelines.rerun.partition import parts
 
     change, dask, count = how

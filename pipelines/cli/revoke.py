@@ -28,9 +28,9 @@ def command(
 ) -> None:
     """Revoke a unit's calibration, with the reason. Nothing is erased: the event is added to the unit's."""
     from pipelines.archive import Archive, Run
+    from pipelines.certificates import Ledger
+    from pipelines.certificates.days import day_of
     from pipelines.report import renew_report
-    from pipelines.trace import Ledger
-    from pipelines.trace.days import day_of
 
     store = Archive(archive)
     ledger = Ledger(store)

@@ -23,9 +23,9 @@ if TYPE_CHECKING:
     from contextlib import AbstractContextManager
 
     from pipelines.archive import Archive, Run
-    from pipelines.job import Job, Request
-    from pipelines.progress import Progress
-    from pipelines.runner import Done
+    from pipelines.chain.runner import Done
+    from pipelines.jobs.job import Job, Request
+    from schemas.progress import Progress
 
 
 def command(
@@ -65,8 +65,8 @@ def command(
     from pipelines.archive import Archive
     from pipelines.cli.summary import exit_status, print_summary, summary
     from pipelines.cli.terminal import attended, scanned
-    from pipelines.job import Request
-    from pipelines.seating import SCAN, read_seating
+    from pipelines.jobs.job import Request
+    from pipelines.jobs.seating import SCAN, read_seating
     from schemas.station import load_station
 
     config = load_station(station)
@@ -99,9 +99,9 @@ def command(
 
 def _measured(request: Request, job: Job, store: Archive, *, direct: bool, asks: bool) -> Run:
     """The run of one filling of the fixture."""
+    from pipelines.chain.attendance import Attendance
+    from pipelines.chain.runner import Runner
     from pipelines.cli.terminal import Terminal
-    from pipelines.operator import Attendance
-    from pipelines.runner import Runner
 
     with shown() as (progress, told, quiet):
         operator = Terminal(quiet) if asks else None

@@ -50,7 +50,7 @@ def command(
 
 def _is_unit(archive: Archive, name: str) -> bool:
     """Whether no run begins so, and a unit with calibrations is called so."""
-    from pipelines.trace import Ledger
+    from pipelines.certificates import Ledger
 
     if name == "latest" or any(run.startswith(name) for run in archive.run_ids()):
         return False

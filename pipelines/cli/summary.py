@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from pipelines.cli.options import STYLES, console, print_table, short
-from pipelines.plain import plain
-from pipelines.rows import rows_of
+from pipelines.tables.frames import rows_of
+from pipelines.tables.json_values import plain
 from schemas.errors import DONE, PART_FAILED
 
 if TYPE_CHECKING:

@@ -6,14 +6,14 @@ import sys
 from typing import TYPE_CHECKING
 
 from pipelines.cli.options import error_console
-from pipelines.seating import Seating, scan
+from pipelines.jobs.seating import Seating, scan
 from schemas.errors import WrongUse
 
 if TYPE_CHECKING:
     from collections.abc import Callable
     from contextlib import AbstractContextManager
 
-    from pipelines.operator import Answer, Prompt
+    from pipelines.chain.attendance import Answer, Prompt
 
 YES = frozenset({"", "y", "yes", "go", "ok"})
 STOP = frozenset({"stop", "s", "q", "quit", "no", "n"})

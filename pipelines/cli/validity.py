@@ -8,15 +8,15 @@ from pipelines.cli.options import console, print_json, print_table
 
 if TYPE_CHECKING:
     from pipelines.archive import Archive
-    from pipelines.trace import Calibration
+    from pipelines.certificates import Calibration
 
 MADE = ("stage", "code", "key", "libraries", "schema", "inputs", "parameters", "who", "where", "when")
 
 
 def show_validity(archive: Archive, serial: str, at: str, known: str, *, as_json: bool) -> bool:
     """Print it; whether a calibration holds."""
-    from pipelines.trace import Ledger
-    from pipelines.trace.days import day_of, today
+    from pipelines.certificates import Ledger
+    from pipelines.certificates.days import day_of, today
     from schemas.errors import WrongUse
 
     day = day_of(at, "--at") if at else today()
@@ -41,7 +41,7 @@ def show_validity(archive: Archive, serial: str, at: str, known: str, *, as_json
 def _made(archive: Archive, valid: Calibration) -> dict[str, Any]:
     """The coefficients of a calibration, and from which code, libraries and data they were made."""
     from pipelines.archive import Run
-    from pipelines.trace.coefficients import coefficients_of
+    from pipelines.certificates.certified_coefficients import coefficients_of
 
     run = Run(archive, valid.run)
     if not (run.path / "run.json").is_file():

@@ -10,7 +10,7 @@ from pipelines.cli.options import ArchiveOption, JsonOption, console, error_cons
 from schemas.errors import DONE, PART_FAILED
 
 if TYPE_CHECKING:
-    from pipelines.trace.checks import Report
+    from pipelines.integrity import Report
 
 
 def command(
@@ -40,7 +40,7 @@ def command(
     """
     from pipelines.archive import Archive
     from pipelines.archive.signatures import public_keys
-    from pipelines.trace.checks import verify
+    from pipelines.integrity import verify
 
     store = Archive(archive)
     store.refuse_none()

@@ -23,8 +23,8 @@ from pipelines.cli.options import (
 
 if TYPE_CHECKING:
     from pipelines.archive import Archive
-    from pipelines.rerun.judged import Fresh, Judged
-    from pipelines.rerun.wanted import Wanted
+    from pipelines.jobs.model_change import Wanted
+    from pipelines.rerun.lot_comparison import Fresh, Judged
 
 SHOWN = 12
 
@@ -49,9 +49,9 @@ def command(
     status 1: the model is no better.
     """
     from pipelines.archive import Archive
-    from pipelines.rerun.releases import keep_evidence
+    from pipelines.jobs.model_change import wanted
+    from pipelines.jobs.releases import keep_evidence
     from pipelines.rerun.selection import selected
-    from pipelines.rerun.wanted import wanted
     from pipelines.rerun.whatif import BETTER, summary
 
     change = wanted("", model, limits, effect_file, where="whatif")
@@ -79,8 +79,8 @@ def _judged(
     """Every lot under both models, and the fresh errors of those whose units were measured before."""
     from pathlib import Path as LocalPath
 
-    from pipelines.flows.partitions import map_partitions, processors
-    from pipelines.rerun.judged import fresh, judged
+    from pipelines.parallel import map_partitions, processors
+    from pipelines.rerun.lot_comparison import fresh, judged
     from pipelines.rerun.partition import parts
     from pipelines.rerun.whatif import fresh_tasks
 

@@ -13,12 +13,12 @@ import numpy as np
 import pandas as pd
 
 from inertial import poses
+from pipelines.capture.capture import capture
 from pipelines.demo.scenes import Scene
-from pipelines.progress import silent
-from pipelines.recipes import load_recipe
-from pipelines.stages.capture import capture
+from pipelines.jobs.recipes import load_recipe
 from pipelines.stages.reduce import reduce
 from schemas.errors import WrongUse
+from schemas.progress import silent
 from schemas.recipe import Lot, Pose, Recipe, Unit
 from schemas.station import Hidden, Soak, StationConfig, load_station
 from stations import open_station
@@ -26,7 +26,7 @@ from stations import open_station
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from pipelines.progress import Progress
+    from schemas.progress import Progress
 
 UNITS = 4
 QUIET = {

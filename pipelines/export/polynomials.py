@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from pipelines.stages.calibration import read_calibration
-from pipelines.trace.stated import stated
+from pipelines.certificates.statement import stated
+from pipelines.tables.calibration import read_calibration
 from schemas.errors import WrongUse
 
 if TYPE_CHECKING:
@@ -18,8 +18,8 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from pipelines.archive import Run
-    from pipelines.stages.calibration import Calibration
-    from pipelines.trace.stated import Stated
+    from pipelines.certificates.statement import Stated
+    from pipelines.tables.calibration import Calibration
 
 BIAS = ("bias", "bias_temperature", "bias_temperature_quadratic", "bias_temperature_cubic")
 SCALE = ("scale", "scale_temperature", "scale_temperature_quadratic")

@@ -19,8 +19,8 @@ from pipelines.audit.finding import WHO
 from pipelines.audit.findings import findings
 from pipelines.audit.page import render
 from pipelines.audit.rules import load_rules
-from pipelines.plain import plain
-from pipelines.trace.days import today
+from pipelines.certificates.days import today
+from pipelines.tables.json_values import plain
 
 if TYPE_CHECKING:
     from pipelines.audit.audit import Audit
@@ -65,7 +65,7 @@ def audit_archive(
     ----------
     pages : folder for the page and the document of every audit
     since, until : dates; everything up to today where empty
-    dask, workers : where runs are read, see :func:`pipelines.flows.partitions.map_partitions`
+    dask, workers : where runs are read, see :func:`pipelines.parallel.map_partitions`
     """
     store = Archive(archive)
     found = look(store, Path(rules) if rules else None, since, until or today(), dask, workers)

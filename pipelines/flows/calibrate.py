@@ -17,19 +17,19 @@ from prefect.runtime import flow_run
 from prefect.states import Crashed
 
 from pipelines.archive import Archive
-from pipelines.chain import ORDER
+from pipelines.chain.attendance import Attendance
+from pipelines.chain.chain import ORDER
+from pipelines.chain.runner import Done, Runner
 from pipelines.flows.operator import Paused
-from pipelines.job import Request
-from pipelines.operator import Attendance
-from pipelines.progress import silent
-from pipelines.runner import Done, Runner
+from pipelines.jobs.job import Request
 from schemas.errors import LinkLost, NotReached, StationTimeout
+from schemas.progress import silent
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Generator
 
-    from pipelines.operator import Operator
-    from pipelines.progress import Progress
+    from pipelines.chain.attendance import Operator
+    from schemas.progress import Progress
 
 HISTORY_S = 20.0
 MANY = 200  # the server's own largest page

@@ -9,7 +9,7 @@ from prefect import flow, task
 from prefect.cache_policies import NO_CACHE
 from prefect_dask.task_runners import DaskTaskRunner
 
-from pipelines.flows.partitions import LOCAL, in_one_thread, one_thread_each
+from pipelines.parallel import LOCAL, in_one_thread, one_thread_each
 from schemas.errors import LinkLost
 
 if TYPE_CHECKING:

@@ -13,16 +13,19 @@ from typing import TYPE_CHECKING, Any
 from prefect import flow
 
 from pipelines.archive import Archive
+from pipelines.chain.attendance import Prompt
+from pipelines.chain.chain import ORDER
 from pipelines.flows.calibrate import requested, stage
+from pipelines.flows.local import reached
 from pipelines.flows.operator import Paused
-from pipelines.inquiry.play import Consent, Table, Terms, always, play
-from pipelines.operator import Prompt
+from pipelines.inquiry.loop import Consent, Table, Terms, always, play
 
 if TYPE_CHECKING:
     from collections.abc import Generator
 
+    from pipelines.chain.runner import Done, Runner
     from pipelines.inquiry.inquiry import Finding, Inquiry, Move
-    from pipelines.runner import Done, Runner
+    from pipelines.jobs.job import Request
 
 _tables: list[Table] = []
 
@@ -82,3 +85,26 @@ def investigate(  # noqa: PLR0913 - a flow's parameters are its form on the serv
     approve = Asked(Paused()) if ask else (table.approve if _tables else always)
     at = Table(_stage, approve, table.progress, table.told, table.looked)
     return play(job, Archive(archive), Terms(tuple(effects or ()), budget_min, unseen), at)
+
+
+def investigate_locally(request: Request, archive: Archive, terms: Terms, table: Table, *, ask: bool) -> dict[str, Any]:
+    """The document of the inquiry that the flow makes, on the server named by PREFECT_API_URL or on one of our own."""
+    archive.prepare()
+    job = request.job(archive)
+    name = f"investigate {job.recipe.name} {job.capture_id}"
+    with reached(archive):
+        from pipelines.flows.calibrate import close_dead_runs, settle_history
+
+        close_dead_runs(name)
+        with seated(table):
+            named = investigate.with_options(flow_run_name=name)
+            found: Any = named(
+                **request.parameters(),
+                archive=archive.address,
+                effects=list(terms.effects),
+                budget_min=terms.budget,
+                unseen=terms.unseen,
+                ask=ask,
+            )
+        settle_history(name, len(ORDER))
+    return found

@@ -17,7 +17,7 @@ from hashlib import sha256
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from pipelines.chain import ORDER
+from pipelines.chain.chain import ORDER
 from pipelines.flows.settings import STARTUP_S, settings
 from schemas.errors import StationTimeout
 
@@ -25,10 +25,10 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Generator
 
     from pipelines.archive import Archive, Run
-    from pipelines.job import Job, Request
-    from pipelines.operator import Operator
-    from pipelines.progress import Progress
-    from pipelines.runner import Done
+    from pipelines.chain.attendance import Operator
+    from pipelines.chain.runner import Done
+    from pipelines.jobs.job import Job, Request
+    from schemas.progress import Progress
 
 POLL_S = 0.1
 CLIENTS, START_LOCK, ADDRESS = "clients", "start.lock", "server.json"

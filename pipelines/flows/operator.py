@@ -18,7 +18,7 @@ from prefect.client.schemas.objects import FlowRun, StateType
 from prefect.input import RunInput
 
 if TYPE_CHECKING:
-    from pipelines.operator import Answer, Prompt
+    from pipelines.chain.attendance import Answer, Prompt
 
 PATIENCE_S = 7 * 24 * 3600
 POLL_S = 1

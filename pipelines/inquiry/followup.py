@@ -9,11 +9,11 @@ import numpy as np
 
 from inertial.criticism.menus import Reach
 from inertial.criticism.proposals import Circumstances
-from inertial.sequences import Pace
-from inertial.sequences import Step as Wanted
-from pipelines.job import Job
-from pipelines.stages.capture import Step, steps
-from pipelines.stages.minutes import Standing, axis_seconds, lag_of, minutes
+from inertial.planning.sequences import Pace
+from inertial.planning.sequences import Step as Wanted
+from pipelines.jobs.job import Job
+from pipelines.schedule.steps import Step, steps
+from pipelines.schedule.timing import Standing, axis_seconds, lag_of, minutes
 from schemas.recipe import Pose, Recipe, SoakPart
 from stations.profile_files import profile_of
 

@@ -8,13 +8,13 @@ from typing import TYPE_CHECKING, Any, Literal
 from threadpoolctl import threadpool_limits
 
 from pipelines.archive import code_hash, files, stage_key
+from pipelines.chain.runner import Runner
+from pipelines.diagnosis.diagnose import document, examined
+from pipelines.diagnosis.next_measurement import Proposed, proposed, rows_of
+from pipelines.inquiry.explanation import shows, why
 from pipelines.inquiry.followup import circumstances, follow_up
 from pipelines.inquiry.lineage import Lineage
-from pipelines.inquiry.words import shows, why
-from pipelines.job import Job
-from pipelines.runner import Runner
-from pipelines.stages.criticise import document, examined
-from pipelines.stages.next_measurement import Proposed, proposed, rows_of
+from pipelines.jobs.job import Job
 from schemas.recipe import Recipe
 
 if TYPE_CHECKING:
@@ -22,11 +22,11 @@ if TYPE_CHECKING:
 
     from inertial.criticism.diagnosis import Diagnosis
     from inertial.criticism.proposals import Proposal
-    from inertial.sequences import Step
+    from inertial.planning.sequences import Step
     from inertial.state import State
     from pipelines.archive import Archive, Records, Run
-    from pipelines.progress import Progress
-    from pipelines.stages.measured import Measured
+    from pipelines.tables.dwells import Measured
+    from schemas.progress import Progress
 
 End = Literal["adequate", "told_apart", "nothing_parts", "budget", "declined", "asked", "blocked", "unexplained"]
 
@@ -35,7 +35,7 @@ EXTRA = 0.3
 
 MOST_ROUNDS = 6
 FOLLOW_UP = ("capture", "validate", "reduce")
-TABLE_OF_CODE = ("inertial", "pipelines.stages.criticise", "pipelines.stages.measured")
+TABLE_OF_CODE = ("inertial", "pipelines.diagnosis.diagnose", "pipelines.tables.dwells")
 FILE = "inquiry.json"
 
 
@@ -259,7 +259,7 @@ def _going_on(before: Records) -> Any:
     """A measurement that begins with the station as another capture left it."""
 
     def measure(job: Job, records: Records, progress: Progress) -> None:
-        from pipelines.stages.capture import capture
+        from pipelines.capture.capture import capture
         from stations import open_station
 
         state = records.last_state() or before.last_state()
@@ -290,7 +290,7 @@ def _classes(finding: Finding) -> str:
 def _named(found: Measured, effects: Sequence[str], diagnosis: Diagnosis | None) -> dict[str, Any]:
     """What reports and people need beside the fixed keys."""
     from inertial import effects as catalogue
-    from inertial.reasons import reason
+    from inertial.planning.reasons import reason
 
     unseen = diagnosis.unseen if diagnosis is not None else ()
     breakers = {name: catalogue.get(name).breaker for name in unseen}

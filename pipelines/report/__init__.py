@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from pipelines.archive import code_hash, stage_key
-from pipelines.report.page import render
-from pipelines.trace.stated import stated
+from pipelines.certificates.statement import stated
+from pipelines.report.run_page import render
 from schemas.errors import WrongUse
 
 if TYPE_CHECKING:

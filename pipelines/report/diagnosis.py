@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from inertial.criticism.diagnosis import Diagnosis
-    from pipelines.stages.measured import Measured
+    from pipelines.tables.dwells import Measured
 
 FEWEST_POSES = 4  # fewer make no map
 

@@ -9,7 +9,7 @@ from pipelines.report.plan_plots import alias_plot, sight_plot, sphere_plot, tem
 from pipelines.report.templates import template
 
 if TYPE_CHECKING:
-    from pipelines.stages.plan import Planned
+    from pipelines.planning.plan import Planned
 
 
 def render_plan(document: dict[str, Any], course: Planned) -> str:
@@ -17,7 +17,7 @@ def render_plan(document: dict[str, Any], course: Planned) -> str:
 
     Parameters
     ----------
-    document : of :func:`pipelines.stages.plan.plan`
+    document : of :func:`pipelines.planning.plan.plan`
     course : the recipe as the station will go through it
     """
     return template("plan.html").render(

@@ -10,16 +10,16 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter
 
 from inertial.frames import force_from_angles
-from inertial.planning import likeness
+from inertial.planning.visibility import likeness
 from pipelines.report.plots import COLOURS, STYLE, WIDTH_IN, svg
-from pipelines.stages.minutes import temperatures
+from pipelines.schedule.timing import temperatures
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from numpy.typing import NDArray
 
-    from pipelines.stages.minutes import Stretch
-    from pipelines.stages.plan import Planned
+    from pipelines.planning.plan import Planned
+    from pipelines.schedule.timing import Stretch
 
     Array = NDArray[np.float64]
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from pipelines.chain import BY_NAME
+from pipelines.chain.chain import BY_NAME
 
 if TYPE_CHECKING:
     from pipelines.archive import Run

@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 
 from pipelines.rerun.causes import causes
-from pipelines.rows import rows_of
+from pipelines.tables.frames import rows_of
 from schemas.errors import DataRejected
 
 if TYPE_CHECKING:

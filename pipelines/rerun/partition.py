@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING
 
 from inertial.errors import InertialError
 from pipelines.archive import Archive
-from pipelines.rerun.again import Outcome, again
-from pipelines.rerun.check import Checked, check
-from pipelines.rerun.wanted import Wanted
+from pipelines.jobs.model_change import Wanted
+from pipelines.rerun.reproduce import Checked, check
+from pipelines.rerun.rerun import Outcome, again
 from schemas.errors import TumblelineError
 
 if TYPE_CHECKING:

@@ -10,15 +10,15 @@ from pydantic import ValidationError
 
 from pipelines.archive import code_hash
 from pipelines.archive.signatures import ENTRY
-from pipelines.chain import BY_NAME, RECORDS, STAGES, Tables
-from pipelines.job import Job
-from pipelines.models import refuse_unknown_effects, use_formulas
-from pipelines.runner import captured_tables
-from pipelines.stages.criticise import default_model
-from pipelines.stages.empty import empty_table
+from pipelines.chain.chain import BY_NAME, RECORDS, STAGES, Tables
+from pipelines.chain.runner import captured_tables
+from pipelines.diagnosis.diagnose import default_model
+from pipelines.jobs.job import Job
+from pipelines.jobs.model_files import refuse_unknown_effects, use_formulas
 from pipelines.stages.fit import fit
 from pipelines.stages.grade import Evidence, grade, refuse_limits_without_figures
 from pipelines.stages.verify import verify
+from pipelines.tables.frames import empty_table
 from schemas.errors import DataRejected
 from schemas.limits import Limits
 from schemas.recipe import FormulaSpec, Lot, Recipe, explain
@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
     from pipelines.archive import Run
-    from pipelines.rerun.wanted import Wanted
+    from pipelines.jobs.model_change import Wanted
 
 CAPTURED = ("readings", "history")
 RAW = ("validate", "reduce", "noise")
@@ -38,7 +38,7 @@ PROVENANCE = ("who", "where", "when", "software", "libraries", ENTRY, "rerun_of"
 
 @dataclass(frozen=True)
 class Step:
-    """One stage for one run: as :class:`pipelines.chain.Stage`, with everything that the job decides filled in."""
+    """One stage for one run: as :class:`pipelines.chain.chain.Stage`, with everything that the job decides filled in."""
 
     name: str
     inputs: tuple[str, ...]

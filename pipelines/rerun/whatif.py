@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections import defaultdict
 from typing import TYPE_CHECKING, Any
 
-from pipelines.rerun.judged import FreshTask, Judged
+from pipelines.rerun.lot_comparison import FreshTask, Judged
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from pipelines.rerun.judged import Fresh, Side, Sums
-    from pipelines.rerun.wanted import Wanted
+    from pipelines.jobs.model_change import Wanted
+    from pipelines.rerun.lot_comparison import Fresh, Side, Sums
 
 FALLS = 0.005
 """Share by which an error must change to count."""

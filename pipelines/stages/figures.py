@@ -15,8 +15,8 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from pipelines.stages.calibration import Calibration
-    from pipelines.stages.unit_rows import UnitRows
+    from pipelines.tables.calibration import Calibration
+    from pipelines.tables.frames import UnitRows
 
 NORMAL_95 = 1.959964
 GUARD = 2.0

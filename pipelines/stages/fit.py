@@ -12,11 +12,10 @@ from inertial import design
 from inertial.errors import InertialError
 from inertial.fits.linear import LotFit, felt_force, fit_lot
 from inertial.fits.wander import WanderFit, fit_lot_with_wander, student
-from pipelines.stages.arrays import LotArrays, lot_arrays
-from pipelines.stages.calibration import coefficient_rows, covariance_rows
-from pipelines.stages.empty import empty_table
-from pipelines.stages.profile import profiled
-from pipelines.stages.texts import picked
+from pipelines.stages.nonlinear import profiled
+from pipelines.tables.calibration import coefficient_rows, covariance_rows
+from pipelines.tables.dwells import LotArrays, lot_arrays
+from pipelines.tables.frames import empty_table, picked
 from schemas.errors import DataRejected
 from schemas.units import AXES, MICRO
 

@@ -8,8 +8,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pandas as pd
 
-from pipelines.stages.calibration import read_calibration
-from pipelines.stages.empty import empty_table
 from pipelines.stages.figures import (
     NEEDS_EFFECT,
     NEEDS_STATIC,
@@ -19,7 +17,8 @@ from pipelines.stages.figures import (
     coefficient_figures,
     figures_of,
 )
-from pipelines.stages.unit_rows import ByUnit
+from pipelines.tables.calibration import read_calibration
+from pipelines.tables.frames import ByUnit, empty_table
 from schemas.errors import RecipeInvalid
 from schemas.limits import FIGURES, GRADE_FIGURE, GRADES, Decision, Limits, decide, describe_rule, grade_of
 

@@ -10,9 +10,9 @@ import pandas as pd
 
 from inertial.noise.allan import AllanCurve, overlapping
 from inertial.noise.terms import FLICKER_FLOOR, Terms, fit_terms, model_deviation
-from pipelines.stages.calibration import read_calibration
-from pipelines.stages.empty import empty_table
-from pipelines.stages.pieces import by_record
+from pipelines.tables.calibration import read_calibration
+from pipelines.tables.frames import empty_table
+from pipelines.tables.samples import by_record
 from schemas.errors import DataRejected
 from schemas.units import AXES, MICRO
 

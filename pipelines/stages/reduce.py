@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 
 from inertial.frames import force_from_angles
-from pipelines.stages.pieces import dwells_whole
+from pipelines.tables.samples import dwells_whole
 from schemas.units import AXES, STANDARD_GRAVITY_M_S2
 
 if TYPE_CHECKING:

@@ -12,9 +12,10 @@ import numpy as np
 import pandas as pd
 
 from inertial.frames import force_from_angles
+from inertial.pointing import contradicts
 from pipelines.stages.frozen import frozen
-from pipelines.stages.pieces import STATIC, Signal, by_record
-from pipelines.stages.pointing import contradicts, pointing_of
+from pipelines.stages.pointing import pointing_of
+from pipelines.tables.samples import STATIC, Signal, by_record
 from schemas.units import AXES
 
 if TYPE_CHECKING:

@@ -8,10 +8,9 @@ import numpy as np
 import pandas as pd
 
 from inertial.correction import correct, station_change
-from pipelines.stages.arrays import LotArrays, lot_arrays
-from pipelines.stages.calibration import read_calibration
-from pipelines.stages.empty import empty_table
-from pipelines.stages.texts import picked
+from pipelines.tables.calibration import read_calibration
+from pipelines.tables.dwells import LotArrays, lot_arrays
+from pipelines.tables.frames import empty_table, picked
 from schemas.units import AXES, MICRO
 
 if TYPE_CHECKING:

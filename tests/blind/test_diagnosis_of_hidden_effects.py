@@ -4,7 +4,7 @@ import pytest
 from score import Score, score, table, text
 from truth import Run, case
 
-from pipelines.stages.criticise import diagnose
+from pipelines.diagnosis.diagnose import diagnose
 
 SEED = 5
 SMALL = {

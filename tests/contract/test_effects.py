@@ -7,17 +7,17 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from docs.effects_page import page
 from inertial import effects, poses
-from inertial.criticism.problem import grid_of
+from inertial.design import grid_of
 from inertial.effects import SensorEffect, StationEffect
 from inertial.effects.base import AnyEffect
 from inertial.errors import NotIdentified
 from inertial.fits.linear import fit_lot
 from inertial.frames import force_from_angles
 from inertial.state import State
-from pipelines.docs import page
+from pipelines.diagnosis.diagnose import diagnose
 from pipelines.export.polynomials import ACROSS, BIAS, SCALE
-from pipelines.stages.criticise import diagnose
 
 EVERY = sorted(effects.built_in())
 BASE = ("bias", "scale", "misalignment")
@@ -175,9 +175,9 @@ def test_a_document_says_what_it_is(name: str) -> None:
 
 
 def test_the_reference_is_up_to_date() -> None:
-    from pipelines.docs import PAGE
+    from docs.effects_page import PAGE
 
-    assert PAGE.read_text(encoding="utf-8") == page(), "write it again with 'python -m pipelines.docs'"
+    assert PAGE.read_text(encoding="utf-8") == page(), "write it again with 'python -m docs.effects_page'"
 
 
 def model_columns(names: list[str], state: State, axis: int) -> np.ndarray:
@@ -241,7 +241,7 @@ def diagnosis_of_six_faces() -> dict:
 @pytest.mark.parametrize("name", [n for n in EVERY if n not in BASE])
 def test_is_reported_unseen_on_six_faces_exactly_where_it_cannot_show(name: str, diagnosis_of_six_faces: dict) -> None:
     from inertial.errors import MissingInput
-    from pipelines.stages.measured import lot_of, measured
+    from pipelines.tables.dwells import lot_of, measured
 
     state = lot_of(measured(six_faces())).state
     effect = effects.get(name)

@@ -24,7 +24,7 @@ from pipelines.audit.index import up_to_date
 from pipelines.audit.rules import load_rules
 from pipelines.audit.sql import ask
 from pipelines.cli import main
-from pipelines.plain import plain
+from pipelines.tables.json_values import plain
 from schemas.errors import RecipeInvalid, WrongUse
 
 UNTIL = "2022-01-31"

@@ -11,7 +11,7 @@ from capture_double import recipe_file
 from root_process import ROOT, python
 
 from pipelines.archive import Archive
-from pipelines.chain import ORDER
+from pipelines.chain.chain import ORDER
 from pipelines.flows.local import local_server
 
 

@@ -15,7 +15,7 @@ from typer.testing import CliRunner
 from pipelines.archive import Archive
 from pipelines.cli import app
 from pipelines.inquiry.inquiry import Finding, Inquiry, Move
-from pipelines.inquiry.play import Consent, Table, Terms, play
+from pipelines.inquiry.loop import Consent, Table, Terms, play
 from pipelines.rerun.selection import selected
 from schemas.errors import WrongUse
 
@@ -84,7 +84,7 @@ def test_a_follow_up_has_a_report_and_is_listed_and_shown(told_apart: tuple[Path
 
 @pytest.mark.slow
 def test_a_follow_up_is_no_model_of_its_own(told_apart: tuple[Path, dict]) -> None:
-    from pipelines.job import job_of_run
+    from pipelines.jobs.job import job_of_run
 
     archive = Archive(told_apart[0] / "archive")
     with pytest.raises(WrongUse, match="has too few poses for a model of its own"):

@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 from small_station import MemorySink, lot_of, quiet_progress, short_recipe
 
-from pipelines.stages.capture import capture
+from pipelines.capture.capture import capture
 from schemas.fault import parse_fault
 from schemas.station import load_station, with_faults
 from stations.opening import open_station

@@ -14,10 +14,10 @@ from typer.testing import CliRunner
 from pipelines.archive import Archive, Run
 from pipelines.archive.locks import alone
 from pipelines.archive.store import ObjectPath
-from pipelines.chain import ORDER
+from pipelines.certificates import Ledger
+from pipelines.chain.chain import ORDER
+from pipelines.chain.runner import Runner
 from pipelines.cli import app
-from pipelines.runner import Runner
-from pipelines.trace import Ledger
 from schemas.errors import ArchiveUnusable, OperatorNeeded
 
 pytestmark = pytest.mark.slow

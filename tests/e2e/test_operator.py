@@ -12,11 +12,11 @@ from capture_double import CaptureDouble, recipe_file, small_job
 from typer.testing import CliRunner
 
 from pipelines.archive import Archive
+from pipelines.chain.attendance import Answer, Attendance, Prompt
+from pipelines.chain.runner import Runner
 from pipelines.cli import app
 from pipelines.cli.terminal import scanned
 from pipelines.flows.local import local_server
-from pipelines.operator import Answer, Attendance, Prompt
-from pipelines.runner import Runner
 from schemas.errors import OperatorNeeded
 from schemas.fault import Fault
 from schemas.station import with_faults

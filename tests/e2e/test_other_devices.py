@@ -7,7 +7,7 @@ import pandas as pd
 import pytest
 from small_station import MemorySink, lot_of, quiet_progress, short_recipe
 
-from pipelines.stages.capture import capture
+from pipelines.capture.capture import capture
 from schemas.station import load_station
 from stations import open_station
 from stations.links.lines import LineLink

@@ -11,8 +11,8 @@ from typer.testing import CliRunner
 from inertial.errors import NotIdentified
 from pipelines.archive import Archive
 from pipelines.cli import app
-from pipelines.rerun.releases import release
-from pipelines.rerun.wanted import wanted
+from pipelines.jobs.model_change import wanted
+from pipelines.jobs.releases import release
 from schemas.errors import RecipeInvalid, WrongUse
 
 RECIPE = """

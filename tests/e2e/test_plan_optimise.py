@@ -11,16 +11,16 @@ from typer.testing import CliRunner
 from inertial.frames import force_from_angles
 from inertial.noise.dwells import DwellNoise
 from pipelines.cli import app
-from pipelines.recipe_text import limits_from, recipe_text
-from pipelines.recipes import load_recipe, sample_names
-from pipelines.stages.capture import steps
-from pipelines.stages.least import least
-from pipelines.stages.minutes import minutes
-from pipelines.stages.plan import planned
-from pipelines.stages.soak_orders import orders, soak_seconds
-from pipelines.stages.textbook import reference_errors, textbook
-from pipelines.stages.verification import apart
-from pipelines.stages.wish import Wish, candidates
+from pipelines.jobs.recipe_text import limits_from, recipe_text
+from pipelines.jobs.recipes import load_recipe, sample_names
+from pipelines.planning.lower_bound import least
+from pipelines.planning.plan import planned
+from pipelines.planning.requirement import Wish, candidates
+from pipelines.planning.soak_orders import orders, soak_seconds
+from pipelines.planning.textbook import reference_errors, textbook
+from pipelines.planning.verification_poses import apart
+from pipelines.schedule.steps import steps
+from pipelines.schedule.timing import minutes
 from schemas.errors import RecipeInvalid, WrongUse
 from schemas.station import load_station
 

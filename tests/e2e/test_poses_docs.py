@@ -10,7 +10,7 @@ import pytest
 from typer.testing import CliRunner
 
 from inertial import frames, poses
-from inertial.reasons import reason
+from inertial.planning.reasons import reason
 from inertial.state import State
 from pipelines.cli import COMMANDS, app
 

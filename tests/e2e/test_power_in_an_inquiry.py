@@ -7,14 +7,14 @@ import inquiries
 import numpy as np
 import pytest
 
+from inertial.planning.sequences import Step
 from inertial.power import switched
-from inertial.sequences import Step
 from pipelines.archive import Archive
-from pipelines.chain import ORDER
+from pipelines.chain.chain import ORDER
+from pipelines.chain.runner import Runner
 from pipelines.inquiry.followup import follow_up
 from pipelines.inquiry.inquiry import FOLLOW_UP, Move, begin
-from pipelines.progress import silent
-from pipelines.runner import Runner
+from schemas.progress import silent
 
 UP, DOWN = (0.0, 0.0), (math.pi, 0.0)
 

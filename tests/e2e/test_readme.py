@@ -10,7 +10,7 @@ from typer.main import get_command
 
 from pipelines.cli import COMMANDS, app
 from pipelines.demo.scenes import SCENES
-from pipelines.recipes import load_limits, load_recipe
+from pipelines.jobs.recipes import load_limits, load_recipe
 from schemas.recipe import parse_recipe
 
 ROOT = Path(__file__).resolve().parents[2]

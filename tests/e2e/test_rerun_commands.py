@@ -13,8 +13,8 @@ import pytest
 from capture_double import CaptureDouble, small_job, small_run
 
 from pipelines.archive import Archive, parquet
-from pipelines.chain import ORDER
-from pipelines.runner import Runner
+from pipelines.chain.chain import ORDER
+from pipelines.chain.runner import Runner
 from schemas import tables as contracts
 
 LARGER = "bias,scale,misalignment,bias_temperature,scale_temperature,third_order"

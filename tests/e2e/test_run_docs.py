@@ -7,7 +7,7 @@ import pytest
 from typer.testing import CliRunner
 
 from pipelines.cli import app
-from pipelines.seating import Seating, read_seating
+from pipelines.jobs.seating import Seating, read_seating
 from schemas.station import load_station
 
 ROOT = Path(__file__).resolve().parents[2]

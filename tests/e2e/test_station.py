@@ -12,7 +12,8 @@ import pytest
 from small_station import MemorySink, lot_of, quiet_progress, short_recipe, station_of
 
 from inertial.frames import force_from_angles
-from pipelines.stages.capture import capture, steps
+from pipelines.capture.capture import capture
+from pipelines.schedule.steps import steps
 from schemas.station import load_station
 from schemas.tables import check
 from stations import open_station

@@ -4,13 +4,13 @@ import re
 import tomllib
 from pathlib import Path
 
+from docs.devices_page import PAGE, page
 from schemas.profile import parse_profile
 from schemas.station import Device
 from stations.devices.adapters import AXES, CHAMBERS, chamber_adapter
 from stations.plant.hidden import HIDDEN
 from stations.plant.preset import load_preset
 from stations.plant.sampler import Sampler
-from stations.profile_docs import PAGE, page
 
 DOCS = Path(__file__).resolve().parents[2] / "docs"
 GUIDE = (DOCS / "how-to" / "add-a-device.md").read_text(encoding="utf-8")
@@ -41,7 +41,7 @@ def test_links_of_the_guide_are_those_of_a_station():
 
 
 def test_the_reference_of_devices_is_what_the_profiles_say():
-    assert PAGE.read_text(encoding="utf-8") == page(), "write it anew: python -m stations.profile_docs"
+    assert PAGE.read_text(encoding="utf-8") == page(), "write it anew: python -m docs.devices_page"
 
 
 def test_every_hidden_effect_is_told_of():

@@ -10,8 +10,8 @@ from typer.testing import CliRunner
 
 from pipelines.archive import Archive
 from pipelines.archive.signatures import VARIABLE
+from pipelines.chain.runner import Runner
 from pipelines.cli import app
-from pipelines.runner import Runner
 
 ROOT = Path(__file__).resolve().parents[2]
 GUIDE = (ROOT / "docs" / "how-to" / "trace-a-certificate.md").read_text(encoding="utf-8")

@@ -6,8 +6,8 @@ import sys
 from pathlib import Path
 
 from pipelines.archive import Archive, files
-from pipelines.job import Request
-from pipelines.runner import Runner
+from pipelines.chain.runner import Runner
+from pipelines.jobs.job import Request
 from stations.plant.clock import PlantClock
 
 

@@ -14,12 +14,12 @@ import pandas as pd
 import pytest
 from capture_double import CaptureDouble, recipe_file, small_job
 
-from pipelines.archive import Archive, Run, chain, provenance
+from pipelines.archive import Archive, Run, hash_chain, provenance
+from pipelines.certificates import Ledger
+from pipelines.chain.runner import Runner
 from pipelines.cli import main
-from pipelines.job import Request
-from pipelines.runner import Runner
-from pipelines.trace import Ledger
-from pipelines.trace.checks import verify
+from pipelines.integrity import verify
+from pipelines.jobs.job import Request
 from schemas.errors import WrongUse
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -154,7 +154,7 @@ def test_a_clock_that_goes_backwards_loses_nothing_and_is_told(tmp_path: Path, m
     assert report.checked.findings == []
     assert any("a clock went backwards" in remark for remark in report.checked.remarks)
     assert len(store.runs()) == 2
-    assert chain.last_number(store.root) == 2
+    assert hash_chain.last_number(store.root) == 2
 
 
 @pytest.mark.parametrize("day", ["0001-01-01T00:00:00+02:00", "9999-12-31T23:00:00-05:00", "2026-13-01", "tomorrow"])

@@ -7,8 +7,8 @@ import pytest
 from capture_double import CaptureDouble, small_job
 
 from pipelines.archive import Archive, files
-from pipelines.chain import ORDER
-from pipelines.runner import Runner
+from pipelines.chain.chain import ORDER
+from pipelines.chain.runner import Runner
 from schemas.errors import UNUSABLE, ArchiveUnusable
 
 RESULTS = ("readings", "history", "verdicts", "dwells", "coefficients", "covariance", "residuals", "grades", "figures")

@@ -11,8 +11,8 @@ import pytest
 from capture_double import PulledPlug, recipe_file, small_job
 
 from pipelines.archive import Archive
-from pipelines.chain import ORDER
-from pipelines.runner import Runner
+from pipelines.chain.chain import ORDER
+from pipelines.chain.runner import Runner
 from stations.plant.clock import PlantClock
 
 ROOT = Path(__file__).resolve().parents[2]

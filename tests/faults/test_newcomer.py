@@ -14,11 +14,11 @@ from capture_double import CaptureDouble, PulledPlug, recipe_file, small_job
 from lots import lot
 
 from pipelines.archive import Archive, files
+from pipelines.chain.runner import Runner
 from pipelines.cli import main
 from pipelines.importers import exchange
-from pipelines.job import Request
-from pipelines.models import chosen_effects
-from pipelines.runner import Runner
+from pipelines.jobs.job import Request
+from pipelines.jobs.model_files import chosen_effects
 from schemas.errors import ArchiveUnusable, DataRejected, RecipeInvalid, WrongUse, did_you_mean
 
 ROOT = Path(__file__).resolve().parents[2]

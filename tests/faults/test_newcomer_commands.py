@@ -8,9 +8,9 @@ from ledger_events import event
 from typer.testing import CliRunner
 
 from pipelines.archive import Archive
+from pipelines.certificates import Ledger
 from pipelines.cli import COMMANDS, app, main
-from pipelines.cli.verdict import verdict
-from pipelines.trace import Ledger
+from pipelines.cli.diagnosis_text import verdict
 
 
 def told(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], *words: object) -> tuple[int, str, str]:

@@ -3,7 +3,7 @@
 import pytest
 from small_station import MemorySink, lot_of, quiet_progress, short_recipe
 
-from pipelines.stages.capture import capture
+from pipelines.capture.capture import capture
 from schemas.errors import StationRefused
 from schemas.event import MemoryLog
 from schemas.fault import Fault

@@ -9,7 +9,7 @@ import pytest
 from pydantic import ValidationError
 from small_station import MemorySink, lot_of, quiet_progress, short_recipe, station_of
 
-from pipelines.stages.capture import capture
+from pipelines.capture.capture import capture
 from schemas.errors import (
     ArchiveUnusable,
     DataRejected,

@@ -4,7 +4,7 @@ import pandas as pd
 import pytest
 from small_station import QUIET, MemorySink, lot_of, quiet_progress, short_recipe, station_of
 
-from pipelines.stages.capture import capture
+from pipelines.capture.capture import capture
 from schemas.errors import OperatorNeeded, StationTimeout
 from schemas.event import MemoryLog
 from stations.opening import make_plant, open_station, serve_plant

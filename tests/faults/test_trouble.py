@@ -9,12 +9,12 @@ from capture_double import CaptureDouble, PulledPlug, small_job, small_run
 from typer.testing import CliRunner
 
 from pipelines.archive import Archive, Run
-from pipelines.chain import ORDER
+from pipelines.chain.chain import ORDER
+from pipelines.chain.runner import Runner
 from pipelines.cli import app
 from pipelines.cli.summary import exit_status, summary
 from pipelines.export import unit_calibrations
 from pipelines.report import render
-from pipelines.runner import Runner
 from schemas.errors import DataRejected, WrongUse
 
 TABLES_OF_RESULTS = (

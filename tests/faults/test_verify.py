@@ -13,10 +13,10 @@ from typer.testing import CliRunner
 
 from pipelines.archive import Archive, Run, files
 from pipelines.archive.signatures import VARIABLE, make_key, name_of, public_keys
+from pipelines.certificates import Ledger
+from pipelines.chain.runner import Runner
 from pipelines.cli import app
-from pipelines.runner import Runner
-from pipelines.trace import Ledger
-from pipelines.trace.checks import Report, seals, verify
+from pipelines.integrity import Report, seals, verify
 from schemas.errors import ArchiveUnusable, WrongUse
 
 

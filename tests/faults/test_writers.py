@@ -13,14 +13,14 @@ from capture_double import CaptureDouble, PulledPlug, small_job, small_run
 from ledger_events import event
 from typer.testing import CliRunner
 
-from pipelines.archive import Archive, chain, files, parquet
+from pipelines.archive import Archive, files, hash_chain, parquet
 from pipelines.archive.cleaning import clean
 from pipelines.archive.locks import alone
-from pipelines.chain import ORDER
+from pipelines.certificates import Ledger
+from pipelines.chain.chain import ORDER
+from pipelines.chain.runner import Runner
 from pipelines.cli import app
-from pipelines.runner import Runner
-from pipelines.trace import Ledger
-from pipelines.trace.checks import verify
+from pipelines.integrity import verify
 from schemas.errors import ArchiveUnusable
 
 TESTS = Path(__file__).resolve().parents[1]
@@ -116,7 +116,7 @@ def test_eight_writers_at_once_lose_nothing_and_nobody_reads_half(tmp_path: Path
     assert {e.start for e in events} == {f"2026-01-{n:02d}" for n in range(1, WRITERS + 1)}
     report = verify(archive, keys={})
     assert report.checked.findings == []
-    assert chain.last_number(root) >= 3 * WRITERS
+    assert hash_chain.last_number(root) >= 3 * WRITERS
     assert not list(root.rglob(f"{files.TEMPORARY}*"))
 
 

@@ -3,13 +3,13 @@
 import numpy as np
 import pytest
 
+from inertial.population.change_points import change_points
+from inertial.population.control_charts import alarms, baseline, false_alarms, signals
 from pipelines.audit.calibrations import Calibrations
 from pipelines.audit.drifts import OWN, kind_drifts, unit_drifts
 from pipelines.audit.parameters import NAMES
 from pipelines.audit.population import Figures, abilities, odd_ones
 from pipelines.audit.rules import load_rules
-from pipelines.audit.statistics.change_points import change_points
-from pipelines.audit.statistics.control_charts import alarms, baseline, false_alarms, signals
 from pipelines.audit.swaps import strangers
 
 DEVICE, YEAR_D = "adxl355", 365.25

@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from pipelines.audit.statistics.agreement import e_n
-from pipelines.audit.statistics.capability import cp, cpk, fraction_interval
-from pipelines.audit.statistics.comparison import compare, holm
-from pipelines.audit.statistics.control_charts import (
+from inertial.population.agreement import e_n
+from inertial.population.capability import cp, cpk, fraction_interval
+from inertial.population.comparison import compare, holm
+from inertial.population.control_charts import (
     EWMA_RUN_LENGTH,
     EWMA_WEIGHT,
     EWMA_WIDTH,
@@ -17,7 +17,7 @@ from pipelines.audit.statistics.control_charts import (
     ewma,
     western_electric,
 )
-from pipelines.audit.statistics.gauge import gauge_study
+from inertial.population.gauge import gauge_study
 
 # NIST/SEMATECH e-Handbook of Statistical Methods, 6.3.2.2 (individuals) and 6.3.2.4 (EWMA)
 FLOW = np.array([49.6, 47.6, 49.9, 51.3, 47.8, 51.2, 52.6, 52.4, 53.6, 52.1])

@@ -2,9 +2,9 @@
 
 import pytest
 
+from pipelines.diagnosis.compare import compare
+from pipelines.diagnosis.diagnose import diagnose
 from pipelines.importers import exchange
-from pipelines.stages.compare import compare
-from pipelines.stages.criticise import diagnose
 
 MM_S2 = 9.80665e-3
 """One µg in mm/s²."""

@@ -14,7 +14,7 @@ from inertial.criticism.model import Model, Term
 from inertial.criticism.problem import Lot, Problem
 from inertial.criticism.proposals import Circumstances, proposal, rivals_in
 from inertial.criticism.separation import separations, smallest
-from inertial.sequences import Pace, Step
+from inertial.planning.sequences import Pace, Step
 from inertial.state import State
 
 NOISE = 11.4e-6

@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 
 from inertial import poses
-from inertial.expected import expected_errors
 from inertial.fits.wander import fit_lot_with_wander, student
 from inertial.frames import force_from_angles
 from inertial.noise.dwells import DwellNoise, dwell_covariance
-from inertial.planning import sights
+from inertial.planning.expected import expected_errors
+from inertial.planning.visibility import sights
 from inertial.state import State
 
 LINEAR = ("bias", "scale", "misalignment")

@@ -8,8 +8,8 @@ import pytest
 from capture_double import CaptureDouble, small_job, small_run
 
 from pipelines.archive import Archive, Run, code_hash, files, parquet, stage_key
-from pipelines.chain import ORDER
-from pipelines.runner import Runner
+from pipelines.chain.chain import ORDER
+from pipelines.chain.runner import Runner
 from schemas.errors import ArchiveUnusable, OperatorNeeded, WrongUse
 
 FRAME = pd.DataFrame({"unit": ["A", "B"], "value": [1.0, 2.0]})

@@ -13,7 +13,7 @@ from pipelines.audit.certificates import Certificates, certificates_of
 from pipelines.audit.due import due, uncertified
 from pipelines.audit.parameters import NAMES
 from pipelines.audit.rules import load_rules
-from pipelines.trace import Event, Ledger
+from pipelines.certificates import Event, Ledger
 from schemas.errors import WrongUse
 
 DAY = "2026-06-30"

@@ -3,17 +3,11 @@
 import numpy as np
 import pytest
 
-from pipelines.audit.statistics.change_points import change_points, noise_of
-from pipelines.audit.statistics.comparison import outlier_limit, robust_z
-from pipelines.audit.statistics.drift import forecast, in_tolerance, kind_of, last_reliable, leaves, standing
-from pipelines.audit.statistics.fingerprints import (
-    alike_below,
-    change_scale,
-    distance,
-    foreign_above,
-    nearest,
-)
-from pipelines.audit.statistics.two_way import unit_and_place
+from inertial.population.change_points import change_points, noise_of
+from inertial.population.comparison import outlier_limit, robust_z
+from inertial.population.drift import forecast, in_tolerance, kind_of, last_reliable, leaves, standing
+from inertial.population.fingerprints import alike_below, change_scale, distance, foreign_above, nearest
+from inertial.population.two_way import unit_and_place
 
 SLOPE, WALK, MOUNT, SIGMA, MEAN = 60.0, 40.0, 30.0, 50.0, 10.0
 

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from inertial.criticism.faults.outputs import lattice_step
-from pipelines.stages.criticise import diagnose
+from pipelines.diagnosis.diagnose import diagnose
 
 OUT = ["out_x", "out_y", "out_z"]
 

@@ -4,8 +4,8 @@ import lots
 import numpy as np
 import pytest
 
-from pipelines.stages.compare import compare
-from pipelines.stages.criticise import default_model, diagnose
+from pipelines.diagnosis.compare import compare
+from pipelines.diagnosis.diagnose import default_model, diagnose
 from schemas.errors import DataRejected
 
 

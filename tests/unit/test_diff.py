@@ -8,11 +8,11 @@ import pytest
 from capture_double import CaptureDouble, small_job, small_run
 
 from pipelines.archive import Archive, Run
-from pipelines.chain import ORDER
-from pipelines.rerun.again import again
+from pipelines.chain.chain import ORDER
+from pipelines.chain.runner import Runner
+from pipelines.jobs.model_change import wanted
 from pipelines.rerun.diff import diff
-from pipelines.rerun.wanted import wanted
-from pipelines.runner import Runner
+from pipelines.rerun.rerun import again
 from schemas.errors import DataRejected
 
 LARGER = "bias,scale,misalignment,bias_temperature,scale_temperature,third_order"

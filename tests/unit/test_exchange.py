@@ -5,7 +5,7 @@ from itertools import product
 import numpy as np
 import pytest
 
-from inertial.exchange import CRITERIA, Slots, exchanged, ratios
+from inertial.planning.pose_exchange import CRITERIA, Slots, exchanged, ratios
 
 
 def line(levels, n, weight=None, travel=None, seconds=1000.0):

@@ -5,10 +5,10 @@ import pytest
 
 from inertial import frames, poses
 from inertial.errors import NotIdentified
-from inertial.expected import expected_errors
 from inertial.fits.linear import fit_lot
 from inertial.fits.wander import fit_lot_with_wander
 from inertial.noise.dwells import DwellNoise, dwell_covariance
+from inertial.planning.expected import expected_errors
 from inertial.state import State
 from stations.plant.noise import Noise
 from stations.plant.preset import load_preset

@@ -7,9 +7,9 @@ import pytest
 from inertial import poses
 from inertial.frames import force_from_angles
 from inertial.noise import generate
-from pipelines.stages.calibration import read_calibration
 from pipelines.stages.fit import fit
 from pipelines.stages.verify import verify
+from pipelines.tables.calibration import read_calibration
 from schemas.tables import check
 
 LINEAR = ["bias", "scale", "misalignment", "bias_temperature"]

@@ -4,7 +4,8 @@ import pytest
 from pydantic import ValidationError
 from small_station import lot_of, short_recipe, station_of
 
-from pipelines.stages.capture import check, steps
+from pipelines.capture.capture import check
+from pipelines.schedule.steps import steps
 from schemas.errors import RecipeInvalid, StationRefused
 from schemas.recipe import Pose
 from schemas.station import StationConfig

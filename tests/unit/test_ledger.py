@@ -13,10 +13,10 @@ from ledger_events import event
 from typer.testing import CliRunner
 
 from pipelines.archive import Run
+from pipelines.certificates import Event, Ledger
+from pipelines.certificates.days import day_of, months_after
+from pipelines.certificates.validity import calibrations_of, overlapped
 from pipelines.cli import app
-from pipelines.trace import Event, Ledger
-from pipelines.trace.days import day_of, months_after
-from pipelines.trace.validity import calibrations_of, overlapped
 from schemas.errors import ArchiveUnusable, WrongUse
 
 

@@ -4,7 +4,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from pipelines.recipes import sample_names
+from pipelines.jobs.recipes import sample_names
 from schemas.errors import RecipeInvalid
 from schemas.limits import GRADES, Limits, decide, grade_of, parse_limits
 

@@ -15,13 +15,13 @@ from typer.testing import CliRunner
 
 from pipelines.archive import Archive, Run, files
 from pipelines.archive.signatures import VARIABLE
+from pipelines.certificates import Ledger
+from pipelines.chain.runner import Runner
 from pipelines.cli import app
-from pipelines.job import Request
-from pipelines.runner import Runner
-from pipelines.trace import Ledger
-from pipelines.trace.lineage import Lineage, lineage
-from pipelines.trace.lineage.crate import write_crate
-from pipelines.trace.lineage.prov import iri, prov_of
+from pipelines.jobs.job import Request
+from pipelines.lineage import Lineage, lineage
+from pipelines.lineage.prov import iri, prov_of
+from pipelines.lineage.ro_crate import write_crate
 from schemas.errors import ArchiveUnusable, WrongUse
 
 ROOT = Path(__file__).resolve().parents[2]

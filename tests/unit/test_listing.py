@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from pipelines.archive import Archive, Run, RunInfo, listing, noted
+from pipelines.archive import Archive, Run, RunInfo, listing
 
 LOTS = 40
 
@@ -34,7 +34,7 @@ def test_the_list_is_the_same_when_it_is_read_again_without_reading_the_runs(
 ) -> None:
     first = archive.runs()
     assert len(first) == LOTS
-    monkeypatch.setattr(noted, "info_of", lambda run: pytest.fail(f"{run.id} was read again"))
+    monkeypatch.setattr(listing, "info_of", lambda run: pytest.fail(f"{run.id} was read again"))
     assert archive.runs() == first
 
 

@@ -12,12 +12,12 @@ from small_station import MemorySink, lot_of, quiet_progress, short_recipe
 
 from inertial.noise.allan import overlapping
 from pipelines.archive import Archive
-from pipelines.stages import capture as capture_stage
+from pipelines.capture import acquisition
+from pipelines.capture import capture as capture_stage
 from pipelines.stages import noise as noise_stage
-from pipelines.stages import taking
-from pipelines.stages.pieces import by_record, dwells_whole
 from pipelines.stages.reduce import reduce
 from pipelines.stages.validate import validate
+from pipelines.tables.samples import by_record, dwells_whole
 from schemas.recipe import Unit
 from schemas.station import load_station
 from stations import open_station
@@ -34,8 +34,8 @@ def captured(recipe, sink: MemorySink) -> MemorySink:
 def test_a_record_in_pieces_has_the_samples_of_one_in_a_piece(monkeypatch: pytest.MonkeyPatch) -> None:
     recipe = short_recipe(poses=1, static_s=120.0)
     whole = captured(recipe, MemorySink())
-    monkeypatch.setattr(taking, "LONG_ROWS", 20000)
-    monkeypatch.setattr(taking, "PIECE_ROWS", 5000)
+    monkeypatch.setattr(acquisition, "LONG_ROWS", 20000)
+    monkeypatch.setattr(acquisition, "PIECE_ROWS", 5000)
     pieces = captured(recipe, MemorySink())
     assert len(pieces.ahead) == 4
     assert max(len(piece) for piece in pieces.ahead) < 8000

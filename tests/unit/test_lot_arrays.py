@@ -3,8 +3,8 @@
 import numpy as np
 import pandas as pd
 
-from pipelines.stages.arrays import lot_arrays
-from pipelines.stages.unit_rows import ByUnit
+from pipelines.tables.dwells import lot_arrays
+from pipelines.tables.frames import ByUnit
 
 UNITS, DWELLS = ("A1", "B2", "C3"), 5
 

@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 from small_station import MemorySink, lot_of, quiet_progress, short_recipe, station_of
 
-from pipelines.planned import planned_state
-from pipelines.stages.capture import capture, steps
-from pipelines.stages.minutes import Standing, minutes
+from pipelines.capture.capture import capture
+from pipelines.schedule.planned_state import planned_state
+from pipelines.schedule.steps import steps
+from pipelines.schedule.timing import Standing, minutes
 from schemas.recipe import Pose, SoakPart
 from stations.opening import open_station
 

@@ -5,8 +5,8 @@ from datetime import UTC, datetime
 import pytest
 
 from inertial import effects
-from pipelines.models import Step, chosen_effects, extended, new_model, read_model, versions
-from pipelines.stages.evolution import evolution
+from pipelines.diagnosis.model_history import evolution
+from pipelines.jobs.model_files import Step, chosen_effects, extended, new_model, read_model, versions
 from schemas.errors import RecipeInvalid, WrongUse
 
 NOW = datetime(2026, 5, 4, 12, 0, tzinfo=UTC)

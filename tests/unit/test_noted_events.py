@@ -7,9 +7,9 @@ from pathlib import Path
 import pytest
 from ledger_events import event
 
-from pipelines.trace import Ledger
-from pipelines.trace import noted as module
-from pipelines.trace.noted import NOTED, histories_of
+from pipelines.certificates import Ledger
+from pipelines.certificates import ledger_index as module
+from pipelines.certificates.ledger_index import NOTED, histories_of
 from schemas.errors import ArchiveUnusable
 
 

@@ -8,11 +8,11 @@ import pytest
 from capture_double import CaptureDouble
 
 from pipelines.archive import Archive, Run, parquet
-from pipelines.job import job_of_run
-from pipelines.runner import Runner
-from pipelines.trace import Ledger
-from pipelines.trace.checks import verify
-from pipelines.trace.lineage import lineage
+from pipelines.certificates import Ledger
+from pipelines.chain.runner import Runner
+from pipelines.integrity import verify
+from pipelines.jobs.job import job_of_run
+from pipelines.lineage import lineage
 from schemas import upgrades, version
 from schemas.errors import ArchiveUnusable
 

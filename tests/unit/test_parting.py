@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from inertial import design, frames, poses
-from inertial.exchange import Slots, exchanged
-from inertial.parting import Parting
+from inertial.planning.discrimination import Parting
+from inertial.planning.pose_exchange import Slots, exchanged
 from inertial.state import State
 
 MODEL = ("bias", "scale", "misalignment", "third_order", "odd_quadratic")

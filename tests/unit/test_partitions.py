@@ -5,7 +5,7 @@ import os
 import pytest
 from threadpoolctl import threadpool_info
 
-from pipelines.flows.partitions import map_partitions
+from pipelines.parallel import map_partitions
 from schemas.errors import DataRejected, LinkLost, WrongUse
 
 

@@ -5,7 +5,7 @@ import pytest
 
 from inertial import poses
 from inertial.frames import force_from_angles
-from pipelines.stages.pointing import POINTING_DEG, Pointing, contradicts, pointing_error
+from inertial.pointing import POINTING_DEG, Pointing, contradicts, pointing_error
 
 
 def lot(rng: np.random.Generator, force: np.ndarray, units: int = 6) -> np.ndarray:

@@ -13,13 +13,13 @@ from inertial.criticism.menus import Reach, courses
 from inertial.criticism.problem import Lot
 from inertial.criticism.proposals import Proposal
 from inertial.frames import force_from_angles
+from inertial.planning.reasons import begins_again
+from inertial.planning.sequences import Pace, Step, extended
 from inertial.power import coldness, switched
-from inertial.reasons import begins_again
-from inertial.sequences import Pace, Step, extended
 from inertial.state import History, State
+from pipelines.inquiry.explanation import what
 from pipelines.inquiry.followup import circumstances, follow_up, place_after, station_minutes
-from pipelines.inquiry.words import what
-from pipelines.stages.measured import measured
+from pipelines.tables.dwells import measured
 
 UP, DOWN = (0.0, 0.0), (math.pi, 0.0)
 

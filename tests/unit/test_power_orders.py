@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 from small_station import QUIET, MemorySink, lot_of, plant_of, quiet_progress, short_recipe, station_of, write
 
-from pipelines.stages.capture import capture
-from pipelines.stages.guard import Guard
-from pipelines.stages.minutes import minutes
-from pipelines.stages.power import Power
-from pipelines.stages.steps import steps
+from pipelines.capture.capture import capture
+from pipelines.capture.power_cycling import Power
+from pipelines.capture.supervision import Guard
+from pipelines.schedule.steps import steps
+from pipelines.schedule.timing import minutes
 from schemas.errors import OperatorNeeded, StationRefused
 from schemas.event import MemoryLog
 from schemas.recipe import Recipe, SoakPart

@@ -3,7 +3,7 @@
 import numpy as np
 from small_station import QUIET, MemorySink, lot_of, quiet_progress, short_recipe, station_of
 
-from pipelines.stages.capture import capture
+from pipelines.capture.capture import capture
 from schemas.recipe import Recipe, SoakPart
 from stations.opening import make_plant, serve_plant
 

@@ -3,8 +3,9 @@
 import numpy as np
 import pytest
 
-from inertial import effects, frames, planning, poses
-from inertial.reasons import reason
+from inertial import effects, frames, poses
+from inertial.planning import visibility
+from inertial.planning.reasons import reason
 from inertial.state import State
 
 PLAIN = ("bias", "scale", "misalignment")
@@ -101,7 +102,7 @@ def test_one_axis_alone_can_be_asked_for():
 def test_every_effect_that_a_plan_does_not_see_has_a_reason_and_a_cure(plan, temperatures):
     state = planned(plan, temperatures)
     base = PLAIN if len(temperatures) == 1 else THERMAL
-    for sight in planning.sights(state, base, 1e-5):
+    for sight in visibility.sights(state, base, 1e-5):
         said = reason(state, sight.effect, base)
         assert bool(said) != sight.seen
         if said:

@@ -7,9 +7,9 @@ import pytest
 from capture_double import recipe_file, small_job
 
 from inertial.poses import NAMED
-from pipelines.job import Request
-from pipelines.recipes import load_recipe, sample_names
-from pipelines.stages.capture import steps
+from pipelines.jobs.job import Request
+from pipelines.jobs.recipes import load_recipe, sample_names
+from pipelines.schedule.steps import steps
 from schemas.errors import RecipeInvalid, WrongUse
 
 POSES = 'poses = "nine"'

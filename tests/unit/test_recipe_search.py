@@ -8,15 +8,15 @@ import pytest
 
 from inertial.frames import force_from_angles
 from inertial.noise.dwells import DwellNoise, dwell_covariance
-from pipelines.models import STARTING_MODEL
-from pipelines.recipes import load_recipe
-from pipelines.stages.counts import FEWEST, fewest, least
-from pipelines.stages.layout import Design, Layout, spanned
-from pipelines.stages.minutes import spent
-from pipelines.stages.plan import identified, planned
-from pipelines.stages.soak_orders import mirrored, orders
-from pipelines.stages.textbook import reference_errors, textbook
-from pipelines.stages.wish import Wish, between, candidates
+from pipelines.jobs.model_files import STARTING_MODEL
+from pipelines.jobs.recipes import load_recipe
+from pipelines.planning.dwell_counts import FEWEST, fewest, least
+from pipelines.planning.layout import Design, Layout, spanned
+from pipelines.planning.plan import identified, planned
+from pipelines.planning.requirement import Wish, between, candidates
+from pipelines.planning.soak_orders import mirrored, orders
+from pipelines.planning.textbook import reference_errors, textbook
+from pipelines.schedule.timing import spent
 from schemas.station import load_station
 from stations.plant.preset import load_preset
 

@@ -6,8 +6,9 @@ import re
 import pytest
 from small_station import MemorySink, lot_of, short_recipe, station_of
 
-from pipelines.stages.capture import capture, steps
-from pipelines.stages.remaining import Remaining, duration_text
+from pipelines.capture.capture import capture
+from pipelines.capture.time_left import Remaining, duration_text
+from pipelines.schedule.steps import steps
 from schemas.recipe import Pose
 from stations.opening import open_station
 

@@ -10,14 +10,14 @@ import pytest
 from capture_double import CaptureDouble, small_job, small_run
 
 from pipelines.archive import Archive, Run, code_hash
-from pipelines.chain import ORDER
+from pipelines.chain.chain import ORDER
+from pipelines.chain.runner import Runner
+from pipelines.jobs.model_change import Wanted, wanted
 from pipelines.rerun import steps
-from pipelines.rerun.again import again
-from pipelines.rerun.check import LEFT_OUT, SAME, check
 from pipelines.rerun.partition import Part, run_again
+from pipelines.rerun.reproduce import LEFT_OUT, SAME, check
+from pipelines.rerun.rerun import again
 from pipelines.rerun.selection import selected
-from pipelines.rerun.wanted import Wanted, wanted
-from pipelines.runner import Runner
 from schemas.errors import DataRejected, WrongUse
 
 LARGER = "bias,scale,misalignment,bias_temperature,scale_temperature,third_order"
@@ -116,7 +116,7 @@ def test_an_interrupted_rerun_goes_on(run: Run, monkeypatch: pytest.MonkeyPatch)
         raise KeyboardInterrupt
 
     with monkeypatch.context() as patch:
-        patch.setattr("pipelines.chain.verify", unplugged)
+        patch.setattr("pipelines.chain.chain.verify", unplugged)
         with pytest.raises(KeyboardInterrupt):
             again(run.archive, run.id, change)
     outcome = again(run.archive, run.id, change)
@@ -127,7 +127,7 @@ def test_an_interrupted_rerun_goes_on(run: Run, monkeypatch: pytest.MonkeyPatch)
 def test_an_old_capture_keeps_its_name_whatever_names_are_made_of_today(
     run: Run, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("pipelines.job.ANALYSIS_KEYS", set())
+    monkeypatch.setattr("pipelines.jobs.job.ANALYSIS_KEYS", set())
     outcome = again(run.archive, run.id, wanted(limits="industrial"))
     assert run.archive.run(outcome.new).about["capture"] == run.about["capture"]
 

@@ -3,8 +3,8 @@
 from dataclasses import replace
 
 from inertial.criticism.proposals import Proposal
-from inertial.sequences import Step
-from pipelines.stages.next_measurement import rows_of
+from inertial.planning.sequences import Step
+from pipelines.diagnosis.next_measurement import rows_of
 
 STEP = Step(0.1, 0.2, 25.0)
 

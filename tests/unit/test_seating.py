@@ -5,8 +5,8 @@ from pathlib import Path
 import pytest
 from capture_double import recipe_file
 
-from pipelines.job import Request
-from pipelines.seating import Seating, read_seating, scan
+from pipelines.jobs.job import Request
+from pipelines.jobs.seating import Seating, read_seating, scan
 from schemas.errors import RecipeInvalid, WrongUse
 
 ROOT = Path(__file__).resolve().parents[2]

@@ -4,7 +4,8 @@ import pandas as pd
 import pytest
 import small_station as small
 
-from pipelines.stages.capture import capture, steps
+from pipelines.capture.capture import capture
+from pipelines.schedule.steps import steps
 from schemas.recipe import Recipe, SoakPart
 from stations import open_station
 

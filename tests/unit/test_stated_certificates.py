@@ -12,8 +12,8 @@ from typer.testing import CliRunner, Result
 
 from pipelines.archive import Archive, Run
 from pipelines.cli import app
+from pipelines.integrity import verify
 from pipelines.report import make_report
-from pipelines.trace.checks import verify
 
 FROM = ("--from", "2026-01-01", "--until", "2099-01-01")
 Typed = Callable[..., Result]

@@ -8,17 +8,17 @@ import pytest
 from capture_double import CaptureDouble, recipe_file, small_job
 
 from pipelines.archive import Archive
-from pipelines.chain import ORDER
-from pipelines.job import Request
-from pipelines.recipes import load_recipe
-from pipelines.rerun.again import again
-from pipelines.rerun.judged import applied, fresh, judged
+from pipelines.chain.chain import ORDER
+from pipelines.chain.runner import Runner
+from pipelines.jobs.job import Request
+from pipelines.jobs.model_change import Wanted, wanted
+from pipelines.jobs.recipes import load_recipe
+from pipelines.jobs.releases import evidence_for, keep_evidence, line_model, release, released, releases
+from pipelines.rerun.lot_comparison import applied, fresh, judged
 from pipelines.rerun.partition import Part
-from pipelines.rerun.releases import evidence_for, keep_evidence, line_model, release, released, releases
-from pipelines.rerun.wanted import Wanted, wanted
+from pipelines.rerun.rerun import again
 from pipelines.rerun.whatif import fresh_tasks, summary
-from pipelines.runner import Runner
-from pipelines.stages.calibration import read_calibration
+from pipelines.tables.calibration import read_calibration
 from schemas.errors import RecipeInvalid, WrongUse
 
 FULL = 'effects = ["bias", "scale", "misalignment", "bias_temperature", "scale_temperature"]'

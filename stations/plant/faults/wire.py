@@ -6,13 +6,15 @@ from collections import Counter
 from collections.abc import Generator
 from contextlib import contextmanager
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, ClassVar
 
-from stations.plant.faults.base import Trouble
-from stations.plant.faults.proxy import ChaosProxy
+import numpy as np
+
+from stations.plant.faults.base import DEVICES, UNIT, Trouble
+from stations.plant.faults.proxy import ChaosProxy, Meddling
 
 if TYPE_CHECKING:
-    from stations.plant.faults.proxy import Meddling, Script, Way
+    from stations.plant.faults.proxy import Script, Way
     from stations.plant.plant import Plant
 
 
@@ -55,3 +57,113 @@ def script_of(plant: Plant) -> Script | None:
         return None
 
     return script
+
+
+@dataclass
+class ByteGarbage(Wire):
+    """Some bytes of an answer change on their way; Modbus TCP has no checksum of its own."""
+
+    kind: ClassVar[str] = "byte_garbage"
+
+    size: float = 2.0
+
+    def meddles(self) -> Meddling:
+        """Changed."""
+        return Meddling("garble", size=int(self.size))
+
+
+@dataclass
+class Delay(Wire):
+    """An answer takes ``delay_s`` of wall time, with everything behind it."""
+
+    kind: ClassVar[str] = "delay"
+
+    delay_s: float = 0.2
+
+    def meddles(self) -> Meddling:
+        """Held."""
+        return Meddling("delay", delay_s=self.delay_s)
+
+
+@dataclass
+class Garbage(Trouble):
+    """A device tells random words in frames that are whole: a memory gone wrong behind a sound interface."""
+
+    kind: ClassVar[str] = "garbage"
+    about: ClassVar[tuple[str, ...]] = (UNIT, *DEVICES)
+
+    def told(self, now_us: int, address: int, words: list[int]) -> list[int]:
+        """Words that depend on the time and the address."""
+        rng = np.random.default_rng([now_us, address, self.device_id])
+        return rng.integers(0, 65536, len(words)).tolist()
+
+
+@dataclass
+class HalfOpen(Wire):
+    """The connection stays open and swallows everything: the device lost its power without a word."""
+
+    kind: ClassVar[str] = "half_open"
+
+    def meddles(self) -> Meddling:
+        """Swallowed."""
+        return Meddling("half_open")
+
+
+@dataclass
+class LateReply(Wire):
+    """An answer is held back until the next one comes, and arrives in front of it under its own, older transaction id."""
+
+    kind: ClassVar[str] = "late_reply"
+
+    def meddles(self) -> Meddling:
+        """Held back."""
+        return Meddling("late")
+
+
+@dataclass
+class OtherTransaction(Wire):
+    """An answer arrives under a transaction id that nobody asked with."""
+
+    kind: ClassVar[str] = "other_transaction"
+
+    def meddles(self) -> Meddling:
+        """Its number is another."""
+        return Meddling("retag", size=1)
+
+
+@dataclass
+class Reset(Wire):
+    """The connection is reset in place of an answer: a switch restarts, a cable is moved."""
+
+    kind: ClassVar[str] = "reset"
+
+    def meddles(self) -> Meddling:
+        """Reset."""
+        return Meddling("reset")
+
+
+@dataclass
+class SwappedWords(Trouble):
+    """A device tells numbers of 32 bits with their words the other way round; its set-up was changed."""
+
+    kind: ClassVar[str] = "swapped_words"
+    about: ClassVar[tuple[str, ...]] = (UNIT, *DEVICES)
+
+    def told(self, now_us: int, address: int, words: list[int]) -> list[int]:
+        """Pairs of words exchanged."""
+        del now_us, address
+        even = len(words) // 2 * 2
+        return [word for i in range(0, even, 2) for word in (words[i + 1], words[i])] + words[even:]
+
+
+@dataclass
+class Truncated(Wire):
+    """An answer ends too early, and the connection with it."""
+
+    kind: ClassVar[str] = "truncated"
+
+    size: float = 3.0
+
+    def meddles(self) -> Meddling:
+        """Cut off."""
+        return Meddling("truncate", size=int(self.size))

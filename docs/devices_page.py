@@ -1,0 +1,137 @@
+"""``python -m docs.devices_page``: the reference of devices, written from their profiles; ``--check`` only compares."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from stations.profile_files import load_profile, profile_names
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from schemas.profile import Command, Profile, Register
+
+PAGE = Path(__file__).resolve().parent.parent / "docs" / "reference" / "devices.md"
+KINDS = {"axis": "Drives of the table", "chamber": "Chambers", "reader": "Readers", "slot": "Slots of a reader"}
+MOST_NAMES = 16
+SPACES = {"holding": "", "input": "input register", "coil": "coil", "discrete": "discrete input"}
+HEAD = """\
+# Devices
+
+Written by `python -m docs.devices_page` from the profiles in `stations/profiles/`; change a profile, not this page. A
+station's file names a device by its profile (`profile = "…"`) and what carries it (`link = "…"`, the device's own way first
+below). None of the real ones has been held against hardware yet: **verified** says so, and **disputed** what the sources
+disagree about. Addresses are those on the wire, from 0.
+"""
+
+
+def page() -> str:
+    """The whole page as Markdown."""
+    found = sorted((load_profile(name) for name in profile_names()), key=lambda p: (list(KINDS).index(p.kind), p.name))
+    parts = [HEAD, _table(found), _disputes(found)]
+    for kind, title in KINDS.items():
+        parts.append(f"## {title}\n")
+        parts += [_section(profile) for profile in found if profile.kind == kind]
+    return "\n".join(parts)
+
+
+def _table(found: list[Profile]) -> str:
+    rows = [
+        f"| [`{p.name}`](#{p.name}) | {_cell(f'{p.maker} {p.model}')} | {p.kind} | `{p.adapter}` | {', '.join(p.links)} | "
+        f"{'yes' if p.verified else 'no'} | {sum(bool(entry.disputed) for entry in _entries(p)) or ''} |"
+        for p in found
+    ]
+    head = "| profile | device | kind | adapter | links | verified | disputed |"
+    return "\n".join([head, "|---|---|---|---|---|---|---|", *rows, ""])
+
+
+def _disputes(found: list[Profile]) -> str:
+    """What to look at first when a device is there."""
+    rows = [
+        f"| `{p.name}` | `{entry.name}` | {entry.manual} | {_cell(entry.disputed)} |"
+        for p in found
+        for entry in _entries(p)
+        if entry.disputed
+    ]
+    head = [
+        "## To be settled at the device\n",
+        "| profile | value | manual | what sources disagree about |",
+        "|---|---|---|---|",
+    ]
+    return "\n".join([*head, *rows, ""])
+
+
+def _section(profile: Profile) -> str:
+    lines = [f"### {profile.name}\n", f"{profile.maker} {profile.model}. Source: {profile.source}.\n"]
+    if profile.commands:
+        lines += ["| value | asked by | set by | unit | limits |", "|---|---|---|---|---|"]
+        lines += [_command(command) for command in profile.commands]
+    else:
+        lines += [
+            "| value | address | manual | type | order | unit | limits | access |",
+            "|---|---|---|---|---|---|---|---|",
+        ]
+        lines += [_register(profile, register) for register in profile.registers]
+    return "\n".join([*lines, ""])
+
+
+def _command(command: Command) -> str:
+    field = f", part {command.field + 1}" if command.field else ""
+    told = f"`{command.tell}`" if command.tell else ""
+    limits = ", ".join(command.values) or _limits(command)
+    return f"| `{command.name}` | `{command.ask}`{field} | {told} | {command.unit} | {limits} |"
+
+
+def _register(profile: Profile, register: Register) -> str:
+    count = f" × {register.count}" if register.count > 1 else ""
+    scale = f", in {register.scale:g}" if register.scale != 1.0 else ""
+    scale += f", decimals by `{register.scaled_by}`" if register.scaled_by else ""
+    space = SPACES[register.space]
+    order = (
+        profile.order(register).replace("_", " ")
+        if register.words > register.count and register.type != "string"
+        else ""
+    )
+    names = register.enumeration or register.bits
+    limits = (
+        ", ".join(f"{name} {value}" for name, value in names.items())
+        if len(names) <= MOST_NAMES
+        else f"{len(names)} names"
+    )
+    where = f"0x{register.address:04X} ({register.address})"
+    where += f", {space}" if space else ""
+    return (
+        f"| `{register.name}` | {where} | {_cell(register.manual)} | {register.type}{count}{scale} | {order} | "
+        f"{register.unit} | {limits or _limits(register)} | {register.access.replace('_', ', ')} |"
+    )
+
+
+def _limits(entry: Register | Command) -> str:
+    if entry.minimum is None and entry.maximum is None:
+        return ""
+    low, high = ("" if bound is None else f"{bound:g}" for bound in (entry.minimum, entry.maximum))
+    return f"{low} to {high}"
+
+
+def _entries(profile: Profile) -> Iterator[Register | Command]:
+    yield from profile.registers
+    yield from profile.commands
+
+
+def _cell(text: str) -> str:
+    """Text for a table, in which a stroke would end the cell."""
+    return text.replace("|", "\\|")
+
+
+def main() -> int:
+    """Writes the page; with ``--check`` gives 1 where it is not what the profiles say."""
+    if "--check" in sys.argv[1:]:
+        return 0 if PAGE.read_text(encoding="utf-8") == page() else 1
+    PAGE.write_text(page(), encoding="utf-8")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,126 @@
+"""``python -m docs.effects_page``: the reference of effects, written from the catalogue; ``--check`` only compares."""
+
+from __future__ import annotations
+
+import inspect
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from inertial import effects
+from inertial.effects.covariate import Covariate
+from inertial.effects.formula import Formula
+from inertial.expressions import FORCES, FUNCTIONS, QUANTITIES
+
+if TYPE_CHECKING:
+    from inertial.effects.base import AnyEffect
+
+PAGE = Path(__file__).resolve().parent.parent / "docs" / "reference" / "effects.md"
+SCOPES = {
+    "sensor": "In the sensor: coefficients of their own for every unit and axis",
+    "slot": "Of the fixture's slots",
+    "station": "Of the station: shared by all units of a run",
+}
+HEAD = """\
+# Effects
+
+Written by `python -m docs.effects_page` from the catalogue; change an effect's file, not this page. Ids are the names in model
+files, on the command line and in JSON. i is the output's axis, j and k the next two in the order x → y → z → x; f is specific
+force in g, θ the temperature above 25 °C, t the time, u the time since power-on, s the time since the last move.
+"""
+
+
+def page() -> str:
+    """The whole page as Markdown."""
+    found = sorted(effects.built_in().values(), key=lambda e: (list(SCOPES).index(e.scope), e.simplicity, e.id))
+    parts = [HEAD, _table(found)]
+    for scope, title in SCOPES.items():
+        parts.append(f"## {title}\n")
+        parts += [_section(effect) for effect in found if effect.scope == scope]
+    return "\n".join([*parts, _covariates(), _formulas()])
+
+
+def _table(found: list[AnyEffect]) -> str:
+    rows = [f"| [`{e.id}`](#{e.id}) | {_cell(e.symbol)} | {_cell(e.equation)} | {e.scope} |" for e in found]
+    return "\n".join(["| id | symbol | term | of the |", "|---|---|---|---|", *rows, ""])
+
+
+def _cell(text: str) -> str:
+    """Text for a table, in which a stroke would end the cell."""
+    return text.replace("|", "\\|")
+
+
+def _section(effect: AnyEffect) -> str:
+    low, high = effect.typical_ug
+    lines = [
+        f"### {effect.id}\n",
+        f"{first_line(effect)}\n",
+        f"- term: {effect.equation} ({effect.symbol})",
+        f"- usual size: {low:g} to {high:g} µg",
+        f"- source: {effect.source}",
+    ]
+    lines += [
+        f"- {p.name}: found between {p.low:g} and {p.high:g} {p.unit}".rstrip()
+        if not p.choices
+        else f"- {p.name}: one of {', '.join(f'{c:g}' for c in p.choices)}"
+        for p in effect.nonlinear
+    ]
+    if effect.hides_behind:
+        lines.append(f"- hides behind: {', '.join(f'`{name}`' for name in effect.hides_behind)}")
+    lines.append(f"- shows with: {effect.breaker}\n")
+    return "\n".join(lines)
+
+
+def first_line(effect: AnyEffect) -> str:
+    """The first line of an effect's docstring."""
+    return (inspect.getdoc(effect) or "").partition("\n")[0]
+
+
+def _covariates() -> str:
+    lines = [
+        "## covariate:&lt;column&gt;\n",
+        f"{_summary(Covariate)}\n",
+        "Any numeric column of the dwells without a meaning of its own is one.\n",
+        f"- term: {Covariate.equation}",
+        f"- shows with: {Covariate.breaker}\n",
+    ]
+    return "\n".join(lines)
+
+
+def _summary(kind: type) -> str:
+    return (inspect.getdoc(kind) or "").partition("\n")[0]
+
+
+def _formulas() -> str:
+    rows = [f"| `{name}` | {meaning} |" for name, meaning in FORCES.items()]
+    rows += [f"| `{name}` | {meaning} |" for name, (_, _, meaning) in QUANTITIES.items()]
+    functions = ", ".join(f"`{name}`" for name in FUNCTIONS)
+    lines = [
+        "## Formulas of a model file\n",
+        f"{_summary(Formula)}\n",
+        f"Allowed are numbers, `+ - * / **`, the functions {functions}, and these names:\n",
+        "| name | meaning |",
+        "|---|---|",
+        *rows,
+        "| any other | a recorded column of that name |",
+        "",
+    ]
+    return "\n".join(lines)
+
+
+def main(arguments: list[str]) -> int:
+    """Write the page, or check it; 1 where it is out of date."""
+    text = page()
+    if "--check" in arguments:
+        same = PAGE.is_file() and PAGE.read_text(encoding="utf-8") == text
+        sys.stdout.write(
+            "" if same else f"{PAGE.name} is out of date; write it again with 'python -m docs.effects_page'\n"
+        )
+        return 0 if same else 1
+    PAGE.parent.mkdir(parents=True, exist_ok=True)
+    PAGE.write_text(text, encoding="utf-8")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))

@@ -1,0 +1,78 @@
+"""The journal of a capture: one small file per event, beside its records."""
+
+from __future__ import annotations
+
+from datetime import UTC, datetime
+from typing import TYPE_CHECKING, Any
+
+from pipelines.archive import files
+from pipelines.archive.hash_chain import is_number
+from schemas.event import Event
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+    from pipelines.archive.store import Place
+
+FOLDER = "events"
+SOAK_FIGURES = ("target_C", "seconds", "air_overshoot_K", "device_overshoot_K")
+
+
+class Events:
+    """The events of one capture, in the order in which they happened."""
+
+    def __init__(self, capture: Place) -> None:
+        self.path = capture / FOLDER
+
+    def note(self, event: Event) -> None:
+        """Keep an event durably; one that a resumed simulation comes to again is not kept twice."""
+        known = self._files()
+        if any(_event(content) == event for content in map(files.read_json, known)):
+            return
+        number = int(known[-1].stem) + 1 if known else 0
+        content = {**event.document(), "when": datetime.now(UTC).isoformat(timespec="milliseconds")}
+        files.publish(self.path / f"{number:05d}.json", files.json_bytes(content))
+
+    def noted(self) -> list[Event]:
+        """Every event so far."""
+        return [_event(content) for content in self.documents()]
+
+    def documents(self) -> list[dict[str, Any]]:
+        """The events for people and for JSON, with the date of each."""
+        return [files.read_json(path) for path in self._files()]
+
+    def table(self) -> pd.DataFrame:
+        """What paused or ended the capture, and what was done about it: the archive's table ``events``."""
+        import pandas as pd
+
+        rows = [
+            {"time_s": e.time_s, "kind": e.kind, "record": e.record, "reason": e.reason, "action": e.action}
+            for e in self.noted()
+        ]
+        columns = {"time_s": float, "kind": "str", "record": "int64", "reason": "str", "action": "str"}
+        return pd.DataFrame(rows, columns=list(columns)).astype(columns)
+
+    def soaks(self) -> pd.DataFrame:
+        """How long each soak took, and how far air and devices went beyond its target: the archive's table ``soaks``."""
+        import pandas as pd
+
+        rows = [
+            {"time_s": e.time_s, "record": e.record, **{name: e.figures[name] for name in SOAK_FIGURES}}
+            for e in self.noted()
+            if e.kind == "soak" and e.figures
+        ]
+        columns = {"time_s": float, "record": "int64", **dict.fromkeys(SOAK_FIGURES, float)}
+        return pd.DataFrame(rows, columns=list(columns)).astype(columns)
+
+    def hashes(self) -> dict[str, str]:
+        """The hash of every event's file by its name."""
+        return {path.name: files.sha256(path) for path in self._files()}
+
+    def _files(self) -> list[Place]:
+        if not self.path.is_dir():
+            return []
+        return sorted((path for path in self.path.glob("*.json") if is_number(path.stem)), key=lambda path: path.name)
+
+
+def _event(content: dict[str, Any]) -> Event:
+    return Event(**{name: content[name] for name in Event.__dataclass_fields__})

@@ -1,0 +1,1 @@
+"""Capture: what the station measures, kept as it comes."""

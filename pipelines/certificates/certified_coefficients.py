@@ -1,0 +1,36 @@
+"""The coefficients of one calibration, read without a table library: an auditor waits for them."""
+
+from __future__ import annotations
+
+import hashlib
+from typing import TYPE_CHECKING, Any
+
+from pipelines.archive.store import first_line
+from schemas.errors import ArchiveUnusable
+
+if TYPE_CHECKING:
+    from pipelines.archive import Run
+    from pipelines.certificates.validity import Calibration
+
+
+def coefficients_of(run: Run, calibration: Calibration) -> list[dict[str, Any]]:
+    """Rows of the unit in the run's table of coefficients, which is the one that was certified."""
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    place = run.path / "coefficients.parquet"
+    try:
+        data = place.read_bytes()
+        if hashlib.sha256(data).hexdigest() != calibration.event.coefficients:
+            message = (
+                f"calibrations: {place} is not the table that certificate {calibration.certificate} was given for (its hash is "
+                "another); restore it from a copy"
+            )
+            raise ArchiveUnusable(message)
+        # read_table imports pandas; and a pool of threads that is still starting when so short a process ends aborts it
+        table = pq.ParquetFile(pa.BufferReader(data), pre_buffer=False).read(use_threads=False)
+    except (OSError, pa.ArrowInvalid) as problem:
+        message = f"calibrations: {place} cannot be read ({first_line(problem)}); restore it from a copy"
+        raise ArchiveUnusable(message) from None
+    # table.take would make an array of the row numbers, and pyarrow asks pandas whether they are a series
+    return [row for row in table.to_pylist() if row["unit"] == calibration.serial]

@@ -1,0 +1,160 @@
+"""Certifying a run: its units that passed get a validity in the ledger; those that did not are told with the reason."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+from pipelines.archive import Run, files
+from pipelines.certificates.days import day_of, months_after, today
+from pipelines.certificates.entries import Event
+from pipelines.tables.frames import rows_of
+from schemas.errors import WrongUse, did_you_mean
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from pipelines.certificates.ledger import Ledger
+
+EVIDENCE = ("dwells", "coefficients", "covariance", "grades")
+
+
+@dataclass
+class Certified:
+    """What became of a run's units.
+
+    written : the events that certify, new in the ledger
+    there : those that were in it already
+    left_out : why a unit was not certified, by serial
+    """
+
+    written: list[Event] = field(default_factory=list[Event])
+    there: list[Event] = field(default_factory=list[Event])
+    left_out: dict[str, str] = field(default_factory=dict[str, str])
+
+    @property
+    def events(self) -> list[Event]:
+        """All that certify."""
+        return [*self.written, *self.there]
+
+
+def certify(
+    ledger: Ledger,
+    run: Run,
+    units: Sequence[str] = (),
+    start: str = "",
+    until: str = "",
+    *,
+    months: int = 12,
+    reason: str = "",
+    supersede: bool = False,
+) -> Certified:
+    """The events that certify units of a run, written to the ledger.
+
+    Parameters
+    ----------
+    units : serials; every unit of the run that passed where empty.
+    start : first day, today where empty.
+    until : day after the last, so many ``months`` after the first where empty.
+    supersede : end calibrations that begin later and overlap, too.
+    """
+    first = day_of(start, "--from") if start else today()
+    last = day_of(until, "--until") if until else months_after(first, months)
+    if first >= last:
+        message = (
+            f"certify: valid from {first} until {last}, a day after the first is needed; correct --from or --until"
+        )
+        raise WrongUse(message)
+    proposals, result = _proposals(run, units, first, last, reason)
+    for proposal in proposals:
+        refuse_two_at_once(ledger, run, proposal.serial)
+    for proposal in proposals:
+        event, was_there = ledger.add(proposal, supersede=supersede)
+        (result.there if was_there else result.written).append(event)
+    ledger.anchor(result.written)
+    return result
+
+
+def _proposals(run: Run, units: Sequence[str], first: str, last: str, reason: str) -> tuple[list[Event], Certified]:
+    """What is to be certified, and what is not with the reason; a named unit that may not be is refused."""
+    grades = {str(row["unit"]): row for row in rows_of(_grades(run))}
+    refuse_overdue(run)
+    about, result = run.about, Certified()
+    evidence = tuple(sorted((name, files.sha256(run.path / f"{name}.json")) for name in EVIDENCE))
+    shared: dict[str, Any] = {
+        "device": about["lot"]["device"], "run": run.id, "start": first, "until": last, "station": about["station"]["name"],
+        "recipe": about["recipe"]["name"], "coefficients": run.manifest("coefficients")["sha256"], "reason": reason,
+        "evidence": evidence,
+    }  # fmt: skip
+    proposals: list[Event] = []
+    for serial in units or tuple(grades):
+        if serial not in grades:
+            message = f"certify: no unit {serial!r} in run {run.id}; {did_you_mean(serial, grades)}"
+            raise WrongUse(message)
+        row = grades[serial]
+        if row["outcome"] == "pass":
+            proposals.append(_blank(serial, grade=str(row["grade"]), **shared))
+            continue
+        why = f"{row['outcome']}: {row['reasons']}"
+        if units:
+            message = f"certify: unit {serial} of run {run.id} did not pass ({why}); only what passed is certified"
+            raise WrongUse(message)
+        result.left_out[serial] = why
+    return proposals, result
+
+
+def _grades(run: Run) -> Any:
+    if "grades" not in run.tables():
+        message = f"certify: run {run.id} has no grades, they are needed; it was imported, or it is not finished"
+        raise WrongUse(message)
+    run.table("coefficients")  # refuses one that was changed since it was graded
+    return run.table("grades")
+
+
+def _blank(serial: str, **content: Any) -> Event:
+    """An event that the ledger has still to number and stamp."""
+    return Event(
+        serial=serial, sequence=0, action="certify", ends=(), who="", where="", when="", previous="", **content
+    )
+
+
+def refuse_overdue(run: Run) -> None:
+    """Refuse a run whose station had a reference standard that was due before it measured."""
+    about = run.about
+    day = str(about.get("measured") or about["when"])[:10]
+    for standard in (about.get("station") or {}).get("reference", []):
+        if str(standard["due"]) <= day:
+            message = (
+                f"certify: run {run.id} was measured on {day}, reference standard {standard['id']} (certificate "
+                f"{standard['certificate']}) was due on {standard['due']}; have it calibrated, enter its new certificate in the "
+                "station's file, and measure again"
+            )
+            raise WrongUse(message)
+
+
+def refuse_two_at_once(ledger: Ledger, run: Run, serial: str) -> None:
+    """Refuse a unit that was measured somewhere else at the same time: two units have one serial."""
+    own = _measured(run)
+    for one in ledger.calibrations(serial):
+        other = Run(run.archive, one.run)
+        if (
+            other.id == run.id
+            or not (other.path / END).is_file()
+            or other.about.get("capture") == run.about.get("capture")
+        ):
+            continue
+        theirs = _measured(other)
+        if own and theirs and own[0] < theirs[1] and theirs[0] < own[1]:
+            message = (
+                f"certify: unit {serial} was measured in run {run.id} from {own[0]} to {own[1]} and in run {other.id} from "
+                f"{theirs[0]} to {theirs[1]}: two units have one serial; find out which is which, and give one another"
+            )
+            raise WrongUse(message)
+
+
+def _measured(run: Run) -> tuple[str, str] | None:
+    """When a run began and its capture ended; None where that is not known, or not of its own."""
+    about = run.about
+    if about.get("rerun_of") or not about.get("capture") or not (run.path / END).is_file():
+        return None
+    return str(files.read_json(run.path / START)["when"]), str(files.read_json(run.path / END)["when"])

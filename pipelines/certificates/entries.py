@@ -1,0 +1,96 @@
+"""What is written about a unit's calibrations: one event per file, never changed afterwards."""
+
+from __future__ import annotations
+
+import hashlib
+from dataclasses import asdict, dataclass, fields
+from typing import TYPE_CHECKING, Any, Literal, get_args
+
+from schemas.errors import ArchiveUnusable
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+SCHEMA = 1
+Action = Literal["certify", "supersede", "revoke"]
+
+
+@dataclass(frozen=True)
+class Event:
+    """One thing that happened to a unit's calibrations.
+
+    ``certify`` begins the validity of a calibration, ``supersede`` does the same and ends others, ``revoke`` only ends some.
+
+    Parameters
+    ----------
+    sequence : counts the unit's events from 1; a calibration is known by the sequence of the event that began it.
+    start, until : validity, first day and the day after the last; a revocation ends validity with ``start``.
+    ends : sequences of the calibrations that end with ``start``.
+    coefficients : hash of the table of coefficients.
+    evidence : hashes of the manifests of the run that the decision rests on, by table.
+    previous : hash of the file of the unit's event before; empty for the first.
+    """
+
+    serial: str
+    sequence: int
+    action: Action
+    device: str
+    run: str
+    start: str
+    until: str
+    grade: str
+    station: str
+    recipe: str
+    coefficients: str
+    ends: tuple[int, ...]
+    who: str
+    where: str
+    when: str
+    reason: str
+    previous: str
+    evidence: tuple[tuple[str, str], ...] = ()
+
+    @property
+    def certificate(self) -> str:
+        """Number of the certificate that this event began: serial and sequence."""
+        return f"{self.serial}/{self.sequence}"
+
+    def document(self) -> dict[str, Any]:
+        """The event as it is written."""
+        content = asdict(self)
+        content["from"] = content.pop("start")
+        return {**content, "ends": list(self.ends), "evidence": dict(self.evidence), "schema": SCHEMA}
+
+
+_NAMES = {field.name for field in fields(Event)}
+
+
+def event_of(content: Mapping[str, Any], where: str) -> Event:
+    """The event that a file holds; refused where it is none, or of a schema that is not known yet.
+
+    Parameters
+    ----------
+    where : the file, for messages.
+    """
+    schema = content.get("schema")
+    if isinstance(schema, int) and schema > SCHEMA:
+        message = f"calibrations: {where} has schema {schema}, this version knows up to {SCHEMA}; use a newer version"
+        raise ArchiveUnusable(message)
+    known = {("start" if name == "from" else name): value for name, value in content.items()}
+    missing = sorted(_NAMES - known.keys())
+    if missing or known["action"] not in get_args(Action):
+        found = f"no {missing[0]}" if missing else f"action {known['action']!r}"
+        message = f"calibrations: {where} is no event of this ledger ({found}); restore it from a copy"
+        raise ArchiveUnusable(message)
+    known["ends"] = tuple(known["ends"])
+    known["evidence"] = tuple(sorted(known["evidence"].items()))
+    return Event(**{name: known[name] for name in _NAMES})
+
+
+FOLDER = "calibrations"
+
+
+def folder_of(serial: str) -> str:
+    """Folder of a unit's events below the archive's root."""
+    name = hashlib.sha256(serial.encode("utf-8", "surrogateescape")).hexdigest()
+    return f"{FOLDER}/{name[:2]}/{name[:16]}"

@@ -1,0 +1,246 @@
+"""The ledger of calibrations: by unit, the events that began and ended their validity.
+
+``calibrations/<aa>/<hash of the serial>/<sequence>.json``: a unit is found by one look into one folder, however many there are,
+and no serial can name a place outside. Each event is a file that is created once. Of two processes that write a unit's next
+event one is told that it is there, reads it and decides anew; so an event was always decided knowing all before it.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from contextlib import nullcontext
+from dataclasses import replace
+from datetime import datetime, timedelta
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from pipelines.archive import Archive, files, hash_chain
+from pipelines.archive.locks import alone
+from pipelines.archive.provenance import provenance
+from pipelines.archive.store import ObjectPath, place_of
+from pipelines.certificates.days import LAST, today
+from pipelines.certificates.entries import Event, event_of, folder_of
+from pipelines.certificates.refusals import nothing_to_revoke, refuse_other_device, refuse_serial
+from pipelines.certificates.validity import Calibration, calibrations_of, overlapped
+from schemas.errors import ArchiveUnusable, WrongUse
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterable, Iterator, Sequence
+
+    from pipelines.archive import Run
+    from pipelines.archive.store import Place
+    from pipelines.certificates.certify import Certified
+
+CLOCK_SLACK = timedelta(minutes=5)  # clocks of hosts that write into one archive differ by less
+
+
+class Ledger:
+    """The calibrations of an archive.
+
+    Parameters
+    ----------
+    archive : the archive, or its place or address.
+    """
+
+    def __init__(self, archive: Archive | Place | str) -> None:
+        self.root = archive.root if isinstance(archive, Archive) else place_of(archive)
+
+    def events(self, serial: str) -> list[Event]:
+        """What happened to a unit's calibrations, in order; empty for a unit that is not known."""
+        return [event for event, _ in self._read(serial)]
+
+    def calibrations(self, serial: str, known: str = "") -> list[Calibration]:
+        """The unit's calibrations in the order in which they were certified.
+
+        Parameters
+        ----------
+        known : only what was written up to this day; all of it where empty.
+        """
+        return calibrations_of(e for e in self.events(serial) if not known or e.when[:10] <= known)
+
+    def valid_at(self, serial: str, day: str, known: str = "") -> Calibration | None:
+        """The calibration that holds for a unit on a day; None where none does."""
+        return next((one for one in self.calibrations(serial, known) if one.holds(day)), None)
+
+    def all(self) -> Iterator[Calibration]:
+        """Every calibration of every unit."""
+        for events in self.histories():
+            yield from calibrations_of(events)
+
+    def histories(self) -> list[list[Event]]:
+        """The events of every unit, unit by unit, in no order that means anything; few files are read where they were before."""
+        from pipelines.certificates.ledger_index import (
+            histories_of,  # needs a table library, which looking up one unit does not
+        )
+
+        found = histories_of(self.root)
+        for folder, problem in found.problems.items():
+            message = f"calibrations: {folder} {problem}"
+            raise ArchiveUnusable(message)
+        return found.units
+
+    def certify(
+        self,
+        run: Run,
+        units: Sequence[str] = (),
+        start: str = "",
+        until: str = "",
+        *,
+        months: int = 12,
+        reason: str = "",
+        supersede: bool = False,
+    ) -> Certified:
+        """What became of certifying a run's units; see :func:`pipelines.certificates.certify.certify`."""
+        from pipelines.certificates.certify import certify  # reads tables, which looking up does not
+
+        return certify(self, run, units, start, until, months=months, reason=reason, supersede=supersede)
+
+    def add(self, event: Event, *, supersede: bool = False) -> tuple[Event, bool]:
+        """The event that certifies a calibration, as it was written, and whether it was there already.
+
+        Parameters
+        ----------
+        event : with serial, run, validity and what it rests on; the ledger fills in the rest.
+        supersede : end calibrations that begin later and overlap, too.
+        """
+        refuse_serial(event.serial, "certify")
+
+        def decided(events: Sequence[Event]) -> Event | None:
+            known = calibrations_of(events)
+            if any(_same(one, event) for one in known):
+                return None
+            refuse_other_device(known, event)
+            ends = overlapped(known, event.start, event.until, supersede=supersede)
+            return replace(event, action="supersede" if ends else "certify", ends=ends)
+
+        written = self._append(event.serial, decided)
+        if written is not None:
+            return written, False
+        return next(one.event for one in self.calibrations(event.serial) if _same(one, event)), True
+
+    def revoke(self, serial: str, reason: str, *, day: str = "", certificate: int = 0) -> Event:
+        """The event that ends a unit's calibrations.
+
+        Parameters
+        ----------
+        day : from when they do not hold; empty: from their first day, as if they had never been.
+        certificate : sequence of the one that is meant; 0 for all that hold today or later.
+        """
+        if not reason.strip():
+            message = "revoke: no reason is given, one is needed for those who relied on it; add --reason"
+            raise WrongUse(message)
+
+        def decided(events: Sequence[Event]) -> Event:
+            known = [one for one in calibrations_of(events) if one.start < one.until]
+            chosen = [one for one in known if certificate in {0, one.event.sequence}]
+            meant = [one for one in chosen if one.until > (day or ("" if certificate else today()))]
+            if not meant:
+                raise WrongUse(nothing_to_revoke(serial, known, certificate, day))
+            start = day or min(one.start for one in meant)
+            ends = tuple(one.event.sequence for one in meant)
+            last = meant[-1].event
+            return replace(
+                last, action="revoke", start=start, until=LAST, ends=ends, reason=reason.strip(), evidence=()
+            )
+
+        written = self._append(serial, decided)
+        if written is None:  # revoking always has something to write, or raises
+            raise WrongUse(nothing_to_revoke(serial, [], certificate, day))
+        self.anchor([written])
+        return written
+
+    def anchor(self, events: Sequence[Event]) -> None:
+        """Name events in the archive's chain, so that one that is taken away is missed."""
+        if events:
+            places = {self._place(one.serial, one.sequence): one for one in events}
+            sealed = {place: files.sha256(self.root / place) for place in sorted(places)}
+            hash_chain.append(self.root, "calibrations", sealed, {**provenance(), "run": events[0].run})
+
+    def write_bulk(self, events: Iterable[Event]) -> int:
+        """Write events of a new archive at once, without a look at what is there nor a sync per file; how many there were.
+
+        Parameters
+        ----------
+        events : of a unit in order, numbered from 1; ``previous`` is filled in.
+        """
+        count, last = 0, dict[str, str]()
+        for event in events:
+            data = files.json_bytes(replace(event, previous=last.get(event.serial, "")).document())
+            place = self.root / self._place(event.serial, event.sequence)
+            place.parent.mkdir(parents=True, exist_ok=True)
+            place.write_bytes(data)
+            last[event.serial] = hashlib.sha256(data).hexdigest()
+            count += 1
+        return count
+
+    def _append(self, serial: str, decide: Callable[[Sequence[Event]], Event | None]) -> Event | None:
+        """Write what is decided on a unit's events as its next one; None where nothing is to be written."""
+        folder = self._folder(serial)
+        with alone(folder, wait=True) if isinstance(folder, ObjectPath) else nullcontext():
+            while True:
+                known = self._read(serial)
+                event = decide([one for one, _ in known])
+                if event is None:
+                    return None
+                event = _stamped(event, known)
+                data = files.manifest_bytes(event.document())
+                if files.publish_first(self.root / self._place(serial, event.sequence), data):
+                    return event
+
+    def _folder(self, serial: str) -> Place:
+        return self.root / folder_of(serial)
+
+    @staticmethod
+    def _place(serial: str, sequence: int) -> str:
+        return f"{folder_of(serial)}/{sequence:06d}.json"
+
+    def _read(self, serial: str) -> list[tuple[Event, str]]:
+        found = _events(self._folder(serial))
+        for event, _ in found:
+            if event.serial != serial:
+                where = self._folder(serial)
+                message = (
+                    f"calibrations: {where} holds unit {event.serial!r}, {serial!r} is needed; restore it from a copy"
+                )
+                raise ArchiveUnusable(message)
+        return found
+
+
+def _events(folder: Place) -> list[tuple[Event, str]]:
+    """Events of a unit's folder with the hashes of their files; refused where one is missing among them."""
+    if isinstance(folder, Path):
+        names = sorted(path.name for path in folder.iterdir()) if folder.is_dir() else []
+    else:
+        names = sorted(path.name for path in folder.iterdir())
+    names = [name for name in names if name.endswith(".json") and hash_chain.is_number(name.removesuffix(".json"))]
+    found: list[tuple[Event, str]] = []
+    for count, name in enumerate(names, 1):
+        place = folder / name
+        data = place.read_bytes()
+        event = event_of(files.parsed(data, place), str(place))
+        if event.sequence != count or name != f"{count:06d}.json":
+            message = f"calibrations: {folder} has event {name} where number {count} is due; restore what is missing from a copy"
+            raise ArchiveUnusable(message)
+        found.append((event, hashlib.sha256(data).hexdigest()))
+    return found
+
+
+def _stamped(event: Event, known: Sequence[tuple[Event, str]]) -> Event:
+    """The event with its number, what it follows, and who writes it where and when."""
+    by = provenance()
+    if known:
+        last = known[-1][0]
+        if datetime.fromisoformat(by["when"]) < datetime.fromisoformat(last.when) - CLOCK_SLACK:
+            message = (
+                f"calibrations: the clock says {by['when']}, the last event of unit {event.serial} was written at {last.when}; "
+                "set this host's clock, then give the command again (nothing was written)"
+            )
+            raise ArchiveUnusable(message)
+    stamp = {key: by[key] for key in ("who", "where", "when")}
+    return replace(event, sequence=len(known) + 1, previous=known[-1][1] if known else "", **stamp)
+
+
+def _same(one: Calibration, event: Event) -> bool:
+    """Whether a calibration that holds is what an event would certify again."""
+    old = (one.run, one.event.coefficients, one.start, one.until)
+    return old == (event.run, event.coefficients, event.start, event.until)

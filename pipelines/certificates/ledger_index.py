@@ -1,0 +1,216 @@
+"""The events of all units, as they were read before: a hundred thousand small files need not be read again.
+
+``index/ledger/<digit>.parquet`` holds the events of the units whose folder's name begins so. It is made from the ledger's files
+and from nothing else and can be removed at any time; an event is believed while its file has the size and the time that it had.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import suppress
+from dataclasses import dataclass, field, fields
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+from pipelines.archive import files
+from pipelines.archive.store import ObjectPath, first_line
+from pipelines.certificates.entries import FOLDER, Event, event_of, folder_of
+from schemas.errors import ArchiveUnusable
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Mapping, Sequence
+
+    import pyarrow as pa
+
+    from pipelines.archive.store import Place
+
+NOTED = "index/ledger"
+VERSION = b"tumbleline.ledger 1"
+DIGITS = "0123456789abcdef"
+FEWEST_NEW = 8  # of one file; fewer are read again sooner than they are written
+READERS = 8
+AT_ONCE = 64  # files that one thread reads in one go
+NAMES = tuple(field.name for field in fields(Event))
+
+
+class Noted(NamedTuple):
+    """An event, and what its file looked like."""
+
+    stamp: str
+    event: Event
+
+
+@dataclass
+class Histories:
+    """The events of every unit, in order; and why a unit's cannot be told, by its folder.
+
+    read : how many files had to be read
+    """
+
+    units: list[list[Event]] = field(default_factory=list[list[Event]])
+    problems: dict[str, str] = field(default_factory=dict[str, str])
+    read: int = 0
+
+
+def histories_of(root: Place) -> Histories:
+    """The events of all units of an archive, from what was noted where it still holds."""
+    found = Histories()
+    stamps = _stamps(root / FOLDER)
+    for digit in DIGITS:
+        own = stamps.get(digit, {})
+        if own:
+            _gather(found, root, _events(found, root, digit, own))
+    return found
+
+
+def _events(found: Histories, root: Place, digit: str, stamps: Mapping[str, str]) -> dict[str, Event | str]:
+    """Events by the places of their files, or what is wrong with a file; what is new is noted."""
+    place = root / NOTED / f"{digit}.parquet"
+    before = _noted(place)
+    known = {name: one for name, one in before.items() if stamps.get(name) == one.stamp}
+    missing = [name for name in stamps if name not in known]
+    read = _all_read(root / FOLDER, missing)
+    found.read += len(read)
+    new = {name: Noted(stamps[name], event) for name, event in read.items() if isinstance(event, Event)}
+    if len(new) + len(before) - len(known) >= FEWEST_NEW:
+        with suppress(ArchiveUnusable):  # who may only read the archive reads it without
+            files.publish(place, _encoded(known | new))
+    return {name: known[name].event if name in known else read[name] for name in stamps}
+
+
+def _gather(found: Histories, root: Place, events: Mapping[str, Event | str]) -> None:
+    """Put the events of every unit together; a unit of which one is missing, strange or unreadable is a problem."""
+    by_unit: dict[str, list[str]] = {}
+    for name in sorted(events):
+        by_unit.setdefault(name.rpartition("/")[0], []).append(name)
+    for folder, names in by_unit.items():
+        own: list[Event] = []
+        for count, name in enumerate(names, 1):
+            event = events[name]
+            wrong = event if isinstance(event, str) else _wrong(event, folder, count, name)
+            if wrong or isinstance(event, str):
+                found.problems[str(root / FOLDER / folder)] = wrong
+                break
+            own.append(event)
+        else:
+            found.units.append(own)
+
+
+def _wrong(event: Event, folder: str, count: int, name: str) -> str:
+    if event.sequence != count or not name.endswith(f"/{count:06d}.json"):
+        return f"has event {name.rpartition('/')[2]} where number {count} is due; restore what is missing from a copy"
+    if folder_of(event.serial) != f"{FOLDER}/{folder}":
+        return f"holds unit {event.serial!r}, whose folder is another; restore it from a copy"
+    return ""
+
+
+def _all_read(top: Place, names: Sequence[str]) -> dict[str, Event | str]:
+    """The events of files below a folder, read by several threads: a cold disk answers many questions as fast as one."""
+    groups = [names[k : k + AT_ONCE] for k in range(0, len(names), AT_ONCE)]
+    out: dict[str, Event | str] = {}
+    with ThreadPoolExecutor(READERS) as pool:
+        for group, found in zip(groups, pool.map(lambda own: [_read(top, name) for name in own], groups), strict=True):
+            out |= zip(group, found, strict=True)
+    return out
+
+
+def _read(top: Place, name: str) -> Event | str:
+    """The event that a file holds, or why there is none."""
+    try:
+        if isinstance(top, ObjectPath):
+            data = (top / name).read_bytes()
+        else:
+            with open(f"{top}/{name}", "rb", buffering=0) as file:  # noqa: PTH123 - a hundred thousand of these
+                data = file.readall()
+        return event_of(files.parsed(data, top / name), f"{top}/{name}")
+    except ArchiveUnusable as problem:
+        return str(problem).partition(": ")[2]
+    except OSError as problem:
+        return f"cannot be read ({first_line(problem)}); restore it from a copy"
+
+
+def _noted(place: Place) -> dict[str, Noted]:
+    """What was noted; nothing where there is nothing, or half of something that nobody needs."""
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    try:
+        table = pq.ParquetFile(pa.BufferReader(place.read_bytes())).read(use_threads=False)
+        if (table.schema.metadata or {}).get(VERSION) is None:
+            return {}
+        columns = {name: table.column(name).to_pylist() for name in ("place", "stamp", *NAMES)}
+    except (OSError, ArchiveUnusable, pa.ArrowInvalid, KeyError):
+        return {}
+    for name in ("ends", "evidence"):  # of which many are the same
+        known = {text: _tuples(json.loads(text)) for text in set(columns[name])}
+        columns[name] = [known[text] for text in columns[name]]
+    events = (Event(*row) for row in zip(*(columns[name] for name in NAMES), strict=True))
+    rows = zip(columns["place"], columns["stamp"], events, strict=True)
+    return {name: Noted(stamp, event) for name, stamp, event in rows}
+
+
+def _tuples(value: Any) -> Any:
+    """Lists as tuples, at any depth."""
+    return tuple(_tuples(one) for one in value) if isinstance(value, list) else value
+
+
+def _encoded(known: Mapping[str, Noted]) -> bytes:
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    order = sorted(known)
+    columns: dict[str, pa.Array] = {
+        "place": pa.array(order, pa.string()),
+        "stamp": pa.array([known[name].stamp for name in order], pa.string()),
+    }
+    for name in NAMES:
+        values = [getattr(known[one].event, name) for one in order]
+        if name == "sequence":
+            columns[name] = pa.array(values, pa.int64())
+        else:
+            texts = values if name not in {"ends", "evidence"} else [json.dumps(value) for value in values]
+            columns[name] = pa.array(map(str, texts), pa.string())
+    table = pa.table(columns).replace_schema_metadata({VERSION: b""})
+    sink = pa.BufferOutputStream()
+    pq.write_table(table, sink, compression="zstd", compression_level=1)
+    return sink.getvalue().to_pybytes()
+
+
+def _stamps(top: Place) -> dict[str, dict[str, str]]:
+    """Size and time of every event's file: by the first digit of its folder, by its place below ``calibrations``."""
+    out: dict[str, dict[str, str]] = {}
+    if isinstance(top, ObjectPath):
+        for info in _objects(top):
+            out.setdefault(info[0][0], {})[info[0]] = info[1]
+        return out
+    if not top.is_dir():
+        return {}
+    shards = [name for name in sorted(os.listdir(top)) if name[0] in DIGITS]  # noqa: PTH208 - names are enough
+    with ThreadPoolExecutor(READERS) as pool:
+        for name, found in zip(shards, pool.map(lambda shard: _of_shard(top, shard), shards), strict=True):
+            out.setdefault(name[0], {}).update(found)
+    return out
+
+
+def _of_shard(top: Path, shard: str) -> dict[str, str]:
+    out: dict[str, str] = {}
+    with os.scandir(top / shard) as units:
+        for unit in units:
+            if unit.is_dir():
+                with os.scandir(unit.path) as found:
+                    events = [one for one in found if one.name.endswith(".json") and one.name[0] != "."]
+                for one in events:
+                    about = one.stat()
+                    out[f"{shard}/{unit.name}/{one.name}"] = f"{about.st_size}.{about.st_mtime_ns}"
+    return out
+
+
+def _objects(top: ObjectPath) -> Iterable[tuple[str, str]]:
+    from pyarrow.fs import FileSelector, FileType
+
+    for info in top.system.get_file_info(FileSelector(top.key, allow_not_found=True, recursive=True)):
+        name = info.path.removeprefix(f"{top.key}/")
+        if info.type == FileType.File and name.endswith(".json") and name.count("/") == 2:
+            yield name, f"{info.size}.{info.mtime_ns}"

@@ -1,0 +1,65 @@
+"""What a document that is handed out says of a unit's certificate: export and report."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+from pipelines.certificates.days import today
+from pipelines.certificates.ledger import Ledger
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+
+    from pipelines.archive import Run
+    from pipelines.certificates.validity import Calibration
+
+
+class Stated(NamedTuple):
+    """The certificate that a unit has for a run.
+
+    start, until : first day, and the day after the last
+    state : ``valid``, ``superseded`` or ``revoked``, whatever the date; reason : why it was ended
+    """
+
+    certificate: str
+    start: str
+    until: str
+    state: str
+    reason: str
+
+    def holds(self, day: str) -> bool:
+        """Whether it is valid on a day."""
+        return self.start <= day < self.until
+
+    def words(self) -> str:
+        """In a line, with nothing in it that changes by itself."""
+        if self.state == "revoked":
+            return f"certificate {self.certificate} REVOKED ({self.reason})"
+        ended = "" if self.state == "valid" else f", {self.state} {self.reason}"
+        return f"certificate {self.certificate}, valid from {self.start} until {self.until}{ended}"
+
+    def document(self) -> dict[str, Any]:
+        """For JSON, with whether it holds today."""
+        return {
+            "certificate": self.certificate,
+            "from": self.start,
+            "until": self.until,
+            "state": self.state,
+            "reason": self.reason,
+            "valid_now": self.holds(today()),
+        }
+
+
+def stated(run: Run, serials: Iterable[str]) -> dict[str, Stated]:
+    """The certificates of a run's units by serial: of each the one that was not ended, else the last; none of other runs."""
+    ledger, out = Ledger(run.archive), dict[str, Stated]()
+    for serial in serials:
+        own = [one for one in ledger.calibrations(serial) if one.run == run.id]
+        if own:
+            out[serial] = _stated(next((one for one in own if one.state == "valid"), own[-1]))
+    return out
+
+
+def _stated(one: Calibration) -> Stated:
+    reason = one.ended_by.reason or f"by {one.ended_by.certificate}" if one.ended_by is not None else ""
+    return Stated(one.certificate, one.start, one.until, one.state, reason)

@@ -1,0 +1,123 @@
+"""Which calibrations of a unit hold when: a pure function of its events, in the order in which they were written.
+
+A new calibration ends those that hold on its first day; so no two of a unit hold on one day, whatever is written.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
+
+from schemas.errors import WrongUse
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Sequence
+
+    from pipelines.certificates.entries import Event
+
+
+@dataclass(frozen=True)
+class Calibration:
+    """A unit's calibration with the days on which it holds.
+
+    Parameters
+    ----------
+    start, until : first day, and the day after the last; the same where it holds on none any more.
+    stated_until : as it was when it was certified.
+    ended_by : the event that ended it earlier; None where nothing did.
+    """
+
+    event: Event
+    until: str
+    ended_by: Event | None = None
+
+    @property
+    def serial(self) -> str:
+        """The unit."""
+        return self.event.serial
+
+    @property
+    def certificate(self) -> str:
+        """Number of its certificate."""
+        return self.event.certificate
+
+    @property
+    def run(self) -> str:
+        """The run that it came from."""
+        return self.event.run
+
+    @property
+    def start(self) -> str:
+        """First day."""
+        return self.event.start
+
+    @property
+    def stated_until(self) -> str:
+        """The day after the last as it was certified."""
+        return self.event.until
+
+    @property
+    def state(self) -> str:
+        """``valid``, ``superseded`` or ``revoked``: what became of it, whatever the date."""
+        if self.ended_by is None:
+            return "valid"
+        return "revoked" if self.ended_by.action == "revoke" else "superseded"
+
+    def holds(self, day: str) -> bool:
+        """Whether it is valid on a day."""
+        return self.start <= day < self.until
+
+    def document(self) -> dict[str, Any]:
+        """The calibration for JSON."""
+        event = self.event
+        ended = self.ended_by
+        return {
+            "certificate": self.certificate,
+            "serial": self.serial,
+            "device": event.device,
+            "from": self.start,
+            "until": self.until,
+            "state": self.state,
+            "stated_until": self.stated_until,
+            "run": self.run,
+            "grade": event.grade,
+            "station": event.station,
+            "recipe": event.recipe,
+            "coefficients": event.coefficients,
+            "certified": {"who": event.who, "where": event.where, "when": event.when, "reason": event.reason},
+            "ended": None
+            if ended is None
+            else {"action": ended.action, "sequence": ended.sequence, "who": ended.who, "when": ended.when,
+                  "reason": ended.reason},
+        }  # fmt: skip
+
+
+def calibrations_of(events: Iterable[Event]) -> list[Calibration]:
+    """The calibrations that a unit's events make, in the order in which they were certified."""
+    found: dict[int, Calibration] = {}
+    for event in events:
+        for sequence in event.ends:
+            old = found[sequence]
+            if event.start < old.until:
+                found[sequence] = replace(old, until=max(old.start, event.start), ended_by=event)
+        if event.action != "revoke":
+            found[event.sequence] = Calibration(event, event.until)
+    return list(found.values())
+
+
+def overlapped(known: Sequence[Calibration], start: str, until: str, *, supersede: bool) -> tuple[int, ...]:
+    """Sequences of the calibrations that one from ``start`` to ``until`` ends.
+
+    What began earlier ends by itself where the new one begins. What begins later is ended only where ``supersede`` says so,
+    for a calibration that is written afterwards would otherwise silently take the place of a newer one.
+    """
+    clash = [one for one in known if one.start < one.until and one.start < until and start < one.until]
+    later = [one for one in clash if one.start > start]
+    if later and not supersede:
+        one = later[0]
+        message = (
+            f"certify: unit {one.serial}: {start} to {until} overlaps calibration {one.certificate} of run {one.run}, valid "
+            f"from {one.start} to {one.until}, and begins before it; choose other dates, or end that one with --supersede"
+        )
+        raise WrongUse(message)
+    return tuple(one.event.sequence for one in clash)

@@ -1,0 +1,151 @@
+"""The stages of the chain, in order: what each reads, what it writes, its parameters and its code."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from pipelines.stages.fit import fit
+from pipelines.stages.grade import Evidence, grade
+from pipelines.stages.noise import noise
+from pipelines.stages.reduce import reduce
+from pipelines.stages.validate import validate
+from pipelines.stages.verify import verify
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    import pandas as pd
+
+    from pipelines.archive import Records, Run
+    from pipelines.jobs.job import Job
+
+Tables = dict[str, "pd.DataFrame"]
+RECORDS = "records"
+
+
+@dataclass(frozen=True)
+class Stage:
+    """One stage of the chain.
+
+    inputs : tables it reads; ``records`` are the captured samples
+    parameters : what it is called with besides tables, JSON-able: part of its key
+    modules : import names whose source, with all that it imports from the product, is part of its key
+    """
+
+    name: str
+    inputs: tuple[str, ...]
+    outputs: tuple[str, ...]
+    parameters: Callable[[Job], dict[str, Any]]
+    call: Callable[[Job, Run], Tables]
+    modules: tuple[str, ...]
+
+
+def _records(run: Run) -> Records:
+    records = run.records
+    if records is None:
+        message = f"run {run.id} has no captured records"
+        raise LookupError(message)
+    return records
+
+
+def _validate(job: Job, run: Run) -> Tables:
+    return {"verdicts": validate(_records(run).samples(), run.table("readings"), job.lot.units, job.recipe.zero_output)}
+
+
+def _reduce(job: Job, run: Run) -> Tables:
+    tables = run.table("readings"), run.table("verdicts")
+    return {"dwells": reduce(_records(run).samples(), *tables, job.recipe.local_gravity_m_s2)}
+
+
+_VERIFIED = ("dwells", "history", "coefficients", "covariance", "predictions")
+
+
+def _fit(job: Job, run: Run) -> Tables:
+    return fit(run.table("dwells"), run.table("history"), job.recipe.effects)
+
+
+def _verify(job: Job, run: Run) -> Tables:
+    del job
+    return verify(*(run.table(name) for name in _VERIFIED))
+
+
+def _noise(job: Job, run: Run) -> Tables:
+    del job
+    readings, *tables = (run.table(name) for name in ("readings", "coefficients", "covariance"))
+    static = set(readings.loc[readings["kind"] == "allan", "record"])
+    return noise(_records(run).samples(static), readings, *tables)
+
+
+_EVIDENCE = ("verdicts", "coefficients", "covariance", "residuals", "verification", "verification_poses", "noise")
+
+
+def _grade(job: Job, run: Run) -> Tables:
+    return grade(Evidence(*(run.table(name) for name in _EVIDENCE)), job.limits, job.recipe.zero_output)
+
+
+def _none(job: Job) -> dict[str, Any]:
+    del job
+    return {}
+
+
+_TABLES = "schemas.tables"
+
+STAGES: tuple[Stage, ...] = (
+    Stage(
+        name="validate",
+        inputs=(RECORDS, "readings"),
+        outputs=("verdicts",),
+        parameters=lambda job: {"lot": job.lot.model_dump(mode="json"), "zero_output": job.recipe.zero_output},
+        call=_validate,
+        modules=("pipelines.stages.validate", _TABLES),
+    ),
+    Stage(
+        name="reduce",
+        inputs=(RECORDS, "readings", "verdicts"),
+        outputs=("dwells",),
+        parameters=lambda job: {"local_gravity_m_s2": job.recipe.local_gravity_m_s2},
+        call=_reduce,
+        modules=("pipelines.stages.reduce", _TABLES),
+    ),
+    Stage(
+        name="fit",
+        inputs=("dwells", "history"),
+        outputs=("coefficients", "covariance", "residuals", "predictions", "wander"),
+        parameters=lambda job: {
+            "effects": job.recipe.effects,
+            "formulas": [f.model_dump(mode="json") for f in job.recipe.formulas],
+        },
+        call=_fit,
+        modules=("pipelines.stages.fit", _TABLES),
+    ),
+    Stage(
+        name="verify",
+        inputs=_VERIFIED,
+        outputs=("verification", "verification_poses"),
+        parameters=_none,
+        call=_verify,
+        modules=("pipelines.stages.verify", _TABLES),
+    ),
+    Stage(
+        name="noise",
+        inputs=(RECORDS, "readings", "coefficients", "covariance"),
+        outputs=("allan", "noise"),
+        parameters=_none,
+        call=_noise,
+        modules=("pipelines.stages.noise", _TABLES),
+    ),
+    Stage(
+        name="grade",
+        inputs=_EVIDENCE,
+        outputs=("figures", "grades"),
+        parameters=lambda job: {
+            "limits": job.limits.model_dump(mode="json"),
+            "zero_output": job.recipe.zero_output,
+        },
+        call=_grade,
+        modules=("pipelines.stages.grade", _TABLES),
+    ),
+)
+ORDER = ("capture", *(stage.name for stage in STAGES), "report")
+BY_NAME = {stage.name: stage for stage in STAGES}

@@ -1,0 +1,126 @@
+"""The runner: for each stage it loads, hashes, calls, checks and saves; a stage whose key is there is not run again.
+
+That is going on after a crash and running an archive again, by one mechanism.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from threadpoolctl import threadpool_limits
+
+from pipelines.archive import Archive, Records, Run, code_hash, files, stage_key
+from pipelines.archive.locks import alone
+from pipelines.chain.chain import BY_NAME, ORDER, RECORDS, Stage
+from schemas.progress import silent
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    import pandas as pd
+
+    from pipelines.jobs.job import Job
+    from schemas.progress import Progress
+
+
+@dataclass(frozen=True)
+class Done:
+    """What became of one stage: whether its output was there already, and how long it took."""
+
+    stage: str
+    reused: bool
+    seconds: float
+
+
+Measure = Callable[["Job", "Records", "Progress"], None]
+
+
+def from_station(job: Job, records: Records, progress: Progress) -> None:
+    """Measure a job's lot on its station, going on behind the last record that is stored."""
+    from pipelines.capture.capture import capture  # a re-run of archived data opens no station
+    from stations import open_station
+
+    run = f"{job.recipe.name} {job.capture_id}"
+    with open_station(job.station, job.lot, resume=records.last_state(), run=run) as station:
+        capture(station, job.recipe, job.lot, records, progress=progress, events=records.events)
+
+
+def captured_tables(records: Records) -> dict[str, pd.DataFrame]:
+    """What a run keeps of its capture besides the samples: readings, temperatures against time, soaks, what happened."""
+    told = {"events": records.events.table(), "soaks": records.events.soaks()}
+    return {**told, **{name: records.gathered(name) for name in ("readings", "history")}}
+
+
+class Runner:
+    """The chain for one job in one archive."""
+
+    def __init__(
+        self, job: Job, archive: Archive, progress: Progress = silent, measure: Measure = from_station
+    ) -> None:
+        self.job, self.archive, self.progress, self.measure = job, archive, progress, measure
+        self.run: Run = archive.open_run(job.recipe.name, job.about, self._decisive())
+
+    def all(self) -> Iterator[Done]:
+        """Every stage, in order, as it is done."""
+        for name in ORDER:
+            yield self.stage(name)
+
+    def stage(self, name: str) -> Done:
+        """Do one stage, or find it done."""
+        start = time.perf_counter()
+        with threadpool_limits(1):
+            if name == "capture":
+                reused = self._capture()
+            else:
+                with alone(self.run.path, wait=True):
+                    files.sweep(self.run.path)
+                    reused = self._report() if name == "report" else self._compute(BY_NAME[name])
+        return Done(name, reused, time.perf_counter() - start)
+
+    def _decisive(self) -> dict[str, Any]:
+        """What the result depends on; the report only shows it and may be made anew in its place."""
+        code = {stage.name: code_hash(stage.modules) for stage in BY_NAME.values()}
+        about = {key: value for key, value in self.job.about.items() if key != "station"}
+        return {**about, "code": code}
+
+    def _capture(self) -> bool:
+        records = self.archive.capture(self.job.capture_id)
+        was_there = records.is_complete()
+        if not was_there:
+            with alone(records.path):
+                records.begin()
+                self.measure(self.job, records, self.progress)
+                records.complete()
+        inputs = {RECORDS: records.hash()}
+        parameters = {"capture": self.job.capture_id}
+        about = {"inputs": inputs, "parameters": parameters, "code": ""}
+        key = stage_key("capture", inputs, parameters, "")
+        with alone(self.run.path, wait=True):
+            if not self.run.has(("readings", "history"), key):
+                self.run.save("capture", key, captured_tables(records), about)
+        return was_there
+
+    def _compute(self, stage: Stage) -> bool:
+        inputs, parameters, code = self._inputs(stage.inputs), stage.parameters(self.job), code_hash(stage.modules)
+        key = stage_key(stage.name, inputs, parameters, code)
+        if self.run.has(stage.outputs, key):
+            return True
+        about = {"inputs": inputs, "parameters": parameters, "code": code}
+        self.run.save(stage.name, key, stage.call(self.job, self.run), about)
+        return False
+
+    def _report(self) -> bool:
+        from pipelines.report import make_report  # plots are slow to import
+
+        return make_report(self.run)
+
+    def _inputs(self, names: tuple[str, ...]) -> dict[str, str]:
+        return {name: self._input_hash(name) for name in names}
+
+    def _input_hash(self, name: str) -> str:
+        if name == RECORDS:
+            return self.archive.capture(self.job.capture_id).hash()
+        return self.run.manifest(name)["sha256"]

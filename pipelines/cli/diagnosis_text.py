@@ -1,0 +1,206 @@
+"""A diagnosis for people: the verdict in a sentence, then faults, places, classes, the next command, and what was not seen."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from pipelines.cli.options import console, print_table, short, short_values
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from rich.console import Console
+
+
+SMALL = 1.1
+"""Errors below so many times the floor look like noise to whoever compares the two numbers."""
+
+
+def print_diagnosis(document: dict[str, Any], *, source: str, model: Path | None) -> None:
+    """Print a diagnosis.
+
+    Parameters
+    ----------
+    source : the dwells as they were named on the command line
+    model : the model file as it was given there
+    """
+    out = console()
+    out.print(verdict(document), style="bold green" if document["adequate"] else "bold red", soft_wrap=True)
+    print_findings(document)
+    _unexplained(out, document, model)
+    _next_command(out, document, source, model)
+    _unseen(document)
+    measurements_table(document["next_measurements"])
+
+
+def print_findings(document: dict[str, Any]) -> None:
+    """Print data faults, the places where the model fails, and the classes of what is missing."""
+    _faults(document["blocked_by"])
+    _where(document["where"])
+    _classes(document)
+
+
+def verdict(document: dict[str, Any]) -> str:
+    """The verdict in one sentence with its numbers."""
+    error, faulty = document["error"], {u for f in document["blocked_by"] for u in f["units"]}
+    if error["rms_ug"] is None:
+        return f"BLOCKED: every unit ({len(faulty)}) has a data fault; no physics is diagnosed until it is mended."
+    sound = len(document["units"]) - len(faulty)
+    floor = f"the noise that is there is {short(error['floor_ug'])} µg (p {equal(error['p_value'])})"
+    left = f"{short(error['rms_ug'])} µg rms are left in {sound} unit{'s' if sound != 1 else ''}, {floor}"
+    if document["adequate"]:
+        return f"ADEQUATE: {left}."
+    if error["rms_ug"] < SMALL * error["floor_ug"]:
+        left += "; what is wrong is small beside it, but no noise"
+    named = [" or ".join(group["effects"]) for group in document["classes"]]
+    if named:
+        return f"NOT ADEQUATE: {left}; missing: {', and '.join(named)}."
+    if document["unexplained"]:
+        driver = document["unexplained"]["driver"]
+        return f"NOT ADEQUATE: {left}; the rest follows {driver}, and no effect of the catalogue explains it."
+    return f"NOT ADEQUATE: {left}; nothing that was recorded explains the rest."
+
+
+def chance(p: float | None) -> str:
+    """A probability for people."""
+    if p is None:
+        return ""
+    if p <= 1e-299:
+        return "< 1e-299"
+    return short(p, 2) if p > 1e-3 else f"{p:.0e}"
+
+
+def equal(p: float) -> str:
+    """A probability with its sign: equal, or below the smallest that is told."""
+    text = chance(p)
+    return text if text.startswith("<") else f"= {text}"
+
+
+def _faults(faults: list[dict[str, Any]]) -> None:
+    if faults:
+        lines = [[f["fault"], ", ".join(f["units"]), _numbers(f["dwells"]), f["evidence"]] for f in faults]
+        print_table(
+            ["fault", "unit", "dwells", "evidence"],
+            lines,
+            title="Data faults: mend these first; these units are left out",
+        )
+
+
+def _numbers(dwells: list[int]) -> str:
+    if len(dwells) > 4:
+        return f"{len(dwells)}, from {dwells[0]} on"
+    return ", ".join(map(str, dwells)) or "all"
+
+
+def _where(places: list[dict[str, Any]]) -> None:
+    if places:
+        lines = [
+            [p["driver"], " ".join(p["axes"]), f"{100.0 * p['share']:.0f} %", chance(p["p_value"])] for p in places[:8]
+        ]
+        print_table(["follows", "axes", "of the excess", "p"], lines, title="Where the model fails")
+
+
+def _classes(document: dict[str, Any]) -> None:
+    from inertial import effects
+
+    if not document["classes"]:
+        return
+    lines = []
+    for group in document["classes"]:
+        simplest = effects.get(recommended_of(document, group))
+        names = "\n".join(f"{name} ({effects.get(name).symbol})" for name in group["effects"])
+        values = ", ".join(
+            f"{p.name} = {short_values(group['nonlinear'].get(p.name))} {p.unit}" for p in simplest.nonlinear
+        )
+        size = short(group["size_ug"]) + ("" if group["plausible"] else " (!)")
+        errors = short(group["rms_after_ug"]), short(group["heldout_after_ug"])
+        lines.append([names, simplest.scope, size, chance(group["p_value"]), *errors, values])
+    columns = ["effect", "of the", "size\nµg", "p", "left\nµg", "left out\nµg", "with"]
+    title = "What is missing; effects in one row cannot be told apart by these data"
+    print_table(columns, lines, title=title, whole=6)
+    if any(not group["plausible"] for group in document["classes"]):
+        console().print(
+            "(!) a size that this effect has not been seen to reach: look for another cause, too", markup=False
+        )
+    legend = "left: error after it is added · left out: the same on poses that the fit has not seen"
+    console().print(legend, style="dim", markup=False)
+
+
+def recommended_of(document: dict[str, Any], group: dict[str, Any]) -> str:
+    """The member of a class that is recommended."""
+    return next((name for name in document["recommended"] if name in group["effects"]), group["effects"][0])
+
+
+def _unexplained(out: Console, document: dict[str, Any], model: Path | None) -> None:
+    found = document["unexplained"]
+    if not found:
+        return
+    out.print(
+        f"\nReal, but no physics known for it: the error follows {found['driver']} in a {found['shape']} "
+        f"(p {equal(found['p_value'])}).",
+        markup=False,
+        soft_wrap=True,
+    )
+    if document["offer"]:
+        out.print(f"As a formula, to paste into {model or 'a model file'} and refine:\n", markup=False, soft_wrap=True)
+        out.print(document["offer"]["toml"], markup=False, soft_wrap=True)
+        out.print(
+            f"\nthen  tumbleline extend {model or 'model.toml'} {document['offer']['id']}", markup=False, soft_wrap=True
+        )
+
+
+def _next_command(out: Console, document: dict[str, Any], source: str, model: Path | None) -> None:
+    if not document["recommended"]:
+        return
+    from pipelines.jobs.model_files import STARTING_MODEL
+
+    file = str(model or "model.toml")
+    judged = ",".join(document["effects"])
+    start = "" if (model and model.exists()) or judged == ",".join(STARTING_MODEL) else f" --effects {judged}"
+    out.print("\nNext:", style="bold")
+    for place, name in enumerate(document["recommended"]):
+        out.print(f"  tumbleline extend {file} {name}{start if place == 0 else ''}", markup=False, soft_wrap=True)
+    out.print(
+        f"  tumbleline compare {source} --model {file} --fresh ANOTHER-RUN-OF-THE-SAME-UNITS",
+        markup=False,
+        soft_wrap=True,
+    )
+
+
+def _unseen(document: dict[str, Any]) -> None:
+    if document["unseen"]:
+        reasons = document.get("reasons", {})
+        lines = [[name, reasons.get(name) or document["breakers"][name]] for name in document["unseen"]]
+        print_table(["effect", "why, and what would show it"], lines, title="This plan could not have seen", whole=1)
+
+
+def measurements_table(proposed: list[dict[str, Any]], out: Console | None = None) -> None:
+    """Print what to measure next, step by step, with what it costs and brings.
+
+    Parameters
+    ----------
+    out : standard output where None
+    """
+    if not proposed:
+        return
+    lines = [
+        [
+            short(p["outer_deg"]),
+            short(p["inner_deg"]),
+            short(p["chamber_C"]) + ("" if p.get("soaked", True) else " (on the way)"),
+            short(p.get("wait_s")) + (f" after {short(p['off_s'] / 60.0)} min off" if p.get("off_s") else ""),
+            str(p.get("repeats", 1)),
+            p["why"],
+        ]
+        for p in proposed
+    ]
+    title = "Measure next, in this order"
+    print_table(
+        ["outer\n°", "inner\n°", "chamber\n°C", "wait\ns", "times", "decides between"], lines, title=title, out=out
+    )
+    for row in {p["why"]: p for p in proposed if "minutes" in p}.values():
+        text = (
+            f"{row['why']}: {short(row['minutes'])} min of station time; χ² between the best and its nearest rival "
+            f"{row['separation_before']:.1f} now, {row['separation_after']:.0f} expected then"
+        )
+        (out or console()).print(text, style="dim", markup=False, soft_wrap=True)

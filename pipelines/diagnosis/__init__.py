@@ -1,0 +1,1 @@
+"""Diagnosis: is the model adequate, which effect is missing, which measurement decides."""

@@ -1,0 +1,132 @@
+"""Comparison of a model with measurements: the error on the run it is fitted to, on poses left out, and on a fresh run."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from inertial import effects as catalogue
+from inertial.criticism.comparison import estimate, residuals_of, rms
+from inertial.criticism.heldout import heldout_rms
+from inertial.criticism.model import Model, refuse_without_freedom
+from inertial.criticism.problem import Problem
+from inertial.criticism.refinement import terms_of
+from inertial.effects import StationEffect
+from inertial.errors import InertialError
+from pipelines.tables.dwells import Measured, lot_of, measured
+from schemas.errors import DataRejected
+from schemas.units import MICRO
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    import pandas as pd
+    from numpy.typing import NDArray
+
+    from inertial.criticism.comparison import Estimate
+
+    Array = NDArray[np.float64]
+
+
+def compare(
+    dwells: pd.DataFrame,
+    effects: Sequence[str],
+    history: pd.DataFrame | None = None,
+    fresh: pd.DataFrame | None = None,
+    fresh_history: pd.DataFrame | None = None,
+) -> dict[str, Any]:
+    """How well a model fits a lot, and a fresh run of the same units with the coefficients unchanged.
+
+    Parameters
+    ----------
+    dwells, fresh : exchange format; the model is fitted to ``dwells`` only
+    history, fresh_history : temperatures against time of the two runs
+
+    Raises
+    ------
+    DataRejected
+        A unit of the fresh run was not in the first, or a quantity that the model needs is missing.
+    """
+    try:
+        return _compared(measured(dwells, history), effects, None if fresh is None else measured(fresh, fresh_history))
+    except InertialError as problem:
+        raise DataRejected(str(problem)) from None
+
+
+def _compared(found: Measured, effects: Sequence[str], fresh: Measured | None) -> dict[str, Any]:
+    square = "misalignment" not in effects
+    problem = Problem(lot_of(found, square=square))
+    model = Model(problem, terms_of(catalogue.get_all(effects), problem))
+    refuse_without_freedom(model)
+    fitted = estimate(model)
+    left = residuals_of(problem, fitted)
+    units = _by_unit(found, left)
+    answer: dict[str, Any] = {
+        "effects": [t.effect.id for t in model.terms],
+        "rms_ug": MICRO * rms(left),
+        "floor_ug": MICRO * model.floor(),
+        "heldout_rms_ug": MICRO * heldout_rms(problem, model.terms),
+        "fresh_rms_ug": None,
+        "by_unit": {
+            u: {"rms_ug": MICRO * rms(r), "fresh_rms_ug": None} for u, r in zip(found.units, units, strict=True)
+        },
+        "by_axis": _by_axis(left, radial=problem.lot.radial),
+        "by_pose": _by_pose(found, left),
+        "nonlinear": {t.effect.id: t.keywords for t in model.terms if t.keywords},
+        "station": _station(fitted),
+    }
+    if fresh is not None:
+        again = _same_units(found, fresh)
+        on_fresh = residuals_of(Problem(lot_of(again, like=found, square=square)), fitted)
+        answer["fresh_rms_ug"] = MICRO * rms(on_fresh)
+        for unit, values in zip(again.units, _by_unit(again, on_fresh), strict=True):
+            answer["by_unit"][unit]["fresh_rms_ug"] = MICRO * rms(values)
+        answer["fresh_by_pose"] = _by_pose(again, on_fresh)
+    return answer
+
+
+def _station(fitted: Estimate) -> list[dict[str, Any]]:
+    """Parameters of the station with their standard errors."""
+    names = [(t.effect.id, n) for t in fitted.terms if isinstance(t.effect, StationEffect) for n in t.effect.names()]
+    return [
+        {"effect": effect, "name": name, "value": float(value), "standard_error": float(error)}
+        for (effect, name), value, error in zip(
+            names, fitted.shared[: len(names)], fitted.shared_error[: len(names)], strict=True
+        )
+    ]
+
+
+def _same_units(first: Measured, again: Measured) -> Measured:
+    """The fresh run with its units in the order of the first."""
+    strange = sorted(set(again.units) ^ set(first.units))
+    if strange:
+        raise DataRejected(
+            f"compare: {', '.join(strange[:5])} not in both runs, every unit is needed in both; "
+            "give a fresh run of the same units, or leave the others out of both files"
+        )
+    return again.pick([again.units.index(u) for u in first.units])
+
+
+def _by_unit(found: Measured, left: Array) -> Array:
+    return left.reshape(len(found.units), -1)
+
+
+def _by_axis(left: Array, *, radial: bool) -> dict[str, float]:
+    if radial:
+        return {"norm": MICRO * rms(left)}
+    return {axis: MICRO * rms(left[i::3]) for i, axis in enumerate("xyz")}
+
+
+def _by_pose(found: Measured, left: Array) -> list[dict[str, Any]]:
+    """RMS residual of each pose over all units and axes, worst first."""
+    if found.reference == "norm":
+        return []
+    force = np.round(found.state.force[0], 2) + 0.0
+    poses, place = np.unique(force, axis=0, return_inverse=True)
+    place = place.reshape(-1)
+    rows = [
+        {"force": poses[k].tolist(), "dwells": int(np.sum(place == k)), "rms_ug": MICRO * rms(left[:, place == k])}
+        for k in range(len(poses))
+    ]
+    return sorted(rows, key=lambda row: -row["rms_ug"])

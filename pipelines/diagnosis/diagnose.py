@@ -1,0 +1,160 @@
+"""Diagnosis and comparison of a table of dwells against a model, as documents with the keys that other programs read."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from inertial import effects as catalogue
+from inertial.criticism.diagnosis import Diagnosis
+from inertial.criticism.diagnosis import diagnose as diagnose_lot
+from inertial.criticism.faults import Fault, find_faults
+from inertial.errors import InertialError
+from pipelines.diagnosis.compare import compare
+from pipelines.diagnosis.condense import condense
+from pipelines.diagnosis.next_measurement import proposed
+from pipelines.tables.dwells import Measured, lot_of, measured
+from schemas.errors import DataRejected
+from schemas.units import MICRO
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    import pandas as pd
+
+    from pipelines.diagnosis.next_measurement import Proposed
+
+__all__ = ["compare", "default_model", "diagnose", "document", "examined"]
+
+DEFAULT = ("bias", "scale", "misalignment")
+THERMAL = ("bias_temperature", "scale_temperature")
+_WARM = 5.0
+_SEED = 1293
+"""Noise that adequacy is measured against is drawn anew, but alike, for every diagnosis: the same data give the same answer."""
+
+
+def default_model(dwells: pd.DataFrame) -> list[str]:
+    """The model that is judged where none is named: with temperature terms when it varies by more than 5 °C."""
+    for column in ("unit_C", "chamber_C"):
+        if column in dwells.columns and dwells[column].notna().any():
+            return [*DEFAULT, *THERMAL] if float(np.ptp(dwells[column].dropna())) > _WARM else list(DEFAULT)
+    return list(DEFAULT)
+
+
+def diagnose(
+    dwells: pd.DataFrame, history: pd.DataFrame | None = None, effects: Sequence[str] | None = None
+) -> dict[str, Any]:
+    """The diagnosis of a lot as a JSON document.
+
+    Parameters
+    ----------
+    dwells : exchange format
+    history : temperatures against time; lag and hysteresis read it where it is there
+    effects : the model to judge; :func:`default_model` where None
+
+    Raises
+    ------
+    DataRejected
+        Nothing is left to diagnose, or the model asks for what the dwells do not carry.
+    """
+    return document(*examined(dwells, history, effects))
+
+
+def examined(
+    dwells: pd.DataFrame, history: pd.DataFrame | None, effects: Sequence[str] | None
+) -> tuple[Measured, list[Fault], Diagnosis | None]:
+    """Readings, data faults and the diagnosis of the units without a fault; None where every unit has one."""
+    model = list(effects) if effects else default_model(dwells)
+    catalogue.get_all(model)
+    found = measured(condense(dwells), history)
+    faults = find_faults(found.readings) if found.reference != "norm" else []
+    blocked = {f.unit for f in faults}
+    sound = [u for u in range(len(found.units)) if u not in blocked]
+    if not sound:
+        return found, faults, None
+    try:
+        lot = lot_of(found.pick(sound) if blocked else found, square="misalignment" not in model)
+        return found, faults, diagnose_lot(lot, model, np.random.default_rng(_SEED))
+    except InertialError as problem:
+        raise DataRejected(str(problem)) from None
+
+
+def document(
+    found: Measured, faults: list[Fault], diagnosis: Diagnosis | None, following: Proposed | None = None
+) -> dict[str, Any]:
+    """The document of a diagnosis; where every unit has a data fault, nothing is said of physics.
+
+    Parameters
+    ----------
+    following : what to measure next; by what the run itself shows of its station where None
+    """
+    blocked = [_fault(found, f) for f in faults]
+    if diagnosis is None:
+        return {
+            "adequate": False,
+            "blocked_by": blocked,
+            "error": {"rms_ug": None, "floor_ug": None, "p_value": None},
+            "where": [],
+            "classes": [],
+            "recommended": [],
+            "unexplained": None,
+            "unseen": [],
+            "next_measurements": [],
+        }
+    return {
+        "adequate": bool(diagnosis.adequate),
+        "blocked_by": blocked,
+        "error": {
+            "rms_ug": MICRO * diagnosis.rms,
+            "floor_ug": MICRO * diagnosis.floor,
+            "p_value": _probability(diagnosis.log_p),
+            "wander_share": diagnosis.final.share,
+        },
+        "where": [
+            {"driver": p.driver, "axes": list(p.axes), "share": round(p.share, 4), "p_value": _probability(p.log_p)}
+            for p in diagnosis.where
+        ],
+        "classes": [
+            {
+                "effects": list(n.effects.ids),
+                "scope": n.effects.simplest.effect.scope,
+                "rms_after_ug": MICRO * n.rms_after,
+                "heldout_after_ug": MICRO * n.heldout_after,
+                "p_value": _probability(n.effects.log_p),
+                "size_ug": MICRO * n.effects.size,
+                "nonlinear": dict(n.effects.simplest.values),
+                "plausible": _plausible(n.effects.size, n.effects.simplest.effect.typical_ug),
+            }
+            for n in diagnosis.named
+        ],
+        "recommended": [n.effects.simplest.effect.id for n in diagnosis.named],
+        "unexplained": None
+        if diagnosis.unexplained is None
+        else {
+            "driver": diagnosis.unexplained.driver,
+            "shape": diagnosis.unexplained.shape,
+            "p_value": _probability(diagnosis.unexplained.log_p),
+        },
+        "unseen": list(diagnosis.unseen),
+        "next_measurements": (proposed(diagnosis) if following is None else following).rows(),
+    }
+
+
+def _fault(found: Measured, fault: Fault) -> dict[str, Any]:
+    return {
+        "fault": fault.name,
+        "units": [found.units[fault.unit]],
+        "dwells": [int(found.dwells[k]) for k in fault.dwells],
+        "evidence": fault.evidence,
+    }
+
+
+def _probability(log_p: float) -> float:
+    """A probability; one below the smallest number is given as that."""
+    return float(max(np.exp(min(log_p, 0.0)), 1e-300))
+
+
+def _plausible(size: float, typical: tuple[float, float]) -> bool:
+    """Whether a size in g is what the effect has been seen to reach, within a factor of ten below."""
+    return 0.1 * typical[0] <= MICRO * size <= typical[1]

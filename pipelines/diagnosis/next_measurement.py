@@ -1,0 +1,109 @@
+"""The next measurement as rows of a document: one per step, with what it decides, what it costs and what it brings."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from inertial.criticism.proposals import Circumstances, Proposal, proposal, sighting
+from inertial.errors import MissingInput
+
+if TYPE_CHECKING:
+    from inertial.criticism.classes import EffectClass
+    from inertial.criticism.diagnosis import Diagnosis
+    from inertial.planning.sequences import Step
+
+BREAKER_POSE = (0.0, 0.0, 25.0)
+"""Where a row says a breaker in words: any pose is as good, the words count."""
+
+
+@dataclass(frozen=True)
+class Proposed:
+    """What to measure next, in order: for every class of more than one effect what parts it, then what shows the unseen.
+
+    parting : classes, each with None where no steps of the station part it
+    showing : None where nothing that was not seen matters, or the station cannot show it
+    """
+
+    parting: tuple[tuple[EffectClass, Proposal | None], ...] = ()
+    showing: Proposal | None = None
+
+    @property
+    def found(self) -> tuple[Proposal, ...]:
+        """What parts classes."""
+        return tuple(p for _, p in self.parting if p is not None)
+
+    def rows(self) -> list[dict[str, Any]]:
+        """All of it as rows, in the order in which it is to be measured."""
+        rows: list[dict[str, Any]] = []
+        for group, wanted in self.parting:
+            rows += [_breaker(group)] if wanted is None else rows_of(wanted)
+        return rows if self.showing is None else [*rows, *rows_of(self.showing)]
+
+
+def proposed(diagnosis: Diagnosis, around: Circumstances | None = None) -> Proposed:
+    """What to measure after a diagnosis, each part after those before it.
+
+    Parameters
+    ----------
+    around : what the station can do; what the run itself shows of it where None
+    """
+    parting: list[tuple[EffectClass, Proposal | None]] = []
+    already: list[Step] = []
+    for named in diagnosis.named:
+        if len(named.effects.members) > 1:
+            wanted = _parted(diagnosis, named.effects, around, already)
+            already += wanted.steps if wanted is not None else ()
+            parting.append((named.effects, wanted))
+    return Proposed(tuple(parting), sighting(diagnosis.final, diagnosis.unseen, around, already))
+
+
+def _parted(
+    diagnosis: Diagnosis, group: EffectClass, around: Circumstances | None, already: list[Step]
+) -> Proposal | None:
+    try:
+        return proposal(diagnosis.final, group, around, already)
+    except MissingInput:
+        return None
+
+
+def _breaker(group: EffectClass) -> dict[str, Any]:
+    """What would part a class, in words, where no steps of the station do."""
+    first, second = group.members[0].term.effect, group.members[1].term.effect
+    outer, inner, temperature = BREAKER_POSE
+    why = f"{first.id} | {second.id}: {second.breaker}"
+    return {"outer_deg": outer, "inner_deg": inner, "chamber_C": temperature, "why": why}
+
+
+def rows_of(found: Proposal) -> list[dict[str, Any]]:
+    """Rows of one proposal: equal steps in a row are one, with their number."""
+    rows: list[dict[str, Any]] = []
+    before: dict[str, Any] | None = None
+    about = " | ".join(found.pair) or f"not seen so far: {', '.join(found.ids)}"
+    for step in found.steps:
+        row = {
+            "outer_deg": _degrees(step.outer),
+            "inner_deg": _degrees(step.inner),
+            "chamber_C": round(step.temperature, 2),
+            "why": about,
+            "wait_s": round(step.wait, 1),
+            "soaked": step.soaked,
+            **({"off_s": round(step.off, 1)} if step.off > 0.0 else {}),
+        }
+        if row == before:
+            rows[-1]["repeats"] += 1
+        else:
+            rows.append({**row, "repeats": 1})
+        before = row
+    whole = {
+        "minutes": round(found.minutes, 1),
+        "separation_before": round(found.before, 2),
+        "separation_after": round(found.after, 2),
+    }
+    return [{**row, **whole} for row in rows]
+
+
+def _degrees(angle: float) -> float:
+    return round(float(np.degrees(angle)), 3) + 0.0

@@ -1,0 +1,6 @@
+"""Checks of an archive: every hash computed anew, every manifest held against those that name it."""
+
+from pipelines.integrity.archive import Report, verify
+from pipelines.integrity.findings import Finding
+
+__all__ = ["Finding", "Report", "verify"]

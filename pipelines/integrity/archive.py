@@ -1,0 +1,175 @@
+"""Checks of a whole archive, or of some of its runs with their captures, read side by side."""
+
+from __future__ import annotations
+
+import os
+import time
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import asdict, dataclass
+from typing import TYPE_CHECKING, Any
+
+from pipelines.archive import Archive, Run
+from pipelines.archive.signatures import GOOD, UNKNOWN, UNSIGNED
+from pipelines.archive.store import ObjectPath
+from pipelines.integrity.calibrations import check_shard
+from pipelines.integrity.captures import check_capture, check_strangers
+from pipelines.integrity.chain import check_chain
+from pipelines.integrity.findings import MISSING, SIGNATURE, Checked
+from pipelines.integrity.runs import check_run
+from pipelines.integrity.seals import check_seals
+from pipelines.integrity.surroundings import SHOWN, check_mark, check_surroundings
+from schemas.errors import ArchiveUnusable
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping, Sequence
+
+    from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PublicKey
+
+    from pipelines.archive.store import Place
+
+READERS = min(8, 2 * (os.cpu_count() or 1))
+READERS_OF_OBJECTS = 32  # an object store answers late, and many at once
+
+
+@dataclass(frozen=True)
+class Report:
+    """What a verification came to.
+
+    head : hash of the chain's last entry; noted elsewhere, it shows later that nothing before it was taken away.
+    trust : in words, who signed.
+    """
+
+    checked: Checked
+    head: str
+    trust: str
+    runs: int
+    captures: int
+    seconds: float
+
+    @property
+    def whole(self) -> bool:
+        """Whether nothing is wrong."""
+        return not self.checked.findings
+
+    def document(self) -> dict[str, Any]:
+        """The report for JSON."""
+        checked = self.checked
+        return {
+            "archive": str(checked.root),
+            "whole": self.whole,
+            "findings": [asdict(finding) for finding in checked.findings],
+            "remarks": checked.remarks,
+            "signatures": {"trust": self.trust, "keys": sorted(checked.keys), "manifests": dict(checked.signatures)},
+            "chain_head": self.head,
+            "runs": self.runs,
+            "captures": self.captures,
+            "tables": checked.tables,
+            "manifests": checked.manifests,
+            "rows": checked.rows,
+            "bytes": checked.bytes,
+            "seconds": self.seconds,
+            "rows_per_s": checked.rows / self.seconds,
+            "bytes_per_s": checked.bytes / self.seconds,
+        }
+
+
+def verify(
+    archive: Archive,
+    runs: Sequence[str] = (),
+    *,
+    keys: Mapping[str, Ed25519PublicKey],
+    demanded: bool = False,
+    head: str = "",
+    progress: Callable[[int, int], None] = lambda _done, _total: None,
+) -> Report:
+    """What is wrong with an archive.
+
+    Parameters
+    ----------
+    runs : only these and their captures; everything where empty.
+    keys : public keys that are trusted, by name.
+    demanded : whether a manifest without a signature by one of these is wrong.
+    head : hash of an entry of the chain that was noted elsewhere.
+    """
+    from schemas import tables
+
+    start, total = time.perf_counter(), Checked(archive.root, keys)
+    there = _below(archive.root / "captures")  # before the runs: each run is there before its capture
+    chosen = [archive.run(name) for name in runs] or [Run(archive, one.name) for one in _below(archive.root / "runs")]
+    captures = _captures(archive, chosen) if runs else there
+    shards = [] if runs else _below(archive.root / "calibrations")
+    tasks: list[Callable[[], Checked]] = [
+        *(lambda run=run: check_run(run, total.blank(), tables.VERSION) for run in chosen),
+        *(lambda path=path: check_capture(path, total.blank(), tables.VERSION) for path in captures),
+        *(lambda shard=shard: check_shard(shard, total.blank()) for shard in shards),
+    ]
+    readers = READERS_OF_OBJECTS if isinstance(archive.root, ObjectPath) else READERS
+    with ThreadPoolExecutor(readers) as pool:
+        for done, part in enumerate(pool.map(lambda task: task(), tasks), 1):
+            total.add(part)
+            progress(done, len(tasks))
+    for folder in () if runs else ("", "runs", "captures", *(f"captures/{path.name}" for path in captures)):
+        check_strangers(archive.root / folder if folder else archive.root, set(), total)
+    told = check_chain(archive.root, total, only={run.id for run in chosen} if runs else None, head=head)
+    check_seals(archive.root, chosen, told, total, everything=not runs)
+    check_mark(archive, total)
+    if not runs:
+        _check_owners(chosen, captures, total)
+        check_surroundings(archive, total)
+    _tell_untrusted(total, demanded=demanded)
+    total.findings = list(dict.fromkeys(total.findings))  # a manifest may be missed by several that name it
+    return Report(total, told.head, _trust(total), len(chosen), len(captures), time.perf_counter() - start)
+
+
+def _captures(archive: Archive, runs: Sequence[Run]) -> list[Place]:
+    """Folders of the captures that runs were made from."""
+    named = dict.fromkeys(str(run.about.get("capture") or "") for run in runs)
+    return [archive.root / "captures" / name for name in named if name and (archive.root / "captures" / name).is_dir()]
+
+
+def _check_owners(runs: Sequence[Run], captures: Sequence[Place], total: Checked) -> None:
+    """Every capture has a run that it was measured for."""
+    named: set[str] = set()
+    for run in runs:
+        try:
+            named.add(str(run.about.get("capture") or ""))
+        except ArchiveUnusable:  # told where the run is checked
+            return
+    for path in captures:
+        if path.name not in named:
+            total.wrong(MISSING, path, "has no run in this archive: its run was taken away, or it was copied here")
+
+
+def _below(folder: Place) -> list[Place]:
+    """Folders in a folder, by name."""
+    if not folder.is_dir():
+        return []
+    return sorted((place for place in folder.iterdir() if place.is_dir()), key=lambda place: place.name)
+
+
+def _tell_untrusted(total: Checked, *, demanded: bool) -> None:
+    """Name the manifests that nobody known signed: wrong where a signature is demanded, said where others are signed."""
+    for state, names in total.untrusted.items():
+        what = "is not signed" if state == UNSIGNED else "is signed with a key that is not known here"
+        if demanded and len(names) == total.manifests:
+            all_of_them = f"{len(names)} of {total.manifests} manifests: each {what}; a signature by --key is demanded"
+            total.wrong(SIGNATURE, total.root, all_of_them)
+        elif demanded:
+            for name in names:
+                total.wrong(SIGNATURE, total.root / name, f"{what}; a signature by --key is demanded")
+        elif len(names) < total.manifests:
+            shown = f"{', '.join(names[:SHOWN])}{f' and {len(names) - SHOWN} more' if len(names) > SHOWN else ''}"
+            total.remarks += [f"{shown} {what.replace('is', 'are', 1) if len(names) > 1 else what}"] if names else []
+
+
+def _trust(total: Checked) -> str:
+    """In words, who signed."""
+    count, found = total.manifests, total.signatures
+    if found[UNSIGNED] == count:
+        return "UNSIGNED: nothing here shows who wrote it; make a key with 'tumbleline archive key'"
+    signed = [f"{found[GOOD]} of {count} manifests signed by {', '.join(sorted(total.keys))}"] if found[GOOD] else []
+    unknown = (
+        [f"{found[UNKNOWN]} signed by a key that is not known here (give it with --key)"] if found[UNKNOWN] else []
+    )
+    unsigned = [f"{found[UNSIGNED]} unsigned"] if found[UNSIGNED] else []
+    return ", ".join([*signed, *unknown, *unsigned])

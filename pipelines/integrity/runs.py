@@ -1,0 +1,126 @@
+"""Checks of one run: its tables, their manifests, and the chain from one to the next."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from pipelines.archive import files, parquet, stage_key
+from pipelines.archive.records import COMPLETE
+from pipelines.archive.store import ObjectPath
+from pipelines.integrity.findings import EDITED, FOREIGN, MISSING, Checked
+
+if TYPE_CHECKING:
+    from pipelines.archive import Run
+    from pipelines.archive.store import Place
+
+OURS = ("run.json", "sealed.json", "lock")
+KEYED = ("stage", "inputs", "parameters", "code", "key")
+
+
+def check_run(run: Run, checked: Checked, schema: int) -> Checked:
+    """What is wrong with a run."""
+    names = {place.name: place for place in run.path.iterdir()}
+    if all(name == "lock" or name.startswith(files.TEMPORARY) for name in names):
+        checked.remarks.append(f"{checked.name(run.path)} holds no run: its writer was killed, or has just begun")
+        return checked
+    start = checked.manifest(run.path / "run.json", schema)
+    if start is None:
+        return checked
+    about, hashes = start[0], {"run": start[1]}
+    manifests: dict[str, dict[str, Any]] = {}
+    for name, place in sorted(names.items()):
+        if place.suffix == ".json" and name not in OURS and not name.startswith(files.TEMPORARY):
+            found = checked.manifest(place, schema)
+            if found is not None:
+                manifests[place.stem], hashes[place.stem] = found
+    for name, content in manifests.items():
+        data = run.path / ("report.html" if name == "report" else f"{name}.parquet")
+        checked.table(data, str(content.get("sha256")), content.get("rows"))
+        if name != "report" and "stage" not in content:
+            checked.wrong(EDITED, run.path / f"{name}.json", "was edited: it does not say which stage made its table")
+        _check_links(run.path / f"{name}.json", content, manifests, hashes, checked)
+    capture = str(about.get("capture") or "")
+    _check_capture_link(run, capture, manifests, checked)
+    _check_others(run, names, manifests, checked)
+    if not names.keys() & {"report.json"} and capture:
+        checked.remarks.append(f"run {run.id} is not finished: give its command again and it goes on")
+    return checked
+
+
+def _check_links(
+    place: Place,
+    content: dict[str, Any],
+    manifests: dict[str, dict[str, Any]],
+    hashes: dict[str, str],
+    checked: Checked,
+) -> None:
+    """Hold a manifest against its own key, and against the manifests that it names."""
+    if all(name in content for name in KEYED) and all(
+        isinstance(content[name], dict) for name in ("inputs", "parameters")
+    ):
+        key = stage_key(*(content[name] for name in KEYED[:4]))
+        if key != content["key"]:
+            checked.wrong(EDITED, place, "was edited: stage, inputs, parameters and code do not make its key")
+    elif not isinstance(content.get("parameters", {}), dict):
+        checked.wrong(EDITED, place, "was edited: its parameters are no names with values")
+    for name, wanted in checked.named(content, "inputs", place).items():
+        if name in manifests and manifests[name].get("sha256") != wanted:
+            checked.wrong(EDITED, place, f"names another table {name} than the run has")
+    for name, wanted in checked.named(content, "manifests", place).items():
+        if name in hashes and hashes[name] != wanted:
+            edited = place.parent / f"{name}.json"
+            checked.wrong(
+                EDITED, edited, f"is not the manifest that {place.stem} was made from: edited, or written anew"
+            )
+        elif name not in hashes and name != "records":
+            checked.wrong(MISSING, place.parent / f"{name}.json", f"is not there, {place.stem} was made from it")
+
+
+def _check_capture_link(run: Run, capture: str, manifests: dict[str, dict[str, Any]], checked: Checked) -> None:
+    """Hold the capture's end against what the run's tables were made from."""
+    if not capture:
+        return
+    end = run.archive.root / "captures" / capture / COMPLETE
+    if not end.is_file():
+        if manifests:
+            checked.wrong(MISSING, end, f"is not there, run {run.id} was made from this capture")
+        return
+    found = files.sha256(end)
+    for name, content in manifests.items():
+        named = content.get("manifests", {})
+        if isinstance(named, dict) and named.get("records", found) != found:
+            checked.wrong(EDITED, end, f"is not the end of the capture that {name} of run {run.id} was made from")
+            return
+
+
+def _check_others(run: Run, names: dict[str, Place], manifests: dict[str, Any], checked: Checked) -> None:
+    """Files of the run's folder that no manifest names."""
+    for name, place in sorted(names.items()):
+        if name.startswith(files.TEMPORARY):
+            checked.remarks.append(
+                f"{checked.name(place)} was left by a killed writer, or is being written; see 'archive clean'"
+            )
+        elif (
+            place.suffix == ".parquet"
+            and place.stem not in manifests
+            and not (run.path / f"{place.stem}.json").is_file()
+        ):
+            mark = table_mark(place)
+            if mark != place.stem:
+                what = f"holds table '{mark}'" if mark else "was not written by this archive"
+                checked.wrong(FOREIGN, place, f"{what}: take it out; import foreign files with 'tumbleline import'")
+            elif "report.json" in names:
+                checked.wrong(MISSING, run.path / f"{place.stem}.json", "is not there, its table is")
+
+
+def table_mark(place: Place) -> str:
+    """The table's name that a Parquet file bears; empty for a foreign or broken one."""
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    source = pa.BufferReader(place.read_bytes()) if isinstance(place, ObjectPath) else str(place)
+    try:
+        metadata = pq.read_metadata(source).metadata or {}
+    except (pa.ArrowInvalid, OSError):
+        return ""
+    return metadata.get(parquet.TABLE_MARK, b"").decode(errors="replace")

@@ -1,0 +1,83 @@
+"""What lies in an archive and nothing of it put there: links that lead elsewhere, keys that sign, files of others."""
+
+from __future__ import annotations
+
+import os
+import re
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from pipelines.archive import files
+from pipelines.integrity.findings import CHANGED, FOREIGN, MISSING, SIGNATURE, UNREADABLE
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from pipelines.archive import Archive
+    from pipelines.integrity.findings import Checked
+
+OURS = re.compile(
+    r"archive\.json|(index|orchestrator)/.*|.*\.parquet"
+    r"|captures/[^/]+/(lock|complete\.json|events/\d+\.json|state/\d+\.bin|\d+/record\.json)"
+    r"|runs/[^/]+/(lock|report\.html|[^/.]+\.json)"
+    r"|calibrations/[0-9a-f]{2}/[0-9a-f]{16}/\d+\.json|chain/\d+/\d+\.json"
+    r"|(releases|whatif)/(lock|[0-9a-f-]+\.json)"
+)
+KEY_MARK, KEY_BYTES = b"PRIVATE KEY-----", 16_384
+SHOWN = 10
+
+
+def check_mark(archive: Archive, checked: Checked) -> None:
+    """The file that makes a folder an archive, which no chain names, is always the same."""
+    place, wanted = archive.root / "archive.json", archive.mark
+    try:
+        found = place.read_bytes()
+    except FileNotFoundError:
+        checked.wrong(MISSING, place, "is not there, an archive begins with it")
+        return
+    except OSError:
+        checked.wrong(UNREADABLE, place, "cannot be read")
+        return
+    if found != wanted:
+        checked.wrong(CHANGED, place, f"is not as every archive begins; its content is {wanted.decode().split()}")
+
+
+def check_surroundings(archive: Archive, checked: Checked) -> None:
+    """Every file and link of a local archive that is not the archive's own."""
+    if not isinstance(archive.root, Path):  # an object store has no links, and lists slowly
+        return
+    strangers: list[str] = []
+    for name, place in _all(archive.root):
+        if place.is_symlink():
+            _check_link(name, place, checked)
+        elif not OURS.fullmatch(name) and files.TEMPORARY not in name:
+            if _is_key(place):
+                checked.wrong(
+                    SIGNATURE, place, "is a private key: whoever edits the archive could sign with it; move it out"
+                )
+            strangers.append(name)
+    if strangers:
+        more = f" and {len(strangers) - SHOWN} more" if len(strangers) > SHOWN else ""
+        checked.remarks.append(f"{', '.join(strangers[:SHOWN])}{more}: nothing of the archive put that there")
+
+
+def _all(root: Path) -> Iterator[tuple[str, Path]]:
+    """Files and links below a folder by name; folders that are links are not followed."""
+    for folder, below, names in os.walk(root):
+        for name in sorted((*names, *(one for one in below if (Path(folder) / one).is_symlink()))):
+            place = Path(folder) / name
+            yield place.relative_to(root).as_posix(), place
+
+
+def _check_link(name: str, place: Path, checked: Checked) -> None:
+    """A link is no file of the archive: what it leads to can be changed elsewhere. Whole top folders may lie on another disk."""
+    if "/" in name:
+        what = f"is a link to {os.readlink(place)}: put there what it leads to"  # noqa: PTH115 - as it was written
+        checked.wrong(FOREIGN, place, what)
+
+
+def _is_key(place: Path) -> bool:
+    try:
+        return place.stat().st_size <= KEY_BYTES and KEY_MARK in place.read_bytes()
+    except OSError:
+        return False

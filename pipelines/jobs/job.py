@@ -1,0 +1,248 @@
+"""A job: recipe, limits, lot and station together, and the names that follow from them."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from inertial.errors import InertialError
+from pipelines.archive.keys import digest
+from pipelines.jobs.model_files import read_model, refuse_unknown_effects, use_formulas
+from pipelines.jobs.recipes import MAIN_JOB, load_limits, load_recipe, lot_of, units_of
+from pipelines.schedule.planned_state import refuse_unidentified
+from pipelines.stages.grade import refuse_limits_without_figures
+from schemas.errors import RecipeInvalid, WrongUse
+from schemas.fault import parse_fault
+from schemas.limits import Limits
+from schemas.recipe import Lot, Recipe
+from schemas.station import StationConfig, load_station, with_faults
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from pipelines.archive import Archive, Run
+
+ANALYSIS_KEYS = {
+    "name",
+    "description",
+    "effects",
+    "formulas",
+    "limits",
+    "units",
+    "seed",
+    "zero_output",
+    "model_name",
+    "model_version",
+    "faults",  # they are the station's, which is in the capture's name
+}
+
+
+GUARDS = {"suspenders", "safety", "self_test"}
+"""Parts of a station that say when a capture pauses and how it ends: one that an operator has eased goes on where it was."""
+
+
+@dataclass(frozen=True)
+class Job:
+    """All that decides a run's result, except the code.
+
+    ``captured`` names the capture of a lot that was measured before, by a version that may have named captures otherwise.
+    ``parents`` are the runs whose measurements this one goes on with, on the same station from where it stands.
+    """
+
+    recipe: Recipe
+    limits: Limits
+    lot: Lot
+    station: StationConfig
+    captured: str = ""
+    parents: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        """Formulas of the model are effects wherever this job is worked on."""
+        use_formulas(self.recipe.formulas, f"recipe {self.recipe.name}")
+
+    @property
+    def capture_id(self) -> str:
+        """Name of the capture: the same for recipes that differ only in what is made of the data."""
+        if self.captured:
+            return self.captured
+        measured = self.recipe.model_dump(mode="json", exclude=ANALYSIS_KEYS)
+        if not measured["soaks"]:  # recipes without them keep the names that their captures had before there were any
+            del measured["soaks"]
+        unmoved = {"pace", "reference", *GUARDS}  # plan time, name standards, guard: they drive nothing
+        station = self.station.model_dump(mode="json", exclude=unmoved)
+        after = {"parents": list(self.parents)} if self.parents else {}
+        content = {"recipe": measured, "lot": self.lot.model_dump(), "station": station, **after}
+        return digest(content)[:16]
+
+    @property
+    def about(self) -> dict[str, Any]:
+        """What is kept beside the run for readers."""
+        return {
+            "recipe": self.recipe.model_dump(mode="json"),
+            "limits": self.limits.model_dump(mode="json"),
+            "lot": self.lot.model_dump(mode="json"),
+            "station": self.station.model_dump(mode="json"),
+            "capture": self.capture_id,
+            **({"parents": list(self.parents)} if self.parents else {}),
+        }
+
+
+@dataclass(frozen=True)
+class Request:
+    """What a command or a schedule asks for: plain values that a job is made from.
+
+    ``slots`` say where each of the ``units`` sits; slot by slot from 0 where there are none. ``faults`` are trouble for a
+    simulated station, written as on the command line.
+    """
+
+    recipe: str = MAIN_JOB
+    station: Path | None = None
+    units: tuple[str, ...] = ()
+    slots: tuple[int, ...] = ()
+    seed: int | None = None
+    repeat: int = 0
+    faults: tuple[str, ...] = ()
+
+    def parameters(self) -> dict[str, Any]:
+        """The request as JSON-able values."""
+        lists = {name: list(getattr(self, name)) for name in ("units", "slots", "faults")}
+        return {**asdict(self), "station": str(self.station) if self.station else None, **lists}
+
+    def fillings(self, slots: int) -> list[Request]:
+        """The request in portions that fit a fixture of so many slots; a slot map is one filling as it is."""
+        named = self.units or tuple(units_of(self.recipe))
+        if self.slots or len(named) <= slots:
+            return [self]
+        return [replace(self, units=units) for units in fillings(named, slots)]
+
+    def job(self, archive: Archive | None = None) -> Job:
+        """The job that is asked for, with everything refused that cannot work, before anything moves.
+
+        Parameters
+        ----------
+        archive : where the line's model is released, for recipes that ask for it; the default one where None
+        """
+        recipe = load_recipe(self.recipe, lambda device: self._line_model(archive, device))
+        limits = load_limits(recipe, Path(self.recipe).parent)
+        lot = lot_of(recipe, self.units, self.slots, seed=self.seed, repeat=self.repeat)
+        station = with_faults(load_station(self.station), [*recipe.faults, *map(parse_fault, self.faults)])
+        job = Job(recipe, limits, lot, station)
+        _refuse_more_units_than_slots(job)
+        _refuse_unknown_device(job)
+        _refuse_beyond_station(job)
+        _refuse_inconsistent(job)
+        return job
+
+    def _line_model(self, archive: Archive | None, device: str) -> dict[str, Any]:
+        from pipelines.archive import Archive as Store
+        from pipelines.jobs.releases import line_model
+
+        return line_model(archive or Store(), device, load_station(self.station).name)
+
+
+def job_of_run(run: Run, *, effects: Sequence[str] = (), model: Path | None = None, limits: str = "") -> Job:
+    """The job of an archived run, with another model or other limits where they are given."""
+    about = run.about
+    if not about.get("capture"):
+        message = (
+            f"run {run.id}: its data were imported, a captured run is needed; fit them with 'tumbleline rerun {run.id} "
+            "--effects a,b,c', or at import with --fit"
+        )
+        raise WrongUse(message)
+    if about.get("parents"):
+        message = (
+            f"run {run.id}: it measured what run {about['parents'][0]} lacked, and has too few poses for a model of its own; "
+            f"name run {about['parents'][0]}"
+        )
+        raise WrongUse(message)
+    recipe = Recipe.model_validate(about["recipe"])
+    if effects and model is not None:
+        message = "fit: --effects and --model are both given, one is needed; leave one out"
+        raise WrongUse(message)
+    if model is not None:
+        file = read_model(model)
+        effects, names = file.model.effects, {"model_name": file.model.name, "model_version": file.model.version}
+        recipe = recipe.model_copy(update={**names, "formulas": file.formula})
+    if effects:
+        use_formulas(recipe.formulas, f"run {run.id}")
+        refuse_unknown_effects(effects, "fit")
+        recipe = recipe.model_copy(update={"effects": list(effects)})
+    chosen = Limits.model_validate(about["limits"])
+    if limits:
+        recipe = recipe.model_copy(update={"limits": limits})
+        chosen = load_limits(recipe)
+    station = StationConfig.model_validate(about["station"])
+    job = Job(recipe, chosen, Lot.model_validate(about["lot"]), station, captured=about["capture"])
+    _refuse_inconsistent(job)
+    return job
+
+
+def _refuse_inconsistent(job: Job) -> None:
+    """Refuse a model that the plan cannot determine, and limits that neither can serve."""
+    refuse_limits_without_figures(job.limits, job.recipe)
+    try:
+        refuse_unidentified(job.recipe)
+    except InertialError as problem:
+        raise RecipeInvalid(str(problem), key="effects") from None
+
+
+def _refuse_more_units_than_slots(job: Job) -> None:
+    """Refuse a lot that does not fit the fixture: between two fillings somebody must seat units, so each is a lot of its own."""
+    serials, slots = [unit.serial for unit in job.lot.units], job.station.devices.slots.count
+    if len(serials) > slots:
+        found = fillings(serials, slots)
+        commands = ", then ".join(f"--units {','.join(own)}" for own in found)
+        message = (
+            f"lot: {len(serials)} units, the fixture has {slots} slots; measure {len(found)} lots, one after the other: "
+            f"{commands}"
+        )
+        raise WrongUse(message)
+    for unit in job.lot.units:
+        if unit.slot >= slots:
+            message = (
+                f"lot: unit {unit.serial} in slot {unit.slot}, the fixture of station {job.station.name} has slots 0 to "
+                f"{slots - 1}; correct the slot map"
+            )
+            raise WrongUse(message)
+
+
+def fillings(serials: Sequence[str], slots: int) -> list[tuple[str, ...]]:
+    """Serial numbers in portions that fit a fixture of so many slots."""
+    return [tuple(serials[start : start + slots]) for start in range(0, len(serials), slots)]
+
+
+def _refuse_unknown_device(job: Job) -> None:
+    """Refuse devices and faults that a simulated station does not know; on hardware the slots tell what they hold."""
+    if job.station.simulation is not None:
+        from stations.plant.faults.catalogue import trouble_of
+        from stations.plant.preset import load_preset  # a station of hardware has no plant
+
+        load_preset(job.lot.device, job.station.simulation.preset_overrides)
+        for fault in job.station.simulation.faults:
+            trouble_of(fault, [unit.serial for unit in job.lot.units])
+
+
+def _refuse_beyond_station(job: Job) -> None:
+    """Refuse temperatures, angles and rates that the station is not able to reach or not allowed to."""
+    recipe, limits = job.recipe, job.station.limits
+    low, high = limits.temperature_C
+    temperatures = [*recipe.temperatures_C, *([recipe.static_temperature_C] if recipe.static_record_s > 0.0 else [])]
+    _refuse_outside("temperatures_C", temperatures, (low, high), f"°C, the chamber of station {job.station.name}")
+    chosen = [*recipe.poses, *recipe.verification, recipe.static_pose]
+    where = f"°, the table of station {job.station.name}"
+    _refuse_outside("poses (outer)", [p.outer_deg for p in chosen], (limits.outer_deg[0], limits.outer_deg[1]), where)
+    _refuse_outside("poses (inner)", [p.inner_deg for p in chosen], (limits.inner_deg[0], limits.inner_deg[1]), where)
+    _refuse_outside("rate_hz", [recipe.rate_hz], (0.0, limits.rate_hz), f"Hz, the reader of station {job.station.name}")
+
+
+def _refuse_outside(key: str, values: Sequence[float], bounds: tuple[float, float], what: str) -> None:
+    low, high = bounds
+    outside = [value for value in values if not low <= value <= high]
+    if outside:
+        unit, owner = what.split(", ", 1)
+        message = (
+            f"recipe: key '{key}': {outside[0]:g} {unit}, {owner} reaches {low:g} to {high:g} {unit}; change the recipe, "
+            "or measure on another station"
+        )
+        raise RecipeInvalid(message, key=key.split(" ", 1)[0])

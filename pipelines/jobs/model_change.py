@@ -1,0 +1,82 @@
+"""What a re-run is to change: model, limits or nothing. Plain values, so that workers elsewhere are given the same."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from inertial.effects import add_file
+from pipelines.jobs.model_files import chosen_effects, read_model, use_formulas
+from pipelines.jobs.recipes import read_limits
+from schemas.limits import Limits
+from schemas.recipe import FormulaSpec
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+    from pathlib import Path
+
+
+@dataclass(frozen=True)
+class Wanted:
+    """The model and limits for a re-run; each as the run had it where it is None."""
+
+    effects: tuple[str, ...] | None = None
+    formulas: tuple[FormulaSpec, ...] = ()
+    model_name: str = ""
+    model_version: int = 0
+    limits: Limits | None = None
+    limits_name: str = ""
+    effect_files: tuple[str, ...] = ()
+
+    def of_model(self) -> dict[str, Any]:
+        """The keys of a recipe that say its model, as they are to be; none where the model stays."""
+        if self.effects is None:
+            return {}
+        return {
+            "effects": list(self.effects),
+            "formulas": list(self.formulas),
+            "model_name": self.model_name,
+            "model_version": self.model_version,
+        }
+
+    def use(self) -> None:
+        """Make the model's formulas, and effects of files outside the tree, effects of the catalogue of this process."""
+        for path in self.effect_files:
+            if path not in _added:
+                add_file(path)
+                _added.add(path)
+        use_formulas(self.formulas, f"model {self.model_name}")
+
+
+_added: set[str] = set()
+
+
+def wanted(
+    effects: str = "",
+    model: Path | None = None,
+    limits: str = "",
+    effect_files: Sequence[Path] | None = None,
+    *,
+    where: str = "rerun",
+) -> Wanted:
+    """What a command was given as effects, model file, limits and effects of its own.
+
+    Raises
+    ------
+    WrongUse, RecipeInvalid
+        Effects and a model are both given; an effect, the file or the limits are not known.
+    """
+    outside = tuple(str(path.resolve()) for path in effect_files or ())
+    Wanted(effect_files=outside).use()
+    names = chosen_effects(effects, model, where)
+    head: dict[str, Any] = {}
+    if model is not None:
+        file = read_model(model)
+        head = {
+            "formulas": tuple(file.formula),
+            "model_name": file.model.name,
+            "model_version": file.model.version,
+        }
+    chosen = read_limits(limits) if limits else None
+    own = None if names is None else tuple(names)
+    return Wanted(own, **head, limits=chosen, limits_name=limits, effect_files=outside)

@@ -1,0 +1,205 @@
+"""Recipes and limits by file or built-in name, with every name in them resolved and every pose checked.
+
+Nothing here touches a station: what cannot work is refused before anything moves.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from importlib.resources import files
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from pydantic import ValidationError
+
+from inertial import poses
+from inertial.frames import force_from_angles
+from pipelines.jobs.model_files import read_model, refuse_unknown_effects
+from schemas.errors import RecipeInvalid, WrongUse, close_matches, did_you_mean
+from schemas.limits import Limits, parse_limits, unknown_limits
+from schemas.recipe import Lot, Pose, Recipe, RecipeFile, Unit, explain, parse_recipe, read_text
+from schemas.units import AXES
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import NDArray
+
+MAIN_JOB = "production"
+SAME_POSE_DEG = 1.0
+LINE = "line"
+"""What a recipe says in place of a model file for the model that is released to the line."""
+LineModel = Callable[[str], dict[str, Any]]
+
+
+def load_recipe(name: str = MAIN_JOB, line: LineModel | None = None) -> Recipe:
+    """The recipe of a file, or the built-in one of this name, resolved and checked.
+
+    Parameters
+    ----------
+    line : the keys that say the line's model for a kind of device; refused where a recipe asks for it and it is None
+    """
+    text, source, folder = _recipe_text(name)
+    file = parse_recipe(text, source)
+    model = _model(file, folder, source, line)
+    fit_poses = _resolve(file.poses, "p", "poses", source)
+    verification = _resolve(file.verification, "v", "verification", source)
+    _refuse_flat_plan(fit_poses, file.span_min_g)
+    _refuse_coincidence(fit_poses, verification, source)
+    shared = file.model_dump(
+        exclude={"poses", "verification", "verification_repeats", "static_pose", "model", "effects"}
+    )
+    outer, inner = file.static_pose
+    try:
+        return Recipe(
+            **shared,
+            **model,
+            poses=fit_poses,
+            verification=verification * file.verification_repeats,
+            static_pose=Pose(name="static", outer_deg=outer, inner_deg=inner),
+        )
+    except ValidationError as problem:
+        raise explain(problem, source, RecipeFile) from None
+
+
+def units_of(name: str = MAIN_JOB) -> list[str]:
+    """The units that a recipe names, whatever its model is."""
+    text, source, _ = _recipe_text(name)
+    return parse_recipe(text, source).units
+
+
+def load_limits(recipe: Recipe, folder: Path | None = None) -> Limits:
+    """The limits that a recipe names: a file beside the recipe or anywhere, or built-in ones."""
+    return read_limits(recipe.limits, folder)
+
+
+def read_limits(name: str, folder: Path | None = None) -> Limits:
+    """The limits of a file in a folder or anywhere, or the built-in ones of this name."""
+    for path in ((folder or Path()) / name, Path(name)):
+        if path.is_file():
+            return parse_limits(read_text(path, "limits"), f"limits {path.name}")
+    built_in = files("schemas") / "samples" / f"limits-{name}.toml"
+    if not built_in.is_file():
+        raise unknown_limits(name, sample_names("limits-"))
+    return parse_limits(built_in.read_text(encoding="utf-8"), f"limits {name}")
+
+
+def lot_of(
+    recipe: Recipe, serials: Sequence[str], slots: Sequence[int] = (), *, seed: int | None = None, repeat: int = 0
+) -> Lot:
+    """The lot to measure: the serials given, or else the recipe's, each in its slot or one slot after the other."""
+    named = list(serials) or recipe.units
+    if not named:
+        message = "lot: no unit is named, at least one is needed; give serial numbers with --units, or in the recipe"
+        raise WrongUse(message)
+    bad = [s for s in named if not 0 < len(s) <= LONGEST_SERIAL or not set(s) <= _SERIAL or not s[0].isalnum()]
+    if bad:
+        needed = f"1 to {LONGEST_SERIAL} letters, digits and . _ + - are needed"
+        message = f"lot: serial {bad[0]!r} is not usable, {needed}; correct it"
+        raise WrongUse(message)
+    twice = sorted({serial for serial in named if named.count(serial) > 1})
+    if twice:
+        message = f"lot: serial {', '.join(twice)} is there twice, each may be there once; correct the list of units"
+        raise WrongUse(message)
+    units = [Unit(serial=serial, slot=slot) for serial, slot in zip(named, slots or range(len(named)), strict=True)]
+    return Lot(
+        units=units,
+        device=recipe.device,
+        seed=recipe.seed if seed is None else seed,
+        repeat=repeat,
+    )
+
+
+LONGEST_SERIAL = 64
+_SERIAL = frozenset("ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789._+-")
+
+
+def sample_names(prefix: str = "") -> list[str]:
+    """Names of the built-in recipes (no prefix) or limits (prefix ``limits-``)."""
+    stems = [item.name.removesuffix(".toml") for item in (files("schemas") / "samples").iterdir()]
+    if prefix:
+        return sorted(stem.removeprefix(prefix) for stem in stems if stem.startswith(prefix))
+    return sorted(stem for stem in stems if not stem.startswith("limits-"))
+
+
+def _recipe_text(name: str) -> tuple[str, str, Path]:
+    """Content, what to call it in messages, and the folder that names inside it are relative to."""
+    path = Path(name)
+    if path.is_file():
+        return read_text(path, "recipe"), f"recipe {path.name}", path.parent
+    built_in = files("schemas") / "samples" / f"{name}.toml"
+    if name in sample_names() and built_in.is_file():
+        return built_in.read_text(encoding="utf-8"), f"recipe {name}", Path()
+    message = f"recipe: no file and no built-in recipe is called '{name}'; {did_you_mean(name, sample_names())}"
+    raise RecipeInvalid(message, close=close_matches(name, sample_names()))
+
+
+def _model(file: RecipeFile, folder: Path, source: str, line: LineModel | None) -> dict[str, Any]:
+    """Effects, formulas, name and version of the model; name and version are empty for a list of effects."""
+    if file.model == LINE:
+        if line is None:
+            message = (
+                f"{source}: key 'model': '{LINE}' is the model that is released in an archive, which this command does not ask; "
+                "name a model file or effects"
+            )
+            raise RecipeInvalid(message, key="model")
+        return line(file.device)
+    if not file.model:
+        refuse_unknown_effects(file.effects, f"{source}: key 'effects'")
+        return {"effects": file.effects}
+    model = read_model(folder / file.model)
+    return {
+        "effects": model.model.effects,
+        "formulas": model.formula,
+        "model_name": model.model.name,
+        "model_version": model.model.version,
+    }
+
+
+def _resolve(given: str | Sequence[Sequence[float]], letter: str, key: str, source: str) -> list[Pose]:
+    if isinstance(given, str):
+        if given not in poses.NAMED:
+            known = list(poses.NAMED)
+            message = f"{source}: key '{key}': no plan is called '{given}'; {did_you_mean(given, known)}"
+            raise RecipeInvalid(message, key=key, close=close_matches(given, known))
+        given = poses.plan(given).tolist()
+    pairs = [(float(outer), float(inner)) for outer, inner in given]
+    width = len(str(len(pairs)))
+    return [
+        Pose(name=f"{letter}{number:0{width}d}", outer_deg=outer, inner_deg=inner)
+        for number, (outer, inner) in enumerate(pairs, start=1)
+    ]
+
+
+def directions(chosen: Sequence[Pose]) -> NDArray[np.float64]:
+    """Directions of gravity in the fixture, (n, 3), of some poses."""
+    angles = np.radians([(pose.outer_deg, pose.inner_deg) for pose in chosen])
+    return force_from_angles(angles[:, 0], angles[:, 1])
+
+
+def _refuse_flat_plan(chosen: Sequence[Pose], needed_g: float) -> None:
+    spans = np.ptp(directions(chosen), axis=0)
+    worst = int(np.argmin(spans))
+    if spans[worst] < needed_g:
+        axis = AXES[worst]
+        message = (
+            f"fit: poses span {spans[worst]:.2f} g on {axis}, the recipe needs {needed_g:g} g; "
+            f"add poses with {axis} up and {axis} down"
+        )
+        raise RecipeInvalid(message, key="poses")
+
+
+def _refuse_coincidence(fit: Sequence[Pose], verification: Sequence[Pose], source: str) -> None:
+    """Refuse verification in a direction that the fit has seen: it would verify nothing."""
+    if not verification:
+        return
+    cosines = np.clip(directions(verification) @ directions(fit).T, -1.0, 1.0)
+    apart = np.degrees(np.arccos(cosines))
+    row, column = divmod(int(np.argmin(apart)), apart.shape[1])
+    if apart[row, column] < SAME_POSE_DEG:
+        message = (
+            f"{source}: key 'verification': pose {verification[row].name} lies {apart[row, column]:.2f}° from pose "
+            f"{fit[column].name} of the fit, at least {SAME_POSE_DEG:g}° is needed; choose directions between the fit's"
+        )
+        raise RecipeInvalid(message, key="verification")

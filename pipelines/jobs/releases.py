@@ -1,0 +1,225 @@
+"""Which model is the line's, and from when: release records in the archive that are never changed, and the evidence for them.
+
+As with the reference files of an observatory every record says for what it holds and after which date it is to be used: the
+one for the same device and station comes before one for the same device, that before one for all; among equals the one with the
+latest date that has been reached, and of two with the same date the one that was written last.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from typing import TYPE_CHECKING, Any
+
+from pipelines.archive import files, hash_chain
+from pipelines.archive.keys import digest
+from pipelines.archive.locks import alone
+from pipelines.archive.provenance import provenance
+from pipelines.jobs.recipes import LINE
+from schemas.errors import RecipeInvalid, WrongUse
+from schemas.recipe import FormulaSpec
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from pipelines.archive import Archive
+    from pipelines.jobs.model_change import Wanted
+
+FOLDER, EVIDENCE = "releases", "whatif"
+SCHEMA = 1
+
+
+@dataclass(frozen=True)
+class Release:
+    """One record: a model, from when, for which device and station (all where empty), why, and on what evidence."""
+
+    number: int
+    effects: tuple[str, ...]
+    formulas: tuple[FormulaSpec, ...]
+    model_name: str
+    model_version: int
+    since: datetime
+    device: str
+    station: str
+    reason: str
+    evidence: str
+    forced: bool
+    who: str
+    when: str
+
+    def holds_for(self, device: str, station: str) -> bool:
+        """Whether the record is for this device and station."""
+        return _matches(self.device, device) and _matches(self.station, station)
+
+    @property
+    def rank(self) -> tuple[bool, bool, datetime, int]:
+        """By what one record comes before another."""
+        return bool(self.station), bool(self.device), self.since, self.number
+
+    def of_model(self) -> dict[str, Any]:
+        """The keys of a recipe that say the model."""
+        return {
+            "effects": list(self.effects),
+            "formulas": list(self.formulas),
+            "model_name": self.model_name,
+            "model_version": self.model_version,
+        }
+
+
+def _matches(wanted: str, found: str) -> bool:
+    return not wanted or wanted.lower() == found.lower()
+
+
+def model_digest(wanted: Wanted) -> str:
+    """Hash of what a model fits: its effects and formulas, not its name."""
+    formulas = [formula.model_dump(mode="json") for formula in wanted.formulas]
+    return digest({"effects": sorted(wanted.effects or ()), "formulas": formulas})
+
+
+def keep_evidence(archive: Archive, wanted: Wanted, document: Mapping[str, Any], runs: list[str]) -> str:
+    """The name under which a what-if is kept in the archive."""
+    model = model_digest(wanted)
+    content = {"schema": SCHEMA, "model": model, "runs": sorted(runs), **document}
+    name = f"{model[:10]}-{digest(content)[:10]}"
+    archive.prepare()
+    place = archive.root / EVIDENCE / f"{name}.json"
+    if not place.is_file():
+        files.publish(place, files.manifest_bytes({**provenance(), **content}))
+    return name
+
+
+def evidence_for(archive: Archive, wanted: Wanted, device: str, station: str) -> dict[str, Any] | None:
+    """The newest what-if of a model whose lots are of this device and station; None where there is none."""
+    model = model_digest(wanted)
+    found: list[dict[str, Any]] = []
+    for place in (archive.root / EVIDENCE).glob(f"{model[:10]}-*.json"):
+        content = files.read_json(place)
+        groups = content.get("groups", [])
+        if content.get("model") == model and any(
+            _matches(device, row["device"]) and _matches(station, row["station"]) for row in groups
+        ):
+            found.append({**content, "name": place.stem})
+    return max(found, key=lambda one: str(one["when"]), default=None)
+
+
+def release(
+    archive: Archive,
+    wanted: Wanted,
+    since: datetime,
+    *,
+    device: str = "",
+    station: str = "",
+    reason: str,
+    force: bool = False,
+) -> Release:
+    """The new record that makes a model the line's.
+
+    Raises
+    ------
+    WrongUse
+        There is no what-if of the model for this device and station, or it says that the model is no better, and the release is
+        not forced; or no reason is given.
+    """
+    if not reason.strip():
+        message = "release: no reason, one is needed; give --reason TEXT"
+        raise WrongUse(message)
+    evidence = evidence_for(archive, wanted, device, station)
+    if not force:
+        _refuse_without(evidence, wanted, device, station)
+    archive.prepare()
+    content: dict[str, Any] = {
+        "schema": SCHEMA,
+        "model": {**wanted.of_model(), "formulas": [one.model_dump(mode="json") for one in wanted.formulas]},
+        "from": since.isoformat(),
+        "device": device,
+        "station": station,
+        "reason": reason.strip(),
+        "evidence": evidence["name"] if evidence else "",
+        "forced": force,
+    }
+    return _read(archive, _published(archive, content))
+
+
+def _published(archive: Archive, content: dict[str, Any]) -> int:
+    """The number under which a record is written, and sealed in the archive's chain."""
+    with alone(archive.root / FOLDER, wait=True):
+        number = max((one.number for one in releases(archive)), default=0) + 1  # one may have been taken away
+        place = _place(archive, number)
+        files.publish_first(place, files.manifest_bytes({**provenance(), **content, "number": number}))
+        sealed = {f"{FOLDER}/{place.name}": files.sha256(place)}
+        hash_chain.append(archive.root, "release", sealed, {**provenance(), "release": number})
+    return number
+
+
+def _refuse_without(evidence: dict[str, Any] | None, wanted: Wanted, device: str, station: str) -> None:
+    where = "".join([f" of {device}" if device else "", f" on {station}" if station else ""])
+    name = wanted.model_name or "the model"
+    if evidence is None:
+        message = (
+            f"release: nothing in the archive shows what {name} makes of lots{where}, a what-if is needed; run "
+            "'tumbleline whatif', or give --force with a reason that says why not"
+        )
+        raise WrongUse(message)
+    if evidence["verdict"] != "better":
+        message = (
+            f"release: the what-if {evidence['name']} says {evidence['verdict']}: {evidence['words']}; a better model is needed; "
+            "change it, or give --force with a reason that says why it is released"
+        )
+        raise WrongUse(message)
+
+
+def releases(archive: Archive) -> list[Release]:
+    """Every record, the one written first first."""
+    numbers = sorted(int(place.stem) for place in (archive.root / FOLDER).glob("*.json") if place.stem.isdigit())
+    return [_read(archive, number) for number in numbers]
+
+
+def released(archive: Archive, device: str, station: str, when: datetime) -> Release | None:
+    """The record that says the line's model for a device and station at a time; None where none does yet."""
+    holding = [one for one in releases(archive) if one.holds_for(device, station) and one.since <= when]
+    return max(holding, key=lambda one: one.rank, default=None)
+
+
+def line_model(archive: Archive, device: str, station: str, when: datetime | None = None) -> dict[str, Any]:
+    """The keys of a recipe that say the line's model, now or at a time.
+
+    Raises
+    ------
+    RecipeInvalid
+        None is released for the device and station.
+    """
+    at = when or datetime.now(UTC)
+    found = released(archive, device, station, at)
+    if found is None:
+        there = releases(archive)
+        known = ", ".join(f"{one.device or 'every device'} from {one.since:%Y-%m-%d}" for one in there) or "none"
+        message = (
+            f"recipe: key 'model': '{LINE}' is asked for, and for {device} on {station} no model is released at {at:%Y-%m-%d} "
+            f"(released: {known}); release one with 'tumbleline release', or name effects in the recipe"
+        )
+        raise RecipeInvalid(message, key="model")
+    return found.of_model()
+
+
+def _place(archive: Archive, number: int) -> Any:
+    return archive.root / FOLDER / f"{number:06d}.json"
+
+
+def _read(archive: Archive, number: int) -> Release:
+    content = files.read_json(_place(archive, number))
+    model = content["model"]
+    return Release(
+        number=number,
+        effects=tuple(model["effects"]),
+        formulas=tuple(FormulaSpec.model_validate(one) for one in model["formulas"]),
+        model_name=model["model_name"],
+        model_version=model["model_version"],
+        since=datetime.fromisoformat(content["from"]),
+        device=content["device"],
+        station=content["station"],
+        reason=content["reason"],
+        evidence=content["evidence"],
+        forced=content["forced"],
+        who=content["who"],
+        when=content["when"],
+    )

@@ -1,0 +1,173 @@
+"""Gathering the graph: what an archive's manifests, captures and calibrations tell of runs."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from pipelines.archive import files
+from pipelines.archive.keys import digest
+from pipelines.archive.listing import SEALED
+from pipelines.archive.records import COMPLETE
+from pipelines.certificates.entries import folder_of
+from pipelines.certificates.ledger import Ledger
+from pipelines.lineage.graph import Graph, Node, Step
+
+if TYPE_CHECKING:
+    from pipelines.archive import Archive, Run
+    from pipelines.certificates.entries import Event
+    from pipelines.certificates.validity import Calibration
+
+MADE = ("who", "where", "when", "code", "key", "software", "libraries", "schema", "parameters", "taken_from")
+RAW = "records"
+
+
+class Gatherer:
+    """The graph of an archive's runs, as far as they were asked for."""
+
+    def __init__(self, archive: Archive) -> None:
+        self.archive, self.graph = archive, Graph()
+        self._runs: set[str] = set()
+        self._captures: dict[str, list[str]] = {}
+
+    def run(self, run: Run) -> None:
+        """Take in a run, its capture, and the runs that it goes back to."""
+        if run.id in self._runs:
+            return
+        self._runs.add(run.id)
+        about = run.about
+        settings = self._settings(about)
+        start = self.graph.add(Node(f"runs/{run.id}", "run", run.id, f"runs/{run.id}/run.json", about=_short(about)))
+        earlier = [str(one) for one in (about.get("rerun_of"), *about.get("parents", ())) if one]
+        earlier = [one for one in dict.fromkeys(earlier) if one != run.id]
+        raw = self._capture(str(about.get("capture") or ""), about, settings)
+        for name in earlier:
+            other = self._other(name)
+            if other is not None:
+                self.run(other)
+        self.graph.put(
+            Step(
+                id=f"start of {run.id}",
+                name="run again" if about.get("rerun_of") else "start",
+                used=(*settings, *(f"runs/{name}" for name in earlier if f"runs/{name}" in self.graph.nodes)),
+                made=(start,),
+                about={key: about[key] for key in (*MADE[:3], "because", "software", "libraries") if key in about},
+            )
+        )
+        self._tables(run, raw, start)
+
+    def calibrations(self, serial: str) -> list[str]:
+        """Take in a unit's certificates with the runs that they rest on; their ids."""
+        found: list[str] = []
+        for calibration in Ledger(self.archive).calibrations(serial):
+            run = self._other(calibration.run)
+            if run is not None:
+                self.run(run)
+            found.append(self._certificate(calibration))
+        return found
+
+    def certificates_of(self, run: Run) -> list[str]:
+        """Take in the certificates of a run's units; their ids."""
+        serials = [unit["serial"] for unit in run.about.get("lot", {}).get("units", [])]
+        return [
+            self._certificate(one)
+            for serial in serials
+            for one in Ledger(self.archive).calibrations(serial)
+            if one.run == run.id
+        ]
+
+    def _other(self, name: str) -> Run | None:
+        return self.archive.run(name) if name in self.archive.run_ids() else None
+
+    def _settings(self, about: dict[str, Any]) -> list[str]:
+        """Recipe, limits, station and its reference standards of a run, as things of their own."""
+        found: list[str] = []
+        for kind in ("recipe", "limits", "station"):
+            content = about.get(kind)
+            if isinstance(content, dict):
+                name = f"{kind}:{content.get('name', '')}@{digest(content)[:12]}"
+                found.append(self.graph.add(Node(name, kind, str(content.get("name", kind)), about=content)))
+        for standard in (about.get("station") or {}).get("reference", []):
+            name = f"reference:{standard['id']}@{digest(standard)[:12]}"
+            found.append(self.graph.add(Node(name, "reference", standard["id"], about=standard)))
+        return found
+
+    def _capture(self, capture: str, about: dict[str, Any], settings: list[str]) -> list[str]:
+        """The files of raw samples of a capture, and the step that measured them; their ids."""
+        if not capture or capture in self._captures:
+            return self._captures.get(capture, [])
+        top = self.archive.root / "captures" / capture
+        found: list[str] = []
+        for folder in sorted(top.iterdir(), key=lambda place: place.name) if top.is_dir() else []:
+            if not folder.name.isdigit() or not (folder / "record.json").is_file():
+                continue
+            content = files.read_json(folder / "record.json").get("content", {})
+            for name, value in sorted(content.items()):
+                place = f"captures/{capture}/{folder.name}/{name}"
+                kind = "samples" if name.startswith("samples") else "table"
+                found.append(self.graph.add(Node(place, kind, f"record {int(folder.name)} {name}", place, str(value))))
+        self._captures[capture] = found
+        step = {key: about[key] for key in ("who", "where", "when") if key in about} | {"capture": capture}
+        if (top / COMPLETE).is_file():
+            step["complete"] = files.sha256(top / COMPLETE)
+        self.graph.put(Step(f"capture {capture}", "capture", tuple(settings), tuple(found), step))
+        return found
+
+    def _tables(self, run: Run, raw: list[str], start: str) -> None:
+        """The tables of a run, stage by stage."""
+        manifests = {
+            place.stem: files.read_json(place)
+            for place in sorted(run.path.glob("*.json"), key=lambda one: one.name)
+            if place.name not in {"run.json", SEALED}
+        }
+        steps: dict[str, list[str]] = {}
+        for name, content in manifests.items():
+            ending = "report.html" if name == "report" else f"{name}.parquet"
+            place = f"runs/{run.id}/{ending}"
+            kind = "report" if name == "report" else "table"
+            about = {
+                "rows": content.get("rows"),
+                "schema": content.get("schema"),
+                "manifest": f"runs/{run.id}/{name}.json",
+            }
+            self.graph.add(Node(place, kind, name, place, str(content.get("sha256", "")), about))
+            steps.setdefault(f"{content.get('stage')} {content.get('key')} of {run.id}", []).append(name)
+        for step, names in steps.items():
+            content = manifests[names[0]]
+            used = [start]
+            for name, value in content.get("inputs", {}).items():
+                used += raw if name == RAW else [self._input(run, name, str(value), manifests)]
+            made = tuple(f"runs/{run.id}/{'report.html' if n == 'report' else f'{n}.parquet'}" for n in names)
+            about = {key: content[key] for key in MADE if key in content}
+            self.graph.put(Step(step, str(content.get("stage")), tuple(used), made, about))
+
+    def _input(self, run: Run, name: str, value: str, manifests: dict[str, Any]) -> str:
+        if name in manifests:
+            return f"runs/{run.id}/{name}.parquet"
+        source = run.about.get("source") or {}
+        label = str(source.get("path") or name)
+        return self.graph.add(Node(f"source:{value}", "source", label, sha256=value, about=dict(source)))
+
+    def _certificate(self, one: Calibration) -> str:
+        event = one.event
+        place = f"{folder_of(event.serial)}/{event.sequence:06d}.json"
+        name = self.graph.add(Node(place, "certificate", one.certificate, place, about=one.document()))
+        rests = tuple(f"runs/{event.run}/{table}.parquet" for table, _ in event.evidence)
+        used = tuple(node for node in (*rests, f"runs/{event.run}") if node in self.graph.nodes)
+        self.graph.put(Step(f"{event.action} {event.certificate}", event.action, used, (name,), _by(event)))
+        if one.ended_by is not None and one.ended_by.action == "revoke":
+            ended = one.ended_by
+            gone = f"{folder_of(ended.serial)}/{ended.sequence:06d}.json"
+            self.graph.add(
+                Node(gone, "revocation", f"revocation {ended.certificate}", gone, about={"reason": ended.reason})
+            )
+            self.graph.put(Step(f"revoke {ended.certificate}", "revoke", (name,), (gone,), _by(ended)))
+        return name
+
+
+def _by(event: Event) -> dict[str, Any]:
+    return {"who": event.who, "where": event.where, "when": event.when, "reason": event.reason}
+
+
+def _short(about: dict[str, Any]) -> dict[str, Any]:
+    """What a run tells of itself, without what has things of its own."""
+    return {key: value for key, value in about.items() if key not in {"recipe", "limits", "station", "signature"}}

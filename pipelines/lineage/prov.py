@@ -1,0 +1,126 @@
+"""A lineage as W3C PROV-O (Recommendation of 30 April 2013) in JSON-LD; the context is inside, nothing is fetched."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+from urllib.parse import quote
+
+if TYPE_CHECKING:
+    from pipelines.lineage.graph import Graph, Node, Step
+    from pipelines.lineage.targets import Lineage
+
+BASE = "urn:x-tumbleline:"
+SETTINGS = {"run", "recipe", "limits", "station", "reference"}  # used, but nothing is derived from them
+LINKS = (
+    "used", "wasGeneratedBy", "wasDerivedFrom", "wasRevisionOf", "wasAssociatedWith", "wasInvalidatedBy", "agent", "hadPlan",
+    "wasAttributedTo",
+)  # fmt: skip
+TIMES = ("endedAtTime", "generatedAtTime", "invalidatedAtTime")
+CONTEXT: dict[str, Any] = {
+    "prov": "http://www.w3.org/ns/prov#",
+    "rdfs": "http://www.w3.org/2000/01/rdf-schema#",
+    "xsd": "http://www.w3.org/2001/XMLSchema#",
+    "tl": f"{BASE}term/",
+    "label": "rdfs:label",
+    **{name: {"@id": f"prov:{name}", "@type": "@id"} for name in LINKS},
+    **{name: {"@id": f"prov:{name}", "@type": "xsd:dateTime"} for name in TIMES},
+    "qualifiedAssociation": "prov:qualifiedAssociation",
+}
+
+
+def prov_of(found: Lineage) -> dict[str, Any]:
+    """The document: entities, activities and agents of a lineage."""
+    graph = found.graph
+    agents: dict[str, dict[str, Any]] = {}
+    activities = [_activity(step, graph, agents) for step in graph.steps.values()]
+    entities = [_entity(node, graph) for node in graph.nodes.values()]
+    return {"@context": CONTEXT, "@graph": [*entities, *activities, *agents.values()]}
+
+
+def iri(kind: str, name: str) -> str:
+    """An identifier that every part of a document uses for the same thing."""
+    return f"{BASE}{kind}/{quote(name, safe='/:@._-~')}"
+
+
+def _entity(node: Node, graph: Graph) -> dict[str, Any]:
+    made = graph.made_by().get(node.id, [])
+    kinds = {"recipe": ["prov:Plan"], "limits": ["prov:Plan"]}.get(node.kind, [])
+    entity: dict[str, Any] = {
+        "@id": iri("thing", node.id),
+        "@type": ["prov:Entity", *kinds, f"tl:{node.kind.capitalize()}"],
+        "label": node.label,
+    }
+    if node.sha256:
+        entity["tl:sha256"] = node.sha256
+    if node.file:
+        entity["tl:file"] = node.file
+    entity |= {f"tl:{key}": str(value) for key, value in _told(node).items() if value not in {None, ""}}
+    if made:
+        entity["wasGeneratedBy"] = [iri("step", step.id) for step in made]
+        sources = [name for step in made for name in step.used]
+        entity["wasDerivedFrom"] = [iri("thing", n) for n in sources if graph.nodes[n].kind not in SETTINGS]
+        entity["wasRevisionOf"] = [iri("thing", n) for n in sources if graph.nodes[n].kind == node.kind == "run"]
+        if made[0].about.get("when"):
+            entity["generatedAtTime"] = made[0].about["when"]
+        if made[0].about.get("who"):
+            entity["wasAttributedTo"] = iri("agent", _person(made[0]))
+    for step in graph.used_by().get(node.id, []):
+        if step.name == "revoke":
+            entity["wasInvalidatedBy"], entity["invalidatedAtTime"] = iri("step", step.id), step.about["when"]
+    return {key: value for key, value in entity.items() if value != []}
+
+
+def _told(node: Node) -> dict[str, Any]:
+    """What is worth telling of a thing beyond its name, flat."""
+    keys = {
+        "certificate": ("serial", "device", "from", "until", "state", "grade", "station"),
+        "reference": ("what", "certificate", "laboratory", "due"),
+        "table": ("rows", "schema"),
+        "station": ("kind", "description"),
+        "revocation": ("reason",),
+    }
+    return {key: node.about.get(key) for key in keys.get(node.kind, ())}
+
+
+def _activity(step: Step, graph: Graph, agents: dict[str, dict[str, Any]]) -> dict[str, Any]:
+    activity: dict[str, Any] = {
+        "@id": iri("step", step.id),
+        "@type": "prov:Activity",
+        "label": step.name,
+        "used": [iri("thing", name) for name in step.used],
+    }
+    about = step.about
+    if about.get("when"):
+        activity["endedAtTime"] = about["when"]
+    activity |= {
+        f"tl:{key}": str(about[key]) for key in ("code", "key", "schema", "reason", "taken_from") if about.get(key)
+    }
+    activity |= {f"tl:library_{name}": number for name, number in sorted(about.get("libraries", {}).items())}
+    plans = [iri("thing", name) for name in step.used if graph.nodes[name].kind in {"recipe", "limits"}]
+    who = _agents(step, agents)
+    if who:
+        activity["wasAssociatedWith"] = who
+        activity["qualifiedAssociation"] = [
+            {"@type": "prov:Association", "agent": who[0], **({"hadPlan": plans} if plans else {})}
+        ]
+    return activity
+
+
+def _agents(step: Step, agents: dict[str, dict[str, Any]]) -> list[str]:
+    """The person and the program that did a step."""
+    found: list[str] = []
+    if step.about.get("who"):
+        name = iri("agent", _person(step))
+        agents[name] = {"@id": name, "@type": ["prov:Agent", "prov:Person"], "label": _person(step)}
+        found.append(name)
+    software = step.about.get("software", {})
+    if software:
+        label = " ".join(f"{key} {value}" for key, value in sorted(software.items(), reverse=True))
+        name = iri("agent", label)
+        agents[name] = {"@id": name, "@type": ["prov:Agent", "prov:SoftwareAgent"], "label": label}
+        found.append(name)
+    return found
+
+
+def _person(step: Step) -> str:
+    return f"{step.about['who']}@{step.about.get('where', '')}"

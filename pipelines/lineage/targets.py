@@ -1,0 +1,131 @@
+"""What a lineage is asked of: a unit, a run, or a file in the archive or copied out of it."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from pipelines.archive import files
+from pipelines.certificates.ledger import Ledger
+from pipelines.lineage.gather import Gatherer
+from schemas.errors import ArchiveUnusable, WrongUse, did_you_mean
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from pipelines.archive import Archive, Run
+    from pipelines.lineage.graph import Graph
+
+
+@dataclass(frozen=True)
+class Lineage:
+    """A graph, and what it was asked of.
+
+    Parameters
+    ----------
+    kind : ``unit``, ``run`` or ``file``.
+    focus : ids of the things that were asked for.
+    """
+
+    target: str
+    kind: str
+    focus: tuple[str, ...]
+    graph: Graph
+
+    def document(self) -> dict[str, Any]:
+        """The lineage for JSON."""
+        return {
+            "target": self.target,
+            "kind": self.kind,
+            "focus": list(self.focus),
+            "things": [asdict(node) for node in self.graph.nodes.values()],
+            "steps": [asdict(step) for step in self.graph.steps.values()],
+        }
+
+
+def lineage(archive: Archive, target: str) -> Lineage:
+    """Where a unit's certificates, a run or a file came from, and what came from them.
+
+    Parameters
+    ----------
+    target : a serial number, a run's name or its beginning, or a file.
+    """
+    if Path(target).is_file() or (archive.root / target).is_file():
+        return _of_file(archive, target)
+    if Ledger(archive).events(target):
+        gatherer = Gatherer(archive)
+        found = gatherer.calibrations(target)
+        return Lineage(target, "unit", tuple(found), gatherer.graph.around(found))
+    ids = archive.run_ids()
+    if target == "latest" or any(target and name.startswith(target) for name in ids):
+        return _of_run(archive, archive.run(target))
+    runs = [info.id for info in archive.runs() if target in info.units]
+    if runs:
+        gatherer = Gatherer(archive)
+        for name in runs:
+            gatherer.run(archive.run(name))
+        found = [name for name in gatherer.graph.nodes if name in {f"runs/{run}/grades.parquet" for run in runs}]
+        found = found or [f"runs/{run}" for run in runs]
+        return Lineage(target, "unit", tuple(found), gatherer.graph.around(found))
+    message = f"lineage: '{target}' is neither a unit, a run nor a file of archive {archive.root}; {did_you_mean(target, ids)}"
+    raise WrongUse(message if ids else f"archive {archive.root}: there is no run yet; make one with 'tumbleline run'")
+
+
+def _of_run(archive: Archive, run: Run) -> Lineage:
+    gatherer = Gatherer(archive)
+    gatherer.run(run)
+    gatherer.certificates_of(run)
+    for name in _runs_where(archive, lambda about: run.id in (about.get("rerun_of"), *about.get("parents", ()))):
+        gatherer.run(archive.run(name))
+    focus = [name for name in gatherer.graph.nodes if name.startswith(f"runs/{run.id}/")]
+    return Lineage(run.id, "run", tuple(focus or [f"runs/{run.id}"]), gatherer.graph.around([*focus, f"runs/{run.id}"]))
+
+
+def _of_file(archive: Archive, target: str) -> Lineage:
+    """A file by its place in the archive, else by what is in it."""
+    gatherer = Gatherer(archive)
+    place = _below(archive, target)
+    for name in _runs_of(archive, place):
+        run = archive.run(name)
+        gatherer.run(run)
+        gatherer.certificates_of(run)
+    focus = [node.id for node in gatherer.graph.nodes.values() if place in {node.file, node.about.get("manifest")}]
+    if not focus:
+        wanted = files.sha256(Path(target)) if Path(target).is_file() else files.sha256(archive.root / target)
+        for name in archive.run_ids():
+            gatherer.run(archive.run(name))
+            gatherer.certificates_of(archive.run(name))
+        focus = [node.id for node in gatherer.graph.nodes.values() if node.sha256 == wanted]
+    if not focus:
+        message = f"lineage: the content of {target} is of no table and no source of archive {archive.root}; name another file"
+        raise ArchiveUnusable(message)
+    return Lineage(target, "file", tuple(focus), gatherer.graph.around(focus))
+
+
+def _below(archive: Archive, target: str) -> str:
+    """The file's place below the archive's root; empty where it lies elsewhere."""
+    if not Path(target).is_file():
+        return target
+    if not isinstance(archive.root, Path):
+        return ""
+    path, root = Path(target).resolve(), archive.root.resolve()
+    return path.relative_to(root).as_posix() if path.is_relative_to(root) else ""
+
+
+def _runs_of(archive: Archive, place: str) -> list[str]:
+    """The runs that a file of the archive belongs to, or whose capture it does."""
+    parts = place.split("/")
+    if len(parts) < 3:
+        return []
+    if parts[0] == "runs":
+        return [parts[1]]
+    if parts[0] == "captures":
+        return _runs_where(archive, lambda about: about.get("capture") == parts[1])
+    if parts[0] == "calibrations":
+        return [str(files.read_json(archive.root / place).get("run"))]
+    return []
+
+
+def _runs_where(archive: Archive, wanted: Callable[[dict[str, Any]], bool]) -> list[str]:
+    return [name for name in archive.run_ids() if wanted(archive.run(name).about)]

@@ -1,0 +1,129 @@
+"""A lineage as a tree for people: every thing with the step that made it, and below what that step used."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from rich.text import Text
+from rich.tree import Tree
+
+if TYPE_CHECKING:
+    from pipelines.lineage.graph import Graph, Node, Step
+    from pipelines.lineage.targets import Lineage
+
+SHORT = 12
+ABOVE = "  ↑ see above"
+RESULTS = {"certificate", "revocation", "report", "run"}
+STYLES = {
+    "certificate": "bold green",
+    "revocation": "bold red",
+    "samples": "bold cyan",
+    "run": "bold",
+    "reference": "magenta",
+}
+
+
+def tree_of(found: Lineage) -> Tree:
+    """The tree: what the things asked for came from, and what came from them."""
+    top = Tree(Text(f"{found.kind} {found.target}", style="bold"))
+    drawer = _Drawer(found.graph)
+    came = top.add(Text("came from", style="dim")) if found.kind != "unit" else top
+    for name in _ends(found):
+        drawer.up(came, name)
+    results = sorted(name for name in found.graph.results(found.focus) if found.graph.nodes[name].kind in RESULTS)
+    if results:
+        went = top.add(Text("went into", style="dim"))
+        for name in results:
+            went.add(_thing(found.graph.nodes[name]))
+    return top
+
+
+def _ends(found: Lineage) -> list[str]:
+    """What was asked for, without what other things asked for were made from: those appear below them."""
+    used = found.graph.used_by()
+    asked = set(found.focus)
+    within = {n for n in found.focus for step in used.get(n, []) if asked & set(step.made)}
+    return [name for name in found.focus if name not in within] or list(found.focus)
+
+
+class _Drawer:
+    def __init__(self, graph: Graph) -> None:
+        self.graph, self.made = graph, graph.made_by()
+        self.shown: set[str] = set()
+        self.versions = ""
+
+    def up(self, branch: Tree, name: str) -> None:
+        """A thing, the step that made it, and what that used; each step in full once."""
+        steps = self.made.get(name, [])
+        if steps and all(step.id in self.shown for step in steps):
+            branch.add(_thing(self.graph.nodes[name]).append(ABOVE, style="dim"))
+            return
+        own = branch.add(_thing(self.graph.nodes[name]))
+        for step in steps:
+            self._step(own, step)
+
+    def _step(self, branch: Tree, step: Step) -> None:
+        """A step that was not shown yet, with what it used."""
+        if step.id not in self.shown:
+            self.shown.add(step.id)
+            self._used(branch.add(_step(step, self._versions(step))), step)
+
+    def _versions(self, step: Step) -> str:
+        """Versions of program and libraries; empty where they are those shown last."""
+        known = {**step.about.get("software", {}), **step.about.get("libraries", {})}
+        text = " ".join(f"{name} {number}" for name, number in known.items())
+        before, self.versions = self.versions, text or self.versions
+        return text if text != before else ""
+
+    def _used(self, branch: Tree, step: Step) -> None:
+        raw = [name for name in step.used if name.startswith("captures/")]
+        for name in step.used:
+            told = self.graph.nodes[name].kind == "run" and all(one.id in self.shown for one in self.made.get(name, []))
+            if name not in raw and not told:
+                self.up(branch, name)
+        if raw:
+            self._raw(branch, raw)
+
+    def _raw(self, branch: Tree, names: list[str]) -> None:
+        """The records of a capture in one line: there may be thousands."""
+        steps, first = self.made.get(names[0], []), self.graph.nodes[names[0]]
+        records = {name.split("/")[2] for name in names}
+        words = f"raw samples  {len(records)} records of capture {names[0].split('/')[1]}, {len(names)} files"
+        known = bool(steps) and all(step.id in self.shown for step in steps)
+        rest = ABOVE if known else f"  ({first.file} {first.sha256[:SHORT]} …)"
+        own = branch.add(Text(words, style=STYLES["samples"]).append(rest, style="dim"))
+        for step in steps:
+            self._step(own, step)
+
+
+def _thing(node: Node) -> Text:
+    text = Text(f"{node.kind} ", style="dim").append(node.label, style=STYLES.get(node.kind, ""))
+    return text.append(_details(node))
+
+
+def _details(node: Node) -> Text:
+    about = node.about
+    more = {
+        "certificate": lambda: f"  {about['state']}, {about['from']} until {about['until']}, grade {about['grade']}",
+        "revocation": lambda: f"  {about['reason']}",
+        "reference": lambda: f"  {about.get('what', '')} certificate {about['certificate']}, due {about['due']}",
+        "run": lambda: f"  {str(about.get('when', ''))[:19].replace('T', ' ')}",
+        "source": lambda: f"  {node.sha256[:SHORT]}",
+        "table": lambda: f"  {about.get('rows', '')} rows  {node.sha256[:SHORT]}",
+        "report": lambda: f"  {node.sha256[:SHORT]}",
+        "recipe": lambda: f"  model {', '.join(about.get('effects', []))}",
+        "station": lambda: f"  {about.get('kind', '')} {about.get('description', '')}",
+    }.get(node.kind, lambda: "")
+    return Text(more().rstrip(), style="dim")
+
+
+def _step(step: Step, versions: str) -> Text:
+    about = step.about
+    text = Text("by ", style="dim").append(step.name, style="italic")
+    parts = [str(about["when"])[:19].replace("T", " ")] if about.get("when") else []
+    parts += [f"{about.get('who', '')} on {about.get('where', '')}"] if about.get("who") else []
+    parts += [f"code {str(about['code'])[:SHORT]}"] if about.get("code") else []
+    parts += [versions]
+    parts += [str(about["reason"])] if about.get("reason") else []
+    parts += [f"taken from run {about['taken_from']}"] if about.get("taken_from") else []
+    return text.append("  " + ", ".join(part for part in parts if part), style="dim")

@@ -1,0 +1,169 @@
+"""One archived lot under the model it was run with and under another: outcomes and errors of every unit, nothing is written."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+from threadpoolctl import threadpool_limits
+
+from inertial.correction import correct
+from inertial.errors import InertialError
+from pipelines.archive import Archive, Run
+from pipelines.rerun.selection import entry_of
+from pipelines.rerun.steps import archived_job
+from pipelines.stages.fit import KINDS, fit
+from pipelines.stages.grade import Evidence, grade
+from pipelines.stages.verify import verify
+from pipelines.tables.calibration import Calibration, read_calibration
+from pipelines.tables.dwells import lot_arrays
+from pipelines.tables.frames import ByUnit
+from schemas.errors import DataRejected, TumblelineError
+from schemas.units import MICRO
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+    import pandas as pd
+
+    from pipelines.jobs.model_change import Wanted
+    from pipelines.rerun.partition import Part
+    from pipelines.rerun.selection import Entry
+
+Sums = dict[str, tuple[float, int]]
+"""Sum of squared errors, µg², and their number, by unit."""
+
+
+@dataclass(frozen=True)
+class Side:
+    """A lot under one model.
+
+    outcome, grade, reasons : by unit; fitted, verified : errors of the fit's dwells and of those not fitted
+    """
+
+    outcome: dict[str, str]
+    grade: dict[str, str]
+    reasons: dict[str, str]
+    fitted: Sums
+    verified: Sums
+    calibration: Calibration | None
+
+
+@dataclass(frozen=True)
+class Judged:
+    """A lot under the old and the new model; without sides where it could not be judged."""
+
+    entry: Entry
+    old: Side | None = None
+    new: Side | None = None
+    error: str = ""
+
+
+@dataclass(frozen=True)
+class FreshTask:
+    """A run whose dwells are fresh for calibrations of earlier runs: which units, under which old and new calibration."""
+
+    archive: str
+    run: str
+    wanted: Wanted
+    earlier: tuple[tuple[tuple[str, ...], Calibration | None, Calibration | None], ...]
+
+
+@dataclass(frozen=True)
+class Fresh:
+    """Errors on fresh dwells with the coefficients of an earlier run, unchanged, under either model."""
+
+    run: str
+    old: Sums = field(default_factory=dict[str, tuple[float, int]])
+    new: Sums = field(default_factory=dict[str, tuple[float, int]])
+
+
+def judged(part: Part) -> list[Judged]:
+    """Every run of a portion under both models; what cannot be judged says why."""
+    archive = Archive(part.archive)
+    part.wanted.use()
+    with threadpool_limits(1):
+        return [_judged(Run(archive, run_id), part.wanted) for run_id in part.runs]
+
+
+def _judged(run: Run, wanted: Wanted) -> Judged:
+    entry = entry_of(run.id, run.about)
+    try:
+        old, new = _both(run, wanted)
+    except (TumblelineError, InertialError) as problem:
+        return Judged(entry, error=str(problem))
+    return Judged(entry, old, new)
+
+
+def _both(run: Run, wanted: Wanted) -> tuple[Side, Side]:
+    if "grades" not in run.tables() or not run.about.get("capture"):
+        message = f"run {run.id}: it has no grades to compare with; run it again with limits first"
+        raise DataRejected(message)
+    job = archived_job(run, wanted)
+    names = ("verdicts", "grades", "coefficients", "covariance", "residuals", "verification", "noise")
+    old = {name: run.table(name) for name in names}
+    dwells, history = run.table("dwells"), run.table("history")
+    new = fit(dwells, history, job.recipe.effects)
+    new |= verify(dwells, history, new["coefficients"], new["covariance"], new["predictions"])
+    # the noise is in µg already, and the response by which it was made so hardly depends on the model
+    evidence = Evidence(
+        old["verdicts"],
+        *(new[name] for name in ("coefficients", "covariance", "residuals", "verification", "verification_poses")),
+        noise=old["noise"],
+    )
+    new |= grade(evidence, job.limits, job.recipe.zero_output)
+    return _side(old), _side(new)
+
+
+def _side(tables: Mapping[str, pd.DataFrame]) -> Side:
+    units, outcome, grades, reasons = (
+        tables["grades"][name].tolist() for name in ("unit", "outcome", "grade", "reasons")
+    )
+    coefficients = tables["coefficients"]
+    return Side(
+        outcome=dict(zip(units, outcome, strict=True)),
+        grade=dict(zip(units, grades, strict=True)),
+        reasons=dict(zip(units, reasons, strict=True)),
+        fitted=_sums(tables["residuals"], "residual_ug"),
+        verified=_sums(tables["verification"], "error_ug"),
+        calibration=read_calibration(coefficients, tables["covariance"]) if len(coefficients) else None,
+    )
+
+
+def _sums(table: pd.DataFrame, column: str) -> Sums:
+    rows = ByUnit(table)
+    errors = ((unit, rows.of(unit)[column]) for unit in rows.units)
+    return {unit: (float(np.sum(own**2)), len(own)) for unit, own in errors}
+
+
+def fresh(tasks: Sequence[FreshTask]) -> list[Fresh]:
+    """Errors on the fresh dwells of some runs."""
+    with threadpool_limits(1):
+        return [_fresh(task) for task in tasks]
+
+
+def _fresh(task: FreshTask) -> Fresh:
+    task.wanted.use()
+    run = Run(Archive(task.archive), task.run)
+    found = Fresh(task.run)
+    dwells, history = run.table("dwells"), run.table("history")
+    for units, old, new in task.earlier:
+        for calibration, sums in ((old, found.old), (new, found.new)):
+            if calibration is not None:
+                sums.update(applied(calibration, units, dwells, history))
+    return found
+
+
+def applied(calibration: Calibration, units: Sequence[str], dwells: pd.DataFrame, history: pd.DataFrame) -> Sums:
+    """Errors | |a| − g | of some units of a lot under coefficients that were found elsewhere, unchanged.
+
+    The norm needs no angle, so a unit that sits in another slot of another station is judged by it, too.
+    """
+    known = [unit for unit in units if unit in calibration.units]
+    lot = lot_arrays(dwells[dwells["unit"].isin(known)], history, KINDS)
+    order = [calibration.units.index(unit) for unit in lot.units]
+    state = replace(lot.state, memory={})
+    force = correct(calibration.effects, state, lot.output, calibration.coefficients[order], calibration.nonlinear)
+    error = MICRO * (np.linalg.norm(force, axis=-1) - np.linalg.norm(lot.state.force, axis=-1))
+    return {unit: (float(np.sum(own**2)), own.size) for unit, own in zip(lot.units, error, strict=True)}

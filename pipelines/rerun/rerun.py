@@ -1,0 +1,204 @@
+"""One run of the archive again: only the stages whose key changed, into a new run; the old one stays as it is."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass, field
+from functools import cache
+from typing import TYPE_CHECKING, Any
+
+from threadpoolctl import ThreadpoolController
+
+from pipelines.archive import Archive, Run, files, stage_key
+from pipelines.archive.locks import alone
+from pipelines.chain.chain import RECORDS
+from pipelines.rerun.buffered_run import Remembering
+from pipelines.rerun.steps import RAW, plan_of
+from schemas.errors import DataRejected
+
+if TYPE_CHECKING:
+    from pipelines.jobs.model_change import Wanted
+    from pipelines.rerun.steps import Plan, Step
+
+THERE, TAKEN, KEPT, COMPUTED = "there", "taken over", "kept", "computed"
+"""What became of a stage: in the new run already; from the old run, whose key is the same; from the old run, because the raw
+samples it reads are not in the archive; worked out."""
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What became of one run: its re-run, what had changed, and how every stage came about."""
+
+    run: str
+    new: str = ""
+    because: list[dict[str, str]] = field(default_factory=list)
+    stages: dict[str, str] = field(default_factory=dict)
+    seconds: float = 0.0
+    error: str = ""
+
+
+def again(archive: Archive, run_id: str, wanted: Wanted, *, report: bool = False) -> Outcome:
+    """Run an archived run again, going on where an interrupted re-run was.
+
+    Raises
+    ------
+    DataRejected
+        The run cannot be run again: its capture is not finished, or samples are needed that are not in the archive.
+    """
+    start = time.perf_counter()
+    wanted.use()
+    old = Run(archive, run_id)
+    plan = plan_of(old, wanted)
+    raw = raw_samples(old)
+    because = changes(old, plan, raw=raw)
+    new = Remembering(archive, _opened(archive, old, plan, because).id if because else old.id)
+    with _libraries().limit(limits=1), alone(new.path, wait=True):
+        files.sweep(new.path)
+        work = _Work(old, new, raw=raw)
+        try:
+            stages = {step.name: work.do(step) for step in plan.steps}
+        finally:
+            new.flush()  # an interrupted re-run goes on behind the last stage that was done
+        if report and new.about.get("capture"):
+            from pipelines.report import make_report  # plots are slow to import
+
+            stages["report"] = THERE if make_report(new) else COMPUTED
+        if COMPUTED in stages.values():
+            new.seal()
+    return Outcome(old.id, new.id, because, stages, time.perf_counter() - start)
+
+
+@cache
+def _libraries() -> ThreadpoolController:
+    """The libraries of this process that work in threads; to find them takes longer than a table."""
+    return ThreadpoolController()
+
+
+def raw_samples(run: Run) -> bool:
+    """Whether what was captured for a run is in the archive.
+
+    Raises
+    ------
+    DataRejected
+        It is, in part: its capture is not finished.
+    """
+    records = run.records
+    if records is None or records.is_complete():
+        return records is not None
+    if records.finished():
+        message = (
+            f"run {run.id}: its capture has {len(records.finished())} records and is not finished, all are needed; give its "
+            "'tumbleline run' again and it goes on"
+        )
+        raise DataRejected(message)
+    return False
+
+
+def changes(old: Run, plan: Plan, *, raw: bool) -> list[dict[str, str]]:
+    """What a re-run would do otherwise than the run did: by stage, ``code``, ``model``, ``limits`` or another parameter.
+
+    Parameters
+    ----------
+    raw : whether the raw samples are there; without them the stages that read them are kept as they are
+    """
+    found: list[dict[str, str]] = []
+    there = set(old.tables())
+    for step in plan.steps:
+        if (
+            not there.issuperset(step.outputs)
+            or step.name in {"capture", "import"}
+            or (step.name in RAW[:2] and not raw)
+        ):
+            continue
+        manifest = old.manifest(step.outputs[0])
+        if manifest.get("code") != step.code:
+            found.append({"stage": step.name, "what": "code", "from": str(manifest.get("code", "")), "to": step.code})
+        before = manifest.get("parameters", {})
+        found += [
+            {"stage": step.name, "what": SAID.get(key, key), "from": _said(before[key]), "to": _said(value)}
+            for key, value in step.parameters.items()
+            if key in before and before[key] != value
+        ]
+    whole = {name for step in plan.steps for name in step.outputs}
+    if there >= {"dwells"} and not whole <= there and not old.about.get("capture"):
+        found.append({"stage": "fit", "what": "not fitted yet", "from": "", "to": ""})
+    return found
+
+
+SAID = {"effects": "model", "formulas": "model", "lot": "lot", "limits": "limits"}
+
+
+def _said(value: Any) -> str:
+    """A parameter in short."""
+    if isinstance(value, dict):
+        return str(value.get("name", "")) or "…"
+    return (
+        ", ".join(str(item.get("id", "")) if isinstance(item, dict) else str(item) for item in value)
+        if isinstance(value, list)
+        else str(value)
+    )
+
+
+def _opened(archive: Archive, old: Run, plan: Plan, because: list[dict[str, str]]) -> Run:
+    about = old.about
+    told = {"rerun_of": old.id, "because": because, "measured": about.get("measured", about["when"])}
+    return archive.open_run(plan.name, {**plan.about, **told}, plan.decisive)
+
+
+class _Work:
+    """The stages of one run, each there, taken over or worked out."""
+
+    def __init__(self, old: Run, new: Run, *, raw: bool) -> None:
+        self.old, self.new, self.raw = old, new, raw
+        self._records = ""
+        self._before = set(old.tables())
+
+    def do(self, step: Step) -> str:
+        """What became of a stage; its outputs are in the new run now."""
+        if step.name == "import" or (step.name in {"capture", *RAW[:2]} and not self.raw):
+            return self._keep(step)
+        inputs = {name: self._hash(name) for name in step.inputs}
+        key = stage_key(step.name, inputs, step.parameters, step.code)
+        if self.new.has(step.outputs, key):
+            return THERE
+        if self.new.id != self.old.id and self.old.has(step.outputs, key):
+            self.new.adopt(self.old, step.outputs)
+            return TAKEN
+        self._refuse_without_samples(step)
+        about = {"inputs": inputs, "parameters": step.parameters, "code": step.code}
+        self.new.save(step.name, key, step.call(self.new), about)
+        return COMPUTED
+
+    def _keep(self, step: Step) -> str:
+        if not self._before.issuperset(step.outputs):
+            missing = ", ".join(name for name in step.outputs if name not in self._before)
+            message = (
+                f"run {self.old.id}: neither {missing} nor the raw samples are in the archive, one of the two is needed; "
+                "bring the capture's folder back"
+            )
+            raise DataRejected(message)
+        if self.new.id == self.old.id or set(self.new.tables()).issuperset(step.outputs):
+            return THERE
+        self.new.adopt(self.old, step.outputs)
+        return TAKEN if step.name in {"capture", "import"} else KEPT
+
+    def _hash(self, name: str) -> str:
+        if name != RECORDS:
+            return self.new.manifest(name)["sha256"]
+        if not self._records:  # a lot has a hundred records
+            records, before = self.old.records, {}
+            if not self.raw and "noise" in self._before:
+                before = self.old.manifest("noise").get("inputs", {})
+            self._records = before.get(RECORDS) or ("" if records is None else records.hash())
+        return self._records
+
+    def _refuse_without_samples(self, step: Step) -> None:
+        if step.name != "noise" or self.raw:
+            return
+        readings = self.new.table("readings")
+        if (readings["kind"] == "allan").any():
+            message = (
+                f"run {self.old.id}: its static record is not in the archive, the noise under other coefficients needs it; "
+                "bring the capture's folder back"
+            )
+            raise DataRejected(message)

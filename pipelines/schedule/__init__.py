@@ -1,0 +1,1 @@
+"""Schedule: the steps of a recipe and the time that they take."""

@@ -1,0 +1,104 @@
+"""What a recipe will make a lot go through, as a state of the science: for checks before any chamber time is spent."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from inertial.fits.linear import fit_lot
+from inertial.frames import force_from_angles
+from inertial.state import History, State
+from pipelines.schedule.steps import steps
+from pipelines.schedule.timing import itinerary, temperatures
+from pipelines.tables.dwells import HISTORY_POINTS
+from schemas.station import load_station
+from schemas.units import STANDARD_GRAVITY_M_S2
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import NDArray
+
+    from pipelines.schedule.timing import Stretch
+    from schemas.recipe import Recipe
+    from schemas.station import StationConfig
+
+    Array = NDArray[np.float64]
+
+NOMINAL_SUPPLY_V = 3.3
+SUPPLY_WANDER_V = 1e-3
+QUIET_G = 1e-3
+
+
+def planned_state(recipe: Recipe, station: StationConfig | None = None, *, history: bool = False) -> State:
+    """The dwells of the fit in order of measurement, at the times at which a station gets to them.
+
+    Quantities that the plan does not set (supply, vibration) wander a little, as they do on a station, so that effects
+    of theirs are not refused.
+
+    Parameters
+    ----------
+    station : the built-in simulated one where None
+    history : whether the temperatures between the dwells go along, as a station records them
+    """
+    config = station or load_station()
+    whole = itinerary(steps(recipe), config, recipe)
+    return state_of(whole, config, recipe, history=history)
+
+
+def state_of(stretches: Sequence[Stretch], station: StationConfig, recipe: Recipe, *, history: bool = False) -> State:
+    """The dwells of the fit among what a station does, see :func:`planned_state`."""
+    dwells = [s for s in stretches if s.kind == "dwell"]
+    outer, inner = np.radians([(s.step.pose.outer_deg, s.step.pose.inner_deg) for s in dwells]).T
+    time = np.array([s.start + 0.5 * s.seconds for s in dwells])
+    settled = np.array([s.step.settled for s in dwells])
+    chamber, unit = np.array(
+        [(0.5 * (s.begin.air + s.end.air), 0.5 * (s.begin.device + s.end.device)) for s in dwells]
+    ).T
+    chamber, unit = (
+        np.where(settled, [s.step.temperature for s in dwells], on_the_way) for on_the_way in (chamber, unit)
+    )
+    waits = np.array([recipe.settle_s if s.step.wait_s is None else s.step.wait_s for s in dwells])
+    wander = np.random.default_rng(0).normal(size=(2, time.size))
+    gravity = recipe.local_gravity_m_s2 / STANDARD_GRAVITY_M_S2
+    return State(
+        force=gravity * force_from_angles(outer, inner),
+        time=time,
+        temperature=unit,
+        chamber=chamber,
+        since_power=_since_power(stretches, time),
+        power_off=off if (off := np.array([s.step.off_s for s in dwells])).any() else None,
+        since_move=(waits + 0.5 * recipe.dwell_s) * (1.0 + 0.01 * wander[0]),
+        supply=NOMINAL_SUPPLY_V + SUPPLY_WANDER_V * wander[1],
+        vibration=QUIET_G * (1.0 + 0.1 * np.abs(wander[0])),
+        outer=outer,
+        inner=inner,
+        slot=np.zeros(()),
+        history=_history(stretches, station) if history else None,
+    )
+
+
+def _since_power(stretches: Sequence[Stretch], time: Array) -> Array:
+    """Seconds since the devices were last switched on, at some times: a move with the power off before it ends that pause."""
+    on = np.array([0.0, *(s.start + s.step.off_s for s in stretches if s.kind == "move" and s.step.off_s > 0.0)])
+    return time - on[np.searchsorted(on, time, side="right") - 1]
+
+
+def _history(stretches: Sequence[Stretch], station: StationConfig) -> History:
+    """Temperatures of a device between the dwells; at the dwells it is where the recipe wants it."""
+    time, _, device = np.array(temperatures(stretches, station)).T
+    grid = np.linspace(time[0], time[-1], min(HISTORY_POINTS, time.size))
+    return History(grid, np.interp(grid, time, device))
+
+
+def refuse_unidentified(recipe: Recipe) -> None:
+    """Refuse a model that the planned poses and temperatures cannot determine.
+
+    Raises
+    ------
+    NotIdentified
+        With the coefficients that cannot be told apart.
+    """
+    state = planned_state(recipe)
+    fit_lot(recipe.effects, state, state.force.copy())

@@ -1,0 +1,1 @@
+"""Tables: the reader of dwells, frames, samples and JSON values."""

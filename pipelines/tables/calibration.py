@@ -1,0 +1,246 @@
+"""A fitted calibration as tables, and back: what fit writes and verify, noise, grade and export read."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import groupby
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+import pandas as pd
+
+from inertial import design, effects
+from inertial.effects import SensorEffect, StationEffect
+from inertial.fits.linear import response_matrix
+from inertial.state import State
+from pipelines.tables.frames import picked
+from schemas.errors import DataRejected
+from schemas.units import AXES
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Mapping, Sequence
+
+    from numpy.typing import NDArray
+
+    from inertial.fits.linear import LotFit
+
+ALL_AXES = "*"
+PROBE_T_C = 31.0
+
+
+@dataclass(frozen=True)
+class Calibration:
+    """Coefficients of a lot.
+
+    coefficients : (units, 3, p), output unit per unit of the column; covariance : (units, 3, p, p)
+    nonlinear : values by effect id, one or one per axis; shared : (q,), parameters of the station
+    """
+
+    units: tuple[str, ...]
+    effects: tuple[str, ...]
+    coefficients: NDArray[np.float64]
+    covariance: NDArray[np.float64]
+    nonlinear: dict[str, dict[str, Any]]
+    shared: NDArray[np.float64]
+
+    @cached_property
+    def names(self) -> tuple[tuple[tuple[str, str], ...], ...]:
+        """Per axis, (effect id, coefficient) of the p columns."""
+        return column_names(self.effects)
+
+    @cached_property
+    def response(self) -> NDArray[np.float64]:
+        """The matrix K of each unit, (units, 3, 3), output per g."""
+        return response_matrix(self.coefficients, self.names)
+
+    def value(self, effect: str) -> NDArray[np.float64]:
+        """Coefficients of one effect, (units, 3, columns of the effect)."""
+        return np.stack([self.coefficients[:, axis, self._where(effect, axis)] for axis in range(3)], axis=1)
+
+    def standard_error(self, effect: str) -> NDArray[np.float64]:
+        """Standard errors of one effect's coefficients, (units, 3, columns of the effect)."""
+        errors = np.sqrt(np.diagonal(self.covariance, axis1=-2, axis2=-1))
+        return np.stack([errors[:, axis, self._where(effect, axis)] for axis in range(3)], axis=1)
+
+    def _where(self, effect: str, axis: int) -> list[int]:
+        return [column for column, (name, _) in enumerate(self.names[axis]) if name == effect]
+
+
+def column_names(model: Sequence[str]) -> tuple[tuple[tuple[str, str], ...], ...]:
+    """Per axis, (effect id, coefficient) of a model's columns."""
+    sensor, _ = design.split(model)
+    return tuple(design.local_names(sensor, axis) for axis in range(3))
+
+
+def coefficient_rows(
+    units: Sequence[str],
+    fit: LotFit,
+    covariance: NDArray[np.float64],
+    out_unit: str,
+    nonlinear_error: Mapping[str, Mapping[str, float]],
+) -> pd.DataFrame:
+    """The long table of coefficients: one row per unit, axis and coefficient; what all axes share has axis ``*``."""
+    errors = np.sqrt(np.diagonal(covariance, axis1=-2, axis2=-1))
+    common = _common_rows(fit, nonlinear_error)
+    texts = {effect.id: unit_texts(effect, out_unit) for effect in design.split(fit.effects)[0]}
+    own = [(letter, *row) for letter, names in zip(AXES, fit.names, strict=True) for row in _with_units(names, texts)]
+    axis, effect, name, text = zip(
+        *own, *((row.axis, row.effect, row.name, row.unit_text) for row in common), strict=True
+    )
+    u, k = (index.ravel() for index in np.indices((len(units), len(axis))))
+    return pd.DataFrame(
+        {
+            "unit": picked(units, u),
+            "axis": picked(axis, k),
+            "effect": picked(effect, k),
+            "name": picked(name, k),
+            "value": _beside(fit.coefficients, [row.value for row in common]),
+            "standard_error": _beside(errors, [row.standard_error for row in common]),
+            "unit_text": picked(text, k),
+        }
+    )
+
+
+class _Row(NamedTuple):
+    """A coefficient that all units share."""
+
+    axis: str
+    effect: str
+    name: str
+    value: float
+    standard_error: float
+    unit_text: str
+
+
+def _with_units(names: Sequence[tuple[str, str]], texts: Mapping[str, Sequence[str]]) -> Iterator[tuple[str, str, str]]:
+    """Effect, name and unit of every column of an axis."""
+    for effect, columns in groupby(names, key=lambda pair: pair[0]):
+        yield from ((effect, name, text) for (_, name), text in zip(columns, texts[effect], strict=True))
+
+
+def _beside(own: NDArray[np.float64], common: Sequence[float]) -> NDArray[np.float64]:
+    """Values of every unit, (units, 3, p), and behind them those that all share, in one row."""
+    flat = own.reshape(len(own), -1)
+    return np.concatenate([flat, np.broadcast_to(np.array(common), (len(own), len(common)))], axis=1).ravel()
+
+
+def _common_rows(fit: LotFit, nonlinear_error: Mapping[str, Mapping[str, float]]) -> list[_Row]:
+    """Parameters of the station, and nonlinear parameters and constants: one for all axes, or one each."""
+    errors = np.sqrt(np.diagonal(fit.shared_covariance)) if fit.shared.size else np.zeros(0)
+    rows = [
+        _Row(ALL_AXES, effect, name, float(fit.shared[q]), float(errors[q]), "rad")
+        for q, (effect, name) in enumerate(fit.shared_names)
+    ]
+    for effect, values in fit.nonlinear.items():
+        known = {parameter.name: parameter.unit for parameter in effects.get(effect).nonlinear}
+        for name, value in values.items():
+            error, text = nonlinear_error.get(effect, {}).get(name, 0.0), known.get(name, "")
+            by_axis = zip(AXES, value, strict=True) if isinstance(value, tuple) else ((ALL_AXES, value),)
+            rows += [_Row(axis, effect, name, float(one), float(error), text) for axis, one in by_axis]
+    return rows
+
+
+def covariance_rows(units: Sequence[str], covariance: NDArray[np.float64]) -> pd.DataFrame:
+    """The covariance (units, 3, p, p) as a long table of its lower triangles."""
+    p = covariance.shape[-1]
+    row, column = np.tril_indices(p)
+    u, a, k = np.meshgrid(np.arange(len(units)), np.arange(3), np.arange(row.size), indexing="ij")
+    return pd.DataFrame(
+        {
+            "unit": picked(units, u.ravel()),
+            "axis": picked(AXES, a.ravel()),
+            "row": row[k.ravel()],
+            "column": column[k.ravel()],
+            "value": covariance[:, :, row, column].ravel(),
+        }
+    )
+
+
+def read_calibration(coefficients: pd.DataFrame, covariance: pd.DataFrame) -> Calibration:
+    """The calibration that :func:`coefficient_rows` and :func:`covariance_rows` wrote."""
+    texts = {column: coefficients[column].to_numpy(dtype=object) for column in ("unit", "effect", "name")}
+    units, model = (tuple(dict.fromkeys(texts[column].tolist())) for column in ("unit", "effect"))
+    names = column_names(model)
+    p = len(names[0])
+    linear = {pair for axis in names for pair in axis}
+    pairs = zip(texts["effect"].tolist(), texts["name"].tolist(), strict=True)
+    is_linear = np.array([pair in linear for pair in pairs], dtype=bool)
+    own = coefficients["value"].to_numpy()[(coefficients["axis"].to_numpy(dtype=object) != ALL_AXES) & is_linear]
+    if len(own) != len(units) * 3 * p:
+        message = f"coefficients: {len(own)} rows, the model needs {len(units) * 3 * p}; run the fit again"
+        raise DataRejected(message)
+    matrix = np.zeros((len(units), 3, p, p))
+    row, column = np.tril_indices(p)
+    values = covariance["value"].to_numpy().reshape(len(units), 3, -1)
+    matrix[:, :, row, column] = values
+    matrix[:, :, column, row] = values
+    common = np.flatnonzero((texts["unit"] == units[0]) & ~is_linear)
+    shared, nonlinear = _read_shared(coefficients.iloc[common], model) if common.size else (np.zeros(0), {})
+    return Calibration(units, model, own.reshape(len(units), 3, p), matrix, nonlinear, shared)
+
+
+def _read_shared(common: pd.DataFrame, model: Sequence[str]) -> tuple[NDArray[np.float64], dict[str, dict[str, Any]]]:
+    """Parameters of the station, and nonlinear parameters: a tuple where they are one per axis."""
+    shared: list[float] = []
+    nonlinear: dict[str, dict[str, Any]] = {}
+    for name in model:
+        effect = effects.get(name)
+        station = effect.names() if isinstance(effect, StationEffect) else ()
+        for row in common[common["effect"] == name].itertuples():
+            value, own = float(row.value), nonlinear.setdefault(name, {})  # pyright: ignore[reportArgumentType]
+            if row.name in station:
+                shared.append(value)
+            else:
+                own[str(row.name)] = value if row.axis == ALL_AXES else (*own.get(str(row.name), ()), value)
+    return np.array(shared), {name: values for name, values in nonlinear.items() if values}
+
+
+def unit_texts(effect: SensorEffect, out_unit: str) -> list[str]:
+    """Units of an effect's coefficients, found by how its columns grow with force and with temperature.
+
+    A column that doubles with the force is per g, one that doubles with θ is per K, and so on; a column that grows in
+    neither way has the output's unit per unit of the column.
+    """
+    force = np.array([[0.31, 0.52, 0.79], [0.44, -0.67, 0.59]])
+    zeros = np.zeros(2)
+
+    def columns(factor_force: float, factor_theta: float) -> NDArray[np.float64]:
+        warm = np.full(2, 25.0 + factor_theta * (PROBE_T_C - 25.0))
+        state = State(
+            force=factor_force * force, time=zeros, temperature=warm, chamber=warm, since_power=zeros + 600.0,
+            since_move=zeros + 2.0, supply=zeros + 3.3, vibration=zeros + 0.01, outer=zeros, inner=zeros + 0.1,
+        )  # fmt: skip
+        values = design.starting_values([effect], state)
+        return effect.columns(state, 0, **values.get(effect.id, {}))
+
+    if effect.per:
+        return [_per(out_unit, below) for below in effect.per]
+    if effect.nonlinear or effect.id.startswith("covariate:"):
+        return [out_unit] * len(effect.names(0))
+    base, by_force, by_theta = columns(1.0, 1.0)[0], columns(2.0, 1.0)[0], columns(1.0, 2.0)[0]
+    return [
+        _unit_text(out_unit, _degree(base[c], by_force[c]), _degree(base[c], by_theta[c])) for c in range(base.size)
+    ]
+
+
+def _degree(base: float, doubled: float) -> int:
+    if base == 0.0 or doubled / base <= 0.0:
+        return 0
+    degree = np.log2(doubled / base)
+    return round(degree) if abs(degree - round(degree)) < 1e-6 else 0
+
+
+def _unit_text(out_unit: str, force: int, theta: int) -> str:
+    return _per(
+        out_unit, "·".join(name + _POWERS[degree] for name, degree in (("g", force), ("K", theta)) if degree > 0)
+    )
+
+
+def _per(out_unit: str, below: str) -> str:
+    if not below:
+        return out_unit
+    return f"{out_unit}/({below})" if "·" in below else f"{out_unit}/{below}"
+
+
+_POWERS = ("", "", "²", "³", "⁴", "⁵", "⁶")

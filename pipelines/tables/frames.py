@@ -1,0 +1,80 @@
+"""The rows of a table by unit, as arrays: every column is taken out of the table once, whatever the number of units."""
+
+from __future__ import annotations
+
+from functools import cache
+from itertools import pairwise
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pandas as pd
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import NDArray
+    from pandas.api.extensions import ExtensionArray
+
+
+class ByUnit:
+    """A table whose rows are asked for unit by unit."""
+
+    def __init__(self, table: pd.DataFrame) -> None:
+        self._table, self._columns = table, dict[str, "NDArray[Any]"]()
+        self._units = table["unit"].to_numpy(dtype=object)
+        turns = np.flatnonzero(self._units[1:] != self._units[:-1]) + 1
+        bounds = [0, *turns.tolist(), len(self._units)] if len(self._units) else [0]
+        self._places = {self._units[start]: slice(start, end) for start, end in pairwise(bounds)}
+        self._together = len(self._places) == len(bounds) - 1
+
+    @property
+    def units(self) -> list[str]:
+        """The units, in the order in which they come first."""
+        return list(self._places)
+
+    def column(self, name: str) -> NDArray[Any]:
+        """A column of the table, (rows,)."""
+        if name not in self._columns:
+            self._columns[name] = np.ascontiguousarray(self._table[name].to_numpy())  # a slice of it lies together
+        return self._columns[name]
+
+    def of(self, unit: str) -> UnitRows:
+        """The rows of a unit, in their order; none for a unit that is not there."""
+        if self._together:
+            return UnitRows(self, self._places.get(unit, slice(0, 0)))
+        return UnitRows(self, np.flatnonzero(self._units == unit))
+
+
+class UnitRows:
+    """The rows of one unit: ``rows[column]`` is an array (rows,)."""
+
+    def __init__(self, table: ByUnit, where: slice | NDArray[np.intp]) -> None:
+        self._table, self._where = table, where
+        self._count = where.stop - where.start if isinstance(where, slice) else len(where)
+
+    def __len__(self) -> int:
+        return self._count
+
+    def __getitem__(self, column: str) -> NDArray[Any]:
+        return self._table.column(column)[self._where]
+
+
+def picked(texts: Sequence[str], places: NDArray[np.intp]) -> ExtensionArray:
+    """The texts at some places, (rows,), as a column."""
+    return pd.array(np.asarray(texts, dtype=object), dtype="str").take(places)
+
+
+def empty_table(*, texts: str = "", numbers: str = "", whole: str = "", flags: str = "") -> pd.DataFrame:
+    """A table without rows whose columns, named in blank-separated lists, have the right types."""
+    return _made(texts, numbers, whole, flags).copy()
+
+
+@cache
+def _made(texts: str, numbers: str, whole: str, flags: str) -> pd.DataFrame:
+    kinds = {"str": texts, "float64": numbers, "int64": whole, "bool": flags}
+    return pd.DataFrame({name: pd.Series(dtype=kind) for kind, names in kinds.items() for name in names.split()})
+
+
+def rows_of(table: pd.DataFrame) -> list[dict[str, Any]]:
+    """One dictionary per row, by column name."""
+    return [{str(name): value for name, value in row.items()} for row in table.to_dict("records")]

@@ -1,6 +1,0 @@
-"""Lineage: from a certificate to the raw samples and back, with who, where, when, code, libraries, station and standards."""
-
-from pipelines.trace.lineage.graph import Graph, Node, Step
-from pipelines.trace.lineage.targets import Lineage, lineage
-
-__all__ = ["Graph", "Lineage", "Node", "Step", "lineage"]
