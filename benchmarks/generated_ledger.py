@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 from pipelines.archive import Archive, files
 from pipelines.certificates.days import months_after
-from pipelines.certificates.entries import Event
+from pipelines.certificates.entries import LedgerEntry
 from pipelines.certificates.ledger import Ledger
 
 if TYPE_CHECKING:
@@ -29,13 +29,13 @@ def write_ledger(folder: Path, calibrations: Iterable[tuple[str, str, str, str, 
     return Ledger(Archive(folder)).write_bulk(_events(known, hashes))
 
 
-def _events(calibrations: Iterable[tuple[str, str, str, str, str]], hashes: Mapping[str, str]) -> Iterator[Event]:
+def _events(calibrations: Iterable[tuple[str, str, str, str, str]], hashes: Mapping[str, str]) -> Iterator[LedgerEntry]:
     held: dict[str, tuple[int, str]] = {}
     for serial, device, run, station, day in calibrations:
         sequence, until = held.get(serial, (0, ""))
         ends = (sequence,) if day < until else ()
         held[serial] = (sequence + 1, months_after(day, VALID_MONTHS))
-        yield Event(
+        yield LedgerEntry(
             serial=serial, sequence=sequence + 1, action="supersede" if ends else "certify", device=device, run=run,
             start=day, until=held[serial][1], grade="consumer", station=station, recipe="line",
             coefficients=hashes[run], ends=ends, who="generator", where="generated",

@@ -169,7 +169,7 @@ def job_of(scene: Scene, seed: int, units: int) -> Any:
 def one(task: tuple[str, int, int, float]) -> Outcome:
     """One inquiry in an archive of its own."""
     from pipelines.archive import Archive
-    from pipelines.inquiry.loop import Table, Terms, play
+    from pipelines.inquiry.loop import Participants, Settings, play
 
     name, seed, units, share = task
     scene = next(s for s in SCENES if s.name == name)
@@ -177,8 +177,8 @@ def one(task: tuple[str, int, int, float]) -> Outcome:
     begin = time.perf_counter()
     with tempfile.TemporaryDirectory() as folder:
         job = job_of(scene, seed, units)
-        terms = Terms(job.recipe.effects, None if share <= 0.0 else share, scene.unseen)
-        document = play(job, Archive(folder), terms, Table(looked=looks.append, stage=quickly))
+        terms = Settings(job.recipe.effects, None if share <= 0.0 else share, scene.unseen)
+        document = play(job, Archive(folder), terms, Participants(looked=looks.append, stage=quickly))
     return outcome(scene, seed, looks, document, time.perf_counter() - begin)
 
 

@@ -29,8 +29,8 @@ from pipelines.jobs.model_files import STARTING_MODEL  # noqa: E402
 from pipelines.jobs.recipes import load_recipe  # noqa: E402
 from pipelines.planning.lower_bound import least  # noqa: E402
 from pipelines.planning.optimise import optimise  # noqa: E402
-from pipelines.planning.plan import Planned, identified, planned  # noqa: E402
-from pipelines.planning.requirement import Wish, between, candidates  # noqa: E402
+from pipelines.planning.plan import PlanContext, identified, plan_context  # noqa: E402
+from pipelines.planning.requirement import Requirement, between, candidates  # noqa: E402
 from pipelines.planning.textbook import seen_by, textbook  # noqa: E402
 from pipelines.schedule.timing import spent  # noqa: E402
 from schemas.errors import TumblelineError  # noqa: E402
@@ -56,16 +56,16 @@ class Course:
     rate: float
 
 
-def course_of(planned: Planned) -> Course:
+def course_of(plan_context: PlanContext) -> Course:
     """The dwells of the fit among what a station does."""
-    dwells = [s for s in planned.stretches if s.kind == "dwell"]
+    dwells = [s for s in plan_context.stretches if s.kind == "dwell"]
     return Course(
         outer=np.array([s.step.pose.outer_deg for s in dwells]),
         inner=np.array([s.step.pose.inner_deg for s in dwells]),
         heat=np.array([s.step.temperature for s in dwells]),
         start=np.array([s.start for s in dwells]),
-        duration=planned.recipe.dwell_s,
-        rate=planned.recipe.rate_hz,
+        duration=plan_context.recipe.dwell_s,
+        rate=plan_context.recipe.rate_hz,
     )
 
 
@@ -143,12 +143,12 @@ def compared(name: str, options: argparse.Namespace) -> None:
     )
     levels = tuple(float(part) for part in options.temperatures.split(","))
     station = load_station()
-    against = planned(textbook(base, levels), station, noise)
+    against = plan_context(textbook(base, levels), station, noise)
     wanted = identified(against).errors * options.factor
     if options.bias_factor != 1.0:
         wanted[:, 0] *= options.bias_factor
     begun = time.perf_counter()
-    wish = Wish(
+    wish = Requirement(
         wanted,
         seen_by(against, levels),
         (min(levels), max(levels)),
@@ -181,7 +181,7 @@ def compared(name: str, options: argparse.Namespace) -> None:
     table(names, before, after, best.expected.errors / identified(against).errors)
 
 
-def squared_errors(course: Planned, preset: Preset, options: argparse.Namespace) -> tuple[Names, Array]:
+def squared_errors(course: PlanContext, preset: Preset, options: argparse.Namespace) -> tuple[Names, Array]:
     """Names, and squared errors (units, 3, p) in g, of fits to what units measured that were drawn from the plant's physics."""
     truths = truths_of(preset, options.units, options.seed)
     state, mean, error = measured(course_of(course), preset, truths, options.seed)

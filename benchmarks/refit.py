@@ -30,10 +30,10 @@ import numpy as np  # noqa: E402
 
 from inertial.fits.linear import fit_lot  # noqa: E402
 from pipelines.archive import Archive, Run  # noqa: E402
-from pipelines.jobs.model_change import Wanted, wanted  # noqa: E402
+from pipelines.jobs.model_change import ModelChange, wanted  # noqa: E402
 from pipelines.parallel import map_partitions  # noqa: E402
 from pipelines.rerun.lot_comparison import judged  # noqa: E402
-from pipelines.rerun.partition import Part, parts, run_again  # noqa: E402
+from pipelines.rerun.partition import Batch, parts, run_again  # noqa: E402
 from pipelines.tables.dwells import lot_arrays  # noqa: E402
 
 PER_LOT = 10
@@ -45,7 +45,7 @@ EFFECTS = (
 )
 
 
-def bare(part: Part) -> int:
+def bare(part: Batch) -> int:
     """Read what a fit needs of every lot of a portion, and solve it once; how many units."""
     archive, units = Archive(part.archive), 0
     for run_id in part.runs:
@@ -102,7 +102,7 @@ def used() -> float:
     return own.ru_utime + own.ru_stime + children.ru_utime + children.ru_stime
 
 
-def timed(what: str, function: object, archive: Archive, change: Wanted, workers: int) -> tuple[float, float]:
+def timed(what: str, function: object, archive: Archive, change: ModelChange, workers: int) -> tuple[float, float]:
     """Seconds by the clock and of processor time for all runs; prints them."""
     runs = archive.run_ids()
     with Memory() as memory:
@@ -130,7 +130,7 @@ def measured(units: int, workers: int, folder: Path) -> None:
     subprocess.run(generate, check=True, stdout=subprocess.DEVNULL)
     archive, change = Archive(place), wanted(",".join(EFFECTS))
     print(f"{units} units in {units // PER_LOT} lots × 72 dwells of the fit, {workers} processes of one thread")
-    read, read_cpu = timed("reading and the bare solve", bare, archive, Wanted(), workers)
+    read, read_cpu = timed("reading and the bare solve", bare, archive, ModelChange(), workers)
     memory, memory_cpu = timed("re-fit and re-grade in memory", judged, archive, change, workers)
     whole, whole_cpu = timed("re-fit and re-grade, all written", run_again, archive, change, workers)
     for what, seconds, cpu in (("in memory", memory, memory_cpu), ("all written", whole, whole_cpu)):

@@ -21,7 +21,7 @@ Part = Literal["", "outer", "inner", "chamber", "reader"]
 SEPARATOR = ":"
 
 
-class Fault(BaseModel):
+class FaultOrder(BaseModel):
     """Something that goes wrong at ``at_s`` on the simulated station's clock, for ``for_s`` seconds or for good.
 
     ``serial`` names the unit that is meant, ``device`` one of the station's own; ``figures`` are the kind's own numbers.
@@ -37,7 +37,7 @@ class Fault(BaseModel):
     figures: dict[str, FiniteFloat] = Field(default_factory=dict[str, float])
 
     @model_validator(mode="after")
-    def _means_one(self) -> Fault:
+    def _means_one(self) -> FaultOrder:
         if self.serial and self.device:
             message = (
                 f"fault {self.kind}: serial '{self.serial}' and device '{self.device}', one of the two can be meant; "
@@ -52,7 +52,7 @@ class Fault(BaseModel):
         return math.inf if self.for_s is None else self.at_s + self.for_s
 
 
-def parse_fault(text: str) -> Fault:
+def parse_fault(text: str) -> FaultOrder:
     """The fault in ``kind[:key=value…]``: keys of a fault, or else figures of its kind.
 
     >>> parse_fault("silent:serial=U001:at_s=905").at_s
@@ -66,9 +66,9 @@ def parse_fault(text: str) -> Fault:
         if not equals or not key or not value:
             message = f"fault '{text}': found '{pair}', key=value is needed; write kind:key=value:key=value"
             raise WrongUse(message)
-        (given if key in Fault.model_fields and key != "figures" else figures)[key] = value
+        (given if key in FaultOrder.model_fields and key != "figures" else figures)[key] = value
     try:
-        return Fault.model_validate({**given, "figures": figures})
+        return FaultOrder.model_validate({**given, "figures": figures})
     except ValidationError as problem:
         message = f"fault '{text}': {_sentence(problem.errors(include_url=False)[0])}; write kind:key=value:key=value"
         raise WrongUse(message) from None

@@ -21,7 +21,7 @@ from pydantic import (
 )
 
 from schemas.errors import RecipeInvalid, close_matches, did_you_mean
-from schemas.fault import Fault
+from schemas.fault import FaultOrder
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -132,7 +132,7 @@ class _Measurement(Strict):
     limits: str = "consumer"
     units: list[str] = []
     seed: int = 0
-    faults: list[Fault] = []
+    faults: list[FaultOrder] = []
 
     @model_validator(mode="before")
     @classmethod

@@ -10,7 +10,7 @@ from pydantic import Field, FiniteFloat, ValidationError, model_validator
 
 from schemas.carrier import Carried
 from schemas.errors import RecipeInvalid, WrongUse
-from schemas.fault import Fault
+from schemas.fault import FaultOrder
 from schemas.recipe import Strict, explain, read_text
 from schemas.reference import Reference
 from schemas.safety import Safety, SelfTest, Suspenders
@@ -138,7 +138,7 @@ class Simulation(Strict):
     supply_spread: NotNegative = 1e-3
     preset_overrides: dict[str, FiniteFloat] = Field(default_factory=dict[str, float])
     hidden: list[Hidden] = Field(default_factory=list[Hidden])
-    faults: list[Fault] = Field(default_factory=list[Fault])
+    faults: list[FaultOrder] = Field(default_factory=list[FaultOrder])
 
 
 class StationConfig(Strict):
@@ -182,7 +182,7 @@ class StationConfig(Strict):
         return self
 
 
-def with_faults(config: StationConfig, faults: Sequence[Fault]) -> StationConfig:
+def with_faults(config: StationConfig, faults: Sequence[FaultOrder]) -> StationConfig:
     """The station with faults beyond its file's; a station of hardware has trouble enough of its own."""
     if not faults:
         return config

@@ -32,7 +32,7 @@ UP, DOWN = (0.0, 0.0), (180.0, 0.0)
 
 
 @dataclass(frozen=True)
-class Finding:
+class CheckResult:
     """One thing that was tested: what was found, what is allowed, whether it is good, and a sentence where it is not."""
 
     check: str
@@ -63,11 +63,11 @@ class Bench:
     station: Station
     rules: SelfTest
     history: list[Standard] = field(default_factory=list[Standard])
-    findings: list[Finding] = field(default_factory=list[Finding])
+    findings: list[CheckResult] = field(default_factory=list[CheckResult])
     standard: Standard | None = None
     elapsed: float = 0.0
 
-    def run(self) -> list[Finding]:
+    def run(self) -> list[CheckResult]:
         """Every finding, in the order of the test."""
         self._tested("instruments", "reader", self._instruments)
         if all(finding.ok for finding in self.findings if finding.check in {"door", "emergency stop"}):
@@ -84,7 +84,7 @@ class Bench:
         try:
             test()
         except StationError as problem:
-            self.findings.append(Finding(check, part, ok=False, message=str(problem)))
+            self.findings.append(CheckResult(check, part, ok=False, message=str(problem)))
 
     def _found(self, check: str, part: str, value: float, unit: str, bounds: tuple[float, float]) -> None:
         low, high = bounds
@@ -92,12 +92,12 @@ class Bench:
         measure = f" {unit}" if unit else ""
         needed = f"{low:.6g} to {high:.6g}" if math.isfinite(high) else f"at least {low:.6g}"
         text = "" if ok else f"{part}: {check} {value:.6g}{measure}, {needed}{measure} is needed"
-        self.findings.append(Finding(check, part, ok, value, unit, _finite(low), _finite(high), text))
+        self.findings.append(CheckResult(check, part, ok, value, unit, _finite(low), _finite(high), text))
 
     def _state(self, check: str, part: str, found: str, needed: str) -> None:
         ok = found == needed
         text = "" if ok else f"{part}: {check} is {found}, {needed} is needed"
-        self.findings.append(Finding(check, part, ok, found, message=text))
+        self.findings.append(CheckResult(check, part, ok, found, message=text))
 
     def _instruments(self) -> None:
         now, limits = self.station.reader.instruments(), self.station.config.suspenders
@@ -146,7 +146,7 @@ class Bench:
         if deviation.min() == 0.0:
             axis = "xyz"[int(np.argmin(deviation))]
             text = f"{part}: the output on {axis} stands still, a living one is needed; check wiring and power"
-            self.findings.append(Finding("noise", part, ok=False, value=0.0, unit=identity.out_unit, message=text))
+            self.findings.append(CheckResult("noise", part, ok=False, value=0.0, unit=identity.out_unit, message=text))
             return
         most = self.rules.noise_max or min(NOISIER * usual, WILD * identity.full_scale)
         self._found("noise", part, float(deviation.max()), identity.out_unit, (0.0, most))
@@ -159,7 +159,7 @@ class Bench:
         found = [number for number, slot in slots.items() if slot.identity().serial == self.rules.standard]
         if not found:
             text = f"slots: check standard {self.rules.standard} sits in none of them; seat it, or correct [self_test]"
-            self.findings.append(Finding("check standard", "slots", ok=False, message=text))
+            self.findings.append(CheckResult("check standard", "slots", ok=False, message=text))
             return
         means: list[float] = []
         for pose in (UP, DOWN):

@@ -90,10 +90,10 @@ def serve(
     from stations.opening import make_plant  # noqa: PLC0415
     from stations.plant.line_server import LineServer  # noqa: PLC0415
     from stations.plant.server import PlantServer  # noqa: PLC0415
-    from stations.plant.silence import Silence  # noqa: PLC0415
+    from stations.plant.silence import IdleStop  # noqa: PLC0415
 
     plant = make_plant(config, lot)
-    silence = Silence(plant, config.devices, silence_s)
+    silence = IdleStop(plant, config.devices, silence_s)
     with ExitStack() as stack:
         begin = _with_room_behind(host) if plant.speakers and port == 0 else port
         server = stack.enter_context(PlantServer(plant, host, begin))

@@ -2,11 +2,11 @@
 
 from dataclasses import replace
 
-from pipelines.certificates import Event
+from pipelines.certificates import LedgerEntry
 
 
-def event(serial: str = "A1", start: str = "2026-01-01", until: str = "2027-01-01", **more: object) -> Event:
-    blank = Event(
+def event(serial: str = "A1", start: str = "2026-01-01", until: str = "2027-01-01", **more: object) -> LedgerEntry:
+    blank = LedgerEntry(
         serial=serial, sequence=0, action="certify", device="ADXL355", run="r-1", start=start, until=until, grade="tactical",
         station="bench", recipe="small", coefficients="c", ends=(), who="", where="", when="", reason="", previous="",
     )  # fmt: skip

@@ -9,7 +9,7 @@ from scipy import stats
 
 from inertial.criticism.drivers import Driver
 from inertial.criticism.penalty import log_p_value
-from inertial.criticism.search import Field
+from inertial.criticism.search import Candidates
 from inertial.criticism.space import SEEN, Candidate, Space
 
 Array = NDArray[np.float64]
@@ -22,7 +22,7 @@ _NUMBERS = 10_000_000
 _CLEAR = np.log(1e-4)
 
 
-def adequacy(field: Field, drivers: list[Driver], space: Space, rng: Generator) -> float:
+def adequacy(field: Candidates, drivers: list[Driver], space: Space, rng: Generator) -> float:
     """Natural logarithm of the probability that an adequate model fits as badly somewhere, over all looks together.
 
     The look that fails most is compared with the most failing look of noise drawn from the fitted covariance; a failure far
@@ -42,7 +42,7 @@ def adequacy(field: Field, drivers: list[Driver], space: Space, rng: Generator) 
     return float(np.log(max(beyond, 0.5 / drawn.size)))
 
 
-def _everything(field: Field, drivers: list[Driver]) -> Iterator[Candidate]:
+def _everything(field: Candidates, drivers: list[Driver]) -> Iterator[Candidate]:
     yield from field.pieces()
     yield from (d.candidate for d in drivers)
 

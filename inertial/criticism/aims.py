@@ -13,7 +13,7 @@ from inertial.criticism.penalty import cost_of, freedom
 from inertial.criticism.problem import Lot, Problem
 from inertial.criticism.separation import Rivals, left_of, predictions, separations, smallest, widened
 from inertial.criticism.turn_on import with_turn_on
-from inertial.planning.sequences import Pace, Step
+from inertial.planning.sequences import SequenceStep, StationPace
 
 Array = NDArray[np.float64]
 
@@ -32,7 +32,7 @@ _SHOWN = 36.0
 """Chi-square, a coefficient, at which an effect of typical size counts as seen: six standard errors."""
 
 
-class Aim(Protocol):
+class Objective(Protocol):
     """What measurements are wanted for; ``least`` is the share of all that is wanted that a further course must bring."""
 
     least: float
@@ -47,20 +47,24 @@ class Aim(Protocol):
         """The effects that it is about."""
         ...
 
-    def worth(self, steps: Sequence[Step], pace: Pace) -> float:
+    def worth(self, steps: Sequence[SequenceStep], pace: StationPace) -> float:
         """Share, 0 … 1, of all that is wanted that is there after these steps."""
         ...
 
-    def picks(self, held: Sequence[Step], grid: Sequence[Step], pace: Pace, count: int) -> list[Step]:
+    def picks(
+        self, held: Sequence[SequenceStep], grid: Sequence[SequenceStep], pace: StationPace, count: int
+    ) -> list[SequenceStep]:
         """Steps of a grid, each the best beside those before it."""
         ...
 
-    def told(self, already: Sequence[Step], steps: Sequence[Step], pace: Pace) -> tuple[float, float, tuple[str, ...]]:
+    def effect_of_steps(
+        self, already: Sequence[SequenceStep], steps: Sequence[SequenceStep], pace: StationPace
+    ) -> tuple[float, float, tuple[str, ...]]:
         """What ``steps`` change, taken after ``already``: the figure before and after, and the ids that it is about."""
         ...
 
 
-class Parting:
+class RivalDiscrimination:
     """Rivals parted: of each truth, by how likely it is, every other one must leave enough, and none counts beyond need."""
 
     least = 0.03
@@ -81,14 +85,16 @@ class Parting:
         """The rivals."""
         return self.rivals.terms
 
-    def worth(self, steps: Sequence[Step], pace: Pace) -> float:
+    def worth(self, steps: Sequence[SequenceStep], pace: StationPace) -> float:
         """Share of the separations wanted that is there after these steps."""
         left = separations(self.rivals, steps, pace)
         off = ~np.eye(len(left), dtype=bool)
         share = np.minimum(left / self.needed, 1.0) * off
         return float(np.sum(self.weight[:, None] * share) / np.sum(self.weight[:, None] * off))
 
-    def picks(self, held: Sequence[Step], grid: Sequence[Step], pace: Pace, count: int) -> list[Step]:
+    def picks(
+        self, held: Sequence[SequenceStep], grid: Sequence[SequenceStep], pace: StationPace, count: int
+    ) -> list[SequenceStep]:
         """Steps at which the rivals differ most once those before are fitted."""
         rivals = self.rivals
         problem = widened(rivals, [*held, *grid], pace)
@@ -109,7 +115,9 @@ class Parting:
 
         return _greedy(grid, n, count, apart)
 
-    def told(self, already: Sequence[Step], steps: Sequence[Step], pace: Pace) -> tuple[float, float, tuple[str, ...]]:
+    def effect_of_steps(
+        self, already: Sequence[SequenceStep], steps: Sequence[SequenceStep], pace: StationPace
+    ) -> tuple[float, float, tuple[str, ...]]:
         """Chi-square between the best rival and its nearest, before and after; the best and the one it is parted from most."""
         before = smallest(separations(self.rivals, already, pace))
         after = smallest(separations(self.rivals, [*already, *steps], pace))
@@ -136,11 +144,11 @@ class Sighting:
         """A few units of what was measured."""
         return self.rivals.lot
 
-    def worth(self, steps: Sequence[Step], pace: Pace) -> float:
+    def worth(self, steps: Sequence[SequenceStep], pace: StationPace) -> float:
         """Mean share over the effects of the chi-square wanted."""
         return float(np.mean(np.minimum(self.shown(steps, pace) / _SHOWN, 1.0)))
 
-    def shown(self, steps: Sequence[Step], pace: Pace) -> Array:
+    def shown(self, steps: Sequence[SequenceStep], pace: StationPace) -> Array:
         """Chi-square a coefficient that each effect of typical size would leave, (effects,)."""
         rivals = self.rivals
         problem = widened(rivals, steps, pace) if steps else Problem(rivals.lot, steep=rivals.steep)
@@ -150,7 +158,9 @@ class Sighting:
         per_column = left * rivals.weight / rivals.variance / problem.blocks
         return np.array([float(np.mean(part)) for part in np.split(per_column, np.cumsum(sizes)[:-1])])
 
-    def picks(self, held: Sequence[Step], grid: Sequence[Step], pace: Pace, count: int) -> list[Step]:
+    def picks(
+        self, held: Sequence[SequenceStep], grid: Sequence[SequenceStep], pace: StationPace, count: int
+    ) -> list[SequenceStep]:
         """Steps at which what the model leaves of the effects is largest."""
         rivals = self.rivals
         problem = widened(rivals, [*held, *grid], pace)
@@ -166,7 +176,9 @@ class Sighting:
 
         return _greedy(grid, n, count, shown)
 
-    def told(self, already: Sequence[Step], steps: Sequence[Step], pace: Pace) -> tuple[float, float, tuple[str, ...]]:
+    def effect_of_steps(
+        self, already: Sequence[SequenceStep], steps: Sequence[SequenceStep], pace: StationPace
+    ) -> tuple[float, float, tuple[str, ...]]:
         """Chi-square a coefficient of the effect that shows least of those that will, before and after; those that will."""
         before, after = self.shown(already, pace), self.shown([*already, *steps], pace)
         will = after >= max(1.0, 0.5 * min(_SHOWN, float(np.max(after))))
@@ -189,10 +201,10 @@ def _typical(problem: Problem, terms: Sequence[Term]) -> tuple[Array, list[int]]
     return np.concatenate(found, axis=-1), [f.shape[-1] for f in found]
 
 
-def _greedy(grid: Sequence[Step], n: int, count: int, score: "Score") -> list[Step]:
+def _greedy(grid: Sequence[SequenceStep], n: int, count: int, score: "Score") -> list[SequenceStep]:
     """The steps of a grid that score best one after the other; ``n`` dwells before them are there already."""
     train = np.arange(n + len(grid)) < n
-    chosen: list[Step] = []
+    chosen: list[SequenceStep] = []
     for _ in range(min(count, len(grid))):
         apart = score(train)
         apart[train[n:]] = -1.0

@@ -7,7 +7,7 @@ import numpy as np
 from inertial.criticism.model import Model, Term
 from inertial.criticism.penalty import cost_in, freedom, log_p_value
 from inertial.criticism.refinement import refine
-from inertial.criticism.search import Field, size_of
+from inertial.criticism.search import Candidates, size_of
 from inertial.criticism.shared_noise import shared_factor
 from inertial.criticism.space import Space
 
@@ -55,7 +55,7 @@ class EffectClass:
         return min(self.members, key=lambda m: m.term.effect.simplicity).term
 
 
-def class_of(field: Field, model: Model, term: Term) -> EffectClass:
+def class_of(field: Candidates, model: Model, term: Term) -> EffectClass:
     """The class of one term of a model, all others held in it."""
     rest = model.without(term.effect.id)
     space = rest.at(model.share)
@@ -79,7 +79,7 @@ def class_of(field: Field, model: Model, term: Term) -> EffectClass:
     return EffectClass(tuple(members), log_p, size_of(rest, best_term))
 
 
-def _scores(field: Field, rest: Model, space: Space, variance: float) -> list[tuple[float, Term]]:
+def _scores(field: Candidates, rest: Model, space: Space, variance: float) -> list[tuple[float, Term]]:
     """Every candidate at its best grid value, whole and by its leading column."""
     leave = {t.effect.id for t in rest.terms}
     found: list[tuple[float, Term]] = []
@@ -96,11 +96,11 @@ def _scores(field: Field, rest: Model, space: Space, variance: float) -> list[tu
     return found
 
 
-def _score(field: Field, space: Space, variance: float, term: Term) -> float:
+def _score(field: Candidates, space: Space, variance: float, term: Term) -> float:
     gain = space.gain(term.candidate(field.problem))
     return _penalised(field, term, float(gain.drop[0]), int(gain.rank[0]), variance)
 
 
-def _penalised(field: Field, term: Term, drop: float, rank: int, variance: float) -> float:
+def _penalised(field: Candidates, term: Term, drop: float, rank: int, variance: float) -> float:
     """Penalised chi-square of a term beside the rest; the noise is the whole model's for every rival."""
     return -drop / variance + cost_in(field.problem, rank, freedom(term))

@@ -10,7 +10,7 @@ from numpy.random import Generator
 from inertial import effects as catalogue
 from inertial.criticism.adequacy import adequacy
 from inertial.criticism.classes import EffectClass, class_of
-from inertial.criticism.drivers import Driver, Place, drivers_of, places
+from inertial.criticism.drivers import Driver, Misfit, drivers_of, places
 from inertial.criticism.heldout import fit_rms, heldout_rms
 from inertial.criticism.model import Model, Term, refuse_without_freedom
 from inertial.criticism.penalty import PER_COEFFICIENT, cost_of_model, log_p_value
@@ -18,9 +18,9 @@ from inertial.criticism.problem import Lot, Problem
 from inertial.criticism.refinement import terms_of
 from inertial.criticism.search import (
     NAMED_BELOW,
-    Field,
-    Found,
+    Candidates,
     Rival,
+    SearchResult,
     anything,
     search,
 )
@@ -78,7 +78,7 @@ class Diagnosis:
     floor: float
     log_p: float
     adequate: bool
-    where: tuple[Place, ...]
+    where: tuple[Misfit, ...]
     named: tuple[Named, ...]
     unexplained: Unexplained | None
     unseen: tuple[str, ...]
@@ -113,7 +113,7 @@ def _examined(problem: Problem, effects: Sequence[str], rng: Generator) -> Diagn
     refuse_without_freedom(base)
     candidates = [e for e in catalogue.catalogue().values() if e.id not in set(effects)]
     covariates = [Covariate(name) for name in lot.state.covariates if f"{COVARIATE_PREFIX}{name}" not in set(effects)]
-    field = Field(problem, [*candidates, *covariates])
+    field = Candidates(problem, [*candidates, *covariates])
     drivers = drivers_of(problem)
     unseen = _unseen(field, base, candidates)
     log_p = adequacy(field, drivers, base.space, rng)
@@ -150,7 +150,7 @@ def _examined(problem: Problem, effects: Sequence[str], rng: Generator) -> Diagn
 class _Part:
     """As much of a lot as the search for effects needs: what all units of a large lot share shows in two dozen of them."""
 
-    field: Field
+    field: Candidates
     base: Model
 
     @cached_property
@@ -170,16 +170,16 @@ class _Part:
         return by_far or not anything(self.field, fit.model)
 
 
-def _part(field: Field, base: Model) -> _Part:
+def _part(field: Candidates, base: Model) -> _Part:
     lot = field.problem.lot
     if lot.state.time.shape[0] <= _MANY:
         return _Part(field, base)
     pick = np.linspace(0, lot.state.time.shape[0] - 1, _ENOUGH).round().astype(int)
     problem = Problem(lot.units(pick.tolist()), steep=field.problem.steep)
-    return _Part(Field(problem, field.effects), Model(problem, base.terms))
+    return _Part(Candidates(problem, field.effects), Model(problem, base.terms))
 
 
-def _unseen(field: Field, base: Model, candidates: Sequence[AnyEffect]) -> tuple[str, ...]:
+def _unseen(field: Candidates, base: Model, candidates: Sequence[AnyEffect]) -> tuple[str, ...]:
     """Effects whose columns the plan leaves empty, makes one with the model's, or does not carry the quantities for."""
     gains = field.gains(base.at(0.0), {t.effect.id for t in base.terms})
     blind = [name for name, gain in gains.items() if not gain.rank.any()]
@@ -187,7 +187,7 @@ def _unseen(field: Field, base: Model, candidates: Sequence[AnyEffect]) -> tuple
     return tuple(sorted({*blind, *field.lacking} & set(order), key=order.index))
 
 
-def _classes(field: Field, base: Model, final: Model) -> list[EffectClass]:
+def _classes(field: Candidates, base: Model, final: Model) -> list[EffectClass]:
     """A class for every effect that was found, the largest first."""
     held = {t.effect.id for t in base.terms}
     model, found = final, []
@@ -221,7 +221,7 @@ def _covariate(classes: Sequence[EffectClass]) -> Unexplained | None:
     return None
 
 
-def _beyond(part: "_Part", base: Model, found: Found, drivers: list[Driver]) -> tuple[Model, Unexplained | None]:
+def _beyond(part: "_Part", base: Model, found: SearchResult, drivers: list[Driver]) -> tuple[Model, Unexplained | None]:
     """The effects that stand, and the driver that is left: effects that only imitate a curve of one driver are taken back."""
     instead = better_curve(part.base, found.added, part.suspected) if found.added else None
     if instead is not None:

@@ -34,7 +34,7 @@ class Driver:
 
 
 @dataclass(frozen=True)
-class Place:
+class Misfit:
     """Where the model fails: a driver, the axes it shows on, the share of the excess it explains."""
 
     driver: str
@@ -139,7 +139,7 @@ def _by_axis(problem: Problem, values: Array) -> Candidate:
     return Candidate(problem.basis.rotate(column)[:, :, None, :], shared=False)
 
 
-def places(problem: Problem, drivers: list[Driver], space: Space, floor_variance: float) -> list[Place]:
+def places(problem: Problem, drivers: list[Driver], space: Space, floor_variance: float) -> list[Misfit]:
     """Where the residuals of a space lie, most telling first.
 
     Parameters
@@ -147,14 +147,14 @@ def places(problem: Problem, drivers: list[Driver], space: Space, floor_variance
     floor_variance : what the variance would be if nothing were missing, in the space's own unit
     """
     excess = max(space.rss - space.dof * floor_variance, 1e-12)
-    found: list[Place] = []
+    found: list[Misfit] = []
     for driver in drivers:
         gain = space.gain(driver.candidate)
         drop, rank = float(gain.drop[0]), int(gain.rank[0])
         if rank:
             share = float(np.clip((drop - rank * floor_variance) / excess, 0.0, 1.0))
             axes = _axes(problem, gain.by_block[:, 0], rank, floor_variance)
-            found.append(Place(driver.name, axes, share, log_p_value(space, drop, rank), rank, drop))
+            found.append(Misfit(driver.name, axes, share, log_p_value(space, drop, rank), rank, drop))
     return sorted(found, key=lambda p: (max(p.log_p, _CERTAIN), -p.share))
 
 

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inertial import frames, poses
-from inertial.planning.sequences import Pace, Step, n_of, standing
+from inertial.planning.sequences import SequenceStep, StationPace, n_of, standing
 from inertial.state import T_REFERENCE, State
 
 Array = NDArray[np.float64]
@@ -42,7 +42,7 @@ class Reach:
     settle: float = 2.0
     power: bool = False
 
-    def allows(self, step: Step) -> bool:
+    def allows(self, step: SequenceStep) -> bool:
         """Whether a step lies within the bounds."""
         inside = self.outer[0] <= step.outer <= self.outer[1] and self.inner[0] <= step.inner <= self.inner[1]
         if self.temperature is None:
@@ -52,15 +52,15 @@ class Reach:
 
 
 @dataclass(frozen=True)
-class Course:
+class StepSequence:
     """A sequence of steps that is offered as a whole."""
 
     kind: Kind
-    steps: tuple[Step, ...]
+    steps: tuple[SequenceStep, ...]
 
-    def times(self, repeats: int) -> "Course":
+    def times(self, repeats: int) -> "StepSequence":
         """The same so many times in a row."""
-        return Course(self.kind, self.steps * repeats)
+        return StepSequence(self.kind, self.steps * repeats)
 
 
 def reach_of(state: State) -> Reach:
@@ -73,7 +73,7 @@ def reach_of(state: State) -> Reach:
     )
 
 
-def pose_grid(reach: Reach, temperature: float) -> list[Step]:
+def pose_grid(reach: Reach, temperature: float) -> list[SequenceStep]:
     """Directions that answer to any curve of the force: a lattice, edges and corners, rings near 0.24, 0.5 and 0.75 g.
 
     A direction of the force can be reached by two attitudes of the table; both are there: errors of the table differ.
@@ -82,7 +82,7 @@ def pose_grid(reach: Reach, temperature: float) -> list[Step]:
     named = [poses.plan(name) for name in ("twenty_six", "orthogonal24")]
     angles = np.radians(np.concatenate([poses.fibonacci(48), *named, *rings]))
     other = np.stack([-angles[:, 0], np.where(angles[:, 1] > 0.0, angles[:, 1] - np.pi, angles[:, 1] + np.pi)], axis=1)
-    found = [Step(float(o), float(i), temperature, reach.settle) for o, i in np.concatenate([angles, other])]
+    found = [SequenceStep(float(o), float(i), temperature, reach.settle) for o, i in np.concatenate([angles, other])]
     return [s for s in found if reach.allows(s)]
 
 
@@ -107,7 +107,7 @@ def temperatures(here: float, reach: Reach) -> list[float]:
     return [t for t in (high, low, 0.5 * (low + high)) if abs(t - here) > 2.0]
 
 
-def present(state: State, pace: Pace) -> float:
+def present(state: State, pace: StationPace) -> float:
     """Temperature at which the chamber stands, °C."""
     there = pace.start or standing(state)
     if there is not None:
@@ -115,7 +115,7 @@ def present(state: State, pace: Pace) -> float:
     return T_REFERENCE if state.temperature is None else round(float(np.mean(state.temperature[..., -1])), 1)
 
 
-def courses(state: State, reach: Reach, best: Sequence[Step], here: float) -> list[Course]:
+def courses(state: State, reach: Reach, best: Sequence[SequenceStep], here: float) -> list[StepSequence]:
     """Sequences that do not come from picking poses one by one.
 
     Parameters
@@ -135,70 +135,70 @@ def courses(state: State, reach: Reach, best: Sequence[Step], here: float) -> li
     return [c for c in found if c.steps and all(reach.allows(s) for s in c.steps)]
 
 
-def _spread(best: Sequence[Step], reach: Reach, here: float) -> list[Step]:
+def _spread(best: Sequence[SequenceStep], reach: Reach, here: float) -> list[SequenceStep]:
     """Two opposed faces, and the two best poses."""
-    faces = [Step(0.0, 0.0, here, reach.settle), Step(np.pi, 0.0, here, reach.settle)]
+    faces = [SequenceStep(0.0, 0.0, here, reach.settle), SequenceStep(np.pi, 0.0, here, reach.settle)]
     return [*faces, *(replace(s, temperature=here) for s in best[:2])]
 
 
-def _waits(here: float) -> list[Course]:
+def _waits(here: float) -> list[StepSequence]:
     """Opposed poses in turn, with longer and longer waits after the move."""
     pairs = (
         ((0.0, 0.0), (np.pi, 0.0)),
         ((0.5 * np.pi, 0.0), (-0.5 * np.pi, 0.0)),
         ((0.5 * np.pi, 0.5 * np.pi), (0.5 * np.pi, -0.5 * np.pi)),
     )
-    found: list[Course] = []
+    found: list[StepSequence] = []
     for waits in ((0.0, 20.0, 60.0), (0.0, 10.0, 30.0, 100.0, 300.0), (0.0, 0.0, 0.0, 120.0), (0.0, 600.0)):
-        steps = [Step(o, i, here, w) for w in waits for pair in pairs for o, i in pair]
-        found.append(Course("waits", tuple(steps)))
-        short = [Step(o, i, here, w) for w in waits for o, i in pairs[0]]
-        found.append(Course("waits", tuple(short)))
+        steps = [SequenceStep(o, i, here, w) for w in waits for pair in pairs for o, i in pair]
+        found.append(StepSequence("waits", tuple(steps)))
+        short = [SequenceStep(o, i, here, w) for w in waits for o, i in pairs[0]]
+        found.append(StepSequence("waits", tuple(short)))
     stay = [0.0, *[0.0] * 7]
-    dwell_on = [Step(o, i, here, w) for pair in pairs for o, i in pair for w in stay]
-    found.append(Course("waits", tuple(dwell_on)))  # dwell after dwell at one pose: all of the settling is seen
+    dwell_on = [SequenceStep(o, i, here, w) for pair in pairs for o, i in pair for w in stay]
+    found.append(StepSequence("waits", tuple(dwell_on)))  # dwell after dwell at one pose: all of the settling is seen
     return found
 
 
-def _approaches(state: State, reach: Reach, here: float, chosen: Sequence[Step]) -> list[Course]:
+def _approaches(state: State, reach: Reach, here: float, chosen: Sequence[SequenceStep]) -> list[StepSequence]:
     """Poses reached from both sides of each axis; the poses of the run in the opposite order."""
-    found: list[Course] = []
+    found: list[StepSequence] = []
     for count in (2, 4):
-        steps: list[Step] = []
+        steps: list[SequenceStep] = []
         for pose in chosen[:count]:
             for outer, inner in ((_DETOUR, 0.0), (-_DETOUR, 0.0), (0.0, _DETOUR), (0.0, -_DETOUR)):
                 steps += [replace(pose, outer=pose.outer + outer, inner=pose.inner + inner), pose]
-        found.append(Course("approach", tuple(steps)))
+        found.append(StepSequence("approach", tuple(steps)))
     if state.outer is not None and state.inner is not None:
         last = range(n_of(state) - 2, max(n_of(state) - 26, -1), -1)
         outer, inner = np.atleast_2d(state.outer)[0], np.atleast_2d(state.inner)[0]
-        back = [Step(float(outer[k]), float(inner[k]), here, reach.settle) for k in last]
-        found += [Course("approach", tuple(back[:12])), Course("approach", tuple(back))]
+        back = [SequenceStep(float(outer[k]), float(inner[k]), here, reach.settle) for k in last]
+        found += [StepSequence("approach", tuple(back[:12])), StepSequence("approach", tuple(back))]
     return found
 
 
-def _laters(chosen: Sequence[Step]) -> list[Course]:
+def _laters(chosen: Sequence[SequenceStep]) -> list[StepSequence]:
     """The same poses again and again, with the station left alone between."""
-    found: list[Course] = []
+    found: list[StepSequence] = []
     for wait, times in ((120.0, 3), (600.0, 1), (600.0, 3), (1800.0, 1), (1800.0, 2)):
         group = [replace(chosen[0], wait=wait), *chosen[1:], chosen[0]]
-        found.append(Course("later", tuple(group * times)))
+        found.append(StepSequence("later", tuple(group * times)))
     return found
 
 
-def _power_cycles(chosen: Sequence[Step]) -> list[Course]:
+def _power_cycles(chosen: Sequence[SequenceStep]) -> list[StepSequence]:
     """A pose before and after the devices were off for a while, and again as they warm up, with another opposite to it."""
     first, second = chosen[0], chosen[1]
-    found: list[Course] = []
+    found: list[StepSequence] = []
     for off, later in product((300.0, 600.0, 1800.0), ((), (60.0,), (60.0, 300.0), (60.0, 300.0, 900.0))):
         before = [first, second, first, second]
         after = [replace(first, off=off), second, first, second]
         again = [step for wait in later for step in (replace(first, wait=wait), second, first, second)]
-        found.append(Course("power", (*before, *after, *again)))
+        found.append(StepSequence("power", (*before, *after, *again)))
     return found
 
 
-def _excursions(reach: Reach, here: float, chosen: Sequence[Step]) -> list[Course]:
+def _excursions(reach: Reach, here: float, chosen: Sequence[SequenceStep]) -> list[StepSequence]:
     """Soaks away from where the station stands and back, up and down, far and near."""
     if reach.temperature is None:
         return []
@@ -210,24 +210,24 @@ def _excursions(reach: Reach, here: float, chosen: Sequence[Step]) -> list[Cours
         (up, here), (down, here), (up, down, here), (near_up, here), (near_down, here), (near_up, near_down, here),
         (high, middle), (low, middle), (high, middle, low), (low, middle, high), (high, low), (low, high),
     )  # fmt: skip
-    found: list[Course] = []
+    found: list[StepSequence] = []
     for way, count in product(dict.fromkeys(ways), (2, 4)):
         stops = [t for k, t in enumerate(way) if abs(t - (way[k - 1] if k else here)) > 1.0]
         steps = [replace(pose, temperature=t) for t in stops for pose in chosen[:count]]
-        found.append(Course("excursion", tuple(steps)))
+        found.append(StepSequence("excursion", tuple(steps)))
     return found
 
 
-def _ramps(reach: Reach, here: float, chosen: Sequence[Step]) -> list[Course]:
+def _ramps(reach: Reach, here: float, chosen: Sequence[SequenceStep]) -> list[StepSequence]:
     """Dwell after dwell while the devices follow the air, one way and back."""
     if reach.temperature is None:
         return []
     low, high = reach.temperature
-    found: list[Course] = []
+    found: list[StepSequence] = []
     for away, times in product((min(high, here + _EXCURSION_K), max(low, here - _EXCURSION_K)), (8, 20)):
         if abs(away - here) < 5.0:
             continue
         out = [replace(chosen[k % 2], temperature=away, soaked=False, wait=15.0) for k in range(times)]
         back = [replace(s, temperature=here) for s in out]
-        found += [Course("ramp", tuple(out)), Course("ramp", (*out, *back))]
+        found += [StepSequence("ramp", tuple(out)), StepSequence("ramp", (*out, *back))]
     return found

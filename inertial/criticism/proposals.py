@@ -6,15 +6,15 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from inertial import effects as catalogue
-from inertial.criticism.aims import Aim, Parting, Sighting
+from inertial.criticism.aims import Objective, RivalDiscrimination, Sighting
 from inertial.criticism.classes import EffectClass
-from inertial.criticism.menus import Course, Kind, Reach, courses, pose_grid, present, reach_of, temperatures
+from inertial.criticism.menus import Kind, Reach, StepSequence, courses, pose_grid, present, reach_of, temperatures
 from inertial.criticism.model import Model, Term
 from inertial.criticism.separation import Rivals, rivals_of
 from inertial.design import grid_of
 from inertial.errors import MissingInput
 from inertial.planning.reasons import drivers_of
-from inertial.planning.sequences import Pace, Step, standing, timeline
+from inertial.planning.sequences import SequenceStep, StationPace, standing, timeline
 
 MICRO = 1e6
 
@@ -23,7 +23,7 @@ _PICKS = 12
 _SIZES = (3, 6, 12)
 _REPEATS = (1, 2, 4)
 _ROUNDS = 4
-Minutes = Callable[[Sequence[Step]], float]
+Minutes = Callable[[Sequence[SequenceStep]], float]
 
 
 @dataclass(frozen=True)
@@ -38,7 +38,7 @@ class Proposal:
     """
 
     kinds: tuple[Kind, ...]
-    steps: tuple[Step, ...]
+    steps: tuple[SequenceStep, ...]
     ids: tuple[str, ...]
     pair: tuple[str, ...]
     minutes: float
@@ -52,11 +52,11 @@ class Circumstances:
     """What a proposal may use: the station's reach and pace, its time for steps, and the minutes that may be spent."""
 
     reach: Reach | None = None
-    pace: Pace = field(default_factory=Pace)
+    pace: StationPace = field(default_factory=StationPace)
     minutes: Minutes | None = None
     budget: float = float("inf")
 
-    def cost(self, aim: Aim, steps: Sequence[Step]) -> float:
+    def cost(self, aim: Objective, steps: Sequence[SequenceStep]) -> float:
         """Minutes of station time that steps take after the run."""
         if not steps:
             return 0.0
@@ -75,7 +75,7 @@ def rivals_in(model: Model, group: EffectClass) -> Rivals | None:
 
 
 def proposal(
-    model: Model, group: EffectClass, around: Circumstances | None = None, already: Sequence[Step] = ()
+    model: Model, group: EffectClass, around: Circumstances | None = None, already: Sequence[SequenceStep] = ()
 ) -> Proposal | None:
     """The steps that best part the members of a class; None where nothing the station does parts them.
 
@@ -87,12 +87,12 @@ def proposal(
     if rivals is None:
         return None
     scores = np.array([m.score for m in group.members[:_MEMBERS]])
-    found = _Search(Parting(rivals, scores), around or Circumstances(), already).best()
+    found = ProposalSearch(RivalDiscrimination(rivals, scores), around or Circumstances(), already).best()
     return None if found is None else _named(found, rivals.ids)
 
 
 def sighting(
-    model: Model, unseen: Sequence[str], around: Circumstances | None = None, already: Sequence[Step] = ()
+    model: Model, unseen: Sequence[str], around: Circumstances | None = None, already: Sequence[SequenceStep] = ()
 ) -> Proposal | None:
     """The steps that best show effects that the plan could not see; None where none matters, or the station can show none.
 
@@ -109,7 +109,7 @@ def sighting(
     if not terms:
         return None
     rivals = rivals_of(model, [], model.terms)
-    found = _Search(Sighting(rivals, terms), around, already).best()
+    found = ProposalSearch(Sighting(rivals, terms), around, already).best()
     return None if found is None else _named(found, found.pair, pair=())
 
 
@@ -139,16 +139,16 @@ def _term(model: Model, name: str) -> Term | None:
 class _Offer:
     """A course with what is there after it, the station time until then, and what it brings per minute."""
 
-    course: Course
+    course: StepSequence
     worth: float
     minutes: float
     rate: float
 
 
-class _Search:
+class ProposalSearch:
     """The choice of courses for one aim."""
 
-    def __init__(self, aim: Aim, around: Circumstances, already: Sequence[Step]) -> None:
+    def __init__(self, aim: Objective, around: Circumstances, already: Sequence[SequenceStep]) -> None:
         self.aim, self.around, self.already = aim, around, tuple(already)
         self.state = aim.lot.state
         self.reach = around.reach or reach_of(self.state)
@@ -163,7 +163,7 @@ class _Search:
 
         One course that brings all of it by itself takes their place where they take more time, or do not get there.
         """
-        chosen: list[Course] = []
+        chosen: list[StepSequence] = []
         now = self.aim.worth(self.already, self.pace)
         whole: _Offer | None = None
         for turn in range(_ROUNDS):
@@ -183,10 +183,10 @@ class _Search:
             chosen, now = [whole.course], whole.worth
         return self._told(chosen, now) if chosen else None
 
-    def _minutes(self, chosen: Sequence[Course]) -> float:
+    def _minutes(self, chosen: Sequence[StepSequence]) -> float:
         return self.around.cost(self.aim, [*self.already, *(s for c in chosen for s in c.steps)])
 
-    def _weighed(self, chosen: Sequence[Course], now: float) -> list["_Offer"]:
+    def _weighed(self, chosen: Sequence[StepSequence], now: float) -> list["_Offer"]:
         """Courses that help beside those chosen, and that the budget allows."""
         held = [*self.already, *(s for c in chosen for s in c.steps)]
         spent = self.around.cost(self.aim, held)
@@ -201,26 +201,26 @@ class _Search:
                 found.append(_Offer(course, worth, minutes, rate))
         return found
 
-    def _offers(self, held: Sequence[Step]) -> list[Course]:
+    def _offers(self, held: Sequence[SequenceStep]) -> list[StepSequence]:
         """Every course that is worth a look."""
         here = held[-1].temperature if held else present(self.state, self.pace)
         picks = self._picked(held, here)
-        offers = [Course("poses", tuple(picks[:size])).times(r) for size in _SIZES for r in _REPEATS]
+        offers = [StepSequence("poses", tuple(picks[:size])).times(r) for size in _SIZES for r in _REPEATS]
         for temperature in temperatures(here, self.reach):
             further = self._picked(held, temperature)
-            offers += [Course("soaks", tuple(further[:size])) for size in _SIZES]
+            offers += [StepSequence("soaks", tuple(further[:size])) for size in _SIZES]
         further = courses(self.state, self.reach, picks, here)
         offers += [c for c in further if (c.kind != "ramp" or self.rated) and (c.kind != "power" or self.timed)]
         return [c for c in offers if c.steps]
 
-    def _picked(self, held: Sequence[Step], temperature: float) -> list[Step]:
+    def _picked(self, held: Sequence[SequenceStep], temperature: float) -> list[SequenceStep]:
         """The best poses at a temperature; none where the table or the chamber may not go there."""
         grid = pose_grid(self.reach, temperature)
         return self.aim.picks(held, grid, self.pace, _PICKS) if grid else []
 
-    def _told(self, chosen: Sequence[Course], worth: float) -> Proposal:
+    def _told(self, chosen: Sequence[StepSequence], worth: float) -> Proposal:
         steps = [s for c in chosen for s in c.steps]
-        before, after, about = self.aim.told(self.already, steps, self.pace)
+        before, after, about = self.aim.effect_of_steps(self.already, steps, self.pace)
         whole, free = [*self.already, *steps], self.already
         return Proposal(
             kinds=tuple(dict.fromkeys(c.kind for c in chosen)),

@@ -41,7 +41,7 @@ class Rival:
 
 
 @dataclass(frozen=True)
-class Found:
+class SearchResult:
     """Outcome of the search: the model with what was added, and the rivals of the first step, best first."""
 
     model: Model
@@ -49,7 +49,7 @@ class Found:
     ladder: tuple[Rival, ...]
 
 
-class Field:
+class Candidates:
     """The candidates of a search, those that these dwells carry the quantities for."""
 
     def __init__(self, problem: Problem, effects: Iterable[AnyEffect]) -> None:
@@ -99,7 +99,9 @@ class Field:
         return found
 
 
-def search(field: Field, base: Model, stop: Callable[[Sequence[Term]], bool], start: Sequence[Term] = ()) -> Found:
+def search(
+    field: Candidates, base: Model, stop: Callable[[Sequence[Term]], bool], start: Sequence[Term] = ()
+) -> SearchResult:
     """The effects that the measurements call for beyond a base model.
 
     Parameters
@@ -123,10 +125,10 @@ def search(field: Field, base: Model, stop: Callable[[Sequence[Term]], bool], st
             model, chosen = _reexamine(field, base, model, chosen)
     if len(chosen) > len(start):
         model, chosen = _taken_apart(field, base, model, chosen)
-    return Found(model, tuple(chosen), ladder)
+    return SearchResult(model, tuple(chosen), ladder)
 
 
-def _parent_first(field: Field, model: Model, rival: Rival) -> Rival:
+def _parent_first(field: Candidates, model: Model, rival: Rival) -> Rival:
     """The lower-order effect that a rival is built on, where it is missing and called for by itself; else the rival."""
     held = {t.effect.id for t in model.terms}
     for effect in field.effects:
@@ -137,12 +139,12 @@ def _parent_first(field: Field, model: Model, rival: Rival) -> Rival:
     return rival
 
 
-def anything(field: Field, model: Model) -> bool:
+def anything(field: Candidates, model: Model) -> bool:
     """Whether any effect is still called for beyond a model."""
     return any(convincing(field, model, r) for r in _contest(field, model))
 
 
-def convincing(field: Field, model: Model, rival: Rival) -> bool:
+def convincing(field: Candidates, model: Model, rival: Rival) -> bool:
     """Whether a rival is significant over all looks, and large enough to matter."""
     if rival.log_p + np.log(max(field.looks, 1)) > np.log(NAMED_BELOW):
         return False
@@ -154,7 +156,7 @@ def size_of(model: Model, term: Term) -> float:
     return model.explained(term.candidate(model.problem), model.with_term(term).floor())
 
 
-def _contest(field: Field, model: Model, barred: str = "", finalists: int = _FINALISTS) -> list[Rival]:
+def _contest(field: Candidates, model: Model, barred: str = "", finalists: int = _FINALISTS) -> list[Rival]:
     """Rivals by their penalised likelihood, the finalists with the noise estimated anew beside them."""
     leave = {*(t.effect.id for t in model.terms), barred}
     tried: dict[str, tuple[float, int, int | None]] = {}
@@ -171,7 +173,7 @@ def _contest(field: Field, model: Model, barred: str = "", finalists: int = _FIN
     return sorted(found, key=lambda r: r.cost)
 
 
-def _best_of(field: Field, space: Space, name: str, gain: Gain) -> tuple[int, float]:
+def _best_of(field: Candidates, space: Space, name: str, gain: Gain) -> tuple[int, float]:
     """Best grid value of a candidate, and its penalised deviance there."""
     place = int(np.argmax(gain.drop))
     nonlinear = len(field.grids[name][0]) if len(field.grids[name]) > 1 else 0
@@ -179,7 +181,7 @@ def _best_of(field: Field, space: Space, name: str, gain: Gain) -> tuple[int, fl
     return place, deviance(space, float(gain.drop[place])) + cost
 
 
-def _exact(field: Field, model: Model, name: str, place: int, first: int | None) -> Rival:
+def _exact(field: Candidates, model: Model, name: str, place: int, first: int | None) -> Rival:
     """A finalist with its nonlinear parameters refined and the share of wander estimated with it inside."""
     effect = next(e for e in field.effects if e.id == name)
     term = Term(effect, tuple(field.grids[name][place].items()), first)
@@ -188,7 +190,7 @@ def _exact(field: Field, model: Model, name: str, place: int, first: int | None)
     return judge(field, model, term, richer.share)
 
 
-def judge(field: Field, model: Model, term: Term, share: float) -> Rival:
+def judge(field: Candidates, model: Model, term: Term, share: float) -> Rival:
     """A term beside a model at a given share of wander."""
     space = model.at(share)
     gain = space.gain(term.candidate(field.problem))
@@ -197,7 +199,7 @@ def judge(field: Field, model: Model, term: Term, share: float) -> Rival:
     return Rival(term, drop, rank, cost, log_p_value(space, drop, rank))
 
 
-def _reexamine(field: Field, base: Model, model: Model, chosen: list[Term]) -> tuple[Model, list[Term]]:
+def _reexamine(field: Candidates, base: Model, model: Model, chosen: list[Term]) -> tuple[Model, list[Term]]:
     """Each chosen effect again beside the others: kept, swapped for a better one, or dropped."""
     for term in tuple(chosen):
         if len(chosen) < 2:
@@ -215,7 +217,7 @@ def _reexamine(field: Field, base: Model, model: Model, chosen: list[Term]) -> t
     return model, chosen
 
 
-def _taken_apart(field: Field, base: Model, model: Model, chosen: list[Term]) -> tuple[Model, list[Term]]:
+def _taken_apart(field: Candidates, base: Model, model: Model, chosen: list[Term]) -> tuple[Model, list[Term]]:
     """Each effect of several columns once more against two simpler ones that together do what it does."""
     for term in tuple(chosen):
         columns = term.candidate(field.problem).columns.shape[-1]

@@ -18,7 +18,7 @@ from inertial.criticism.shared_noise import shared_factor
 from inertial.criticism.space import Space
 from inertial.criticism.turn_on import with_turn_on
 from inertial.effects.base import Nonlinear
-from inertial.planning.sequences import Pace, Step, extended
+from inertial.planning.sequences import SequenceStep, StationPace, extended
 
 Array = NDArray[np.float64]
 
@@ -88,7 +88,7 @@ def _coefficients(model: Model, term: Term, blocks: Sequence[int]) -> Array:
     return found.shared[:columns] if term.effect.scope == "station" else found.local[list(blocks), :columns]
 
 
-def separations(rivals: Rivals, steps: Sequence[Step] = (), pace: Pace | None = None) -> Array:
+def separations(rivals: Rivals, steps: Sequence[SequenceStep] = (), pace: StationPace | None = None) -> Array:
     """Chi-square (r, r) that the rival of a column leaves, fitted to what the rival of a row predicts, in the whole lot.
 
     Parameters
@@ -161,7 +161,7 @@ def predictions(rivals: Rivals, problem: Problem) -> Array:
     return np.stack(found, axis=-1)
 
 
-def widened(rivals: Rivals, steps: Sequence[Step], pace: Pace | None) -> Problem:
+def widened(rivals: Rivals, steps: Sequence[SequenceStep], pace: StationPace | None) -> Problem:
     """The problem with steps taken after its dwells; readings there are of no account."""
     lot = rivals.lot
     units = lot.state.time.shape[0]

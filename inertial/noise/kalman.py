@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from inertial.noise.terms import Terms
+from inertial.noise.terms import NoiseTerms
 
 Array = NDArray[np.float64]
 
@@ -29,7 +29,7 @@ class Drift:
         return np.where(self.walk > 0.0, self.walk**2, 2.0 * self.instability**2 / self.correlation_s)
 
 
-def drift_from_terms(terms: Terms, correlation_s: float) -> Drift:
+def drift_from_terms(terms: NoiseTerms, correlation_s: float) -> Drift:
     """Noise of the filter from fitted Allan terms in g: N, and K or, where K is not identified, B with `correlation_s`.
 
     A coefficient that is not identified enters with its upper limit: the filter then trusts its bias too little, not too

@@ -74,7 +74,7 @@ def first_guess(variance: Array, moments: Sums) -> Array:
 
 
 @dataclass(frozen=True)
-class Problem:
+class MixtureFit:
     """Generalised least squares on the log-variance of one channel, the covariance taken at given strengths."""
 
     model: Array
@@ -123,7 +123,7 @@ class Problem:
         return trial
 
 
-def problem(variance: Array, moments: Sums, strengths: Array) -> Problem:
+def problem(variance: Array, moments: Sums, strengths: Array) -> MixtureFit:
     """The least-squares problem of one curve (t,), its covariance taken under `strengths` (5,).
 
     The logarithm of chi-square with nu degrees of freedom has mean digamma(nu/2) - ln(nu/2) and variance trigamma(nu/2);
@@ -134,7 +134,7 @@ def problem(variance: Array, moments: Sums, strengths: Array) -> Problem:
     half = 1.0 / np.diagonal(covariance)  # nu / 2
     spread = np.sqrt(polygamma(1, half))
     correlation = covariance * np.sqrt(np.outer(half, half))
-    return Problem(
+    return MixtureFit(
         model=basis(moments.m),
         target=np.log(variance) - (digamma(half) - np.log(half)),
         whiten=solve_triangular(_root(correlation * np.outer(spread, spread)), np.eye(len(half)), lower=True),

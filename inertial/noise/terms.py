@@ -12,7 +12,7 @@ from scipy.stats import chi2
 from inertial.noise import mixture
 from inertial.noise.allan import AllanCurve
 from inertial.noise.covariance import Sums, sums
-from inertial.noise.mixture import Problem
+from inertial.noise.mixture import MixtureFit
 
 Array = NDArray[np.float64]
 
@@ -46,7 +46,7 @@ _ROUNDS = 3  # of the covariance, which depends on the strengths
 
 
 @dataclass(frozen=True)
-class Term:
+class NoiseTerm:
     """One coefficient of one channel."""
 
     symbol: str
@@ -72,7 +72,7 @@ class Term:
 
 
 @dataclass(frozen=True)
-class Terms:
+class NoiseTerms:
     """Coefficients of every channel of a curve (leading dimensions), the last axis in the order of `symbols`.
 
     N is the coefficient of IEEE Std 952 (two-sided density; sigma = N/√tau, a sample has N·√rate). Data sheets give the
@@ -104,12 +104,12 @@ class Terms:
         """Probability (...,) of a worse agreement if these terms were the whole truth."""
         return np.asarray(chi2.sf(self.chi2, self.dof))
 
-    def one(self, *index: int) -> dict[str, Term]:
+    def one(self, *index: int) -> dict[str, NoiseTerm]:
         """Terms of one channel by symbol."""
         where = tuple(index)
         rows = (self.value[where], self.low[where], self.high[where])
         return {
-            s: Term(
+            s: NoiseTerm(
                 s,
                 NAMES[s],
                 None if np.isnan(v) else float(v),
@@ -121,7 +121,7 @@ class Terms:
         }
 
 
-def fit_terms(curve: AllanCurve, *, confidence: float = 0.95) -> Terms:
+def fit_terms(curve: AllanCurve, *, confidence: float = 0.95) -> NoiseTerms:
     """Coefficients of each channel of `curve` by generalised least squares on the log-variance.
 
     The covariance of the estimates at all averaging times is that of the fitted mixture itself. A term that the curve
@@ -155,7 +155,7 @@ def fit_terms(curve: AllanCurve, *, confidence: float = 0.95) -> Terms:
     def coefficients(which: int) -> Array:
         return np.sqrt(np.stack([row[which] for row in rows])).reshape(*lead, count) * scale
 
-    return Terms(
+    return NoiseTerms(
         symbols=mixture.TERMS,
         value=coefficients(0),
         low=coefficients(1),
@@ -167,7 +167,7 @@ def fit_terms(curve: AllanCurve, *, confidence: float = 0.95) -> Terms:
     )
 
 
-def model_deviation(terms: Terms, tau: Array) -> Array:
+def model_deviation(terms: NoiseTerms, tau: Array) -> Array:
     """Allan deviation (..., t) of the identified terms at `tau` (t,) s: the line through the points of a plot."""
     q, n, b, k, r = np.moveaxis(np.nan_to_num(terms.value), -1, 0)[..., None]
     flat = (FLICKER_FLOOR * b) ** 2
@@ -201,7 +201,7 @@ def _one(variance: Array, moments: Sums, threshold: float) -> tuple[Array, Array
     )
 
 
-def _settled(variance: Array, moments: Sums, free: NDArray[np.bool_], start: Array) -> tuple[Problem, Array, float]:
+def _settled(variance: Array, moments: Sums, free: NDArray[np.bool_], start: Array) -> tuple[MixtureFit, Array, float]:
     """The problem whose covariance is that of its own solution, the solution and its chi-square."""
     strengths = start
     for _ in range(_ROUNDS):
@@ -210,7 +210,7 @@ def _settled(variance: Array, moments: Sums, free: NDArray[np.bool_], start: Arr
     return task, *task.solve(free, strengths)
 
 
-def _needed(task: Problem, strengths: Array, best: float) -> tuple[NDArray[np.bool_], Array, float]:
+def _needed(task: MixtureFit, strengths: Array, best: float) -> tuple[NDArray[np.bool_], Array, float]:
     """Terms that stay after dropping, one by one, the one whose loss costs least, while that is little."""
     kept = strengths > 0.0
     current, cost = np.where(kept, strengths, 0.0), best
@@ -229,7 +229,7 @@ def _needed(task: Problem, strengths: Array, best: float) -> tuple[NDArray[np.bo
     return kept, current, cost
 
 
-def _profile(task: Problem, strengths: Array, best: float, j: int, threshold: float) -> tuple[float, float]:
+def _profile(task: MixtureFit, strengths: Array, best: float, j: int, threshold: float) -> tuple[float, float]:
     """Strengths of term j, below and above, at which chi-square has risen by `threshold`, all others free."""
     free = np.ones(strengths.size, dtype=np.bool_)
     free[j] = False

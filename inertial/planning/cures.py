@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from inertial import poses
 from inertial.planning.features import levels
-from inertial.planning.sequences import Pace, Step, extended, n_of
+from inertial.planning.sequences import SequenceStep, StationPace, extended, n_of
 from inertial.state import State
 
 Array = NDArray[np.float64]
@@ -29,7 +29,7 @@ def last_level(state: State) -> float:
 def with_poses(state: State, angles: list[tuple[float, float]]) -> State:
     """The plan with poses at these angles in degrees after it."""
     temperature = last_level(state)
-    return extended(state, [Step(float(np.radians(o)), float(np.radians(i)), temperature) for o, i in angles])
+    return extended(state, [SequenceStep(float(np.radians(o)), float(np.radians(i)), temperature) for o, i in angles])
 
 
 def near_zero(state: State) -> State:
@@ -45,7 +45,7 @@ def backwards(state: State) -> State:
     if state.outer is None or state.inner is None:
         return state
     order = range(n_of(state) - 2, -1, -1)
-    steps = [Step(float(state.outer[k]), float(state.inner[k]), last_level(state)) for k in order]
+    steps = [SequenceStep(float(state.outer[k]), float(state.inner[k]), last_level(state)) for k in order]
     return extended(state, steps)
 
 
@@ -55,24 +55,28 @@ def waits(state: State) -> State:
         return state
     half = max(n_of(state) // 2, 1)
     pairs = [(0, 0.5), (half, 5.0), (0, 20.0), (half, 60.0), (0, 200.0), (half, 600.0)]
-    return extended(state, [Step(float(state.outer[k]), float(state.inner[k]), last_level(state), w) for k, w in pairs])
+    return extended(
+        state, [SequenceStep(float(state.outer[k]), float(state.inner[k]), last_level(state), w) for k, w in pairs]
+    )
 
 
 def later(state: State) -> State:
     """The plan with every pose again, an hour later."""
     if state.outer is None or state.inner is None:
         return state
-    steps = [Step(float(o), float(i), last_level(state)) for o, i in zip(state.outer, state.inner, strict=True)]
-    return extended(state, steps, Pace(rest=max(3600.0, float(np.ptp(state.time)))))
+    steps = [SequenceStep(float(o), float(i), last_level(state)) for o, i in zip(state.outer, state.inner, strict=True)]
+    return extended(state, steps, StationPace(rest=max(3600.0, float(np.ptp(state.time)))))
 
 
 def with_soaks(state: State, temperatures: list[float], *, soaked: bool = True) -> State:
     """The plan with faces and corners at further temperatures, °C."""
     chosen = [(0.0, 0.0), (180.0, 0.0), (90.0, 0.0), (90.0, 90.0), (90.0, 180.0), (90.0, -90.0), *_CORNERS[:3]]
     steps = [
-        Step(float(np.radians(o)), float(np.radians(i)), t, soaked=soaked) for t in temperatures for o, i in chosen
+        SequenceStep(float(np.radians(o)), float(np.radians(i)), t, soaked=soaked)
+        for t in temperatures
+        for o, i in chosen
     ]
-    return extended(state, steps, Pace(soak_s=900.0))
+    return extended(state, steps, StationPace(soak_s=900.0))
 
 
 def soaks_back(state: State) -> State:
@@ -91,7 +95,7 @@ def cycled(state: State) -> State:
     if state.outer is None or state.inner is None:
         return state
     here = last_level(state)
-    first = Step(float(state.outer[0]), float(state.inner[0]), here, 10.0, off=3600.0)
+    first = SequenceStep(float(state.outer[0]), float(state.inner[0]), here, 10.0, off=3600.0)
     waits = (30.0, 100.0, 300.0, 900.0, 2000.0)
     return extended(state, [first, *(replace(first, wait=w, off=0.0) for w in waits)])
 

@@ -26,7 +26,7 @@ _NOTHING = 1e-12
 
 
 @dataclass(frozen=True)
-class Parting:
+class Discrimination:
     """Rivals that a plan is to tell apart.
 
     base : columns of the model that is fitted anyway, indices into the normal matrix

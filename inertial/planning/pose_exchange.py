@@ -39,7 +39,7 @@ _PASSES = 12
 
 
 @dataclass(frozen=True)
-class Slots:
+class PlanSlots:
     """Slots of a plan, and what may stand in them.
 
     rows : (n, c, 3, p), design rows of every candidate in every slot, in units of the errors wanted: error · column
@@ -100,7 +100,7 @@ def _worst(matrix: Array) -> Array:
 CRITERIA: dict[Criterion, Callable[[Array], Array]] = {"D": _d, "A": _a, "worst": _worst}
 
 
-def exchanged(slots: Slots, choice: Choice, criterion: Criterion | Callable[[Array], Array] = "worst") -> Choice:
+def exchanged(slots: PlanSlots, choice: Choice, criterion: Criterion | Callable[[Array], Array] = "worst") -> Choice:
     """A plan (n,) from which no exchange of one pose, and no swap of two within a soak, gains information per station time.
 
     Parameters
@@ -122,12 +122,12 @@ def exchanged(slots: Slots, choice: Choice, criterion: Criterion | Callable[[Arr
     return best
 
 
-def _cost(slots: Slots, choice: Choice, value: Callable[[Array], Array]) -> float:
+def _cost(slots: PlanSlots, choice: Choice, value: Callable[[Array], Array]) -> float:
     """Log of variance times station time: halving either is worth the same."""
     return float(value(slots.matrix(choice))) + float(np.log(slots.duration(choice)))
 
 
-def _replaced(slots: Slots, choice: Choice, slot: int, value: Callable[[Array], Array]) -> Choice:
+def _replaced(slots: PlanSlots, choice: Choice, slot: int, value: Callable[[Array], Array]) -> Choice:
     """The plan with the best candidate in one slot."""
     h = slots.rows[np.arange(choice.size), choice]
     matrix = slots.matrix(choice)
@@ -144,7 +144,7 @@ def _replaced(slots: Slots, choice: Choice, slot: int, value: Callable[[Array], 
     return found
 
 
-def _detours(slots: Slots, choice: Choice, slot: int) -> Array:
+def _detours(slots: PlanSlots, choice: Choice, slot: int) -> Array:
     """Change of travel (c,) in s for every candidate in a slot."""
     total = np.zeros(len(slots.travel))
     if slot > 0:
@@ -154,7 +154,7 @@ def _detours(slots: Slots, choice: Choice, slot: int) -> Array:
     return total - total[choice[slot]]
 
 
-def _swapped(slots: Slots, choice: Choice, slot: int, value: Callable[[Array], Array]) -> Choice:
+def _swapped(slots: PlanSlots, choice: Choice, slot: int, value: Callable[[Array], Array]) -> Choice:
     """The plan with one slot's pose in the best place of its soak, for that one's pose."""
     others = np.flatnonzero((slots.group == slots.group[slot]) & ~slots.fixed & (choice != choice[slot]))
     if not others.size:

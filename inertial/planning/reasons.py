@@ -17,8 +17,8 @@ from inertial.effects import SensorEffect
 from inertial.effects.base import AnyEffect, excited
 from inertial.errors import MissingInput
 from inertial.planning import visibility
-from inertial.planning.changes import CHANGES, Change, Driver
-from inertial.planning.sequences import Pace, Step, extended
+from inertial.planning.changes import CHANGES, Driver, PlanChange
+from inertial.planning.sequences import SequenceStep, StationPace, extended
 from inertial.planning.wording import signature, symbol
 from inertial.state import State
 
@@ -227,7 +227,9 @@ def _after(wanted: Array, parts: Sequence[Array]) -> float:
     return float(np.linalg.norm(wanted - fitted @ np.linalg.lstsq(fitted, wanted, rcond=1e-9)[0]))
 
 
-def _hiding(state: State, effect_id: str, base: Sequence[str], axis: int | None, behind: Sequence[str]) -> list[Change]:
+def _hiding(
+    state: State, effect_id: str, base: Sequence[str], axis: int | None, behind: Sequence[str]
+) -> list[PlanChange]:
     """The fewest features of the plan without which the effect would show; none where no change helps."""
 
     def cured(changed: State) -> bool:
@@ -254,8 +256,10 @@ def _hiding(state: State, effect_id: str, base: Sequence[str], axis: int | None,
 def begins_again(state: State, effect_id: str) -> bool:
     """Whether an effect is another one after the devices were off for a while than if they had stayed on."""
     one = _one(state)
-    step = Step(0.0, 0.0, 25.0)
-    off, on = (extended(one, [replace(step, off=seconds)], Pace(rest=_OFF_S - seconds)) for seconds in (_OFF_S, 0.0))
+    step = SequenceStep(0.0, 0.0, 25.0)
+    off, on = (
+        extended(one, [replace(step, off=seconds)], StationPace(rest=_OFF_S - seconds)) for seconds in (_OFF_S, 0.0)
+    )
     effect = catalogue.get(effect_id)
     values = design.starting_values([effect], one).get(effect.id, {})
     there = [_columns(of, effect, values, axis)[-1] for of in (off, on) for axis in range(3)]
@@ -328,7 +332,7 @@ def _reordered(state: State) -> State:
     return replace(state, **changed)
 
 
-def _all(state: State, changes: Sequence[Change]) -> State:
+def _all(state: State, changes: Sequence[PlanChange]) -> State:
     makers: list[Callable[[State], State]] = [c.made for c in changes]
     for make in makers:
         state = make(state)

@@ -20,7 +20,7 @@ _STILL_K, _LONG_S = 0.02, 120.0
 
 
 @dataclass(frozen=True)
-class Step:
+class SequenceStep:
     """One dwell to take.
 
     outer, inner : rad
@@ -39,7 +39,7 @@ class Step:
 
 
 @dataclass(frozen=True)
-class Pace:
+class StationPace:
     """How long a station takes, and where it goes on from.
 
     move_s : s of a move of 90°; dwell_s : s of a dwell; overhead_s : s beside each, for commands
@@ -58,7 +58,7 @@ class Pace:
     soak_s: float = 900.0
     settled: float = 0.05
     last_dwell_s: float = 0.0
-    start: Step | None = None
+    start: SequenceStep | None = None
     rest: float = 0.0
 
 
@@ -83,7 +83,7 @@ class Timeline:
     end: float
 
 
-def timeline(steps: Sequence[Step], pace: Pace, start: Step | None, device: float) -> Timeline:
+def timeline(steps: Sequence[SequenceStep], pace: StationPace, start: SequenceStep | None, device: float) -> Timeline:
     """When each of some steps is taken.
 
     Parameters
@@ -119,7 +119,7 @@ class _Follow:
         self.air, self.device, self.target, self.now = air, device, air, 0.0
         self.times, self.devices = [0.0], [device]
 
-    def go_on(self, seconds: float, pace: Pace) -> None:
+    def go_on(self, seconds: float, pace: StationPace) -> None:
         """Lets some seconds pass."""
         end = self.now + max(seconds, 0.0)
         while self.now < end - 1e-9:
@@ -132,7 +132,7 @@ class _Follow:
             self.times.append(self.now)
             self.devices.append(self.device)
 
-    def soak(self, target: float, pace: Pace) -> None:
+    def soak(self, target: float, pace: StationPace) -> None:
         """Goes to a temperature and stays until the devices have settled, the shortest soak at least."""
         self.target, start = target, self.now
         far = abs(target - self.device)
@@ -141,7 +141,9 @@ class _Follow:
         self.go_on(max(pace.soak_s, settling) - (self.now - start), pace)
 
 
-def extended(state: State, steps: Sequence[Step], pace: Pace | None = None, *, response: Array | None = None) -> State:
+def extended(
+    state: State, steps: Sequence[SequenceStep], pace: StationPace | None = None, *, response: Array | None = None
+) -> State:
     """A state with steps taken after its last dwell.
 
     What the steps do not set (supply, vibration, other columns) is as it was, dwell for dwell from the beginning. Where the pace
@@ -153,7 +155,7 @@ def extended(state: State, steps: Sequence[Step], pace: Pace | None = None, *, r
     state : of one unit or a lot, (..., n)
     response : (..., 3, 3), how the force shows on each axis; for states that carry the force felt
     """
-    pace = pace or Pace()
+    pace = pace or StationPace()
     count = len(steps)
     batch = np.broadcast_shapes(state.force.shape[:-2], state.time.shape[:-1])
     wide = (*batch, count)
@@ -192,13 +194,13 @@ def extended(state: State, steps: Sequence[Step], pace: Pace | None = None, *, r
     )
 
 
-def standing(state: State) -> Step | None:
+def standing(state: State) -> SequenceStep | None:
     """Where table and chamber stand after the last dwell of a state; None where its angles are not known."""
     if state.outer is None or state.inner is None:
         return None
     air = state.chamber if state.chamber is not None else state.temperature
     last = T_REFERENCE if air is None else round(float(np.mean(air[..., -1])), 1)
-    return Step(float(np.mean(state.outer[..., -1])), float(np.mean(state.inner[..., -1])), last)
+    return SequenceStep(float(np.mean(state.outer[..., -1])), float(np.mean(state.inner[..., -1])), last)
 
 
 def n_of(state: State) -> int:

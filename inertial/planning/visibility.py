@@ -29,7 +29,7 @@ _BASE = ("bias", "scale", "misalignment")
 
 
 @dataclass(frozen=True)
-class Sight:
+class Visibility:
     """How a plan sees one effect.
 
     left : v, RMS of the column after the base model over its RMS, 0 … 1; the best of its columns, axes and nonlinear values
@@ -68,7 +68,7 @@ def sights(
     candidates: Sequence[str] | None = None,
     *,
     covariance: Array | None = None,
-) -> list[Sight]:
+) -> list[Visibility]:
     """How a plan sees every effect of the catalogue that is not in the base model.
 
     Parameters
@@ -202,12 +202,14 @@ def _columns(effect: AnyEffect, state: State, values: Mapping[str, float]) -> Ar
     return np.moveaxis(effect.force_change(state, **values), -2, 0)
 
 
-def _sight(name: str, found: _Remainder | None, noise: float | _Noise, cosines: Mapping[str, float]) -> Sight:
+def _sight(name: str, found: _Remainder | None, noise: float | _Noise, cosines: Mapping[str, float]) -> Visibility:
     breaker = catalogue.get(name).breaker
     alias = tuple(other for other, cosine in cosines.items() if cosine > ALIAS)
     exact = tuple(other for other in alias if cosines[other] > EXACT)
     if found is None or found.left <= SEEN:
-        return Sight(name, False, 0.0 if found is None else found.left, (0.0, 0.0, 0.0), float("inf"), alias, breaker)
+        return Visibility(
+            name, False, 0.0 if found is None else found.left, (0.0, 0.0, 0.0), float("inf"), alias, breaker
+        )
     if isinstance(noise, _Noise):
         information = noise.information(found.columns)
     else:
@@ -217,7 +219,7 @@ def _sight(name: str, found: _Remainder | None, noise: float | _Noise, cosines: 
     # of columns in different units the one is meant of which the least has to be there
     axis, column = np.unravel_index(int(np.argmin(np.where(seen, size, np.inf))), size.shape)
     floor = 3.0 / float(information[axis, column])
-    return Sight(
+    return Visibility(
         name, True, found.left, found.by_axis, floor, alias, breaker, exact, int(column), float(size[axis, column])
     )
 

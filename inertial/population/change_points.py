@@ -23,7 +23,7 @@ TO_SIGMA = 1.4826  # σ over the median absolute deviation of a normal value
 
 
 @dataclass(frozen=True)
-class Change:
+class ChangePoint:
     """One change of level.
 
     first : index of the first point after it; low, high : earliest and latest that ``first`` may be, 95 %
@@ -40,7 +40,7 @@ class Change:
     p_value: float
 
 
-def change_points(values: Array, level: float = 1e-3) -> list[Change]:
+def change_points(values: Array, level: float = 1e-3) -> list[ChangePoint]:
     """The changes of level of a series (n,), found by binary segmentation, each then placed between its neighbours.
 
     σ is that of the differences of neighbours, by their median, so that neither changes nor single outliers widen it.
@@ -54,7 +54,7 @@ def change_points(values: Array, level: float = 1e-3) -> list[Change]:
     if n < 2 * FEWEST or sigma == 0.0:
         return []
     places = sorted(_segment(values, (0, n), sigma, level))
-    out: list[Change] = []
+    out: list[ChangePoint] = []
     for number, place in enumerate(places):
         low = places[number - 1] if number else 0
         high = places[number + 1] if number + 1 < len(places) else n
@@ -114,7 +114,7 @@ def _p_value(statistic: float, n: int, whole: int) -> float:
     return float(min(1.0, 2.0 * student.sf(statistic, DOF_OF_DIFFERENCES * (whole - 1)) * places))
 
 
-def _described(values: Array, offset: int, place: int, noise: tuple[float, int]) -> Change:
+def _described(values: Array, offset: int, place: int, noise: tuple[float, int]) -> ChangePoint:
     """The change at a place of a part of a series; noise : σ, and of how many values."""
     sigma, whole = noise
     statistic = _statistic(values) / sigma
@@ -124,4 +124,4 @@ def _described(values: Array, offset: int, place: int, noise: tuple[float, int])
     shift = float(values[place:].mean() - values[:place].mean())
     error = float(sigma * np.sqrt(1.0 / place + 1.0 / (n - place)))
     low, high = int(likely.min()), int(likely.max())
-    return Change(offset + place, offset + low, offset + high, shift, error, _p_value(float(best), n, whole))
+    return ChangePoint(offset + place, offset + low, offset + high, shift, error, _p_value(float(best), n, whole))

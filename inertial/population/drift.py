@@ -32,7 +32,7 @@ SPREAD_OF_SQUARES = 2.0  # variance of the square of a normal value of variance 
 
 
 @dataclass(frozen=True)
-class Kind:
+class DeviceDrift:
     """How a kind of device drifts in one parameter; times in years.
 
     mean_slope, slope_sd : per year; walk_sd : per root year; mount_sd : of one mounting, beyond the stated uncertainty
@@ -46,7 +46,7 @@ class Kind:
     pairs: int
 
 
-def kind_of(change: Array, years: Array, known: Array) -> Kind:
+def kind_of(change: Array, years: Array, known: Array) -> DeviceDrift:
     """How a kind drifts, from pairs of calibrations of the same units: moments of the changes, weighted, outliers left out.
 
     E(Δ²) = σ₁² + σ₂² + 2·mount² + walk²·t + slope²·t², solved with no negative part. Pairs should be of different lengths.
@@ -56,7 +56,7 @@ def kind_of(change: Array, years: Array, known: Array) -> Kind:
     change, years : (n,), difference of the pair's values and the time between; known : (n,), σ₁² + σ₂²
     """
     if change.size == 0:
-        return Kind(0.0, 0.0, 0.0, 0.0, 0)
+        return DeviceDrift(0.0, 0.0, 0.0, 0.0, 0)
     expected = known + np.median((change**2 - known).clip(0.0)) + 1e-12
     mean, parts, keep = 0.0, np.zeros(3), np.ones(change.size, dtype=bool)
     for _ in range(ROUNDS):
@@ -64,10 +64,10 @@ def kind_of(change: Array, years: Array, known: Array) -> Kind:
         parts = _parts(columns, target)
         expected = known + _spread_of(parts, years) + 1e-12
     mount, walk, slope = np.sqrt(parts)
-    return Kind(mean, float(slope), float(walk), float(mount), int(keep.sum()))
+    return DeviceDrift(mean, float(slope), float(walk), float(mount), int(keep.sum()))
 
 
-def prudent(kind: Kind, change: Array, years: Array, known: Array) -> Kind:
+def prudent(kind: DeviceDrift, change: Array, years: Array, known: Array) -> DeviceDrift:
     """The kind as forecasts should take it: walk and slope alike where these explain the changes as well as mounting does.
 
     Pairs of one length do not tell mounting, walk and slope apart; drift that was taken for mounting was forecast to stand still.
@@ -118,7 +118,7 @@ def _spread_of(parts: Array, years: Array) -> Array:
 
 
 @dataclass(frozen=True)
-class Standing:
+class LatestState:
     """Where every unit stands at its last calibration: level and slope per year, (units,), and their covariance.
 
     last : the value of that calibration; odd : distance of the unit's own slope from its kind's, in σ
@@ -133,7 +133,7 @@ class Standing:
     odd: Array
 
 
-def standing(values: Array, errors: Array, years: Array, kind: Kind) -> Standing:
+def standing(values: Array, errors: Array, years: Array, kind: DeviceDrift) -> LatestState:
     """Level and slope of every unit at its last calibration.
 
     A unit whose own history gives it a slope that the kind does not have is judged by that history: the spread of slopes
@@ -154,7 +154,7 @@ def standing(values: Array, errors: Array, years: Array, kind: Kind) -> Standing
     return replace(_filtered(values, errors, years, kind, prior), odd=odd)
 
 
-def _filtered(values: Array, errors: Array, years: Array, kind: Kind, slope_sd: Array) -> Standing:
+def _filtered(values: Array, errors: Array, years: Array, kind: DeviceDrift, slope_sd: Array) -> LatestState:
     units = values.shape[0]
     noise = errors**2 + kind.mount_sd**2
     level, slope = values[:, 0].copy(), np.full(units, kind.mean_slope)
@@ -172,10 +172,10 @@ def _filtered(values: Array, errors: Array, years: Array, kind: Kind, slope_sd: 
         level, slope = level + g0 * surprise, slope + g1 * surprise
         p00, p01, p11 = p00 * (1.0 - g0), p01 * (1.0 - g0), p11 - g1 * p01
         last, time = np.where(there, values[:, k], last), np.where(there, years[:, k], time)
-    return Standing(level, slope, p00, p01, np.maximum(p11, 0.0), last, np.zeros(units))
+    return LatestState(level, slope, p00, p01, np.maximum(p11, 0.0), last, np.zeros(units))
 
 
-def forecast(now: Standing, kind: Kind, ahead: Array, *, origin: Array | float) -> tuple[Array, Array]:
+def forecast(now: LatestState, kind: DeviceDrift, ahead: Array, *, origin: Array | float) -> tuple[Array, Array]:
     """Expected value less ``origin`` and its standard deviation, (units, times), for times ``ahead`` (times,) in years.
 
     The deviation is that of the prediction of the true value: what is not known of level and slope, and the walk to come.

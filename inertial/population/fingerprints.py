@@ -25,7 +25,7 @@ _SHORTEST = 1.0 / 365.25  # years; what is closer is one occasion
 
 
 @dataclass(frozen=True)
-class Scale:
+class ChangeScale:
     """How far parameters change from one calibration of a unit to another, and which of them tell units apart.
 
     years : (k,), rising times between two calibrations; change : (k, p), usual change after these
@@ -50,7 +50,9 @@ class Scale:
         return found * np.maximum(t / max(float(self.years[-1]), _SHORTEST), 1.0)[..., None]
 
 
-def change_scale(values: Array, before: Array, years: Array | None = None, population: Array | None = None) -> Scale:
+def change_scale(
+    values: Array, before: Array, years: Array | None = None, population: Array | None = None
+) -> ChangeScale:
     """Robust spread of the change between calibrations of a unit, by the time between them, against the spread between units.
 
     Units that are measured every week would hide what a year does to the others: the times are parted in octaves, and a longer
@@ -68,7 +70,7 @@ def change_scale(values: Array, before: Array, years: Array | None = None, popul
     between = _spread(values if population is None else population)
     telling = np.all(change > 0.0, axis=0) & (between > TELLING * change[-1])
     knots = np.array([float(np.median(time[part])) for part in parts])
-    return Scale(knots, change, telling)
+    return ChangeScale(knots, change, telling)
 
 
 def _spread(values: Array) -> Array:
@@ -90,23 +92,23 @@ def _octaves(years: Array) -> list[Index]:
     return parts or [waiting]
 
 
-def distance(values: Array, others: Array, scale: Scale, years: Array | float = 0.0) -> Array:
+def distance(values: Array, others: Array, scale: ChangeScale, years: Array | float = 0.0) -> Array:
     """Squared distance in units of the usual change after ``years``, summed over the telling parameters; over (..., p)."""
     z = (values - others)[..., scale.telling] / scale.after(years)
     return np.sum(z**2, axis=-1)
 
 
-def foreign_above(scale: Scale) -> float:
+def foreign_above(scale: ChangeScale) -> float:
     """Squared distance beyond which a calibration is not of the unit it is said to be of."""
     return float(chi2.isf(FOREIGN_P, max(scale.count, 1)))
 
 
-def alike_below(scale: Scale) -> float:
+def alike_below(scale: ChangeScale) -> float:
     """Squared distance within which it may be of a unit."""
     return float(chi2.isf(ALIKE_P, max(scale.count, 1)))
 
 
-def nearest(value: Array, others: Array, scale: Scale, years: Array | float = 0.0) -> tuple[int, float]:
+def nearest(value: Array, others: Array, scale: ChangeScale, years: Array | float = 0.0) -> tuple[int, float]:
     """Which row of ``others`` (n, p) is most likely that of ``value`` (p,), ``years`` (n,) later, and its squared distance."""
     distances = distance(value, others, scale, years)
     # after a long time much is possible, and each of it is less likely

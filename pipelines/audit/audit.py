@@ -24,7 +24,7 @@ from pipelines.audit.population import (
     odd_ones,
     yields,
 )
-from pipelines.audit.stations_over_time import Chart, Series, charts, slot_series, station_series
+from pipelines.audit.stations_over_time import Chart, StationSeries, charts, slot_series, station_series
 from pipelines.audit.swaps import Stranger, strangers
 
 if TYPE_CHECKING:
@@ -78,8 +78,8 @@ class Audit:
     units: dict[str, list[UnitDrift]]
     due: Due
     certificates: Certificates
-    stations: tuple[Series, ...]
-    slots: tuple[Series, ...]
+    stations: tuple[StationSeries, ...]
+    slots: tuple[StationSeries, ...]
     slot_means: tuple[dict[str, object], ...]
     charts: tuple[Chart, ...]
     yields: tuple[Share, ...]

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     import pandas as pd
     from numpy.typing import NDArray
 
-    from pipelines.audit.index import Index
+    from pipelines.audit.index import AuditIndex
 
     Array = NDArray[np.float64]
     Texts = NDArray[np.object_]
@@ -85,7 +85,7 @@ def date_of(day: float) -> str:
     return (datetime(1970, 1, 1, tzinfo=UTC) + timedelta(days=float(day))).date().isoformat()
 
 
-def runs_of(index: Index, until: float) -> pd.DataFrame:
+def runs_of(index: AuditIndex, until: float) -> pd.DataFrame:
     """Runs that were measured before ``until``, with their day, device and station; each capture once.
 
     A capture counts as it was first worked on, not as it was run again.
@@ -99,7 +99,7 @@ def runs_of(index: Index, until: float) -> pd.DataFrame:
     return chosen[["run", "day", "device", "station"]].astype({"device": str, "station": str})
 
 
-def undated(index: Index) -> list[tuple[str, str]]:
+def undated(index: AuditIndex) -> list[tuple[str, str]]:
     """Runs whose date cannot be read, and what is wrong with each."""
     runs = index.table("runs", ["run", "measured"]).to_pydict()
     return [
@@ -112,7 +112,7 @@ def undated(index: Index) -> list[tuple[str, str]]:
     ]
 
 
-def later(index: Index, day: float) -> list[tuple[str, float]]:
+def later(index: AuditIndex, day: float) -> list[tuple[str, float]]:
     """Runs that say that they were measured on a day or after it, with their days."""
     runs = index.table("runs", ["run", "measured"]).to_pydict()
     found = ((run, _day_or_nan(moment)) for run, moment in zip(runs["run"], runs["measured"], strict=True) if moment)
@@ -128,13 +128,13 @@ def _day_or_nan(moment: str) -> float:
     return day if day >= CLOCK_SET_D else float("nan")
 
 
-def captures_of(index: Index) -> dict[str, str]:
+def captures_of(index: AuditIndex) -> dict[str, str]:
     """The capture of every run that has one, by the run's name."""
     runs = index.table("runs", ["run", "capture"]).to_pydict()
     return {run: capture for run, capture in zip(runs["run"], runs["capture"], strict=True) if capture}
 
 
-def load(index: Index, runs: pd.DataFrame) -> Calibrations:
+def load(index: AuditIndex, runs: pd.DataFrame) -> Calibrations:
     """The calibrations of chosen runs."""
     units = index.table("units").to_pandas()
     values = index.table("parameters").to_pandas()

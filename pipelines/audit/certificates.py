@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from pipelines.certificates.validity import Calibration
 
 
-class Standing(NamedTuple):
+class CertificateState(NamedTuple):
     """How a unit stands in the ledger on a day.
 
     certificate : the one that holds, else the one certified last, even if it ended; state : of it, on that day: ``valid``,
@@ -49,7 +49,7 @@ class Certificates:
         """Number of calibrations."""
         return sum(len(own) for own in self.of.values())
 
-    def standing(self, device: str, serial: str, run: str) -> Standing | None:
+    def standing(self, device: str, serial: str, run: str) -> CertificateState | None:
         """How a unit stands; None where nothing of it was ever certified.
 
         Parameters
@@ -62,11 +62,13 @@ class Certificates:
         entered = any(self._measured(one.run) == self._measured(run) for one in known)
         held = next((one for one in known if one.holds(self.day)), None)
         if held is not None:
-            return Standing(held.certificate, "valid", day_of(held.until), entered)
+            return CertificateState(held.certificate, "valid", day_of(held.until), entered)
         last = known[-1]
         if last.state == "revoked":
-            return Standing(last.certificate, "revoked", _end(last), entered)
-        return Standing(last.certificate, "later" if last.start > self.day else "ended", day_of(last.until), entered)
+            return CertificateState(last.certificate, "revoked", _end(last), entered)
+        return CertificateState(
+            last.certificate, "later" if last.start > self.day else "ended", day_of(last.until), entered
+        )
 
     def _measured(self, run: str) -> str:
         """The capture of a run, or the run itself where it has none."""

@@ -10,19 +10,19 @@ import numpy as np
 from inertial.population.control_charts import RULES
 from pipelines.audit.calibrations import date_of
 from pipelines.audit.due import uncertified
-from pipelines.audit.finding import WHO, Finding
+from pipelines.audit.finding import WHO, AuditFinding
 from pipelines.audit.parameters import unit_text
 
 if TYPE_CHECKING:
     from pipelines.audit.audit import Audit
     from pipelines.audit.drifts import UnitDrift
-    from pipelines.audit.stations_over_time import Chart, Series
+    from pipelines.audit.stations_over_time import Chart, StationSeries
 
 MOST_UNITS = 200  # histories in the document; every one is in a finding or can be asked for by its serial
 SCHEMA = 1
 
 
-def document(audit: Audit, found: list[Finding], archive: str) -> dict[str, Any]:
+def document(audit: Audit, found: list[AuditFinding], archive: str) -> dict[str, Any]:
     """Everything that the audit found, findings first; dates are ISO and UTC."""
     return {
         "schema": SCHEMA,
@@ -136,7 +136,7 @@ def _unit(drift: UnitDrift) -> dict[str, Any]:
     }
 
 
-def _series(series: Series) -> dict[str, Any]:
+def _series(series: StationSeries) -> dict[str, Any]:
     return {
         "station": series.station,
         "where": series.where,
@@ -161,7 +161,7 @@ def _series(series: Series) -> dict[str, Any]:
     }
 
 
-def weekly(series: Series) -> list[dict[str, Any]]:
+def weekly(series: StationSeries) -> list[dict[str, Any]]:
     """Means of the weeks: their Monday, number of values, mean."""
     week = np.floor((series.day - 4.0) / 7.0).astype(int)  # 1970-01-05 was a Monday
     numbers, place = np.unique(week, return_inverse=True)

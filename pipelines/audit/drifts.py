@@ -9,8 +9,8 @@ import numpy as np
 
 from inertial.population.agreement import e_n
 from inertial.population.drift import (
-    Kind,
-    Standing,
+    DeviceDrift,
+    LatestState,
     forecast,
     in_tolerance,
     kind_of,
@@ -60,8 +60,8 @@ class KindDrift:
 
     device: str
     parameter: str
-    kind: Kind
-    ahead: Kind
+    kind: DeviceDrift
+    ahead: DeviceDrift
     beyond: float
     out: float
     median: float
@@ -146,13 +146,19 @@ def _reliable_months(all_: Calibrations, pairs: Pairs, kinds: list[KindDrift], t
             sigma = float(np.nanmedian(all_.error(one.parameter)[pairs.later[of_kind]]))
             start, fresh = np.array([0.0]), np.array([sigma**2 + one.ahead.mount_sd**2])
             slope, spread = np.array([one.ahead.mean_slope]), np.array([one.ahead.slope_sd**2])
-            new = Standing(start, slope, fresh, start, spread, start, start)
+            new = LatestState(start, slope, fresh, start, spread, start, start)
             probability *= in_tolerance(*forecast(new, one.ahead, AHEAD, origin=0.0), one.tolerance)
     return 12.0 * float(last_reliable(probability, target, AHEAD)[0])
 
 
 def _kind_drift(
-    all_: Calibrations, pairs: Pairs, recent: Flags, device: str, name: str, kinds: tuple[Kind, Kind], rules: Rules
+    all_: Calibrations,
+    pairs: Pairs,
+    recent: Flags,
+    device: str,
+    name: str,
+    kinds: tuple[DeviceDrift, DeviceDrift],
+    rules: Rules,
 ) -> KindDrift:
     tolerance = rules.tolerance_of(device, FAMILY_OF[name])
     kind, ahead = kinds
@@ -207,7 +213,7 @@ class _Course(NamedTuple):
     """Where the units of a kind stand in one parameter, (units,), and when they leave its tolerance and its limit."""
 
     found: KindDrift
-    now: Standing
+    now: LatestState
     counts: Index
     times: tuple[Array, Array, Array]
     limit: float
@@ -279,7 +285,7 @@ def _changes(all_: Calibrations, pairs: Pairs, name: str) -> tuple[Array, Array]
     return value[pairs.later] - value[pairs.earlier], error[pairs.later] ** 2 + error[pairs.earlier] ** 2
 
 
-def _e_n(all_: Calibrations, pairs: Pairs, name: str, kind: Kind) -> Array:
+def _e_n(all_: Calibrations, pairs: Pairs, name: str, kind: DeviceDrift) -> Array:
     """E_n of every pair; what mounting adds belongs to the uncertainty of both."""
     value = all_.column(name)
     error = np.hypot(all_.error(name), kind.mount_sd)

@@ -8,7 +8,7 @@ import numpy as np
 
 from pipelines.audit.calibrations import date_of
 from pipelines.audit.due import uncertified
-from pipelines.audit.finding import Finding, some
+from pipelines.audit.finding import AuditFinding, some
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -28,19 +28,19 @@ REASONS = {  # why units are overdue, as a sentence tells it
 }
 
 
-def of_certificates(audit: Audit) -> Iterator[Finding]:
+def of_certificates(audit: Audit) -> Iterator[AuditFinding]:
     """Where the ledger and the measurements say different things."""
     yield from _held_but_failed(audit)
     yield from _uncertified(audit)
 
 
-def of_what_is_due(audit: Audit) -> Iterator[Finding]:
+def of_what_is_due(audit: Audit) -> Iterator[AuditFinding]:
     """What is overdue, then what comes due."""
     yield from _overdue(audit)
     yield from _coming_due(audit)
 
 
-def _held_but_failed(audit: Audit) -> Iterator[Finding]:
+def _held_but_failed(audit: Audit) -> Iterator[AuditFinding]:
     """Units that did not pass when they were measured last, and have a certificate that holds; by kind of device."""
     own = audit.due
     for device, chosen in _by_device(audit, np.flatnonzero(own.valid & (own.because == "did not pass"))):
@@ -52,10 +52,10 @@ def _held_but_failed(audit: Audit) -> Iterator[Finding]:
         )
         runs = [str(run) for run in audit.all.run[own.row[chosen]]]
         evidence = {"certificates": list(certificates), "runs": runs}
-        yield Finding("quality", "held_but_failed", device, message, units, evidence)
+        yield AuditFinding("quality", "held_but_failed", device, message, units, evidence)
 
 
-def _uncertified(audit: Audit) -> Iterator[Finding]:
+def _uncertified(audit: Audit) -> Iterator[AuditFinding]:
     """Units that passed and were not certified for it, by kind of device; none in an archive without a ledger."""
     found = uncertified(audit.all, audit.due, audit.certificates)
     for device, own in _by_device(audit, found):
@@ -66,20 +66,20 @@ def _uncertified(audit: Audit) -> Iterator[Finding]:
             f"have no certificate that holds; certify their runs, or note why not ({some(units)})"
         )
         runs = sorted({str(run) for run in audit.all.run[audit.due.row[own]]})
-        yield Finding("quality", "uncertified", device, message, units, {"without": without, "runs": runs})
+        yield AuditFinding("quality", "uncertified", device, message, units, {"without": without, "runs": runs})
 
 
-def _overdue(audit: Audit) -> Iterator[Finding]:
+def _overdue(audit: Audit) -> Iterator[AuditFinding]:
     for device, own in _by_device(audit, np.flatnonzero(audit.due.day < audit.scope.until)):
         units, oldest = _units(audit, own), date_of(float(audit.due.day[own].min()))
         counts = {why: int(np.count_nonzero(audit.due.because[own] == why)) for why in REASONS}
         because = ", ".join(f"{count} because {REASONS[why]}" for why, count in counts.items() if count)
         message = f"{device}: {len(units)} units are overdue ({because}), the first since {oldest}; call them in ({some(units)})"
         evidence = {"oldest": oldest, "because": {why: count for why, count in counts.items() if count}}
-        yield Finding("line", "overdue", device, message, units, evidence)
+        yield AuditFinding("line", "overdue", device, message, units, evidence)
 
 
-def _coming_due(audit: Audit) -> Iterator[Finding]:
+def _coming_due(audit: Audit) -> Iterator[AuditFinding]:
     until = audit.scope.until
     soon = np.flatnonzero((audit.due.day >= until) & (audit.due.day < until + audit.rules.notice_days))
     for device, own in _by_device(audit, soon):
@@ -87,7 +87,7 @@ def _coming_due(audit: Audit) -> Iterator[Finding]:
         message = (
             f"{device}: {len(units)} units come due within {audit.rules.notice_days} days; plan them ({some(units)})"
         )
-        yield Finding("line", "due", device, message, units)
+        yield AuditFinding("line", "due", device, message, units)
 
 
 def _by_device(audit: Audit, chosen: Numbers) -> Iterator[tuple[str, Numbers]]:

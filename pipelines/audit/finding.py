@@ -20,7 +20,7 @@ MORE = 20  # units named in a sentence's list
 
 
 @dataclass(frozen=True)
-class Finding:
+class AuditFinding:
     """One thing to do.
 
     who : a key of :data:`WHO`; kind : of the finding, for machines; subject : what it is about

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 from pipelines.audit.calibrations import date_of
 from pipelines.audit.due_findings import of_certificates, of_what_is_due
-from pipelines.audit.finding import WHO, Finding
+from pipelines.audit.finding import WHO, AuditFinding
 from pipelines.audit.population_findings import of_population
 from pipelines.audit.station_findings import of_stations
 from pipelines.audit.unit_findings import of_units
@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from pipelines.audit.audit import Audit
 
 
-def findings(audit: Audit) -> list[Finding]:
+def findings(audit: Audit) -> list[AuditFinding]:
     """All findings: those of quality first, within one person's the weightiest kind first."""
     found = [
         *of_units(audit),
@@ -31,18 +31,18 @@ def findings(audit: Audit) -> list[Finding]:
     return sorted(found, key=lambda finding: order.index(finding.who))
 
 
-def _unreadable(run: str, text: str) -> Finding:
+def _unreadable(run: str, text: str) -> AuditFinding:
     message = f"run {run} was left out: {text}; see 'tumbleline verify', then restore it from a copy"
-    return Finding("archive", "unreadable", run, message)
+    return AuditFinding("archive", "unreadable", run, message)
 
 
-def _later(run: str, day: float) -> Finding:
+def _later(run: str, day: float) -> AuditFinding:
     message = (
         f"run {run} says that it was measured on {date_of(day)}, which is yet to come: it was left out; set the clock of the "
         "host that wrote it, and measure the units again"
     )
-    return Finding("archive", "clock", run, message, (), {"date": date_of(day)})
+    return AuditFinding("archive", "clock", run, message, (), {"date": date_of(day)})
 
 
-def _broken(folder: str, text: str) -> Finding:
-    return Finding("archive", "ledger", folder, f"the certificates of one unit were left out: {folder} {text}")
+def _broken(folder: str, text: str) -> AuditFinding:
+    return AuditFinding("archive", "ledger", folder, f"the certificates of one unit were left out: {folder} {text}")

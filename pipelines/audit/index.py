@@ -77,7 +77,7 @@ class _Reading:
 
 
 @dataclass(frozen=True)
-class Index:
+class AuditIndex:
     """The parts of an index that is up to date, and what had to be done for that.
 
     made, kept : numbers of runs that were read anew, and whose rows were there
@@ -111,7 +111,7 @@ class Index:
         return [str(part / f"{name}.parquet") for part in self.parts]
 
 
-def up_to_date(archive: Archive, dask: str | None = None, workers: int = 1) -> Index:
+def up_to_date(archive: Archive, dask: str | None = None, workers: int = 1) -> AuditIndex:
     """The index of an archive with every run as it is now.
 
     Where the archive cannot be written the index is made in a temporary folder, for this once.
@@ -122,7 +122,7 @@ def up_to_date(archive: Archive, dask: str | None = None, workers: int = 1) -> I
     """
     place = archive.root / FOLDER
     if not (archive.root / "runs").is_dir():  # an address with a slip of the pen is not made into a folder
-        return Index((), 0, 0)
+        return AuditIndex((), 0, 0)
     try:
         with alone(place, wait=True):
             found = _refreshed(archive, place, dask, workers)
@@ -134,7 +134,7 @@ def up_to_date(archive: Archive, dask: str | None = None, workers: int = 1) -> I
         return replace(_refreshed(archive, holder.path, dask, workers), holder=holder)
 
 
-def _refreshed(archive: Archive, place: Place, dask: str | None, workers: int) -> Index:
+def _refreshed(archive: Archive, place: Place, dask: str | None, workers: int) -> AuditIndex:
     stamps, version = stamps_of(archive.root), _version()
     parts = {part: _runs_of(part, version) for part in _folders(place)}
     _remove(place, [part for part, runs in parts.items() if not runs])  # one that is made anew may have its name
@@ -151,7 +151,7 @@ def _refreshed(archive: Archive, place: Place, dask: str | None, workers: int) -
     portions = [Portion(root, own, tuple((r, stamps[r]) for r in chunk), version) for chunk in chunks]
     new = [place / name for name in map_partitions(make_part, portions, dask, workers=workers, name="audit index")]
     _remove(place, set(parts) - set(good) - set(new))
-    return Index(tuple(sorted([*good, *new], key=str)), len(missing), len(there))
+    return AuditIndex(tuple(sorted([*good, *new], key=str)), len(missing), len(there))
 
 
 def make_part(portion: Portion) -> str:

@@ -18,13 +18,13 @@ from pipelines.report.templates import template
 if TYPE_CHECKING:
     from pipelines.audit.audit import Audit
     from pipelines.audit.drifts import UnitDrift
-    from pipelines.audit.finding import Finding
-    from pipelines.audit.stations_over_time import Chart, Series
+    from pipelines.audit.finding import AuditFinding
+    from pipelines.audit.stations_over_time import Chart, StationSeries
 
 MOST_SERIES, MOST_CHARTS, MOST_HISTORIES, MOST_ROWS, MOST_OF_KIND = 8, 4, 4, 25, 40
 
 
-def render(audit: Audit, found: list[Finding], archive: str) -> str:
+def render(audit: Audit, found: list[AuditFinding], archive: str) -> str:
     """The report as one HTML text that needs no other file."""
     months = [share for share in audit.yields if share.of == "month"]
     series, charts, drifts = _telling_series(audit), _telling_charts(audit), _telling_drifts(audit)
@@ -69,12 +69,12 @@ SAME_EVENT_D = 14.0
 _BEGINNING = -700000.0  # days before any calibration
 
 
-def _groups(found: list[Finding]) -> list[dict[str, Any]]:
+def _groups(found: list[AuditFinding]) -> list[dict[str, Any]]:
     """Findings by who must act, the first of a kind shown and the rest counted."""
     out: list[dict[str, Any]] = []
     for who, words in WHO.items():
         own = [finding for finding in found if finding.who == who]
-        shown: list[Finding] = []
+        shown: list[AuditFinding] = []
         more: dict[str, int] = {}
         for finding in own:
             if sum(one.kind == finding.kind for one in shown) < MOST_OF_KIND:
@@ -86,11 +86,11 @@ def _groups(found: list[Finding]) -> list[dict[str, Any]]:
     return out
 
 
-def _telling_series(audit: Audit) -> list[Series]:
+def _telling_series(audit: Audit) -> list[StationSeries]:
     """The series whose level changed, the plainest first and each event once; where none did the stations' levels."""
     moved = [one for one in (*audit.stations, *audit.slots) if one.changes]
     told: list[tuple[str, bool, float]] = []
-    kept: list[Series] = []
+    kept: list[StationSeries] = []
     for one in sorted(moved, key=lambda s: -max(abs(c.shift) / c.error for c in s.changes)):
         plainest = max(one.changes, key=lambda c: abs(c.shift) / c.error)
         event = (one.station, one.where.startswith("slot"), float(one.day[plainest.first]))

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from pipelines.audit.audit import Audit
     from pipelines.audit.drifts import UnitDrift
     from pipelines.audit.population import Share
-    from pipelines.audit.stations_over_time import Chart, Series
+    from pipelines.audit.stations_over_time import Chart, StationSeries
 
 BLUE, RED, GREY, ORANGE, GREEN = "#0072b2", "#c62828", "#b4b4b4", "#d55e00", "#009e73"
 ROW_IN = 2.5
@@ -33,7 +33,7 @@ MOST_POINTS = 1500
 MOST_FORECAST_Y = 6.0
 
 
-def series_plot(series: Sequence[Series]) -> str:
+def series_plot(series: Sequence[StationSeries]) -> str:
     """Quantities of stations over time: single runs in grey, the level between changes, the days of the changes."""
     figure, places = _rows(len(series))
     with mpl.rc_context(STYLE):

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from inertial.population.capability import Index as Capability
+from inertial.population.capability import AuditIndex as Capability
 from inertial.population.capability import cpk, fraction_interval, independent, sigma_within
 from inertial.population.comparison import TO_SIGMA, Comparison, compare, holm, outlier_limit, robust_z, unlike
 from inertial.population.two_way import group_medians
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from pipelines.audit.calibrations import Calibrations
-    from pipelines.audit.index import Index
+    from pipelines.audit.index import AuditIndex
 
     Array = NDArray[np.float64]
     Flags = NDArray[np.bool_]
@@ -101,7 +101,7 @@ class Figures:
     unit_text: Texts
 
 
-def figures_of(index: Index, all_: Calibrations, chosen: Flags) -> Figures:
+def figures_of(index: AuditIndex, all_: Calibrations, chosen: Flags) -> Figures:
     """Figures of the chosen calibrations."""
     frame = index.table("figures", ["run", "unit", "figure", "value", "limit", "unit_text"]).to_pandas()
     runs, run = np.unique(all_.run.astype(str), return_inverse=True)

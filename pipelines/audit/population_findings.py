@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from pipelines.audit.calibrations import date_of
-from pipelines.audit.finding import Finding
+from pipelines.audit.finding import AuditFinding
 from pipelines.audit.parameters import unit_text
 from pipelines.report.numbers import plain
 
@@ -19,14 +19,14 @@ TELLING_EFFECT = 0.02  # share of the variance between groups, below which a dif
 DIFFERENT_P = 1e-3
 
 
-def of_population(audit: Audit) -> Iterator[Finding]:
+def of_population(audit: Audit) -> Iterator[AuditFinding]:
     """All of them, what stands out first."""
     yield from _odd(audit)
     yield from _incapable(audit)
     yield from _different(audit)
 
 
-def _odd(audit: Audit) -> Iterator[Finding]:
+def _odd(audit: Audit) -> Iterator[AuditFinding]:
     for odd in audit.odd:
         what = f"lot of run {odd.run} ({odd.units} units)" if odd.kind == "lot" else f"unit {odd.name}"
         text = unit_text(odd.parameter)
@@ -35,12 +35,12 @@ def _odd(audit: Audit) -> Iterator[Finding]:
             f"{odd.z:+.1f} σ from its kind; look for what was different in making it"
         )
         evidence = {"run": odd.run, "station": odd.station, "parameter": odd.parameter, "value": odd.value, "z": odd.z}
-        yield Finding(
+        yield AuditFinding(
             "product", f"odd_{odd.kind}", odd.name, message, (odd.name,) if odd.kind == "unit" else (), evidence
         )
 
 
-def _incapable(audit: Audit) -> Iterator[Finding]:
+def _incapable(audit: Audit) -> Iterator[AuditFinding]:
     for able in audit.abilities:
         if able.ppk.low < audit.rules.ppk_least:
             message = (
@@ -55,10 +55,10 @@ def _incapable(audit: Audit) -> Iterator[Finding]:
                 "high": able.ppk.high,
                 "n": able.n,
             }
-            yield Finding("product", "capability", able.device, message, (), evidence)
+            yield AuditFinding("product", "capability", able.device, message, (), evidence)
 
 
-def _different(audit: Audit) -> Iterator[Finding]:
+def _different(audit: Audit) -> Iterator[AuditFinding]:
     for one in audit.differences:
         if one.by != "lot" and one.p < DIFFERENT_P and one.found.effect > TELLING_EFFECT:
             message = (
@@ -67,7 +67,7 @@ def _different(audit: Audit) -> Iterator[Finding]:
             )
             who = "station" if one.by in {"station", "slot"} else "product"
             evidence = {"figure": one.figure, "by": one.by, "share": one.found.effect, "p_value": one.p}
-            yield Finding(who, f"differs_by_{one.by}", one.device, message, (), evidence)
+            yield AuditFinding(who, f"differs_by_{one.by}", one.device, message, (), evidence)
 
 
 def _limit(able: Ability) -> str:

@@ -27,7 +27,7 @@ class Tolerance(Strict):
     unit: str
 
 
-class Kind(Strict):
+class DeviceRules(Strict):
     """What is different for one kind of device."""
 
     interval_months: Months | None = None
@@ -54,7 +54,7 @@ class Rules(Strict):
     ppk_least: Positive
     gauge_most_percent: Positive
     tolerance: dict[str, Tolerance]
-    device: dict[str, Kind] = Field(default_factory=dict[str, Kind])
+    device: dict[str, DeviceRules] = Field(default_factory=dict[str, DeviceRules])
 
     @field_validator("tolerance")
     @classmethod
@@ -84,8 +84,8 @@ class Rules(Strict):
         """Whether a unit is one that the stations watch themselves with."""
         return any(fnmatchcase(serial, pattern) for pattern in self.check_standards)
 
-    def _kind(self, device: str) -> Kind:
-        return next((kind for name, kind in self.device.items() if name.upper() == device.upper()), Kind())
+    def _kind(self, device: str) -> DeviceRules:
+        return next((kind for name, kind in self.device.items() if name.upper() == device.upper()), DeviceRules())
 
 
 def load_rules(path: Path | None = None) -> Rules:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import duckdb
 
-from pipelines.audit.index import Index, up_to_date
+from pipelines.audit.index import AuditIndex, up_to_date
 from pipelines.audit.run_rows import SCHEMAS
 from schemas.errors import WrongUse, did_you_mean
 
@@ -62,7 +62,7 @@ def ask(archive: Archive, sql: str, *, workers: int = 1, compact: bool = True) -
         return _answered(connection, statement)
 
 
-def _keep_inside(connection: duckdb.DuckDBPyConnection, archive: Archive, index: Index | None) -> None:
+def _keep_inside(connection: duckdb.DuckDBPyConnection, archive: Archive, index: AuditIndex | None) -> None:
     """Let questions reach files of the archive and its index, and no others."""
     folders = [archive.root, *([part.parent for part in index.parts[:1]] if index else [])]
     allowed = [f"{folder.resolve()}/" for folder in folders if isinstance(folder, Path)]
@@ -104,7 +104,7 @@ def _explained(problem: duckdb.Error) -> str:
 
 
 def _views(
-    archive: Archive, index: Index | None, *, compact: bool
+    archive: Archive, index: AuditIndex | None, *, compact: bool
 ) -> Mapping[str, Callable[[duckdb.DuckDBPyConnection], None]]:
     """How every view is made."""
     out: dict[str, Callable[[duckdb.DuckDBPyConnection], None]] = {}
@@ -117,7 +117,7 @@ def _views(
     return out
 
 
-def _of_index(index: Index | None, name: str) -> Callable[[duckdb.DuckDBPyConnection], None]:
+def _of_index(index: AuditIndex | None, name: str) -> Callable[[duckdb.DuckDBPyConnection], None]:
     def make(connection: duckdb.DuckDBPyConnection) -> None:
         hidden = "EXCLUDE (stamp)" if name == "runs" else ""
         if index is None or not index.parts or not isinstance(index.parts[0], Path):

@@ -7,17 +7,17 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from pipelines.audit.calibrations import date_of
-from pipelines.audit.finding import Finding
+from pipelines.audit.finding import AuditFinding
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from inertial.population.change_points import Change
+    from inertial.population.change_points import ChangePoint
     from pipelines.audit.audit import Audit
-    from pipelines.audit.stations_over_time import Series
+    from pipelines.audit.stations_over_time import StationSeries
 
 
-def of_stations(audit: Audit) -> Iterator[Finding]:
+def of_stations(audit: Audit) -> Iterator[AuditFinding]:
     """All of them, the weightiest kind first."""
     yield from _moved_stations(audit)
     yield from _moved_slots(audit)
@@ -25,7 +25,7 @@ def of_stations(audit: Audit) -> Iterator[Finding]:
     yield from _gauges(audit)
 
 
-def _moved_stations(audit: Audit) -> Iterator[Finding]:
+def _moved_stations(audit: Audit) -> Iterator[AuditFinding]:
     """Changes of a station's level, each told once: by the effect in which it is plainest."""
     told: list[tuple[str, float]] = []
     found = [(abs(c.shift) / c.error, series, c) for series in audit.stations for c in series.changes]
@@ -37,19 +37,19 @@ def _moved_stations(audit: Audit) -> Iterator[Finding]:
             yield _moved(audit, series, change, "station_moved", f"{series.where} ({series.parameter})")
 
 
-def _reach(series: Series, change: Change) -> float:
+def _reach(series: StationSeries, change: ChangePoint) -> float:
     """Days within which another change is the same event."""
     return 7.0 + float(series.day[min(change.high, series.day.size - 1)] - series.day[max(change.low - 1, 0)])
 
 
-def _moved_slots(audit: Audit) -> Iterator[Finding]:
+def _moved_slots(audit: Audit) -> Iterator[AuditFinding]:
     for series in audit.slots:
         for change in series.changes:
             if float(series.day[change.first]) >= audit.scope.since:
                 yield _moved(audit, series, change, "slot_moved", f"{series.where} ({series.parameter})")
 
 
-def _moved(audit: Audit, series: Series, change: Change, kind: str, what: str) -> Finding:
+def _moved(audit: Audit, series: StationSeries, change: ChangePoint, kind: str, what: str) -> AuditFinding:
     first, low = float(series.day[change.first]), float(series.day[max(change.low - 1, 0)])
     high = float(series.day[min(change.high, series.day.size - 1)])
     later = [c.first for c in series.changes if c.first > change.first]
@@ -71,10 +71,10 @@ def _moved(audit: Audit, series: Series, change: Change, kind: str, what: str) -
         "earliest": date_of(low), "latest": date_of(high), "shift_urad": change.shift, "standard_error_urad": change.error,
         "p_value": change.p_value, "first_run": str(series.run[change.first]), "units_since": len(units), "runs_since": runs,
     }  # fmt: skip
-    return Finding("station", kind, series.station, message, units, evidence)
+    return AuditFinding("station", kind, series.station, message, units, evidence)
 
 
-def _measured(audit: Audit, series: Series, start: float, end: float) -> tuple[tuple[str, ...], int]:
+def _measured(audit: Audit, series: StationSeries, start: float, end: float) -> tuple[tuple[str, ...], int]:
     """Units measured on a series' station, or in its slot, after the last moment that was surely good."""
     all_ = audit.all
     rows = (all_.station == series.station) & (all_.day > start) & (all_.day < end) & audit.product
@@ -83,7 +83,7 @@ def _measured(audit: Audit, series: Series, start: float, end: float) -> tuple[t
     return tuple(sorted({str(u) for u in all_.unit[rows]})), len({str(r) for r in all_.run[rows]})
 
 
-def _standards(audit: Audit) -> Iterator[Finding]:
+def _standards(audit: Audit) -> Iterator[AuditFinding]:
     for chart in audit.charts:
         if not chart.in_control:
             first = int(np.argmax(chart.rules.any(axis=0) | chart.outside))
@@ -95,10 +95,10 @@ def _standards(audit: Audit) -> Iterator[Finding]:
             evidence = {"station": chart.station, "standard": chart.standard, "parameter": chart.parameter,
                         "first": date_of(chart.day[first]), "alarms": chart.alarms, "expected": chart.expected,
                         "p_value": chart.p_value}  # fmt: skip
-            yield Finding("station", "standard", chart.station, message, (chart.standard,), evidence)
+            yield AuditFinding("station", "standard", chart.station, message, (chart.standard,), evidence)
 
 
-def _gauges(audit: Audit) -> Iterator[Finding]:
+def _gauges(audit: Audit) -> Iterator[AuditFinding]:
     """Gauge studies that take too much of the tolerance, one finding a study."""
     most = audit.rules.gauge_most_percent
     bad = [s for s in audit.studies if np.isfinite(s.of_tolerance) and s.of_tolerance > most]
@@ -110,4 +110,4 @@ def _gauges(audit: Audit) -> Iterator[Finding]:
             f"(study of {date_of(own[0].first_day)}, {len(runs)} runs); measure longer, or widen the tolerance"
         )
         evidence = {"runs": list(runs), "percent_of_tolerance": {study.parameter: study.of_tolerance for study in own}}
-        yield Finding("station", "gauge", own[0].device, message, (), evidence)
+        yield AuditFinding("station", "gauge", own[0].device, message, (), evidence)

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from inertial.population.change_points import Change, change_points, noise_of
+from inertial.population.change_points import ChangePoint, change_points, noise_of
 from inertial.population.control_charts import Baseline, alarms, baseline, false_alarms, signals
 from inertial.population.two_way import unit_and_place
 from pipelines.audit.calibrations import codes
@@ -32,7 +32,7 @@ CHART_LEVEL = 0.01  # p-value of the number of alarms, shared by all charts
 
 
 @dataclass(frozen=True)
-class Series:
+class StationSeries:
     """One quantity of one station in order of time, (n,) each, and where its level changed.
 
     where : of what: the station's effect, or a slot; unit_text : of the values
@@ -46,10 +46,10 @@ class Series:
     value: Array
     run: Texts
     noise: float
-    changes: tuple[Change, ...]
+    changes: tuple[ChangePoint, ...]
 
 
-def station_series(station: pd.DataFrame, runs: pd.DataFrame) -> list[Series]:
+def station_series(station: pd.DataFrame, runs: pd.DataFrame) -> list[StationSeries]:
     """The station's effects, station by station: what the residuals of its runs had in common.
 
     Parameters
@@ -67,7 +67,7 @@ def station_series(station: pd.DataFrame, runs: pd.DataFrame) -> list[Series]:
     ]  # fmt: skip
 
 
-def slot_series(all_: Calibrations, good: Flags) -> tuple[list[Series], list[dict[str, object]]]:
+def slot_series(all_: Calibrations, good: Flags) -> tuple[list[StationSeries], list[dict[str, object]]]:
     """The rotation of every slot as its units show it, and its mean over all time: only units that sat elsewhere too tell it.
 
     A unit's rotation is its own and its seat's. Over units that come back in other slots the two are taken apart; what is
@@ -80,7 +80,7 @@ def slot_series(all_: Calibrations, good: Flags) -> tuple[list[Series], list[dic
     units = codes(all_.histories[rows].astype(str))
     seats = np.array([f"{s} slot {n}" for s, n in zip(all_.station[rows], all_.slot[rows], strict=True)], dtype=object)
     names, place = np.unique(seats.astype(str), return_inverse=True)
-    out: list[Series] = []
+    out: list[StationSeries] = []
     means: dict[str, dict[str, object]] = {str(name): {"where": str(name)} for name in names}
     for turn in TURNS:
         values = 1e3 * all_.column(turn)[rows]
@@ -99,10 +99,10 @@ def slot_series(all_: Calibrations, good: Flags) -> tuple[list[Series], list[dic
     return out, list(means.values())
 
 
-def _series(key: tuple[str, str, str], text: str, day: Array, value: Array, run: Texts, level: float) -> Series:
+def _series(key: tuple[str, str, str], text: str, day: Array, value: Array, run: Texts, level: float) -> StationSeries:
     station, where, parameter = key
     changes = change_points(np.asarray(value, dtype=float), level)
-    return Series(station, where, parameter, text, day, value, run, noise_of(value), tuple(changes))
+    return StationSeries(station, where, parameter, text, day, value, run, noise_of(value), tuple(changes))
 
 
 @dataclass(frozen=True)

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from inertial.population.fingerprints import Scale, alike_below, change_scale, distance, foreign_above, nearest
+from inertial.population.fingerprints import ChangeScale, alike_below, change_scale, distance, foreign_above, nearest
 from pipelines.audit.few_units import exchanged_pairs
 from pipelines.audit.parameters import FAMILY_OF
 from pipelines.audit.parameters import NAMES as PARAMETERS
@@ -91,7 +91,7 @@ def _before(histories: Index, good: Flags) -> Index:
     return out
 
 
-def _foreign(values: Array, histories: Index, days: Array, scale: Scale) -> Flags:
+def _foreign(values: Array, histories: Index, days: Array, scale: ChangeScale) -> Flags:
     """Which calibrations do not fit the last one before them that does."""
     foreign = np.zeros(len(values), dtype=bool)
     for _ in range(ROUNDS):
@@ -108,7 +108,7 @@ def _foreign(values: Array, histories: Index, days: Array, scale: Scale) -> Flag
     return foreign
 
 
-def _described(all_: Calibrations, own: Index, values: Array, foreign: Flags, scale: Scale) -> list[Stranger]:
+def _described(all_: Calibrations, own: Index, values: Array, foreign: Flags, scale: ChangeScale) -> list[Stranger]:
     before = _before(all_.histories[own], ~foreign)
     histories, days = all_.histories[own], all_.day[own]
     out: list[Stranger] = []
@@ -121,7 +121,7 @@ def _described(all_: Calibrations, own: Index, values: Array, foreign: Flags, sc
     return out
 
 
-def _fits(k: int, values: Array, foreign: Flags, histories: Index, days: Array, scale: Scale) -> tuple[int, int]:
+def _fits(k: int, values: Array, foreign: Flags, histories: Index, days: Array, scale: ChangeScale) -> tuple[int, int]:
     """The good earlier calibration of the one other unit that a stranger fits, and that unit; (−1, −1) for none or several."""
     candidates = np.flatnonzero((days < days[k]) & ~foreign & (histories != histories[k]))
     if not candidates.size:
@@ -135,7 +135,7 @@ def _fits(k: int, values: Array, foreign: Flags, histories: Index, days: Array, 
 
 
 def _exchanged(
-    k: int, unit: int, values: Array, foreign: Flags, histories: Index, days: Array, before: Index, scale: Scale
+    k: int, unit: int, values: Array, foreign: Flags, histories: Index, days: Array, before: Index, scale: ChangeScale
 ) -> bool:
     """Whether the other unit has a stranger of the same days that fits the past of this one."""
     near = np.flatnonzero(foreign & (histories == unit) & (np.abs(days - days[k]) <= 1.0))

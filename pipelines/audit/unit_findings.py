@@ -8,7 +8,7 @@ import numpy as np
 
 from inertial.population.comparison import outlier_limit
 from pipelines.audit.calibrations import date_of
-from pipelines.audit.finding import Finding, date_or_never
+from pipelines.audit.finding import AuditFinding, date_or_never
 from pipelines.audit.parameters import unit_text
 from pipelines.audit.serials import twice
 
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from pipelines.audit.drifts import UnitDrift
 
 
-def of_units(audit: Audit) -> Iterator[Finding]:
+def of_units(audit: Audit) -> Iterator[AuditFinding]:
     """All of them, the weightiest kind first."""
     yield from _two_units(audit)
     yield from _exchanged(audit)
@@ -29,7 +29,7 @@ def of_units(audit: Audit) -> Iterator[Finding]:
     yield from _unlike_their_kind(audit)
 
 
-def _two_units(audit: Audit) -> Iterator[Finding]:
+def _two_units(audit: Audit) -> Iterator[AuditFinding]:
     for one in twice(audit.all):
         if audit.all.day[one.second] < audit.scope.since:
             continue
@@ -39,14 +39,14 @@ def _two_units(audit: Audit) -> Iterator[Finding]:
             "out which is which, give one another, and revoke what was certified under the wrong one"
         )
         evidence = {"runs": [str(audit.all.run[row]) for row in (one.first, one.second)]}
-        yield Finding("quality", "two_units", one.serial, message, (one.serial,), evidence)
+        yield AuditFinding("quality", "two_units", one.serial, message, (one.serial,), evidence)
 
 
 def _where(all_: Calibrations, row: int) -> str:
     return f"{all_.device[row]} on {all_.station[row]}, {date_of(float(all_.day[row]))} (run {all_.run[row]})"
 
 
-def _exchanged(audit: Audit) -> Iterator[Finding]:
+def _exchanged(audit: Audit) -> Iterator[AuditFinding]:
     for one in audit.strangers:
         unit, run, day = (str(getattr(audit.all, n)[one.row]) for n in ("unit", "run", "day"))
         evidence = {"run": run, "date": date_of(float(day)), "distance": one.distance, "looks_like": one.looks_like}
@@ -56,16 +56,16 @@ def _exchanged(audit: Audit) -> Iterator[Finding]:
                 f"{unit} of {date_of(float(day))} (run {run}) does not fit its past, it fits {one.looks_like}, {how}: "
                 "serials were exchanged; read both labels, revoke the certificates and certify anew"
             )
-            yield Finding("quality", "exchanged", unit, message, (unit, one.looks_like), evidence)
+            yield AuditFinding("quality", "exchanged", unit, message, (unit, one.looks_like), evidence)
         else:
             message = (
                 f"{unit} of {date_of(float(day))} (run {run}) does not fit its past, nor that of any other unit: it was "
                 "damaged, or its serial is wrong; measure it again"
             )
-            yield Finding("quality", "foreign", unit, message, (unit,), evidence)
+            yield AuditFinding("quality", "foreign", unit, message, (unit,), evidence)
 
 
-def _out_of_tolerance(audit: Audit) -> Iterator[Finding]:
+def _out_of_tolerance(audit: Audit) -> Iterator[AuditFinding]:
     """Units found outside at their re-calibration, by more than the uncertainty of both: what they measured is in doubt."""
     for drifts in audit.units.values():
         outside = [d for d in drifts if d.day >= audit.scope.since and abs(d.change) - _expanded(d) > d.tolerance]
@@ -79,10 +79,10 @@ def _out_of_tolerance(audit: Audit) -> Iterator[Finding]:
             f"measured since {_before(drift)} is in doubt: tell whoever used it"
         )
         evidence = {**_numbers(drift), "parameters": [d.parameter for d in outside]}
-        yield Finding("quality", "found_outside", drift.unit, message, (drift.unit,), evidence)
+        yield AuditFinding("quality", "found_outside", drift.unit, message, (drift.unit,), evidence)
 
 
-def _leaving(audit: Audit) -> Iterator[Finding]:
+def _leaving(audit: Audit) -> Iterator[AuditFinding]:
     """Units that are expected to leave their tolerance or limit before they are due: each by what it leaves first."""
     due_day = {
         f"{audit.all.device[row]} {audit.all.unit[row]}": float(day)
@@ -100,7 +100,7 @@ def _leaving(audit: Audit) -> Iterator[Finding]:
             f"about {date_or_never(days[0])} ({date_or_never(days[1])} to {date_or_never(days[2])})"
             f"{_besides(others)}, before it is due on {date_of(due)}; call it in"
         )
-        yield Finding(
+        yield AuditFinding(
             "quality", "leaves", drift.unit, message, (drift.unit,), {**_numbers(drift), "parameters": others}
         )
 
@@ -135,7 +135,7 @@ def _besides(found: Sequence[object]) -> str:
     return f", and {more} more parameter{'s' if more > 1 else ''}" if more else ""
 
 
-def _unlike_their_kind(audit: Audit) -> Iterator[Finding]:
+def _unlike_their_kind(audit: Audit) -> Iterator[AuditFinding]:
     """Units whose slope none of their kind has: each by its plainest parameter."""
     count = sum(len(drifts) for drifts in audit.units.values())
     for drifts in audit.units.values():
@@ -147,7 +147,7 @@ def _unlike_their_kind(audit: Audit) -> Iterator[Finding]:
                 f"{worst.unit}: {worst.parameter} moves {worst.slope:+.3g} {text} a year over {worst.calibrations} calibrations, "
                 f"{abs(worst.odd):.1f} σ from its kind, and {when}"
             )
-            yield Finding("quality", "drifts", worst.unit, message, (worst.unit,), _numbers(worst))
+            yield AuditFinding("quality", "drifts", worst.unit, message, (worst.unit,), _numbers(worst))
 
 
 def _numbers(drift: UnitDrift) -> dict[str, Any]:

@@ -10,8 +10,8 @@ import pandas as pd
 
 from pipelines.capture.plausibility import Soundness
 from pipelines.capture.power_cycling import Power
-from pipelines.capture.record import History, Record, readings_row
-from pipelines.capture.supervision import Guard, short_of_samples
+from pipelines.capture.record import Record, TemperatureLog, readings_row
+from pipelines.capture.supervision import Supervisor, short_of_samples
 from schemas.errors import LinkLost, OperatorNeeded, StationError, StationTimeout
 from schemas.event import NO_RECORD
 from stations.devices.slot import SamplesLost
@@ -45,15 +45,15 @@ def fault_text(slot: int, problem: StationError) -> str:
 
 
 @dataclass
-class Taking:
+class Acquisition:
     """The units of a lot on a station while records are taken: who still answers, and the history since the last record."""
 
     station: Station
     recipe: Recipe
     lot: Lot
     sink: CaptureSink
-    guard: Guard
-    history: History = field(default_factory=History)
+    guard: Supervisor
+    history: TemperatureLog = field(default_factory=TemperatureLog)
     lost: dict[str, str] = field(default_factory=dict)
     identities: dict[str, Identity] = field(default_factory=dict)
     soundness: Soundness = field(init=False)

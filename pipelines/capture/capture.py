@@ -5,10 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
-from pipelines.capture.acquisition import Taking
+from pipelines.capture.acquisition import Acquisition
 from pipelines.capture.sink import CaptureSink
 from pipelines.capture.soak_response import Approach
-from pipelines.capture.supervision import LINK_ATTEMPTS, LOST_FOR, WARMING, Guard, StillSuspended
+from pipelines.capture.supervision import LINK_ATTEMPTS, LOST_FOR, WARMING, StillSuspended, Supervisor
 from pipelines.capture.time_left import Remaining
 from pipelines.schedule.steps import Step, steps
 from schemas.errors import LinkLost, NotReached, StationError, StationTimeout
@@ -47,9 +47,9 @@ def capture(
     """
     plan = steps(recipe)
     check(station, recipe, plan)
-    guard = Guard(station, events if events is not None else MemoryLog())
+    guard = Supervisor(station, events if events is not None else MemoryLog())
     remaining = Remaining(plan, station.config, recipe)
-    work = _Work(station, recipe, lot, sink, guard, remaining=remaining, progress=progress)
+    work = CaptureRun(station, recipe, lot, sink, guard, remaining=remaining, progress=progress)
     work.run(plan)
 
 
@@ -64,7 +64,7 @@ def check(station: Station, recipe: Recipe, plan: list[Step]) -> None:
 
 
 @dataclass
-class _Work(Taking):
+class CaptureRun(Acquisition):
     """The capture of one lot, record by record, each from its checkpoint."""
 
     remaining: Remaining = field(kw_only=True)

@@ -9,7 +9,7 @@ from schemas.event import NO_RECORD
 from stations.safety.suspenders import require_released
 
 if TYPE_CHECKING:
-    from pipelines.capture.supervision import Guard
+    from pipelines.capture.supervision import Supervisor
     from pipelines.schedule.steps import Step
     from stations.station import Station
 
@@ -24,7 +24,7 @@ class Power:
     """
 
     station: Station
-    guard: Guard
+    guard: Supervisor
     ordered: bool
 
     def require_on(self) -> None:

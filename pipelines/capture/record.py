@@ -28,7 +28,7 @@ SHARED = 4  # numbers of a look that all slots share: two angles, air, vibration
 
 
 @dataclass
-class History:
+class TemperatureLog:
     """Temperatures against time since the last record was stored."""
 
     rows: list[tuple[float, float, int, str, float]] = field(default_factory=list)

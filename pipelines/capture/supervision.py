@@ -29,7 +29,7 @@ CLOCK_PART = 1e-3
 
 
 @dataclass
-class Guard:
+class Supervisor:
     """Watches the station while a capture runs; ``watched`` are the rules, once the run has begun."""
 
     station: Station

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
-from pipelines.schedule.timing import itinerary
+from pipelines.schedule.timing import schedule
 
 if TYPE_CHECKING:
     from pipelines.capture.soak_response import Approach
@@ -57,7 +57,7 @@ class Remaining:
     def _planned(self, config: StationConfig) -> None:
         """Plans soaks and records by a station's pace."""
         self._soak, self._record = {}, {}
-        for stretch in itinerary(self.plan, config, self.recipe):
+        for stretch in schedule(self.plan, config, self.recipe):
             record = stretch.step.record
             kind = self._soak if stretch.kind == "soak" else self._record
             kind[record] = kind.get(record, 0.0) + stretch.seconds

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from pipelines.archive import Run, files
 from pipelines.certificates.days import day_of, months_after, today
-from pipelines.certificates.entries import Event
+from pipelines.certificates.entries import LedgerEntry
 from pipelines.tables.frames import rows_of
 from schemas.errors import WrongUse, did_you_mean
 
@@ -28,12 +28,12 @@ class Certified:
     left_out : why a unit was not certified, by serial
     """
 
-    written: list[Event] = field(default_factory=list[Event])
-    there: list[Event] = field(default_factory=list[Event])
+    written: list[LedgerEntry] = field(default_factory=list[LedgerEntry])
+    there: list[LedgerEntry] = field(default_factory=list[LedgerEntry])
     left_out: dict[str, str] = field(default_factory=dict[str, str])
 
     @property
-    def events(self) -> list[Event]:
+    def events(self) -> list[LedgerEntry]:
         """All that certify."""
         return [*self.written, *self.there]
 
@@ -75,7 +75,9 @@ def certify(
     return result
 
 
-def _proposals(run: Run, units: Sequence[str], first: str, last: str, reason: str) -> tuple[list[Event], Certified]:
+def _proposals(
+    run: Run, units: Sequence[str], first: str, last: str, reason: str
+) -> tuple[list[LedgerEntry], Certified]:
     """What is to be certified, and what is not with the reason; a named unit that may not be is refused."""
     grades = {str(row["unit"]): row for row in rows_of(_grades(run))}
     refuse_overdue(run)
@@ -86,7 +88,7 @@ def _proposals(run: Run, units: Sequence[str], first: str, last: str, reason: st
         "recipe": about["recipe"]["name"], "coefficients": run.manifest("coefficients")["sha256"], "reason": reason,
         "evidence": evidence,
     }  # fmt: skip
-    proposals: list[Event] = []
+    proposals: list[LedgerEntry] = []
     for serial in units or tuple(grades):
         if serial not in grades:
             message = f"certify: no unit {serial!r} in run {run.id}; {did_you_mean(serial, grades)}"
@@ -111,9 +113,9 @@ def _grades(run: Run) -> Any:
     return run.table("grades")
 
 
-def _blank(serial: str, **content: Any) -> Event:
+def _blank(serial: str, **content: Any) -> LedgerEntry:
     """An event that the ledger has still to number and stamp."""
-    return Event(
+    return LedgerEntry(
         serial=serial, sequence=0, action="certify", ends=(), who="", where="", when="", previous="", **content
     )
 

@@ -16,7 +16,7 @@ Action = Literal["certify", "supersede", "revoke"]
 
 
 @dataclass(frozen=True)
-class Event:
+class LedgerEntry:
     """One thing that happened to a unit's calibrations.
 
     ``certify`` begins the validity of a calibration, ``supersede`` does the same and ends others, ``revoke`` only ends some.
@@ -62,10 +62,10 @@ class Event:
         return {**content, "ends": list(self.ends), "evidence": dict(self.evidence), "schema": SCHEMA}
 
 
-_NAMES = {field.name for field in fields(Event)}
+_NAMES = {field.name for field in fields(LedgerEntry)}
 
 
-def event_of(content: Mapping[str, Any], where: str) -> Event:
+def event_of(content: Mapping[str, Any], where: str) -> LedgerEntry:
     """The event that a file holds; refused where it is none, or of a schema that is not known yet.
 
     Parameters
@@ -84,7 +84,7 @@ def event_of(content: Mapping[str, Any], where: str) -> Event:
         raise ArchiveUnusable(message)
     known["ends"] = tuple(known["ends"])
     known["evidence"] = tuple(sorted(known["evidence"].items()))
-    return Event(**{name: known[name] for name in _NAMES})
+    return LedgerEntry(**{name: known[name] for name in _NAMES})
 
 
 FOLDER = "calibrations"

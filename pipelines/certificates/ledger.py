@@ -19,7 +19,7 @@ from pipelines.archive.locks import alone
 from pipelines.archive.provenance import provenance
 from pipelines.archive.store import ObjectPath, place_of
 from pipelines.certificates.days import LAST, today
-from pipelines.certificates.entries import Event, event_of, folder_of
+from pipelines.certificates.entries import LedgerEntry, event_of, folder_of
 from pipelines.certificates.refusals import nothing_to_revoke, refuse_other_device, refuse_serial
 from pipelines.certificates.validity import Calibration, calibrations_of, overlapped
 from schemas.errors import ArchiveUnusable, WrongUse
@@ -45,7 +45,7 @@ class Ledger:
     def __init__(self, archive: Archive | Place | str) -> None:
         self.root = archive.root if isinstance(archive, Archive) else place_of(archive)
 
-    def events(self, serial: str) -> list[Event]:
+    def events(self, serial: str) -> list[LedgerEntry]:
         """What happened to a unit's calibrations, in order; empty for a unit that is not known."""
         return [event for event, _ in self._read(serial)]
 
@@ -67,7 +67,7 @@ class Ledger:
         for events in self.histories():
             yield from calibrations_of(events)
 
-    def histories(self) -> list[list[Event]]:
+    def histories(self) -> list[list[LedgerEntry]]:
         """The events of every unit, unit by unit, in no order that means anything; few files are read where they were before."""
         from pipelines.certificates.ledger_index import (
             histories_of,  # needs a table library, which looking up one unit does not
@@ -95,7 +95,7 @@ class Ledger:
 
         return certify(self, run, units, start, until, months=months, reason=reason, supersede=supersede)
 
-    def add(self, event: Event, *, supersede: bool = False) -> tuple[Event, bool]:
+    def add(self, event: LedgerEntry, *, supersede: bool = False) -> tuple[LedgerEntry, bool]:
         """The event that certifies a calibration, as it was written, and whether it was there already.
 
         Parameters
@@ -105,7 +105,7 @@ class Ledger:
         """
         refuse_serial(event.serial, "certify")
 
-        def decided(events: Sequence[Event]) -> Event | None:
+        def decided(events: Sequence[LedgerEntry]) -> LedgerEntry | None:
             known = calibrations_of(events)
             if any(_same(one, event) for one in known):
                 return None
@@ -118,7 +118,7 @@ class Ledger:
             return written, False
         return next(one.event for one in self.calibrations(event.serial) if _same(one, event)), True
 
-    def revoke(self, serial: str, reason: str, *, day: str = "", certificate: int = 0) -> Event:
+    def revoke(self, serial: str, reason: str, *, day: str = "", certificate: int = 0) -> LedgerEntry:
         """The event that ends a unit's calibrations.
 
         Parameters
@@ -130,7 +130,7 @@ class Ledger:
             message = "revoke: no reason is given, one is needed for those who relied on it; add --reason"
             raise WrongUse(message)
 
-        def decided(events: Sequence[Event]) -> Event:
+        def decided(events: Sequence[LedgerEntry]) -> LedgerEntry:
             known = [one for one in calibrations_of(events) if one.start < one.until]
             chosen = [one for one in known if certificate in {0, one.event.sequence}]
             meant = [one for one in chosen if one.until > (day or ("" if certificate else today()))]
@@ -149,14 +149,14 @@ class Ledger:
         self.anchor([written])
         return written
 
-    def anchor(self, events: Sequence[Event]) -> None:
+    def anchor(self, events: Sequence[LedgerEntry]) -> None:
         """Name events in the archive's chain, so that one that is taken away is missed."""
         if events:
             places = {self._place(one.serial, one.sequence): one for one in events}
             sealed = {place: files.sha256(self.root / place) for place in sorted(places)}
             hash_chain.append(self.root, "calibrations", sealed, {**provenance(), "run": events[0].run})
 
-    def write_bulk(self, events: Iterable[Event]) -> int:
+    def write_bulk(self, events: Iterable[LedgerEntry]) -> int:
         """Write events of a new archive at once, without a look at what is there nor a sync per file; how many there were.
 
         Parameters
@@ -173,7 +173,7 @@ class Ledger:
             count += 1
         return count
 
-    def _append(self, serial: str, decide: Callable[[Sequence[Event]], Event | None]) -> Event | None:
+    def _append(self, serial: str, decide: Callable[[Sequence[LedgerEntry]], LedgerEntry | None]) -> LedgerEntry | None:
         """Write what is decided on a unit's events as its next one; None where nothing is to be written."""
         folder = self._folder(serial)
         with alone(folder, wait=True) if isinstance(folder, ObjectPath) else nullcontext():
@@ -194,7 +194,7 @@ class Ledger:
     def _place(serial: str, sequence: int) -> str:
         return f"{folder_of(serial)}/{sequence:06d}.json"
 
-    def _read(self, serial: str) -> list[tuple[Event, str]]:
+    def _read(self, serial: str) -> list[tuple[LedgerEntry, str]]:
         found = _events(self._folder(serial))
         for event, _ in found:
             if event.serial != serial:
@@ -206,14 +206,14 @@ class Ledger:
         return found
 
 
-def _events(folder: Place) -> list[tuple[Event, str]]:
+def _events(folder: Place) -> list[tuple[LedgerEntry, str]]:
     """Events of a unit's folder with the hashes of their files; refused where one is missing among them."""
     if isinstance(folder, Path):
         names = sorted(path.name for path in folder.iterdir()) if folder.is_dir() else []
     else:
         names = sorted(path.name for path in folder.iterdir())
     names = [name for name in names if name.endswith(".json") and hash_chain.is_number(name.removesuffix(".json"))]
-    found: list[tuple[Event, str]] = []
+    found: list[tuple[LedgerEntry, str]] = []
     for count, name in enumerate(names, 1):
         place = folder / name
         data = place.read_bytes()
@@ -225,7 +225,7 @@ def _events(folder: Place) -> list[tuple[Event, str]]:
     return found
 
 
-def _stamped(event: Event, known: Sequence[tuple[Event, str]]) -> Event:
+def _stamped(event: LedgerEntry, known: Sequence[tuple[LedgerEntry, str]]) -> LedgerEntry:
     """The event with its number, what it follows, and who writes it where and when."""
     by = provenance()
     if known:
@@ -240,7 +240,7 @@ def _stamped(event: Event, known: Sequence[tuple[Event, str]]) -> Event:
     return replace(event, sequence=len(known) + 1, previous=known[-1][1] if known else "", **stamp)
 
 
-def _same(one: Calibration, event: Event) -> bool:
+def _same(one: Calibration, event: LedgerEntry) -> bool:
     """Whether a calibration that holds is what an event would certify again."""
     old = (one.run, one.event.coefficients, one.start, one.until)
     return old == (event.run, event.coefficients, event.start, event.until)

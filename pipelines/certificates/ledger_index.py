@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from pipelines.archive import files
 from pipelines.archive.store import ObjectPath, first_line
-from pipelines.certificates.entries import FOLDER, Event, event_of, folder_of
+from pipelines.certificates.entries import FOLDER, LedgerEntry, event_of, folder_of
 from schemas.errors import ArchiveUnusable
 
 if TYPE_CHECKING:
@@ -32,14 +32,14 @@ DIGITS = "0123456789abcdef"
 FEWEST_NEW = 8  # of one file; fewer are read again sooner than they are written
 READERS = 8
 AT_ONCE = 64  # files that one thread reads in one go
-NAMES = tuple(field.name for field in fields(Event))
+NAMES = tuple(field.name for field in fields(LedgerEntry))
 
 
 class Noted(NamedTuple):
     """An event, and what its file looked like."""
 
     stamp: str
-    event: Event
+    event: LedgerEntry
 
 
 @dataclass
@@ -49,7 +49,7 @@ class Histories:
     read : how many files had to be read
     """
 
-    units: list[list[Event]] = field(default_factory=list[list[Event]])
+    units: list[list[LedgerEntry]] = field(default_factory=list[list[LedgerEntry]])
     problems: dict[str, str] = field(default_factory=dict[str, str])
     read: int = 0
 
@@ -65,7 +65,7 @@ def histories_of(root: Place) -> Histories:
     return found
 
 
-def _events(found: Histories, root: Place, digit: str, stamps: Mapping[str, str]) -> dict[str, Event | str]:
+def _events(found: Histories, root: Place, digit: str, stamps: Mapping[str, str]) -> dict[str, LedgerEntry | str]:
     """Events by the places of their files, or what is wrong with a file; what is new is noted."""
     place = root / NOTED / f"{digit}.parquet"
     before = _noted(place)
@@ -73,20 +73,20 @@ def _events(found: Histories, root: Place, digit: str, stamps: Mapping[str, str]
     missing = [name for name in stamps if name not in known]
     read = _all_read(root / FOLDER, missing)
     found.read += len(read)
-    new = {name: Noted(stamps[name], event) for name, event in read.items() if isinstance(event, Event)}
+    new = {name: Noted(stamps[name], event) for name, event in read.items() if isinstance(event, LedgerEntry)}
     if len(new) + len(before) - len(known) >= FEWEST_NEW:
         with suppress(ArchiveUnusable):  # who may only read the archive reads it without
             files.publish(place, _encoded(known | new))
     return {name: known[name].event if name in known else read[name] for name in stamps}
 
 
-def _gather(found: Histories, root: Place, events: Mapping[str, Event | str]) -> None:
+def _gather(found: Histories, root: Place, events: Mapping[str, LedgerEntry | str]) -> None:
     """Put the events of every unit together; a unit of which one is missing, strange or unreadable is a problem."""
     by_unit: dict[str, list[str]] = {}
     for name in sorted(events):
         by_unit.setdefault(name.rpartition("/")[0], []).append(name)
     for folder, names in by_unit.items():
-        own: list[Event] = []
+        own: list[LedgerEntry] = []
         for count, name in enumerate(names, 1):
             event = events[name]
             wrong = event if isinstance(event, str) else _wrong(event, folder, count, name)
@@ -98,7 +98,7 @@ def _gather(found: Histories, root: Place, events: Mapping[str, Event | str]) ->
             found.units.append(own)
 
 
-def _wrong(event: Event, folder: str, count: int, name: str) -> str:
+def _wrong(event: LedgerEntry, folder: str, count: int, name: str) -> str:
     if event.sequence != count or not name.endswith(f"/{count:06d}.json"):
         return f"has event {name.rpartition('/')[2]} where number {count} is due; restore what is missing from a copy"
     if folder_of(event.serial) != f"{FOLDER}/{folder}":
@@ -106,17 +106,17 @@ def _wrong(event: Event, folder: str, count: int, name: str) -> str:
     return ""
 
 
-def _all_read(top: Place, names: Sequence[str]) -> dict[str, Event | str]:
+def _all_read(top: Place, names: Sequence[str]) -> dict[str, LedgerEntry | str]:
     """The events of files below a folder, read by several threads: a cold disk answers many questions as fast as one."""
     groups = [names[k : k + AT_ONCE] for k in range(0, len(names), AT_ONCE)]
-    out: dict[str, Event | str] = {}
+    out: dict[str, LedgerEntry | str] = {}
     with ThreadPoolExecutor(READERS) as pool:
         for group, found in zip(groups, pool.map(lambda own: [_read(top, name) for name in own], groups), strict=True):
             out |= zip(group, found, strict=True)
     return out
 
 
-def _read(top: Place, name: str) -> Event | str:
+def _read(top: Place, name: str) -> LedgerEntry | str:
     """The event that a file holds, or why there is none."""
     try:
         if isinstance(top, ObjectPath):
@@ -146,7 +146,7 @@ def _noted(place: Place) -> dict[str, Noted]:
     for name in ("ends", "evidence"):  # of which many are the same
         known = {text: _tuples(json.loads(text)) for text in set(columns[name])}
         columns[name] = [known[text] for text in columns[name]]
-    events = (Event(*row) for row in zip(*(columns[name] for name in NAMES), strict=True))
+    events = (LedgerEntry(*row) for row in zip(*(columns[name] for name in NAMES), strict=True))
     rows = zip(columns["place"], columns["stamp"], events, strict=True)
     return {name: Noted(stamp, event) for name, stamp, event in rows}
 

@@ -11,7 +11,7 @@ from schemas.errors import WrongUse
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from pipelines.certificates.entries import Event
+    from pipelines.certificates.entries import LedgerEntry
     from pipelines.certificates.validity import Calibration
 
 START, END = "run.json", "readings.json"
@@ -28,7 +28,7 @@ def refuse_serial(serial: str, where: str) -> None:
         raise WrongUse(message)
 
 
-def refuse_other_device(known: Sequence[Calibration], event: Event) -> None:
+def refuse_other_device(known: Sequence[Calibration], event: LedgerEntry) -> None:
     """Refuse a serial that the ledger knows as another kind of device, unless those calibrations were revoked."""
     devices = {one.event.device for one in known if one.state != "revoked"} - {event.device}
     if devices:

@@ -13,7 +13,7 @@ from schemas.errors import WrongUse
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
 
-    from pipelines.certificates.entries import Event
+    from pipelines.certificates.entries import LedgerEntry
 
 
 @dataclass(frozen=True)
@@ -27,9 +27,9 @@ class Calibration:
     ended_by : the event that ended it earlier; None where nothing did.
     """
 
-    event: Event
+    event: LedgerEntry
     until: str
-    ended_by: Event | None = None
+    ended_by: LedgerEntry | None = None
 
     @property
     def serial(self) -> str:
@@ -92,7 +92,7 @@ class Calibration:
         }  # fmt: skip
 
 
-def calibrations_of(events: Iterable[Event]) -> list[Calibration]:
+def calibrations_of(events: Iterable[LedgerEntry]) -> list[Calibration]:
     """The calibrations that a unit's events make, in the order in which they were certified."""
     found: dict[int, Calibration] = {}
     for event in events:

@@ -12,7 +12,7 @@ from schemas.errors import DONE, PART_FAILED, WrongUse
 
 if TYPE_CHECKING:
     from pipelines.audit.audit import Audit, Scope
-    from pipelines.audit.finding import Finding
+    from pipelines.audit.finding import AuditFinding
 
 SHOWN = 12  # findings of one kind
 
@@ -100,14 +100,14 @@ def _refuse_nothing(found: Audit, root: str) -> None:
         raise WrongUse(message)
 
 
-def _write_page(page: Path, found: Audit, told: list[Finding], root: str) -> None:
+def _write_page(page: Path, found: Audit, told: list[AuditFinding], root: str) -> None:
     from pipelines.archive.files import ELSEWHERE, publish
     from pipelines.audit.page import render
 
     publish(page, render(found, told, root).encode(), "audit", ELSEWHERE)
 
 
-def _show(found: Audit, told: list[Finding], page: Path | None) -> None:
+def _show(found: Audit, told: list[AuditFinding], page: Path | None) -> None:
     from pipelines.audit.calibrations import date_of
     from pipelines.audit.document import counts
     from pipelines.audit.finding import WHO
@@ -147,7 +147,7 @@ def _certificates(found: Audit) -> str:
     )
 
 
-def _show_kind(own: list[Finding]) -> None:
+def _show_kind(own: list[AuditFinding]) -> None:
     for finding in own[:SHOWN]:
         console().print(f"  · {finding.message}", markup=False, soft_wrap=True)
     if len(own) > SHOWN:

@@ -13,7 +13,7 @@ from pipelines.cli.options import JsonOption, console, error_console, print_json
 if TYPE_CHECKING:
     from collections.abc import Generator
 
-    from pipelines.demo.measure import Measured
+    from pipelines.demo.measure import DemoLot
     from pipelines.demo.scenes import Scene
     from schemas.progress import Progress
 
@@ -104,7 +104,7 @@ def _command(name: str, folder: Path, model: tuple[str, ...] | None) -> str:
 class _Game:
     """One round: compare, diagnose, extend, compare, reveal."""
 
-    def __init__(self, folder: Path, hidden: Scene, lot: Measured, *, asks: bool, quiet: bool) -> None:
+    def __init__(self, folder: Path, hidden: Scene, lot: DemoLot, *, asks: bool, quiet: bool) -> None:
         self.folder, self.hidden, self.lot, self.asks, self.quiet = folder, hidden, lot, asks, quiet
         self.model = list(hidden.model)
 
@@ -224,14 +224,14 @@ def _write_model(file: Path, start: tuple[str, ...], chosen: list[str]) -> tuple
     """The model's file with one version per effect; its effects."""
     from datetime import UTC, datetime
 
-    from pipelines.jobs.model_files import Step, extended, new_model, publish_model
+    from pipelines.jobs.model_files import ModelStep, extended, new_model, publish_model
 
     now = datetime.now(UTC).replace(microsecond=0)
     text = new_model(file, start, "demo", now)
     effects = tuple(start)
     for name in chosen:
         text, model = extended(
-            text, Step(name, "demo", now, "the diagnosis names it", "dwells.parquet"), f"model {file.name}"
+            text, ModelStep(name, "demo", now, "the diagnosis names it", "dwells.parquet"), f"model {file.name}"
         )
         effects = tuple(model.model.effects)
     publish_model(file, text)

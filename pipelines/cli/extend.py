@@ -75,11 +75,11 @@ def _step(effect: str, why: str, by: str, run: str) -> Any:
     import getpass
     from datetime import UTC, datetime
 
-    from pipelines.jobs.model_files import Step
+    from pipelines.jobs.model_files import ModelStep
 
     reason = why.strip() or (f"a diagnosis of {run} names it" if run else "no reason was given")
     at = datetime.now(UTC).replace(microsecond=0)
-    return Step(effect.strip(), by.strip() or getpass.getuser(), at, reason, run)
+    return ModelStep(effect.strip(), by.strip() or getpass.getuser(), at, reason, run)
 
 
 def _start(model: Path, effects: str, step: Any) -> tuple[str, bool]:

@@ -28,8 +28,8 @@ if TYPE_CHECKING:
     from collections.abc import Callable
     from contextlib import AbstractContextManager
 
-    from pipelines.inquiry.inquiry import Finding, Inquiry, Move
-    from pipelines.inquiry.loop import Approval, Consent, Table, Terms
+    from pipelines.inquiry.inquiry import FollowUp, Inquiry, JointDiagnosis
+    from pipelines.inquiry.loop import Approval, Consent, Participants, Settings
     from pipelines.jobs.job import Request
 
 SETTLED = frozenset({"adequate", "told_apart"})
@@ -77,14 +77,14 @@ def command(
     """
     from pipelines.archive import Archive
     from pipelines.cli.terminal import attended
-    from pipelines.inquiry.loop import Terms
+    from pipelines.inquiry.loop import Settings
     from pipelines.jobs.job import Request
     from pipelines.jobs.model_files import chosen_effects
     from pipelines.jobs.seating import read_seating
 
     seating = read_seating(units)
     request = Request(recipe, station, seating.units, seating.slots, seed, repeat)
-    terms = Terms(tuple(chosen_effects(effects, None, "investigate") or ()), budget, unseen)
+    terms = Settings(tuple(chosen_effects(effects, None, "investigate") or ()), budget, unseen)
     here = attended() and not as_json
     paused = yes is False and not here and not direct
     document = _inquired(request, Archive(archive), terms, _consent(yes=yes, here=here), direct=direct, paused=paused)
@@ -101,13 +101,13 @@ def _consent(*, yes: bool | None, here: bool) -> Callable[[Callable[[], Abstract
     from pipelines.inquiry.loop import always
 
     def asked(quiet: Callable[[], AbstractContextManager[None]]) -> Approval:
-        def ask(inquiry: Inquiry, finding: Finding, move: Move) -> Consent:
+        def ask(inquiry: Inquiry, finding: JointDiagnosis, move: FollowUp) -> Consent:
             with quiet():
                 return _question(inquiry, finding, move)
 
         return ask
 
-    def nobody(inquiry: Inquiry, finding: Finding, move: Move) -> Consent:
+    def nobody(inquiry: Inquiry, finding: JointDiagnosis, move: FollowUp) -> Consent:
         del inquiry, finding, move
         return "nobody"
 
@@ -116,7 +116,7 @@ def _consent(*, yes: bool | None, here: bool) -> Callable[[Callable[[], Abstract
     return asked if here else lambda _quiet: nobody
 
 
-def _question(inquiry: Inquiry, finding: Finding, move: Move) -> Consent:
+def _question(inquiry: Inquiry, finding: JointDiagnosis, move: FollowUp) -> Consent:
     """What the person at the terminal says to a proposal."""
     from pipelines.cli.diagnosis_text import measurements_table
     from pipelines.cli.terminal import agreed
@@ -134,22 +134,22 @@ def _question(inquiry: Inquiry, finding: Finding, move: Move) -> Consent:
 def _inquired(
     request: Request,
     archive: Any,
-    terms: Terms,
+    terms: Settings,
     consent: Callable[[Callable[[], AbstractContextManager[None]]], Approval],
     *,
     direct: bool,
     paused: bool,
 ) -> dict[str, Any]:
     """The document of the inquiry."""
-    from pipelines.inquiry.loop import Table, directly, play
+    from pipelines.inquiry.loop import Participants, directly, play
 
     with shown() as (progress, told, quiet):
 
-        def looked(finding: Finding) -> None:
+        def looked(finding: JointDiagnosis) -> None:
             with quiet():
                 _tell(finding)
 
-        table: Table = Table(directly, consent(quiet), progress, told, looked)
+        table: Participants = Participants(directly, consent(quiet), progress, told, looked)
         if direct:
             return play(request.job(archive), archive, terms, table)
         from pipelines.flows.investigate import investigate_locally
@@ -157,12 +157,12 @@ def _inquired(
         return investigate_locally(request, archive, terms, table, ask=paused)
 
 
-def _tell(finding: Finding) -> None:
+def _tell(finding: JointDiagnosis) -> None:
     """A line for each diagnosis on the way."""
     from pipelines.cli.diagnosis_text import verdict
 
     error_console().print(
-        f"diagnosis of {len(finding.lineage.runs)}: {verdict(finding.told)}", markup=False, soft_wrap=True
+        f"diagnosis of {len(finding.lineage.runs)}: {verdict(finding.document)}", markup=False, soft_wrap=True
     )
 
 

@@ -14,8 +14,8 @@ if TYPE_CHECKING:
 
     from inertial.noise.dwells import DwellNoise
     from pipelines.planning.optimise import Optimum
-    from pipelines.planning.plan import Planned
-    from pipelines.planning.requirement import Wish
+    from pipelines.planning.plan import PlanContext
+    from pipelines.planning.requirement import Requirement
     from schemas.recipe import Recipe
     from schemas.station import StationConfig
 
@@ -23,15 +23,17 @@ LACK = 1.1
 """Errors over the textbook plan's up to which the nearest recipe is offered where nobody said what errors are wanted."""
 
 
-def found(base: Recipe, station: StationConfig, noise: DwellNoise, asked: Asked) -> tuple[Optimum, dict[str, Any]]:
+def found(
+    base: Recipe, station: StationConfig, noise: DwellNoise, asked: OptimiseOptions
+) -> tuple[Optimum, dict[str, Any]]:
     """The cheapest recipe, and the document about it."""
     from pipelines.planning.optimise import optimise
-    from pipelines.planning.plan import plan, planned
+    from pipelines.planning.plan import plan, plan_context
     from pipelines.planning.textbook import textbook
     from pipelines.planning.verification_poses import verified_in
 
     levels = levels_of(base, asked.temperatures)
-    against = planned(textbook(base, levels), station, noise)
+    against = plan_context(textbook(base, levels), station, noise)
     wish = wish_of(asked, base, against, levels)
     wish = replace(wish, verification=asked.verification or verified_in(base))
     progress = error_console()
@@ -156,7 +158,7 @@ def _error_lines(rows: list[dict[str, Any]]) -> list[list[str]]:
 
 
 @dataclass(frozen=True)
-class Asked:
+class OptimiseOptions:
     """The options of the command, as they were given."""
 
     see: str
@@ -176,7 +178,7 @@ class Asked:
         return bool(self.wanted) or self.factor != 1.0
 
 
-def wish_of(asked: Asked, base: Recipe, against: Planned, levels: tuple[float, ...]) -> Wish:
+def wish_of(asked: OptimiseOptions, base: Recipe, against: PlanContext, levels: tuple[float, ...]) -> Requirement:
     """The wish of what was asked: errors as wanted, or rivals told apart."""
     return _parted(asked, against, levels) if _parts(asked) else _wish(asked, base, against, levels)
 
@@ -191,7 +193,7 @@ def levels_of(base: Recipe, temperatures: str) -> tuple[float, ...]:
     return tuple(sorted(set(given)))
 
 
-def _parts(asked: Asked) -> bool:
+def _parts(asked: OptimiseOptions) -> bool:
     """Whether rivals are to be told apart; options of the one question beside the other are refused."""
     parts = asked.criterion.upper() == "T"
     other = (
@@ -208,7 +210,7 @@ def _parts(asked: Asked) -> bool:
     return parts
 
 
-def _parted(asked: Asked, against: Planned, levels: tuple[float, ...]) -> Wish:
+def _parted(asked: OptimiseOptions, against: PlanContext, levels: tuple[float, ...]) -> Requirement:
     from pipelines.jobs.model_files import refuse_unknown_effects
     from pipelines.planning.discrimination import ENOUGH, SIZE_UG, parted
 
@@ -242,11 +244,11 @@ def _refuse_unknown_plan(name: str) -> None:
         raise WrongUse(message)
 
 
-def _wish(asked: Asked, base: Recipe, against: Planned, levels: tuple[float, ...]) -> Wish:
+def _wish(asked: OptimiseOptions, base: Recipe, against: PlanContext, levels: tuple[float, ...]) -> Requirement:
     from inertial.design import local_names, split
     from inertial.planning.pose_exchange import Criterion
     from pipelines.jobs.model_files import refuse_unknown_effects
-    from pipelines.planning.requirement import Wish, between, candidates
+    from pipelines.planning.requirement import Requirement, between, candidates
     from pipelines.planning.textbook import reference_errors, seen_by
 
     criteria = {name.lower(): name for name in get_args(Criterion)}
@@ -263,7 +265,7 @@ def _wish(asked: Asked, base: Recipe, against: Planned, levels: tuple[float, ...
         for column, name in enumerate(names):
             if name == effect:
                 errors[:, column] = limit / MICRO
-    return Wish(
+    return Requirement(
         wanted=errors,
         see=see or seen_by(against, levels),
         levels=levels if asked.temperatures else (levels[0], levels[-1]),

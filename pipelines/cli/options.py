@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from pipelines.tables.json_values import plain
+from pipelines.tables.json_values import json_value
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -106,12 +106,12 @@ def error_console() -> Console:
 
 def print_json(document: Any) -> None:
     """One JSON document on standard output; numbers that JSON does not know become null."""
-    sys.stdout.write(json.dumps(plain(document), ensure_ascii=False, indent=1, allow_nan=False) + "\n")
+    sys.stdout.write(json.dumps(json_value(document), ensure_ascii=False, indent=1, allow_nan=False) + "\n")
 
 
 def rows(table: pd.DataFrame) -> list[dict[str, Any]]:
     """A table as a list of rows for JSON."""
-    return [plain(row) for row in table.to_dict("records")]
+    return [json_value(row) for row in table.to_dict("records")]
 
 
 def print_table(

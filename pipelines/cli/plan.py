@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from typer._click import Context
 
     from inertial.noise.dwells import DwellNoise
-    from pipelines.planning.plan import Planned
+    from pipelines.planning.plan import PlanContext
     from schemas.recipe import Recipe
 
 RECIPE = "recipe"
@@ -97,12 +97,12 @@ def command(
 
     With the minutes of station time and the error to be expected of every coefficient of the recipe's model.
     """
-    from pipelines.planning.plan import plan, planned
+    from pipelines.planning.plan import plan, plan_context
     from schemas.station import load_station
 
     config = load_station(station)
     found = with_model(recipe, effects, model, archive, config.name)
-    course = planned(found, config, noise_of(found, device or found.device, noise, wander))
+    course = plan_context(found, config, noise_of(found, device or found.device, noise, wander))
     document = plan(course)
     if page is not None:
         _write(page, document, course)
@@ -199,12 +199,12 @@ def optimise(
     over the same temperatures, and blind to no effect that it sees. With --criterion T --part a,b: the cheapest that tells these
     effects apart.
     """
-    from pipelines.cli.optimal import Asked, found, print_optimum, written
+    from pipelines.cli.optimal import OptimiseOptions, found, print_optimum, written
     from schemas.station import load_station
 
     config = load_station(station)
     base = with_model(recipe, effects, model, archive, config.name)
-    asked = Asked(
+    asked = OptimiseOptions(
         see, tuple(wanted or ()), factor, temperatures, poses, criterion, verification, part, size, separation
     )
     optimum, document = found(base, config, noise_of(base, device or base.device, noise, wander), asked)
@@ -267,14 +267,14 @@ def noise_of(recipe: Recipe, device: str, density: float | None, wander: float |
     return DwellNoise(white * MICRO, preset.bias_instability_ug * MICRO, preset.rate_random_walk_ug * MICRO)
 
 
-def _write(page: Path, document: dict[str, Any], course: Planned) -> None:
+def _write(page: Path, document: dict[str, Any], course: PlanContext) -> None:
     """Writes the page."""
     from pipelines.report.plan import render_plan
 
     _save(page, render_plan(document, course))
 
 
-def _draw(folder: Path, document: dict[str, Any], course: Planned) -> None:
+def _draw(folder: Path, document: dict[str, Any], course: PlanContext) -> None:
     """Writes the pictures, each in a file of its own."""
     from pipelines.report.plan import pictures
 

@@ -27,8 +27,8 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
     from pipelines.archive import Archive
-    from pipelines.jobs.model_change import Wanted
-    from pipelines.rerun.reproduce import Checked
+    from pipelines.jobs.model_change import ModelChange
+    from pipelines.rerun.reproduce import Reproduction
     from pipelines.rerun.rerun import Outcome
 
 SHOWN = 40
@@ -99,7 +99,7 @@ def _mapped(
     function: Callable[[Any], list[Any]],
     store: Archive,
     runs: list[str],
-    how: tuple[Wanted, str, int],
+    how: tuple[ModelChange, str, int],
     *,
     report: bool = False,
 ) -> list[Any]:
@@ -147,10 +147,10 @@ def _line(one: Outcome) -> list[str]:
     return [one.run, one.new if one.new != one.run else "—", ", ".join(whats) or "nothing", ", ".join(worked) or "none"]
 
 
-def _check(store: Archive, runs: list[str], change: Wanted, how: tuple[str, int], *, as_json: bool) -> None:
+def _check(store: Archive, runs: list[str], change: ModelChange, how: tuple[str, int], *, as_json: bool) -> None:
     from pipelines.rerun.partition import checked
 
-    found: list[Checked] = _mapped(checked, store, runs, (change, *how))
+    found: list[Reproduction] = _mapped(checked, store, runs, (change, *how))
     differ = [one for one in found if not one.same]
     document = {
         "archive": str(store.root),
@@ -165,7 +165,7 @@ def _check(store: Archive, runs: list[str], change: Wanted, how: tuple[str, int]
     raise typer.Exit(1 if differ else 0)
 
 
-def _print_check(found: list[Checked]) -> None:
+def _print_check(found: list[Reproduction]) -> None:
     out = console()
     tables = 0
     for one in found:

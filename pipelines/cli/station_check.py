@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
     from schemas.recipe import Lot
     from schemas.station import StationConfig
-    from stations.self_test import Bench, Finding
+    from stations.self_test import Bench, CheckResult
     from stations.serving import Reading
 
 
@@ -53,18 +53,20 @@ def check(
     raise typer.Exit(STATION if failed else 0)
 
 
-def _tested(config: StationConfig, device: str, units: int) -> list[Finding]:
+def _tested(config: StationConfig, device: str, units: int) -> list[CheckResult]:
     """The findings of the self-test; a standard within its limits goes into its history."""
     from stations.opening import open_station
     from stations.safety.folder import state_folder
-    from stations.self_test import Bench, Finding, keep, read_history
+    from stations.self_test import Bench, CheckResult, keep, read_history
 
     path = state_folder() / "checks" / f"{config.name}.jsonl"
     history = read_history(path)
     lot = made_up(device, units, 1, repeat=len(history)) if config.kind == "simulated" else _seated(config)
     if lot is None:
         return [
-            Finding("slots", "reader", ok=False, message="reader: no slot is occupied, one unit is needed; seat one")
+            CheckResult(
+                "slots", "reader", ok=False, message="reader: no slot is occupied, one unit is needed; seat one"
+            )
         ]
     with open_station(config, lot, run="station check") as opened:
         bench = Bench(opened, config.self_test, history)
@@ -89,7 +91,7 @@ def _seated(config: StationConfig) -> Lot | None:
     return Lot(units=units, device="hardware") if units else None
 
 
-def _print(readings: list[Reading], findings: list[Finding], *, registers: bool) -> None:
+def _print(readings: list[Reading], findings: list[CheckResult], *, registers: bool) -> None:
     if registers:
         lines = [[r.device, r.register, str(r.address), "—" if r.fault else r.value, r.unit] for r in readings]
         print_table(["device", "register", "address", "value", "unit"], lines)
@@ -103,7 +105,7 @@ def _print(readings: list[Reading], findings: list[Finding], *, registers: bool)
     )
 
 
-def _line(finding: Finding) -> list[str]:
+def _line(finding: CheckResult) -> list[str]:
     value = finding.value if isinstance(finding.value, str) else f"{finding.value:.6g}"
     sides = ["" if side is None else f"{side:.6g}" for side in (finding.low, finding.high)]
     if finding.high is not None and finding.low == -finding.high:

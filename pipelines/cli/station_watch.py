@@ -26,11 +26,11 @@ if TYPE_CHECKING:
 
 MOVE_S = 5.0  # a table stands where it stood until shortly before the next record
 Points = list[tuple[float, float]]
-Look = Callable[[], "Seen"]
+Look = Callable[[], "ChartData"]
 
 
 @dataclass
-class Seen:
+class ChartData:
     """What there is to draw: temperatures in °C and angles in degrees against the station's time, s."""
 
     title: str
@@ -94,14 +94,14 @@ def _source(run: str, station: Path | None, archive: str | None) -> Generator[Lo
 
     config = load_station(station)
     with looked_at(config, made_up("ADXL355", 8, 1)) as look:
-        seen = Seen(config.name)
+        seen = ChartData(config.name)
         yield lambda: _added(seen, look())
 
 
-def of_records(title: str, records: Records) -> Seen:
+def of_records(title: str, records: Records) -> ChartData:
     """What the records of a capture tell so far."""
     if not records.finished():
-        return Seen(title)
+        return ChartData(title)
     history, readings = records.gathered("history"), records.gathered("readings")
     by_time = history.groupby("time_s").agg(air=("chamber_C", "first"), low=("unit_C", "min"), high=("unit_C", "max"))
     by_record = readings.drop_duplicates("record").sort_values("start_s")
@@ -115,7 +115,7 @@ def of_records(title: str, records: Records) -> Seen:
         ends = [start - MOVE_S for start in starts[1:]] + [starts[-1] + float(by_record["duration_s"].iloc[-1])]
         return [(t, v) for start, end, v in zip(starts, ends, values, strict=True) for t in (start, max(start, end))]
 
-    return Seen(
+    return ChartData(
         title,
         series("air"),
         series("low"),
@@ -126,7 +126,7 @@ def of_records(title: str, records: Records) -> Seen:
     )
 
 
-def _added(seen: Seen, now: Overview) -> Seen:
+def _added(seen: ChartData, now: Overview) -> ChartData:
     """The picture with one more look at the station."""
     time = now.time_s
     if now.chamber_C is not None:
@@ -141,7 +141,7 @@ def _added(seen: Seen, now: Overview) -> Seen:
     return seen
 
 
-def picture(seen: Seen, minutes: float) -> Group:
+def picture(seen: ChartData, minutes: float) -> Group:
     """Both charts, as wide and high as the terminal."""
     from rich.console import Group
 

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 from pipelines.cli.options import STYLES, console, print_table, short
 from pipelines.tables.frames import rows_of
-from pipelines.tables.json_values import plain
+from pipelines.tables.json_values import json_value
 from schemas.errors import DONE, PART_FAILED
 
 if TYPE_CHECKING:
@@ -52,7 +52,7 @@ def summary(run: Run) -> dict[str, Any]:
 
 def _unit(row: dict[str, Any], figures: pd.DataFrame) -> dict[str, Any]:
     own = figures[figures["unit"] == row["unit"]]
-    return plain(
+    return json_value(
         {
             **row,
             "figures": {

@@ -23,8 +23,8 @@ from pipelines.cli.options import (
 
 if TYPE_CHECKING:
     from pipelines.archive import Archive
-    from pipelines.jobs.model_change import Wanted
-    from pipelines.rerun.lot_comparison import Fresh, Judged
+    from pipelines.jobs.model_change import ModelChange
+    from pipelines.rerun.lot_comparison import Fresh, LotComparison
 
 SHOWN = 12
 
@@ -74,8 +74,8 @@ def command(
 
 
 def _judged(
-    store: Archive, runs: list[str], change: Wanted, dask: str, workers: int | None
-) -> tuple[list[Judged], list[Fresh]]:
+    store: Archive, runs: list[str], change: ModelChange, dask: str, workers: int | None
+) -> tuple[list[LotComparison], list[Fresh]]:
     """Every lot under both models, and the fresh errors of those whose units were measured before."""
     from pathlib import Path as LocalPath
 

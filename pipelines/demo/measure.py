@@ -39,7 +39,7 @@ QUIET = {
 
 
 @dataclass(frozen=True)
-class Measured:
+class DemoLot:
     """A lot measured twice: dwells and temperatures of the run, and of the fresh one."""
 
     dwells: pd.DataFrame
@@ -53,11 +53,11 @@ class Measured:
             getattr(self, name).to_parquet(folder / f"{name.replace('_', '-')}.parquet", index=False)
 
 
-def measure(chosen: Scene, seed: int, progress: Progress = silent) -> Measured:
+def measure(chosen: Scene, seed: int, progress: Progress = silent) -> DemoLot:
     """The lot measured on the simulated station with the effect in it, and once more with fresh noise."""
     recipe = _recipe(chosen)
     tables = [*_once(recipe, chosen, seed, 0, progress), *_once(recipe, chosen, seed, 1, progress)]
-    return Measured(*tables)
+    return DemoLot(*tables)
 
 
 @dataclass

@@ -13,7 +13,7 @@ from inertial.errors import MissingInput
 if TYPE_CHECKING:
     from inertial.criticism.classes import EffectClass
     from inertial.criticism.diagnosis import Diagnosis
-    from inertial.planning.sequences import Step
+    from inertial.planning.sequences import SequenceStep
 
 BREAKER_POSE = (0.0, 0.0, 25.0)
 """Where a row says a breaker in words: any pose is as good, the words count."""
@@ -51,7 +51,7 @@ def proposed(diagnosis: Diagnosis, around: Circumstances | None = None) -> Propo
     around : what the station can do; what the run itself shows of it where None
     """
     parting: list[tuple[EffectClass, Proposal | None]] = []
-    already: list[Step] = []
+    already: list[SequenceStep] = []
     for named in diagnosis.named:
         if len(named.effects.members) > 1:
             wanted = _parted(diagnosis, named.effects, around, already)
@@ -61,7 +61,7 @@ def proposed(diagnosis: Diagnosis, around: Circumstances | None = None) -> Propo
 
 
 def _parted(
-    diagnosis: Diagnosis, group: EffectClass, around: Circumstances | None, already: list[Step]
+    diagnosis: Diagnosis, group: EffectClass, around: Circumstances | None, already: list[SequenceStep]
 ) -> Proposal | None:
     try:
         return proposal(diagnosis.final, group, around, already)

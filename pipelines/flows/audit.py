@@ -20,11 +20,11 @@ from pipelines.audit.findings import findings
 from pipelines.audit.page import render
 from pipelines.audit.rules import load_rules
 from pipelines.certificates.days import today
-from pipelines.tables.json_values import plain
+from pipelines.tables.json_values import json_value
 
 if TYPE_CHECKING:
     from pipelines.audit.audit import Audit
-    from pipelines.audit.finding import Finding
+    from pipelines.audit.finding import AuditFinding
 
 KEY = "tumbleline-audit"
 MOST_ROWS = 500  # of the table of findings; the page and the document have all
@@ -38,12 +38,12 @@ def look(archive: Archive, rules: Path | None, since: str, until: str, dask: str
 
 
 @task(task_run_name="tell", cache_policy=NO_CACHE, persist_result=False)
-def tell(found: Audit, told: list[Finding], root: str, folder: Path) -> Path:
+def tell(found: Audit, told: list[AuditFinding], root: str, folder: Path) -> Path:
     """The page that was written, with the document beside it; the findings are artifacts as well."""
     day = date_of(found.scope.until - 1.0)
     page = folder / f"audit-{day}.html"
     publish(page, render(found, told, root).encode(), "audit", ELSEWHERE)
-    publish(page.with_suffix(".json"), json_bytes(plain(document(found, told, root))), "audit", ELSEWHERE)
+    publish(page.with_suffix(".json"), json_bytes(json_value(document(found, told, root))), "audit", ELSEWHERE)
     create_table_artifact(key=KEY, table=_table(told), description=f"{len(told)} findings until {day}")
     create_markdown_artifact(key=f"{KEY}-summary", markdown=_summary(found, told, page))
     return page
@@ -74,14 +74,14 @@ def audit_archive(
     return len(told)
 
 
-def _table(told: list[Finding]) -> list[dict[str, Any]]:
+def _table(told: list[AuditFinding]) -> list[dict[str, Any]]:
     return [
         {"who": WHO[finding.who], "kind": finding.kind, "subject": finding.subject, "finding": finding.message}
         for finding in told[:MOST_ROWS]
     ] or [{"who": "", "kind": "none", "subject": "", "finding": "nothing needs doing"}]
 
 
-def _summary(found: Audit, told: list[Finding], page: Path) -> str:
+def _summary(found: Audit, told: list[AuditFinding], page: Path) -> str:
     number = counts(found)
     lines = [
         f"# Audit until {date_of(found.scope.until - 1.0)}",

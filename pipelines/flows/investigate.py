@@ -18,25 +18,25 @@ from pipelines.chain.chain import ORDER
 from pipelines.flows.calibrate import requested, stage
 from pipelines.flows.local import reached
 from pipelines.flows.operator import Paused
-from pipelines.inquiry.loop import Consent, Table, Terms, always, play
+from pipelines.inquiry.loop import Consent, Participants, Settings, always, play
 
 if TYPE_CHECKING:
     from collections.abc import Generator
 
     from pipelines.chain.runner import Done, Runner
-    from pipelines.inquiry.inquiry import Finding, Inquiry, Move
+    from pipelines.inquiry.inquiry import FollowUp, Inquiry, JointDiagnosis
     from pipelines.jobs.job import Request
 
-_tables: list[Table] = []
+_tables: list[Participants] = []
 
 
 @dataclass(frozen=True)
-class Asked:
+class PausedApproval:
     """Approval by whoever answers the paused flow run."""
 
     paused: Paused
 
-    def __call__(self, inquiry: Inquiry, finding: Finding, move: Move) -> Consent:
+    def __call__(self, inquiry: Inquiry, finding: JointDiagnosis, move: FollowUp) -> Consent:
         """The answer, however long it takes."""
         del finding
         why = "; ".join(move.why)
@@ -50,7 +50,7 @@ def _stage(name: str, runner: Runner) -> Done:
 
 
 @contextmanager
-def seated(table: Table) -> Generator[None]:
+def seated(table: Participants) -> Generator[None]:
     """A block in which inquiries of this process tell, and ask, those at the table."""
     _tables.append(table)
     try:
@@ -81,13 +81,15 @@ def investigate(  # noqa: PLR0913 - a flow's parameters are its form on the serv
     the flow run pauses before every follow-up until somebody approves its minutes.
     """
     job = requested(recipe, station, units, slots, seed, repeat, faults).job(Archive(archive))
-    table = _tables[-1] if _tables else Table()
-    approve = Asked(Paused()) if ask else (table.approve if _tables else always)
-    at = Table(_stage, approve, table.progress, table.told, table.looked)
-    return play(job, Archive(archive), Terms(tuple(effects or ()), budget_min, unseen), at)
+    table = _tables[-1] if _tables else Participants()
+    approve = PausedApproval(Paused()) if ask else (table.approve if _tables else always)
+    at = Participants(_stage, approve, table.progress, table.told, table.looked)
+    return play(job, Archive(archive), Settings(tuple(effects or ()), budget_min, unseen), at)
 
 
-def investigate_locally(request: Request, archive: Archive, terms: Terms, table: Table, *, ask: bool) -> dict[str, Any]:
+def investigate_locally(
+    request: Request, archive: Archive, terms: Settings, table: Participants, *, ask: bool
+) -> dict[str, Any]:
     """The document of the inquiry that the flow makes, on the server named by PREFECT_API_URL or on one of our own."""
     archive.prepare()
     job = request.job(archive)

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from inertial.fits.ferraris import Faces, faces, ferraris
-from pipelines.importers.judged import Judged, coefficient, dwells_of, gravity_of
+from pipelines.importers.judged import FitAnswer, coefficient, dwells_of, gravity_of
 from pipelines.importers.mapping import FACES
 from schemas.errors import DataRejected
 from schemas.units import AXES, MICRO, STANDARD_GRAVITY_M_S2
@@ -23,7 +23,7 @@ UNLIKELY = 0.01
 """Probability of a lack of fit below which six faces are not adequate."""
 
 
-def six_faces(data: Imported, mapping: Mapping) -> Judged:
+def six_faces(data: Imported, mapping: Mapping) -> FitAnswer:
     """Six labelled faces: the published method, and least squares of all eighteen means with its lack of fit."""
     dwells = dwells_of(data)
     gravity = gravity_of(mapping)
@@ -52,7 +52,7 @@ def six_faces(data: Imported, mapping: Mapping) -> Judged:
         },
     }
     lines = tuple(_face_line(k, found, float(published.bias[k]), data.out_unit) for k in range(3))
-    return Judged("faces", adequate, document, lines, _face_coefficients(str(dwells["unit"].iloc[0]), found, data))
+    return FitAnswer("faces", adequate, document, lines, _face_coefficients(str(dwells["unit"].iloc[0]), found, data))
 
 
 def _by_face(

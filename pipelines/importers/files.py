@@ -28,7 +28,7 @@ _MORE = "\0more"
 
 
 @dataclass(frozen=True)
-class Source:
+class SourceFile:
     """Where a table came from, for the archive."""
 
     path: str
@@ -41,7 +41,7 @@ class Source:
         return {"path": self.path, "sha256": self.sha256, "bytes": self.size, "form": self.form}
 
 
-def read(path: Path) -> tuple[pd.DataFrame, Source]:
+def read(path: Path) -> tuple[pd.DataFrame, SourceFile]:
     """Columns of a file, named as there (a text file without a header: "1", "2", …), and where they came from.
 
     What the file is, its first bytes say and not its name: gzip is unpacked, Parquet and MATLAB are recognised, anything
@@ -61,7 +61,7 @@ def read(path: Path) -> tuple[pd.DataFrame, Source]:
     if table.empty:
         message = f"{path.name}: no rows of data were found, at least one is needed; check the file"
         raise DataRejected(message)
-    return table, Source(str(path), hashlib.sha256(packed).hexdigest(), len(packed), form)
+    return table, SourceFile(str(path), hashlib.sha256(packed).hexdigest(), len(packed), form)
 
 
 def _bytes(path: Path) -> bytes:

@@ -11,13 +11,13 @@ from pipelines.importers.ramp import ramp
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from pipelines.importers.judged import Judged
+    from pipelines.importers.judged import FitAnswer
     from pipelines.importers.mapping import Mapping
     from pipelines.importers.record import Imported
 
-METHODS: dict[str, Callable[[Imported, Mapping], Judged]] = {"norm": norm, "faces": six_faces, "temperature": ramp}
+METHODS: dict[str, Callable[[Imported, Mapping], FitAnswer]] = {"norm": norm, "faces": six_faces, "temperature": ramp}
 
 
-def judge(method: str, data: Imported, mapping: Mapping) -> Judged:
+def judge(method: str, data: Imported, mapping: Mapping) -> FitAnswer:
     """The fit called `method`, one of `METHODS`, of one unit's import."""
     return METHODS[method](data, mapping)

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True)
-class Judged:
+class FitAnswer:
     """A fit's answer: a document for JSON, lines for people, and coefficients for the archive."""
 
     method: str

@@ -10,13 +10,13 @@ from pipelines.archive import Archive, code_hash, stage_key
 
 if TYPE_CHECKING:
     from pipelines.archive import Run
-    from pipelines.importers.files import Source
-    from pipelines.importers.judged import Judged
+    from pipelines.importers.files import SourceFile
+    from pipelines.importers.judged import FitAnswer
     from pipelines.importers.mapping import Mapping
     from pipelines.importers.record import Imported
 
 
-def keep(data: Imported, source: Source, how: Mapping, judged: Judged | None, archive: str | None) -> Run:
+def keep(data: Imported, source: SourceFile, how: Mapping, judged: FitAnswer | None, archive: str | None) -> Run:
     """The run that holds the import: samples, dwells and coefficients, each with a manifest that names the source."""
     inputs = {"source": source.sha256}
     parameters = {"mapping": how.model_dump(mode="json"), "fit": None if judged is None else judged.method}

@@ -9,7 +9,7 @@ from scipy.stats import chi2
 
 from inertial.fits.ellipsoid import EllipsoidFit, fit_ellipsoid
 from inertial.state import T_REFERENCE
-from pipelines.importers.judged import Judged, coefficient, dwells_of, gravity_of
+from pipelines.importers.judged import FitAnswer, coefficient, dwells_of, gravity_of
 from schemas.units import AXES, MICRO, STANDARD_GRAVITY_M_S2
 
 if TYPE_CHECKING:
@@ -25,7 +25,7 @@ NORM_LIMIT = 1e-3
 OUT = ["out_x", "out_y", "out_z"]
 
 
-def norm(data: Imported, mapping: Mapping) -> Judged:
+def norm(data: Imported, mapping: Mapping) -> FitAnswer:
     """Nine parameters from the norm of gravity alone, with an offset per °C where a temperature is mapped.
 
     Adequate when the norm of every dwell is within 0.1 % of gravity; beside it stand what white noise alone would leave
@@ -64,7 +64,7 @@ def norm(data: Imported, mapping: Mapping) -> Judged:
         _floor_line(floor, p_value),
         *(_axis_line(k, fit, data.out_unit) for k in range(3)),
     )
-    return Judged(
+    return FitAnswer(
         "norm",
         adequate,
         document,

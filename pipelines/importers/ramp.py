@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from inertial.fits.polynomial import fit_temperature_curve
-from pipelines.importers.judged import Judged
+from pipelines.importers.judged import FitAnswer
 from schemas.errors import WrongUse
 from schemas.units import AXES, MICRO, STANDARD_GRAVITY_M_S2
 
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from pipelines.importers.record import Imported
 
 
-def ramp(data: Imported, mapping: Mapping) -> Judged:
+def ramp(data: Imported, mapping: Mapping) -> FitAnswer:
     """A cubic in temperature of a record in one pose; adequate only if what is left is sample noise."""
     if data.samples is None or "unit_C" not in data.samples.columns:
         message = (
@@ -49,4 +49,4 @@ def ramp(data: Imported, mapping: Mapping) -> Judged:
         for k in range(3)
     )
     advice = "something other than temperature itself drives this output; look at its rate and lag with 'tumbleline diagnose'"
-    return Judged("temperature", fit.adequate, document, lines if fit.adequate else (*lines, advice))
+    return FitAnswer("temperature", fit.adequate, document, lines if fit.adequate else (*lines, advice))

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from inertial.criticism.proposals import Proposal
-    from inertial.planning.sequences import Step
+    from inertial.planning.sequences import SequenceStep
     from inertial.state import State
 
 DRAWN_OUT_S = 5.0
@@ -79,26 +79,26 @@ def what(state: State, found: Proposal) -> str:
     return text[:1].upper() + text[1:]
 
 
-def _directions(steps: Sequence[Step]) -> str:
+def _directions(steps: Sequence[SequenceStep]) -> str:
     force = np.abs([frames.force_from_angles(s.outer, s.inner) for s in steps])
     levels = sorted({f"{v:.2f}" for v in np.round(force[(force > 0.02) & (force < 0.98)] / 0.05) * 0.05})
     shown = ", ".join(levels[:4]) + (" …" if len(levels) > 4 else "")
     return f"{len(steps)} dwells" + (f" with |f| of {shown} g on an axis" if levels else " on faces")
 
 
-def _temperatures(steps: Sequence[Step]) -> str:
+def _temperatures(steps: Sequence[SequenceStep]) -> str:
     stops = [s.temperature for k, s in enumerate(steps) if k == 0 or s.temperature != steps[k - 1].temperature]
     return ", ".join(f"{t:g}" for t in stops) + " °C"
 
 
-def _waits(steps: Sequence[Step]) -> str:
+def _waits(steps: Sequence[SequenceStep]) -> str:
     long = sorted({round(s.wait) for s in steps})
     if len(long) == 1 or long[-1] < DRAWN_OUT_S:
         return f"{long[-1]} s"
     return f"{long[0]} to {long[-1]} s"
 
 
-def _off(steps: Sequence[Step]) -> str:
+def _off(steps: Sequence[SequenceStep]) -> str:
     minutes = sorted({round(s.off / 60.0, 1) for s in steps if s.off > 0.0})
     return " and ".join(f"{m:g}" for m in minutes) + " min"
 

@@ -9,11 +9,11 @@ import numpy as np
 
 from inertial.criticism.menus import Reach
 from inertial.criticism.proposals import Circumstances
-from inertial.planning.sequences import Pace
-from inertial.planning.sequences import Step as Wanted
+from inertial.planning.sequences import SequenceStep as Wanted
+from inertial.planning.sequences import StationPace
 from pipelines.jobs.job import Job
 from pipelines.schedule.steps import Step, steps
-from pipelines.schedule.timing import Standing, axis_seconds, lag_of, minutes
+from pipelines.schedule.timing import StationPose, axis_seconds, lag_of, minutes
 from schemas.recipe import Pose, Recipe, SoakPart
 from stations.profile_files import profile_of
 
@@ -25,7 +25,7 @@ QUARTER_DEG = 90.0
 
 
 @dataclass(frozen=True)
-class Place:
+class StationState:
     """Where a station goes on from, after a run.
 
     pose, temperature : of its last record; at_once : whether it still stands there: hardware is left in its safe state
@@ -41,13 +41,13 @@ class Place:
         return Wanted(float(outer), float(inner), self.temperature)
 
 
-def place_after(job: Job) -> Place:
+def place_after(job: Job) -> StationState:
     """Where the station stands when the last record of a job is taken."""
     last = steps(job.recipe)[-1]
     safe = job.station.safety
     simulated = job.station.kind == "simulated"
     temperature = last.temperature if simulated or safe.chamber == "hold" else safe.temperature_C
-    return Place(last.pose, temperature, simulated)
+    return StationState(last.pose, temperature, simulated)
 
 
 def circumstances(base: Job, last: Job, budget: float) -> Circumstances:
@@ -70,7 +70,7 @@ def circumstances(base: Job, last: Job, budget: float) -> Circumstances:
         power=profile_of(station.devices.reader).has("power"),
     )
     quarter = axis_seconds(QUARTER_DEG, limits.speed_deg_s, limits.acceleration_deg_s2)
-    pace = Pace(
+    pace = StationPace(
         move_s=quarter + station.pace.in_position_s,
         dwell_s=recipe.dwell_s,
         overhead_s=station.pace.record_s,
@@ -82,7 +82,7 @@ def circumstances(base: Job, last: Job, budget: float) -> Circumstances:
     return Circumstances(reach, pace, lambda wanted: station_minutes(wanted, base, place), budget)
 
 
-def station_minutes(wanted: Sequence[Wanted], base: Job, place: Place) -> float:
+def station_minutes(wanted: Sequence[Wanted], base: Job, place: StationState) -> float:
     """Station time of steps from where the station stands, min."""
     if not wanted:
         return 0.0
@@ -94,7 +94,7 @@ def station_minutes(wanted: Sequence[Wanted], base: Job, place: Place) -> float:
             Step(len(plan) + k, "dwell", soak, s.temperature, pose_of(s), s.wait, settled, s.off)
             for k, s in enumerate(part)
         ]
-    start = Standing(place.pose.outer_deg, place.pose.inner_deg, place.temperature, place.temperature)
+    start = StationPose(place.pose.outer_deg, place.pose.inner_deg, place.temperature, place.temperature)
     return minutes(plan, base.station, base.recipe, start).total
 
 
@@ -143,7 +143,7 @@ def _plain(value: object) -> object:
     return value.model_dump() if isinstance(value, Pose | SoakPart) else value
 
 
-def _parts(wanted: Sequence[Wanted], place: Place) -> list[list[Wanted]]:
+def _parts(wanted: Sequence[Wanted], place: StationState) -> list[list[Wanted]]:
     """Steps by soak: a new one where the temperature changes."""
     del place
     parts: list[list[Wanted]] = []
@@ -155,7 +155,7 @@ def _parts(wanted: Sequence[Wanted], place: Place) -> list[list[Wanted]]:
     return parts
 
 
-def _settled(number: int, part: Sequence[Wanted], place: Place) -> bool:
+def _settled(number: int, part: Sequence[Wanted], place: StationState) -> bool:
     """Whether the devices must settle first: not where they stand settled there already, nor where they are read on the way."""
     there = number == 0 and place.at_once and abs(part[0].temperature - place.temperature) < 0.5
     return part[0].soaked and not there

@@ -13,7 +13,7 @@ from pipelines.diagnosis.diagnose import document, examined
 from pipelines.diagnosis.next_measurement import Proposed, proposed, rows_of
 from pipelines.inquiry.explanation import shows, why
 from pipelines.inquiry.followup import circumstances, follow_up
-from pipelines.inquiry.lineage import Lineage
+from pipelines.inquiry.lineage import RunSequence
 from pipelines.jobs.job import Job
 from schemas.recipe import Recipe
 
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
     from inertial.criticism.diagnosis import Diagnosis
     from inertial.criticism.proposals import Proposal
-    from inertial.planning.sequences import Step
+    from inertial.planning.sequences import SequenceStep
     from inertial.state import State
     from pipelines.archive import Archive, Records, Run
     from pipelines.tables.dwells import Measured
@@ -40,10 +40,10 @@ FILE = "inquiry.json"
 
 
 @dataclass(frozen=True)
-class Finding:
+class JointDiagnosis:
     """The diagnosis of all measurements of a lineage together."""
 
-    lineage: Lineage
+    lineage: RunSequence
     effects: tuple[str, ...]
     told: dict[str, Any]
     found: Measured
@@ -61,11 +61,11 @@ class Finding:
     @property
     def ambiguous(self) -> list[list[str]]:
         """Classes of more than one effect."""
-        return [group["effects"] for group in self.told["classes"] if len(group["effects"]) > 1]
+        return [group["effects"] for group in self.document["classes"] if len(group["effects"]) > 1]
 
 
 @dataclass(frozen=True)
-class Move:
+class FollowUp:
     """A measurement that is proposed, or was begun already.
 
     rows : of the proposal, as in the document; why : a sentence per class
@@ -79,7 +79,7 @@ class Move:
 
 
 @dataclass(frozen=True)
-class Verdict:
+class Ending:
     """Why nothing more is measured."""
 
     end: End
@@ -97,7 +97,7 @@ class Inquiry:
 
     archive: Archive
     jobs: list[Job]
-    lineage: Lineage
+    lineage: RunSequence
     effects: tuple[str, ...]
     budget: float
     unseen: bool = False
@@ -113,7 +113,7 @@ class Inquiry:
         """Station minutes of the follow-ups so far."""
         return sum(self.lineage.minutes()[1:])
 
-    def look(self) -> Finding:
+    def look(self) -> JointDiagnosis:
         """The diagnosis of everything that was measured so far, with what the station could measure next."""
         dwells, history = self.lineage.dwells(), self.lineage.history()
         around = circumstances(self.base, self.jobs[-1], self.budget - self.spent)
@@ -122,9 +122,9 @@ class Inquiry:
             following = Proposed() if diagnosis is None else proposed(diagnosis, around)
             told = document(found, faults, diagnosis, following)
         told.update(_named(found, self.effects, diagnosis))
-        return Finding(self.lineage, self.effects, told, found, diagnosis, following)
+        return JointDiagnosis(self.lineage, self.effects, told, found, diagnosis, following)
 
-    def next(self, finding: Finding) -> Move | Verdict:
+    def next(self, finding: JointDiagnosis) -> FollowUp | Ending:
         """What to measure next, or why nothing."""
         begun = self._begun()
         if begun is not None:
@@ -136,37 +136,37 @@ class Inquiry:
                 return self._move((showing,), (shows(finding.state, self.effects, showing),))
             return ended
         if len(self.lineage.runs) > MOST_ROUNDS:
-            return Verdict("nothing_parts", f"{MOST_ROUNDS} follow-ups have not told {_classes(finding)} apart")
+            return Ending("nothing_parts", f"{MOST_ROUNDS} follow-ups have not told {_classes(finding)} apart")
         return self._proposed(finding)
 
-    def _proposed(self, finding: Finding) -> Move | Verdict:
+    def _proposed(self, finding: JointDiagnosis) -> FollowUp | Ending:
         diagnosis = finding.diagnosis
         if diagnosis is None:
-            return Verdict("blocked", "every unit has a data fault")
+            return Ending("blocked", "every unit has a data fault")
         left = self.budget - self.spent
         free = finding.following.found
         if not free:
             wanted = proposed(diagnosis, circumstances(self.base, self.jobs[-1], float("inf"))).found
             if not wanted:
-                return Verdict("nothing_parts", f"nothing that this station does parts {_classes(finding)}")
+                return Ending("nothing_parts", f"nothing that this station does parts {_classes(finding)}")
             needed = sum(p.minutes for p in wanted)
             text = (
                 f"telling {_classes(finding)} apart takes {needed:.0f} min more, {max(left, 0.0):.0f} of {self.budget:.0f} min "
                 f"are left; give --budget {self.spent + needed:.0f}"
             )
-            return Verdict("budget", text)
+            return Ending("budget", text)
         return self._move(free, tuple(why(finding.state, self.effects, p) for p in free))
 
-    def _move(self, wanted: Sequence[Proposal], reasons: tuple[str, ...]) -> Move:
+    def _move(self, wanted: Sequence[Proposal], reasons: tuple[str, ...]) -> FollowUp:
         """Proposals as a measurement of the station."""
-        steps: list[Step] = [s for p in wanted for s in p.steps]
+        steps: list[SequenceStep] = [s for p in wanted for s in p.steps]
         job = follow_up(steps, self.base, self.jobs[-1], self.lineage.ids, "; ".join(reasons))
         recipe = job.recipe.model_copy(update={"effects": list(self.effects)})
         job = Job(recipe, job.limits, job.lot, job.station, parents=job.parents)
         rows = tuple(row for p in wanted for row in rows_of(p))
-        return Move(job, rows, reasons, sum(p.minutes for p in wanted))
+        return FollowUp(job, rows, reasons, sum(p.minutes for p in wanted))
 
-    def _begun(self) -> Move | None:
+    def _begun(self) -> FollowUp | None:
         """A follow-up of this lineage that was begun before: it was approved then, and goes on."""
         for info in reversed(self.archive.runs()):
             run = self.archive.run(info.id)
@@ -175,7 +175,7 @@ class Inquiry:
             if mine and about["recipe"]["effects"] == list(self.effects):
                 told = files.read_json(run.path / FILE)["round"] if (run.path / FILE).is_file() else {}
                 rows, reasons = told.get("next_measurements", ()), told.get("why", [about["recipe"]["description"]])
-                return Move(
+                return FollowUp(
                     self._again(about), tuple(rows), tuple(reasons), told.get("planned_minutes", 0.0), begun=True
                 )
         return None
@@ -186,12 +186,12 @@ class Inquiry:
         base = self.base
         return Job(recipe, base.limits, base.lot, base.station, about["capture"], tuple(about["parents"]))
 
-    def runner(self, move: Move, progress: Progress) -> Runner:
+    def runner(self, move: FollowUp, progress: Progress) -> Runner:
         """The runner of a follow-up: its station goes on from where the newest run left it."""
         before = self.archive.capture(self.jobs[-1].capture_id)
         return Runner(move.job, self.archive, progress, measure=_going_on(before))
 
-    def measured(self, move: Move, run: Run) -> None:
+    def measured(self, move: FollowUp, run: Run) -> None:
         """Takes a follow-up that was measured into the lineage."""
         self.jobs.append(move.job)
         self.lineage = self.lineage.with_run(run)
@@ -207,7 +207,7 @@ class Inquiry:
             }
         )
 
-    def keep(self, finding: Finding) -> None:
+    def keep(self, finding: JointDiagnosis) -> None:
         """Keeps what the newest follow-up has told, with the report of the diagnosis of all runs together."""
         run = self.lineage.runs[-1]
         if len(self.lineage.runs) < 2:
@@ -222,12 +222,16 @@ class Inquiry:
             return
         from pipelines.report.diagnosis import render_diagnosis
 
-        content = {"runs": list(self.lineage.ids), "effects": list(self.effects), "diagnosis": plain_rows(finding.told)}
+        content = {
+            "runs": list(self.lineage.ids),
+            "effects": list(self.effects),
+            "diagnosis": plain_rows(finding.document),
+        }
         files.publish(run.path / FILE, files.json_bytes({**content, "round": self.rounds[-1]}))
-        html = render_diagnosis(finding.told, finding.found, finding.diagnosis, " + ".join(self.lineage.ids))
+        html = render_diagnosis(finding.document, finding.found, finding.diagnosis, " + ".join(self.lineage.ids))
         run.save_report(key, html, {"inputs": inputs, "parameters": parameters, "code": code})
 
-    def document(self, finding: Finding, verdict: Verdict) -> dict[str, Any]:
+    def document(self, finding: JointDiagnosis, verdict: Ending) -> dict[str, Any]:
         """The whole inquiry as one document."""
         minutes = self.lineage.minutes()
         return {
@@ -242,7 +246,7 @@ class Inquiry:
                 "share": round(sum(minutes[1:]) / minutes[0], 4),
             },
             "rounds": self.rounds,
-            **finding.told,
+            **finding.document,
         }
 
 
@@ -250,7 +254,7 @@ def begin(
     archive: Archive, job: Job, run: Run, effects: Sequence[str], budget: float | None, *, unseen: bool = False
 ) -> Inquiry:
     """The inquiry of a run that was measured: with the budget given, or a share of the station time that it took."""
-    lineage = Lineage((run,))
+    lineage = RunSequence((run,))
     allowed = EXTRA * lineage.minutes()[0] if budget is None else budget
     return Inquiry(archive, [job], lineage, tuple(effects or job.recipe.effects), allowed, unseen)
 
@@ -270,20 +274,20 @@ def _going_on(before: Records) -> Any:
     return measure
 
 
-def _ended(finding: Finding) -> Verdict | None:
-    told = finding.told
+def _ended(finding: JointDiagnosis) -> Ending | None:
+    told = finding.document
     if finding.diagnosis is None:
-        return Verdict("blocked", "every unit has a data fault; no physics is diagnosed until it is mended")
+        return Ending("blocked", "every unit has a data fault; no physics is diagnosed until it is mended")
     if told["adequate"]:
-        return Verdict("adequate", "the model leaves nothing but the noise that is there")
+        return Ending("adequate", "the model leaves nothing but the noise that is there")
     if finding.ambiguous:
         return None
     if not told["classes"]:
-        return Verdict("unexplained", "the model is not adequate, and no effect of the catalogue explains the rest")
-    return Verdict("told_apart", f"one effect a class stands: {', '.join(told['recommended'])}")
+        return Ending("unexplained", "the model is not adequate, and no effect of the catalogue explains the rest")
+    return Ending("told_apart", f"one effect a class stands: {', '.join(told['recommended'])}")
 
 
-def _classes(finding: Finding) -> str:
+def _classes(finding: JointDiagnosis) -> str:
     return ", and ".join(" | ".join(group) for group in finding.ambiguous)
 
 

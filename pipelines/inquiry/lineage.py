@@ -18,7 +18,7 @@ NUMBERED = ("dwell", "record")
 
 
 @dataclass(frozen=True)
-class Lineage:
+class RunSequence:
     """A first run and those that went on from it, in order."""
 
     runs: tuple[Run, ...]
@@ -55,9 +55,9 @@ class Lineage:
         ends = [_end(run) for run in self.runs]
         return [(end - begin) / 60.0 for begin, end in zip([0.0, *ends], ends, strict=False)]
 
-    def with_run(self, run: Run) -> Lineage:
+    def with_run(self, run: Run) -> RunSequence:
         """The lineage with one more run."""
-        return Lineage((*self.runs, run))
+        return RunSequence((*self.runs, run))
 
 
 def _numbered_through(tables: Sequence[pd.DataFrame]) -> pd.DataFrame:

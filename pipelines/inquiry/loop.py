@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, Literal, Protocol
 
 from pipelines.chain.chain import ORDER
 from pipelines.chain.runner import Runner
-from pipelines.inquiry.inquiry import FOLLOW_UP, Finding, Inquiry, Move, Verdict, begin
+from pipelines.inquiry.inquiry import FOLLOW_UP, Ending, FollowUp, Inquiry, JointDiagnosis, begin
 from schemas.progress import silent
 
 if TYPE_CHECKING:
@@ -35,12 +35,12 @@ class Stages(Protocol):
 class Approval(Protocol):
     """Whoever approves the extra minutes."""
 
-    def __call__(self, inquiry: Inquiry, finding: Finding, move: Move) -> Consent:
+    def __call__(self, inquiry: Inquiry, finding: JointDiagnosis, move: FollowUp) -> Consent:
         """``go`` to measure it, ``stop`` to leave it, ``nobody`` where there is nobody to be asked."""
         ...
 
 
-def always(inquiry: Inquiry, finding: Finding, move: Move) -> Consent:
+def always(inquiry: Inquiry, finding: JointDiagnosis, move: FollowUp) -> Consent:
     """Everything within the budget is approved."""
     del inquiry, finding, move
     return "go"
@@ -52,7 +52,7 @@ def directly(name: str, runner: Runner) -> Done:
 
 
 @dataclass(frozen=True)
-class Terms:
+class Settings:
     """What an inquiry is given: the model to judge (the recipe's where empty), and station minutes for follow-ups.
 
     ``unseen``: effects that the plan could not see are measured for, too.
@@ -64,17 +64,17 @@ class Terms:
 
 
 @dataclass(frozen=True)
-class Table:
+class Participants:
     """Who takes part: who does the stages, who approves, and who is told."""
 
     stage: Stages = directly
     approve: Approval = always
     progress: Progress = silent
     told: Callable[[Done], None] = lambda _done: None
-    looked: Callable[[Finding], None] = lambda _finding: None
+    looked: Callable[[JointDiagnosis], None] = lambda _finding: None
 
 
-def play(job: Job, archive: Archive, terms: Terms, table: Table) -> dict[str, Any]:
+def play(job: Job, archive: Archive, terms: Settings, table: Participants) -> dict[str, Any]:
     """The document of an inquiry that went as far as it could.
 
     Given again after it was stopped it goes on where it was: what was measured is not measured again, and a follow-up that was
@@ -89,7 +89,7 @@ def play(job: Job, archive: Archive, terms: Terms, table: Table) -> dict[str, An
         inquiry.keep(finding)
         table.looked(finding)
         move = inquiry.next(finding)
-        if isinstance(move, Verdict):
+        if isinstance(move, Ending):
             return inquiry.document(finding, move)
         consent = "go" if move.begun else table.approve(inquiry, finding, move)
         if consent != "go":
@@ -100,9 +100,9 @@ def play(job: Job, archive: Archive, terms: Terms, table: Table) -> dict[str, An
         inquiry.measured(move, follower.run)
 
 
-def _left(consent: Consent, move: Move) -> Verdict:
+def _left(consent: Consent, move: FollowUp) -> Ending:
     """Why a proposal was not measured."""
     told = "; ".join(move.why)
     if consent == "stop":
-        return Verdict("declined", f"not approved: {move.minutes:.1f} min for: {told}")
-    return Verdict("asked", f"{move.minutes:.1f} min of the station's time wait for approval: {told}")
+        return Ending("declined", f"not approved: {move.minutes:.1f} min for: {told}")
+    return Ending("asked", f"{move.minutes:.1f} min of the station's time wait for approval: {told}")

@@ -1,6 +1,6 @@
 """Checks of an archive: every hash computed anew, every manifest held against those that name it."""
 
 from pipelines.integrity.archive import Report, verify
-from pipelines.integrity.findings import Finding
+from pipelines.integrity.findings import IntegrityFinding
 
-__all__ = ["Finding", "Report", "verify"]
+__all__ = ["IntegrityFinding", "Report", "verify"]

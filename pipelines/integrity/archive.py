@@ -14,7 +14,7 @@ from pipelines.archive.store import ObjectPath
 from pipelines.integrity.calibrations import check_shard
 from pipelines.integrity.captures import check_capture, check_strangers
 from pipelines.integrity.chain import check_chain
-from pipelines.integrity.findings import MISSING, SIGNATURE, Checked
+from pipelines.integrity.findings import MISSING, SIGNATURE, CheckedPart
 from pipelines.integrity.runs import check_run
 from pipelines.integrity.seals import check_seals
 from pipelines.integrity.surroundings import SHOWN, check_mark, check_surroundings
@@ -39,7 +39,7 @@ class Report:
     trust : in words, who signed.
     """
 
-    checked: Checked
+    checked: CheckedPart
     head: str
     trust: str
     runs: int
@@ -93,12 +93,12 @@ def verify(
     """
     from schemas import tables
 
-    start, total = time.perf_counter(), Checked(archive.root, keys)
+    start, total = time.perf_counter(), CheckedPart(archive.root, keys)
     there = _below(archive.root / "captures")  # before the runs: each run is there before its capture
     chosen = [archive.run(name) for name in runs] or [Run(archive, one.name) for one in _below(archive.root / "runs")]
     captures = _captures(archive, chosen) if runs else there
     shards = [] if runs else _below(archive.root / "calibrations")
-    tasks: list[Callable[[], Checked]] = [
+    tasks: list[Callable[[], CheckedPart]] = [
         *(lambda run=run: check_run(run, total.blank(), tables.VERSION) for run in chosen),
         *(lambda path=path: check_capture(path, total.blank(), tables.VERSION) for path in captures),
         *(lambda shard=shard: check_shard(shard, total.blank()) for shard in shards),
@@ -127,7 +127,7 @@ def _captures(archive: Archive, runs: Sequence[Run]) -> list[Place]:
     return [archive.root / "captures" / name for name in named if name and (archive.root / "captures" / name).is_dir()]
 
 
-def _check_owners(runs: Sequence[Run], captures: Sequence[Place], total: Checked) -> None:
+def _check_owners(runs: Sequence[Run], captures: Sequence[Place], total: CheckedPart) -> None:
     """Every capture has a run that it was measured for."""
     named: set[str] = set()
     for run in runs:
@@ -147,7 +147,7 @@ def _below(folder: Place) -> list[Place]:
     return sorted((place for place in folder.iterdir() if place.is_dir()), key=lambda place: place.name)
 
 
-def _tell_untrusted(total: Checked, *, demanded: bool) -> None:
+def _tell_untrusted(total: CheckedPart, *, demanded: bool) -> None:
     """Name the manifests that nobody known signed: wrong where a signature is demanded, said where others are signed."""
     for state, names in total.untrusted.items():
         what = "is not signed" if state == UNSIGNED else "is signed with a key that is not known here"
@@ -162,7 +162,7 @@ def _tell_untrusted(total: Checked, *, demanded: bool) -> None:
             total.remarks += [f"{shown} {what.replace('is', 'are', 1) if len(names) > 1 else what}"] if names else []
 
 
-def _trust(total: Checked) -> str:
+def _trust(total: CheckedPart) -> str:
     """In words, who signed."""
     count, found = total.manifests, total.signatures
     if found[UNSIGNED] == count:

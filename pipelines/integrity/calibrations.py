@@ -8,14 +8,14 @@ from typing import TYPE_CHECKING, Any
 from pipelines.archive import files
 from pipelines.archive.hash_chain import is_number
 from pipelines.certificates.entries import SCHEMA, folder_of
-from pipelines.integrity.findings import CHANGED, EDITED, MISSING, Checked
+from pipelines.integrity.findings import CHANGED, EDITED, MISSING, CheckedPart
 from schemas.errors import ArchiveUnusable
 
 if TYPE_CHECKING:
     from pipelines.archive.store import Place
 
 
-def check_shard(shard: Place, checked: Checked) -> Checked:
+def check_shard(shard: Place, checked: CheckedPart) -> CheckedPart:
     """What is wrong with the units of one part of the ledger."""
     known: dict[Place, str] = {}
     for folder in sorted((place for place in shard.iterdir() if place.is_dir()), key=lambda place: place.name):
@@ -41,7 +41,7 @@ def check_shard(shard: Place, checked: Checked) -> Checked:
     return checked
 
 
-def _check_evidence(place: Place, content: dict[str, Any], known: dict[Place, str], checked: Checked) -> None:
+def _check_evidence(place: Place, content: dict[str, Any], known: dict[Place, str], checked: CheckedPart) -> None:
     """Hold what a certificate rests on against the run as it is."""
     if content.get("action") == "revoke":
         return

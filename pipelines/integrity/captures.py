@@ -8,13 +8,13 @@ from pipelines.archive import files
 from pipelines.archive.capture_journal import FOLDER, Events
 from pipelines.archive.hash_chain import is_number
 from pipelines.archive.records import COMPLETE
-from pipelines.integrity.findings import CHANGED, EDITED, FOREIGN, MISSING, Checked
+from pipelines.integrity.findings import CHANGED, EDITED, FOREIGN, MISSING, CheckedPart
 
 if TYPE_CHECKING:
     from pipelines.archive.store import Place
 
 
-def check_capture(path: Place, checked: Checked, schema: int) -> Checked:
+def check_capture(path: Place, checked: CheckedPart, schema: int) -> CheckedPart:
     """What is wrong with a capture."""
     records: list[tuple[dict[str, Any], str, Place]] = []
     for folder in sorted(path.iterdir(), key=lambda place: place.name):
@@ -40,7 +40,7 @@ def check_capture(path: Place, checked: Checked, schema: int) -> Checked:
     return checked
 
 
-def check_strangers(folder: Place, known: set[str], checked: Checked) -> None:
+def check_strangers(folder: Place, known: set[str], checked: CheckedPart) -> None:
     """Tables in a folder that nothing of the archive put there."""
     for place in sorted(folder.iterdir(), key=lambda one: one.name) if folder.is_dir() else ():
         if place.suffix == ".parquet" and place.name not in known and place.is_file():
@@ -49,7 +49,7 @@ def check_strangers(folder: Place, known: set[str], checked: Checked) -> None:
             )
 
 
-def _check_order(records: list[tuple[dict[str, Any], str, Place]], checked: Checked) -> None:
+def _check_order(records: list[tuple[dict[str, Any], str, Place]], checked: CheckedPart) -> None:
     """Every record names the one before; the first of an archive of an older version names none."""
     before = ""
     for count, (content, found, folder) in enumerate(records):
@@ -64,7 +64,9 @@ def _check_order(records: list[tuple[dict[str, Any], str, Place]], checked: Chec
         before = found
 
 
-def _check_end(path: Place, records: list[tuple[dict[str, Any], str, Place]], checked: Checked, schema: int) -> None:
+def _check_end(
+    path: Place, records: list[tuple[dict[str, Any], str, Place]], checked: CheckedPart, schema: int
+) -> None:
     end = path / COMPLETE
     if not end.is_file():
         checked.remarks.append(f"{checked.name(path)} is not finished: {len(records)} records are stored")
@@ -84,7 +86,7 @@ def _check_end(path: Place, records: list[tuple[dict[str, Any], str, Place]], ch
         checked.wrong(EDITED, records[-1][2] / "record.json", "is not the manifest that the capture ended with")
 
 
-def _check_events(path: Place, wanted: dict[str, str], checked: Checked) -> None:
+def _check_events(path: Place, wanted: dict[str, str], checked: CheckedPart) -> None:
     """Hold the journal against what the capture's end says of it."""
     found = Events(path).hashes()
     for name in sorted({*wanted, *found}):
@@ -97,7 +99,7 @@ def _check_events(path: Place, wanted: dict[str, str], checked: Checked) -> None
             checked.wrong(CHANGED, place, "is not the event that was in the journal when the capture ended")
 
 
-def _check_state(path: Place, last: tuple[dict[str, Any], str, Place], checked: Checked) -> None:
+def _check_state(path: Place, last: tuple[dict[str, Any], str, Place], checked: CheckedPart) -> None:
     """Hold the station's state, from which the capture goes on, against the record that it was stored with."""
     wanted = last[0].get("state")
     if wanted is None:  # an older version did not note it

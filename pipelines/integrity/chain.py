@@ -7,7 +7,7 @@ from pathlib import PurePosixPath
 from typing import TYPE_CHECKING
 
 from pipelines.archive import files, hash_chain
-from pipelines.integrity.findings import EDITED, MISSING, Checked
+from pipelines.integrity.findings import EDITED, MISSING, CheckedPart
 
 if TYPE_CHECKING:
     from pipelines.archive.store import Place
@@ -29,7 +29,7 @@ class Chain:
     entries: dict[int, dict[str, str]] = field(default_factory=dict[int, "dict[str, str]"])
 
 
-def check_chain(root: Place, checked: Checked, *, only: set[str] | None = None, head: str = "") -> Chain:
+def check_chain(root: Place, checked: CheckedPart, *, only: set[str] | None = None, head: str = "") -> Chain:
     """What the chain says; what is wrong goes into ``checked``.
 
     Parameters
@@ -74,7 +74,7 @@ def _files(named: dict[str, str]) -> dict[str, str]:
     return {k: v for k, v in named.items() if ".." not in PurePosixPath(k).parts and not k.startswith("/")}
 
 
-def _check_sealed(root: Place, name: str, wanted: str, checked: Checked) -> None:
+def _check_sealed(root: Place, name: str, wanted: str, checked: CheckedPart) -> None:
     place = root / name
     try:
         found = files.sha256(place)

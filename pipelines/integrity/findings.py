@@ -24,7 +24,7 @@ CHANGED, MISSING, EDITED, FOREIGN, NEWER, UNREADABLE, SIGNATURE, UNCHAINED = (
 
 
 @dataclass(frozen=True)
-class Finding:
+class IntegrityFinding:
     """Something that is wrong.
 
     Parameters
@@ -39,7 +39,7 @@ class Finding:
 
 
 @dataclass
-class Checked:
+class CheckedPart:
     """What was found in a part of the archive, and how much of it was read.
 
     Parameters
@@ -51,7 +51,7 @@ class Checked:
 
     root: Place
     keys: Mapping[str, Ed25519PublicKey]
-    findings: list[Finding] = field(default_factory=list[Finding])
+    findings: list[IntegrityFinding] = field(default_factory=list[IntegrityFinding])
     remarks: list[str] = field(default_factory=list[str])
     signatures: Counter[str] = field(default_factory=Counter[str])
     untrusted: dict[str, list[str]] = field(default_factory=lambda: {UNSIGNED: [], UNKNOWN: []})
@@ -60,11 +60,11 @@ class Checked:
     rows: int = 0
     bytes: int = 0
 
-    def blank(self) -> Checked:
+    def blank(self) -> CheckedPart:
         """One of the same archive and keys in which nothing was found yet."""
-        return Checked(self.root, self.keys)
+        return CheckedPart(self.root, self.keys)
 
-    def add(self, other: Checked) -> None:
+    def add(self, other: CheckedPart) -> None:
         """Take in what was found elsewhere."""
         self.findings += other.findings
         self.remarks += other.remarks
@@ -80,7 +80,7 @@ class Checked:
 
     def wrong(self, kind: str, place: Place, message: str) -> None:
         """Note something that is wrong."""
-        self.findings.append(Finding(kind, self.name(place), message))
+        self.findings.append(IntegrityFinding(kind, self.name(place), message))
 
     def manifest(self, place: Place, known_schema: int) -> tuple[dict[str, Any], str] | None:
         """A manifest's content and the hash of its file, its signature checked; None where it cannot be used."""

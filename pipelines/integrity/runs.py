@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 from pipelines.archive import files, parquet, stage_key
 from pipelines.archive.records import COMPLETE
 from pipelines.archive.store import ObjectPath
-from pipelines.integrity.findings import EDITED, FOREIGN, MISSING, Checked
+from pipelines.integrity.findings import EDITED, FOREIGN, MISSING, CheckedPart
 
 if TYPE_CHECKING:
     from pipelines.archive import Run
@@ -17,7 +17,7 @@ OURS = ("run.json", "sealed.json", "lock")
 KEYED = ("stage", "inputs", "parameters", "code", "key")
 
 
-def check_run(run: Run, checked: Checked, schema: int) -> Checked:
+def check_run(run: Run, checked: CheckedPart, schema: int) -> CheckedPart:
     """What is wrong with a run."""
     names = {place.name: place for place in run.path.iterdir()}
     if all(name == "lock" or name.startswith(files.TEMPORARY) for name in names):
@@ -52,7 +52,7 @@ def _check_links(
     content: dict[str, Any],
     manifests: dict[str, dict[str, Any]],
     hashes: dict[str, str],
-    checked: Checked,
+    checked: CheckedPart,
 ) -> None:
     """Hold a manifest against its own key, and against the manifests that it names."""
     if all(name in content for name in KEYED) and all(
@@ -76,7 +76,7 @@ def _check_links(
             checked.wrong(MISSING, place.parent / f"{name}.json", f"is not there, {place.stem} was made from it")
 
 
-def _check_capture_link(run: Run, capture: str, manifests: dict[str, dict[str, Any]], checked: Checked) -> None:
+def _check_capture_link(run: Run, capture: str, manifests: dict[str, dict[str, Any]], checked: CheckedPart) -> None:
     """Hold the capture's end against what the run's tables were made from."""
     if not capture:
         return
@@ -93,7 +93,7 @@ def _check_capture_link(run: Run, capture: str, manifests: dict[str, dict[str, A
             return
 
 
-def _check_others(run: Run, names: dict[str, Place], manifests: dict[str, Any], checked: Checked) -> None:
+def _check_others(run: Run, names: dict[str, Place], manifests: dict[str, Any], checked: CheckedPart) -> None:
     """Files of the run's folder that no manifest names."""
     for name, place in sorted(names.items()):
         if name.startswith(files.TEMPORARY):

@@ -15,7 +15,7 @@ from pipelines.archive.keys import digest
 from pipelines.archive.listing import stages_of
 from pipelines.archive.provenance import provenance
 from pipelines.archive.signatures import ENTRY
-from pipelines.integrity.findings import EDITED, MISSING, UNCHAINED, UNREADABLE, Checked
+from pipelines.integrity.findings import EDITED, MISSING, UNCHAINED, UNREADABLE, CheckedPart
 from schemas.errors import ArchiveUnusable
 
 if TYPE_CHECKING:
@@ -30,7 +30,7 @@ MARK, REPORT = "sealed.json", "report.json"
 REMEDY = "it was copied here, its entry was taken away, or its writer was killed: see 'tumbleline archive clean'"
 
 
-def check_seals(root: Place, runs: Sequence[Run], told: Chain, checked: Checked, *, everything: bool) -> None:
+def check_seals(root: Place, runs: Sequence[Run], told: Chain, checked: CheckedPart, *, everything: bool) -> None:
     """Hold finished runs, and where everything is looked at also calibrations and releases, against what the chain names."""
     for run in runs:
         _check_run(run, told, checked)
@@ -41,7 +41,7 @@ def check_seals(root: Place, runs: Sequence[Run], told: Chain, checked: Checked,
             _check_evidence(place, checked)
 
 
-def _check_run(run: Run, told: Chain, checked: Checked) -> None:
+def _check_run(run: Run, told: Chain, checked: CheckedPart) -> None:
     mark = run.path / MARK
     if not mark.is_file():
         _check_unsealed(run, told, checked)
@@ -67,7 +67,7 @@ def _check_run(run: Run, told: Chain, checked: Checked) -> None:
         _check_stages(run, content, checked)
 
 
-def _check_stages(run: Run, content: dict[str, Any], checked: Checked) -> None:
+def _check_stages(run: Run, content: dict[str, Any], checked: CheckedPart) -> None:
     """The stages that a mark tells, for lists, must be those that made the tables."""
     named = {name.rpartition("/")[2] for name in content["files"] if name.startswith("runs/")}
     there = {place.name for place in run.path.glob("*.json") if place.name != MARK}
@@ -78,7 +78,7 @@ def _check_stages(run: Run, content: dict[str, Any], checked: Checked) -> None:
         return
 
 
-def _check_unsealed(run: Run, told: Chain, checked: Checked) -> None:
+def _check_unsealed(run: Run, told: Chain, checked: CheckedPart) -> None:
     """A run without the mark that it was sealed: not finished, made before there was a chain, or else not as it should be."""
     own = f"runs/{run.id}/"
     if any(name.startswith(own) for name in told.sealed):
@@ -94,7 +94,7 @@ def _check_unsealed(run: Run, told: Chain, checked: Checked) -> None:
         _tell(run.path / REPORT, content, checked)
 
 
-def _check_named(places: Iterable[Place], told: Chain, checked: Checked) -> None:
+def _check_named(places: Iterable[Place], told: Chain, checked: CheckedPart) -> None:
     for place in sorted(places, key=str):
         if is_number(place.stem) and checked.name(place).replace("\\", "/") not in told.sealed:
             try:
@@ -103,7 +103,7 @@ def _check_named(places: Iterable[Place], told: Chain, checked: Checked) -> None
                 continue
 
 
-def _check_evidence(place: Place, checked: Checked) -> None:
+def _check_evidence(place: Place, checked: CheckedPart) -> None:
     """What a release rests on is named for its content; who kept it where and when is not in that."""
     try:
         content = files.read_json(place)
@@ -115,7 +115,7 @@ def _check_evidence(place: Place, checked: Checked) -> None:
         checked.wrong(EDITED, place, "was edited: its content does not make its name")
 
 
-def _tell(place: Place, content: dict[str, Any], checked: Checked) -> None:
+def _tell(place: Place, content: dict[str, Any], checked: CheckedPart) -> None:
     if _is_recent(str(content.get("when", ""))):
         checked.remarks.append(
             f"{checked.name(place)} is not in the chain yet: its writer is at work, or was killed just now"

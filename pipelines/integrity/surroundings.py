@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from pipelines.archive import Archive
-    from pipelines.integrity.findings import Checked
+    from pipelines.integrity.findings import CheckedPart
 
 OURS = re.compile(
     r"archive\.json|(index|orchestrator)/.*|.*\.parquet"
@@ -27,7 +27,7 @@ KEY_MARK, KEY_BYTES = b"PRIVATE KEY-----", 16_384
 SHOWN = 10
 
 
-def check_mark(archive: Archive, checked: Checked) -> None:
+def check_mark(archive: Archive, checked: CheckedPart) -> None:
     """The file that makes a folder an archive, which no chain names, is always the same."""
     place, wanted = archive.root / "archive.json", archive.mark
     try:
@@ -42,7 +42,7 @@ def check_mark(archive: Archive, checked: Checked) -> None:
         checked.wrong(CHANGED, place, f"is not as every archive begins; its content is {wanted.decode().split()}")
 
 
-def check_surroundings(archive: Archive, checked: Checked) -> None:
+def check_surroundings(archive: Archive, checked: CheckedPart) -> None:
     """Every file and link of a local archive that is not the archive's own."""
     if not isinstance(archive.root, Path):  # an object store has no links, and lists slowly
         return
@@ -69,7 +69,7 @@ def _all(root: Path) -> Iterator[tuple[str, Path]]:
             yield place.relative_to(root).as_posix(), place
 
 
-def _check_link(name: str, place: Path, checked: Checked) -> None:
+def _check_link(name: str, place: Path, checked: CheckedPart) -> None:
     """A link is no file of the archive: what it leads to can be changed elsewhere. Whole top folders may lie on another disk."""
     if "/" in name:
         what = f"is a link to {os.readlink(place)}: put there what it leads to"  # noqa: PTH115 - as it was written

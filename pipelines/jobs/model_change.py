@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True)
-class Wanted:
+class ModelChange:
     """The model and limits for a re-run; each as the run had it where it is None."""
 
     effects: tuple[str, ...] | None = None
@@ -58,7 +58,7 @@ def wanted(
     effect_files: Sequence[Path] | None = None,
     *,
     where: str = "rerun",
-) -> Wanted:
+) -> ModelChange:
     """What a command was given as effects, model file, limits and effects of its own.
 
     Raises
@@ -67,7 +67,7 @@ def wanted(
         Effects and a model are both given; an effect, the file or the limits are not known.
     """
     outside = tuple(str(path.resolve()) for path in effect_files or ())
-    Wanted(effect_files=outside).use()
+    ModelChange(effect_files=outside).use()
     names = chosen_effects(effects, model, where)
     head: dict[str, Any] = {}
     if model is not None:
@@ -79,4 +79,4 @@ def wanted(
         }
     chosen = read_limits(limits) if limits else None
     own = None if names is None else tuple(names)
-    return Wanted(own, **head, limits=chosen, limits_name=limits, effect_files=outside)
+    return ModelChange(own, **head, limits=chosen, limits_name=limits, effect_files=outside)

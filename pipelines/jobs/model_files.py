@@ -31,7 +31,7 @@ STARTING_MODEL = ("bias", "scale", "misalignment", "bias_temperature", "scale_te
 
 
 @dataclass(frozen=True)
-class Step:
+class ModelStep:
     """One effect more: who adds it, when, why, and the run or file that showed it."""
 
     effect: str
@@ -146,7 +146,7 @@ def new_model(path: Path, names: Sequence[str], by: str, at: datetime) -> str:
     return tomlkit.dumps(document)
 
 
-def extended(text: str, step: Step, source: str) -> tuple[str, ModelFile]:
+def extended(text: str, step: ModelStep, source: str) -> tuple[str, ModelFile]:
     """The text of the next version of a model, its comments kept, and the model as it then is.
 
     Raises

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
 
     from pipelines.archive import Archive
-    from pipelines.jobs.model_change import Wanted
+    from pipelines.jobs.model_change import ModelChange
 
 FOLDER, EVIDENCE = "releases", "whatif"
 SCHEMA = 1
@@ -70,13 +70,13 @@ def _matches(wanted: str, found: str) -> bool:
     return not wanted or wanted.lower() == found.lower()
 
 
-def model_digest(wanted: Wanted) -> str:
+def model_digest(wanted: ModelChange) -> str:
     """Hash of what a model fits: its effects and formulas, not its name."""
     formulas = [formula.model_dump(mode="json") for formula in wanted.formulas]
     return digest({"effects": sorted(wanted.effects or ()), "formulas": formulas})
 
 
-def keep_evidence(archive: Archive, wanted: Wanted, document: Mapping[str, Any], runs: list[str]) -> str:
+def keep_evidence(archive: Archive, wanted: ModelChange, document: Mapping[str, Any], runs: list[str]) -> str:
     """The name under which a what-if is kept in the archive."""
     model = model_digest(wanted)
     content = {"schema": SCHEMA, "model": model, "runs": sorted(runs), **document}
@@ -88,7 +88,7 @@ def keep_evidence(archive: Archive, wanted: Wanted, document: Mapping[str, Any],
     return name
 
 
-def evidence_for(archive: Archive, wanted: Wanted, device: str, station: str) -> dict[str, Any] | None:
+def evidence_for(archive: Archive, wanted: ModelChange, device: str, station: str) -> dict[str, Any] | None:
     """The newest what-if of a model whose lots are of this device and station; None where there is none."""
     model = model_digest(wanted)
     found: list[dict[str, Any]] = []
@@ -104,7 +104,7 @@ def evidence_for(archive: Archive, wanted: Wanted, device: str, station: str) ->
 
 def release(
     archive: Archive,
-    wanted: Wanted,
+    wanted: ModelChange,
     since: datetime,
     *,
     device: str = "",
@@ -151,7 +151,7 @@ def _published(archive: Archive, content: dict[str, Any]) -> int:
     return number
 
 
-def _refuse_without(evidence: dict[str, Any] | None, wanted: Wanted, device: str, station: str) -> None:
+def _refuse_without(evidence: dict[str, Any] | None, wanted: ModelChange, device: str, station: str) -> None:
     where = "".join([f" of {device}" if device else "", f" on {station}" if station else ""])
     name = wanted.model_name or "the model"
     if evidence is None:

@@ -10,11 +10,11 @@ from pipelines.archive.listing import SEALED
 from pipelines.archive.records import COMPLETE
 from pipelines.certificates.entries import folder_of
 from pipelines.certificates.ledger import Ledger
-from pipelines.lineage.graph import Graph, Node, Step
+from pipelines.lineage.graph import Activity, Graph, Node
 
 if TYPE_CHECKING:
     from pipelines.archive import Archive, Run
-    from pipelines.certificates.entries import Event
+    from pipelines.certificates.entries import LedgerEntry
     from pipelines.certificates.validity import Calibration
 
 MADE = ("who", "where", "when", "code", "key", "software", "libraries", "schema", "parameters", "taken_from")
@@ -45,7 +45,7 @@ class Gatherer:
             if other is not None:
                 self.run(other)
         self.graph.put(
-            Step(
+            Activity(
                 id=f"start of {run.id}",
                 name="run again" if about.get("rerun_of") else "start",
                 used=(*settings, *(f"runs/{name}" for name in earlier if f"runs/{name}" in self.graph.nodes)),
@@ -109,7 +109,7 @@ class Gatherer:
         step = {key: about[key] for key in ("who", "where", "when") if key in about} | {"capture": capture}
         if (top / COMPLETE).is_file():
             step["complete"] = files.sha256(top / COMPLETE)
-        self.graph.put(Step(f"capture {capture}", "capture", tuple(settings), tuple(found), step))
+        self.graph.put(Activity(f"capture {capture}", "capture", tuple(settings), tuple(found), step))
         return found
 
     def _tables(self, run: Run, raw: list[str], start: str) -> None:
@@ -138,7 +138,7 @@ class Gatherer:
                 used += raw if name == RAW else [self._input(run, name, str(value), manifests)]
             made = tuple(f"runs/{run.id}/{'report.html' if n == 'report' else f'{n}.parquet'}" for n in names)
             about = {key: content[key] for key in MADE if key in content}
-            self.graph.put(Step(step, str(content.get("stage")), tuple(used), made, about))
+            self.graph.put(Activity(step, str(content.get("stage")), tuple(used), made, about))
 
     def _input(self, run: Run, name: str, value: str, manifests: dict[str, Any]) -> str:
         if name in manifests:
@@ -153,18 +153,18 @@ class Gatherer:
         name = self.graph.add(Node(place, "certificate", one.certificate, place, about=one.document()))
         rests = tuple(f"runs/{event.run}/{table}.parquet" for table, _ in event.evidence)
         used = tuple(node for node in (*rests, f"runs/{event.run}") if node in self.graph.nodes)
-        self.graph.put(Step(f"{event.action} {event.certificate}", event.action, used, (name,), _by(event)))
+        self.graph.put(Activity(f"{event.action} {event.certificate}", event.action, used, (name,), _by(event)))
         if one.ended_by is not None and one.ended_by.action == "revoke":
             ended = one.ended_by
             gone = f"{folder_of(ended.serial)}/{ended.sequence:06d}.json"
             self.graph.add(
                 Node(gone, "revocation", f"revocation {ended.certificate}", gone, about={"reason": ended.reason})
             )
-            self.graph.put(Step(f"revoke {ended.certificate}", "revoke", (name,), (gone,), _by(ended)))
+            self.graph.put(Activity(f"revoke {ended.certificate}", "revoke", (name,), (gone,), _by(ended)))
         return name
 
 
-def _by(event: Event) -> dict[str, Any]:
+def _by(event: LedgerEntry) -> dict[str, Any]:
     return {"who": event.who, "where": event.where, "when": event.when, "reason": event.reason}
 
 

@@ -33,7 +33,7 @@ class Node:
 
 
 @dataclass(frozen=True)
-class Step:
+class Activity:
     """What made things from others.
 
     Parameters
@@ -56,28 +56,28 @@ class Graph:
     """Things and steps by id."""
 
     nodes: dict[str, Node] = field(default_factory=dict[str, Node])
-    steps: dict[str, Step] = field(default_factory=dict[str, Step])
+    steps: dict[str, Activity] = field(default_factory=dict[str, Activity])
 
     def add(self, node: Node) -> str:
         """Put a thing in, unless it is there; its id."""
         self.nodes.setdefault(node.id, node)
         return node.id
 
-    def put(self, step: Step) -> None:
+    def put(self, step: Activity) -> None:
         """Put a step in."""
         self.steps[step.id] = step
 
-    def made_by(self) -> dict[str, list[Step]]:
+    def made_by(self) -> dict[str, list[Activity]]:
         """The steps that made a thing, by its id; several where a calibration was ended by another step."""
-        found: dict[str, list[Step]] = {}
+        found: dict[str, list[Activity]] = {}
         for step in self.steps.values():
             for node in step.made:
                 found.setdefault(node, []).append(step)
         return found
 
-    def used_by(self) -> dict[str, list[Step]]:
+    def used_by(self) -> dict[str, list[Activity]]:
         """The steps that used a thing, by its id."""
-        found: dict[str, list[Step]] = {}
+        found: dict[str, list[Activity]] = {}
         for step in self.steps.values():
             for node in step.used:
                 found.setdefault(node, []).append(step)
@@ -102,7 +102,9 @@ class Graph:
         start = list(start)
         return self._reached(start, self.used_by(), forward=True)[0] - set(start)
 
-    def _reached(self, start: list[str], links: dict[str, list[Step]], *, forward: bool) -> tuple[set[str], set[str]]:
+    def _reached(
+        self, start: list[str], links: dict[str, list[Activity]], *, forward: bool
+    ) -> tuple[set[str], set[str]]:
         nodes, steps, left = set(start), set[str](), list(start)
         while left:
             for step in links.get(left.pop(), []):
@@ -114,7 +116,7 @@ class Graph:
         return nodes, steps
 
 
-def _within(step: Step, kept: set[str]) -> Step:
+def _within(step: Activity, kept: set[str]) -> Activity:
     used = tuple(node for node in step.used if node in kept)
     made = tuple(node for node in step.made if node in kept)
-    return Step(step.id, step.name, used, made, step.about)
+    return Activity(step.id, step.name, used, made, step.about)

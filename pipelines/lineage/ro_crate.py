@@ -13,7 +13,7 @@ from schemas.errors import WrongUse
 
 if TYPE_CHECKING:
     from pipelines.archive import Archive
-    from pipelines.lineage.graph import Graph, Node, Step
+    from pipelines.lineage.graph import Activity, Graph, Node
     from pipelines.lineage.targets import Lineage
 
 VERSION = "https://w3id.org/ro/crate/1.1"
@@ -129,7 +129,7 @@ def _other(node: Node) -> dict[str, Any]:
     }
 
 
-def _action(step: Step, graph: Graph) -> dict[str, Any]:
+def _action(step: Activity, graph: Graph) -> dict[str, Any]:
     about = step.about
     action: dict[str, Any] = {
         "@id": f"#{quote(step.id)}",
@@ -174,7 +174,7 @@ def _agents(graph: Graph) -> tuple[list[dict[str, Any]], list[dict[str, Any]]]:
     return list(people.values()), list(programs.values())
 
 
-def _person(step: Step) -> str:
+def _person(step: Activity) -> str:
     return f"{step.about['who']}@{step.about.get('where', '')}"
 
 

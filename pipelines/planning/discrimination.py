@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from inertial import design
-from inertial.planning.discrimination import Parting
-from pipelines.planning.requirement import Wish, between, candidates
+from inertial.planning.discrimination import Discrimination
+from pipelines.planning.requirement import Requirement, between, candidates
 from schemas.errors import WrongUse
 from schemas.units import MICRO
 
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from pipelines.planning.plan import Planned
+    from pipelines.planning.plan import PlanContext
 
     Array = NDArray[np.float64]
 
@@ -32,7 +32,7 @@ CANDIDATES = 48
 
 
 def parted(
-    against: Planned,
+    against: PlanContext,
     rivals: Sequence[str],
     levels: Sequence[float],
     *,
@@ -41,7 +41,7 @@ def parted(
     plan: str = "",
     see: Sequence[str] = (),
     verification: int = 1,
-) -> Wish:
+) -> Requirement:
     """The wish that a recipe tells rivals apart; the model of ``against`` is fitted anyway.
 
     Parameters
@@ -66,8 +66,8 @@ def parted(
     ]
     base = tuple(k for k, name in enumerate(names) if name not in rivals)
     units = max(1, len(against.recipe.units))
-    parting = Parting(base, tuple(columns), tuple(sizes), enough, units)
-    return Wish(
+    parting = Discrimination(base, tuple(columns), tuple(sizes), enough, units)
+    return Requirement(
         wanted=scale,
         see=tuple(see),
         levels=(),
@@ -97,12 +97,12 @@ def _refuse(rivals: Sequence[str], effects: Sequence[str]) -> None:
         raise WrongUse(message)
 
 
-def _columns(effects: Sequence[str], course: Planned) -> Array:
+def _columns(effects: Sequence[str], course: PlanContext) -> Array:
     sensor, _ = design.split(effects)
     return design.local_columns(sensor, course.state, design.starting_values(sensor, course.state))
 
 
-def partings(wish: Wish, course: Planned) -> list[dict[str, Any]]:
+def partings(wish: Requirement, course: PlanContext) -> list[dict[str, Any]]:
     """Chi-square that each rival leaves of each other in a recipe's lot; none where there are no rivals."""
     if wish.parting is None:
         return []

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from pipelines.planning.layout import Design, Layout
+    from pipelines.planning.layout import PlanDesign, TimedDesign
 
     Array = NDArray[np.float64]
 
@@ -27,7 +27,7 @@ _FIRST = 3
 """Part of a soak's dwells that is taken away at first."""
 
 
-def fewest(layout: Layout, made: Design, allowed: Array) -> Design | None:
+def fewest_dwells(layout: TimedDesign, made: PlanDesign, allowed: Array) -> PlanDesign | None:
     """The design with the fewest dwells whose plain arrangement lacks no more of the wish than is allowed.
 
     Parameters

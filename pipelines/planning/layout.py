@@ -13,10 +13,10 @@ from inertial import design
 from inertial.frames import force_from_angles
 from inertial.noise.dwells import dwell_covariance
 from inertial.noise.flicker import flicker_of_means
-from inertial.planning.pose_exchange import Slots
+from inertial.planning.pose_exchange import PlanSlots
 from inertial.state import State
 from pipelines.planning.verification_poses import numbered, turns
-from pipelines.schedule.timing import Standing, move_seconds, soaked
+from pipelines.schedule.timing import StationPose, move_seconds, soaked
 from schemas.recipe import FEWEST_SAMPLES
 from schemas.units import STANDARD_GRAVITY_M_S2
 
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from inertial.noise.dwells import DwellNoise
-    from pipelines.planning.requirement import Wish
+    from pipelines.planning.requirement import Requirement
     from schemas.recipe import Recipe
     from schemas.station import StationConfig
 
@@ -42,7 +42,7 @@ _GRAIN_S, _LONG_S = 2.0, 600.0
 
 
 @dataclass(frozen=True)
-class Design:
+class PlanDesign:
     """Soaks in order, in °C, how many dwells each has, and how long a dwell is."""
 
     order: tuple[float, ...]
@@ -61,15 +61,15 @@ class Design:
         return np.concatenate([[True], change]) | np.concatenate([change, [True]])
 
 
-class Layout:
+class TimedDesign:
     """Designs for one recipe, station, noise and wish."""
 
     def __init__(
-        self, recipe: Recipe, station: StationConfig, noise: DwellNoise, wish: Wish, *, slowest: float
+        self, recipe: Recipe, station: StationConfig, noise: DwellNoise, wish: Requirement, *, slowest: float
     ) -> None:
         self.recipe, self.station, self.noise, self.wish, self.slowest = recipe, station, noise, wish, slowest
         places = numbered("p", wish.candidates)
-        standing = [Standing(outer=p.outer_deg, inner=p.inner_deg) for p in places]
+        standing = [StationPose(outer=p.outer_deg, inner=p.inner_deg) for p in places]
         self.travel = np.array([[move_seconds(a, b, station) for b in places] for a in standing])
         self.force = force_from_angles(*np.radians(wish.candidates).T)
         self._reference = int(np.argmax(np.min(np.abs(self.force), axis=1)))  # its least component is largest
@@ -93,13 +93,13 @@ class Layout:
         best = float(lengths[int(np.argmin(cost))])
         return tuple(x for x in (best, 3.0 * best, 9.0 * best) if x <= most)
 
-    def start(self, made: Design) -> Choice:
+    def start(self, made: PlanDesign) -> Choice:
         """A plain design (n,): poses far from one another in turn."""
         choice = self._spread[np.cumsum(~made.fixed) % len(self._spread)]
         choice[made.fixed] = self._reference
         return choice.astype(np.intp)
 
-    def shortfall(self, made: Design) -> tuple[Array, float]:
+    def shortfall(self, made: PlanDesign) -> tuple[Array, float]:
         """What a plain design lacks of the wish (above one), and its station time in s."""
         choice = self.start(made)
         time, seconds = self._times(made, choice)
@@ -116,7 +116,7 @@ class Layout:
         rows = self._columns(np.full(every.size, 1000.0), np.full(every.size, max(self.wish.levels)), self.force, every)
         return np.ptp(rows, axis=1) <= 1e-9 * np.max(np.abs(rows), axis=1)
 
-    def slots(self, made: Design) -> tuple[Slots, Choice]:
+    def slots(self, made: PlanDesign) -> tuple[PlanSlots, Choice]:
         """Every candidate in every slot, and a plain design."""
         choice = self.start(made)
         time, seconds = self._times(made, choice)
@@ -126,7 +126,7 @@ class Layout:
         rows = self._columns(np.repeat(time, c), heat, self.force[every], every).reshape(3, n, c, -1)
         weight = np.asarray(np.linalg.inv(self.covariance(time, made.dwell_s)), dtype=np.float64)
         still = seconds - float(np.sum(self.travel[choice[:-1], choice[1:]]))
-        return Slots(np.moveaxis(rows, 0, 2), weight, self.travel, still, made.group, made.fixed), choice
+        return PlanSlots(np.moveaxis(rows, 0, 2), weight, self.travel, still, made.group, made.fixed), choice
 
     def covariance(self, time: Array, dwell_s: float) -> Array:
         """Covariance (n, n) of dwell means, g²: as :func:`dwell_covariance`, with the flicker from a table."""
@@ -140,7 +140,7 @@ class Layout:
             found += self.noise.instability**2 * flicker
         return found
 
-    def _times(self, made: Design, choice: Choice) -> tuple[Array, float]:
+    def _times(self, made: PlanDesign, choice: Choice) -> tuple[Array, float]:
         """Middle of every dwell, and the end of all, s."""
         recipe, order = self.recipe, made.order
         typical = float(np.median(self.travel))
@@ -160,7 +160,7 @@ class Layout:
         at, recipe = self.recipe.static_temperature_C, self.recipe
         if recipe.static_record_s <= 0.0 or at == last:
             return 0.0
-        return soaked(Standing(air=last, device=last), at, self.station, recipe.soak_min_s)[0]
+        return soaked(StationPose(air=last, device=last), at, self.station, recipe.soak_min_s)[0]
 
     def _columns(self, time: Array, heat: Array, force: Array, choice: Choice) -> Array:
         """Design columns (3, n, p) over those wanted."""
@@ -183,7 +183,7 @@ class Layout:
 def soak_waits(order: Sequence[float], station: StationConfig, shortest_s: float) -> list[float]:
     """Station time of each soak, s, from the room on."""
     room = station.simulation.room_C if station.simulation else station.pace.room_C
-    now, found = Standing(air=room, device=room), list[float]()
+    now, found = StationPose(air=room, device=room), list[float]()
     for temperature in order:
         waited, now = soaked(now, temperature, station, shortest_s)
         found.append(waited)

@@ -25,8 +25,8 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from pipelines.planning.plan import Planned
-    from pipelines.planning.requirement import Wish
+    from pipelines.planning.plan import PlanContext
+    from pipelines.planning.requirement import Requirement
     from schemas.recipe import Recipe
 
     Array = NDArray[np.float64]
@@ -42,7 +42,7 @@ LIKELY = 20
 
 
 @dataclass(frozen=True)
-class Least:
+class LowerBound:
     """The shortest run: its part of the textbook plan's station time, its soaks in °C, and the effect that asks for most."""
 
     share: float
@@ -50,7 +50,7 @@ class Least:
     effect: str
 
 
-def least(recipe: Recipe, against: Planned, wish: Wish) -> Least | None:
+def least(recipe: Recipe, against: PlanContext, wish: Requirement) -> LowerBound | None:
     """The shortest run in which coefficients that no pose changes can be known as well as is wanted.
 
     None where even a run as long as the textbook plan's is too short, or no coefficient is of that kind.
@@ -64,14 +64,14 @@ def least(recipe: Recipe, against: Planned, wish: Wish) -> Least | None:
         if reached is None:
             low = middle + 1
         else:
-            high, best = middle - 1, Least(middle * STEP, *reached)
+            high, best = middle - 1, LowerBound(middle * STEP, *reached)
     return best
 
 
 class _Bound:
     """Errors of the coefficients that no pose changes, for soaks in order and the time after each."""
 
-    def __init__(self, recipe: Recipe, against: Planned, wish: Wish) -> None:
+    def __init__(self, recipe: Recipe, against: PlanContext, wish: Requirement) -> None:
         self.recipe, self.against, self.wish = recipe, against, wish
         self.total = 60.0 * (spent(against.stretches).total - spent(against.stretches).static_record)
         self.slowest = float(against.state.time[-1])

@@ -12,10 +12,10 @@ from inertial import design
 from inertial.errors import NotIdentified
 from inertial.planning.pose_exchange import exchanged
 from inertial.planning.visibility import sights
-from pipelines.planning.dwell_counts import FEWEST, MOST, fewest
-from pipelines.planning.layout import Design, Layout, spanned
+from pipelines.planning.dwell_counts import FEWEST, MOST, fewest_dwells
+from pipelines.planning.layout import PlanDesign, TimedDesign, spanned
 from pipelines.planning.lower_bound import least
-from pipelines.planning.plan import identified, planned
+from pipelines.planning.plan import identified, plan_context
 from pipelines.planning.soak_orders import mirrored, orders
 from pipelines.planning.textbook import PART_SEEN
 from pipelines.planning.verification_poses import apart, numbered, turns
@@ -29,8 +29,8 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from inertial.planning.expected import Expected
-    from pipelines.planning.plan import Planned
-    from pipelines.planning.requirement import Wish
+    from pipelines.planning.plan import PlanContext
+    from pipelines.planning.requirement import Requirement
     from schemas.recipe import Recipe
 
     Array = NDArray[np.float64]
@@ -62,10 +62,10 @@ SPARE = 0.003
 class Optimum:
     """The recipe found, what it takes and expects, the one that it is held against, and what it lacks of the wish (≤ 1)."""
 
-    planned: Planned
+    plan_context: PlanContext
     expected: Expected
-    against: Planned
-    wish: Wish
+    against: PlanContext
+    wish: Requirement
     worst: float
 
     @property
@@ -74,13 +74,15 @@ class Optimum:
         return _busy(self.planned) / _busy(self.against)
 
 
-def _busy(course: Planned) -> float:
+def _busy(course: PlanContext) -> float:
     """Minutes of station time without the static record."""
     own = spent(course.stretches)
     return own.total - own.static_record
 
 
-def optimise(recipe: Recipe, against: Planned, wish: Wish, progress: Progress, *, lack: float = 1.0) -> Optimum:
+def optimise(
+    recipe: Recipe, against: PlanContext, wish: Requirement, progress: Progress, *, lack: float = 1.0
+) -> Optimum:
     """The cheapest recipe that was found to fulfil a wish.
 
     Parameters
@@ -96,8 +98,8 @@ def optimise(recipe: Recipe, against: Planned, wish: Wish, progress: Progress, *
     RecipeInvalid
         No recipe that was tried fulfils it; the message says how near the best comes.
     """
-    search = _Search(recipe, against, wish)
-    best: Planned | None = None
+    search = RecipeSearch(recipe, against, wish)
+    best: PlanContext | None = None
     ranked = search.ranked()
     for number, (made, _) in enumerate(ranked, start=1):
         soaks = ", ".join(f"{t:g}" for t in made.order)
@@ -109,7 +111,7 @@ def optimise(recipe: Recipe, against: Planned, wish: Wish, progress: Progress, *
     return Optimum(best, identified(best), against, wish, float(np.max(search.reached(best))))
 
 
-def _refusal(search: _Search) -> str:
+def _refusal(search: RecipeSearch) -> str:
     """Why there is no recipe, how near the nearest comes, and the least time that physics would allow."""
     wish, near = search.wish, search.nearest
     said = f"plan optimise: no recipe of up to {MOST} dwells "
@@ -127,28 +129,28 @@ def _refusal(search: _Search) -> str:
     return f"{said}reaches the errors wanted{nearest}{why}; allow larger errors (--factor, --wanted), or other temperatures"
 
 
-class _Search:
+class RecipeSearch:
     """Designs for one recipe, station and wish."""
 
-    def __init__(self, recipe: Recipe, against: Planned, wish: Wish) -> None:
+    def __init__(self, recipe: Recipe, against: PlanContext, wish: Requirement) -> None:
         self.recipe, self.against, self.wish = recipe, against, wish
-        self.layout = Layout(recipe, against.station, against.noise, wish, slowest=float(against.state.time[-1]))
+        self.layout = TimedDesign(recipe, against.station, against.noise, wish, slowest=float(against.state.time[-1]))
         self.nearest = math.inf
-        self.near: tuple[float, Planned] | None = None
+        self.near: tuple[float, PlanContext] | None = None
         self.unseen: list[str] = []
 
-    def ranked(self) -> list[tuple[Design, float]]:
+    def ranked(self) -> list[tuple[PlanDesign, float]]:
         """Plain designs with the fewest dwells in promising orders of soaks, and their station time in s, the quickest first."""
         wish, recipe = self.wish, self.recipe
         back = wish.parting is None
         found = orders(wish.levels, self.against.station, recipe.soak_min_s, legal=wish.legal, back=back)
         dwell_s = self.layout.dwells()[0]
         likely = sorted((self.guessed(order, dwell_s), order) for order in found)[:LIKELY]
-        tried: list[tuple[float, Design]] = []
+        tried: list[tuple[float, PlanDesign]] = []
         for seconds, order in likely:
             if math.isfinite(seconds):
-                tried += [self.plain(Design(order, (), length)) for length in self.layout.dwells()]
-        chosen: list[tuple[Design, float]] = []
+                tried += [self.plain(PlanDesign(order, (), length)) for length in self.layout.dwells()]
+        chosen: list[tuple[PlanDesign, float]] = []
         for seconds, made in sorted(tried, key=lambda one: one[0]):
             taken = {other.order for other, _ in chosen}
             if math.isfinite(seconds) and made.order not in taken and mirrored(made.order) not in taken:
@@ -167,7 +169,7 @@ class _Search:
         lacks: list[float] = []
         ends: list[float] = []
         for count in (few, many):
-            lacking, seconds = self.layout.shortfall(Design(order, (count,) * len(order), dwell_s))
+            lacking, seconds = self.layout.shortfall(PlanDesign(order, (count,) * len(order), dwell_s))
             lacks.append(float(np.max(lacking / self.allowed(lacking))))
             ends.append(seconds)
         self.nearest = min(self.nearest, lacks[1])
@@ -179,15 +181,15 @@ class _Search:
             return math.inf
         return ends[0] + (ends[1] - ends[0]) * (count - few) / (many - few)
 
-    def plain(self, made: Design) -> tuple[float, Design]:
+    def plain(self, made: PlanDesign) -> tuple[float, PlanDesign]:
         """A plain design with the fewest dwells, and its station time in s; infinite where none will do."""
         lacking, _ = self.layout.shortfall(replace(made, counts=(FEWEST,) * len(made.order)))
-        found = fewest(self.layout, made, self.allowed(lacking))
+        found = fewest_dwells(self.layout, made, self.allowed(lacking))
         return (math.inf, made) if found is None else (self.layout.shortfall(found)[1], found)
 
-    def best(self, made: Design, best: Planned | None) -> Planned | None:
+    def best(self, made: PlanDesign, best: PlanContext | None) -> PlanContext | None:
         """The quicker of a recipe and the one found by exchanges in the soaks of a design."""
-        now: Design | None = made
+        now: PlanDesign | None = made
         for _ in range(ROUNDS):
             if now is None or self.slower(now, best):
                 break
@@ -205,29 +207,29 @@ class _Search:
                 best = best if self.unseen else found
             if NEAR < worst <= 1.0 or self.unseen:
                 break
-            now = fewest(self.layout, made, (1.0 - SPARE) * self.layout.shortfall(now)[0] / reached)
+            now = fewest_dwells(self.layout, made, (1.0 - SPARE) * self.layout.shortfall(now)[0] / reached)
         return best
 
-    def nearest_within(self, lack: float) -> Planned | None:
+    def nearest_within(self, lack: float) -> PlanContext | None:
         """The recipe that lacks least of the wish, where that is little, it is quicker, and blind to nothing asked for."""
         if self.near is None or self.near[0] > lack:
             return None
         found = self.near[1]
         return None if _busy(found) >= _busy(self.against) or self.blind(found) else found
 
-    def slower(self, made: Design, best: Planned | None) -> bool:
+    def slower(self, made: PlanDesign, best: PlanContext | None) -> bool:
         """Whether a design takes clearly longer than the best recipe so far."""
         return best is not None and self.layout.shortfall(made)[1] / 60.0 > SLOWER * _busy(best)
 
-    def designed(self, made: Design) -> Planned:
+    def designed(self, made: PlanDesign) -> PlanContext:
         """The recipe with poses exchanged, as the station will go through it."""
         slots, start = self.layout.slots(made)
         choice = exchanged(slots, start, self.wish.value)
         choice = spanned(self.layout.force, choice, made.fixed, self.recipe.span_min_g)
         recipe = self._recipe(made, choice)
-        return planned(recipe, self.against.station, self.against.noise, slowest=self.layout.slowest)
+        return plan_context(recipe, self.against.station, self.against.noise, slowest=self.layout.slowest)
 
-    def reached(self, found: Planned) -> Array:
+    def reached(self, found: PlanContext) -> Array:
         """What a recipe lacks of the wish, above one, with every dwell at its time."""
         expected = identified(found)
         if self.wish.parting is None:
@@ -237,7 +239,7 @@ class _Search:
         rows = rows * self.wish.wanted[:, None, :]
         return self.wish.shortfall(np.swapaxes(rows, -1, -2) @ np.linalg.solve(found.covariance, rows))
 
-    def _recipe(self, made: Design, choice: NDArray[np.intp]) -> Recipe:
+    def _recipe(self, made: PlanDesign, choice: NDArray[np.intp]) -> Recipe:
         used = np.unique(choice)
         number = {int(c): k for k, c in enumerate(used, start=1)}
         chosen = self.wish.candidates[used]
@@ -262,7 +264,7 @@ class _Search:
             }
         )
 
-    def blind(self, found: Planned) -> list[str]:
+    def blind(self, found: PlanContext) -> list[str]:
         """Effects that must be seen and are not."""
         seen = {s.effect: s.left for s in sights(found.state, self.recipe.effects, 1.0, self.wish.see)}
         return [name for name in self.wish.see if seen.get(name, 1.0) < PART_SEEN]

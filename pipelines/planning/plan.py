@@ -16,7 +16,7 @@ from inertial.planning.reasons import reason
 from inertial.planning.visibility import SEEN, sights
 from pipelines.schedule.planned_state import state_of
 from pipelines.schedule.steps import steps
-from pipelines.schedule.timing import itinerary, spent
+from pipelines.schedule.timing import schedule, spent
 from pipelines.tables.calibration import unit_texts
 from schemas.units import AXES, MICRO
 
@@ -27,34 +27,34 @@ if TYPE_CHECKING:
 
     from inertial.noise.dwells import DwellNoise
     from inertial.planning.expected import Expected
-    from inertial.planning.visibility import Sight
+    from inertial.planning.visibility import Visibility
     from inertial.state import State
-    from pipelines.schedule.timing import Stretch
+    from pipelines.schedule.timing import Activity
     from schemas.recipe import Recipe
     from schemas.station import StationConfig
 
 
 @dataclass(frozen=True)
-class Planned:
+class PlanContext:
     """A recipe as a station will go through it: what is done when, the dwells of the fit, the covariance of their means in g²."""
 
     recipe: Recipe
     station: StationConfig
     noise: DwellNoise
-    stretches: list[Stretch]
+    stretches: list[Activity]
     state: State
     covariance: NDArray[np.float64]
 
 
-def planned(recipe: Recipe, station: StationConfig, noise: DwellNoise, *, slowest: float = 0.0) -> Planned:
+def plan_context(recipe: Recipe, station: StationConfig, noise: DwellNoise, *, slowest: float = 0.0) -> PlanContext:
     """A recipe on a station, with devices of this noise; ``slowest`` as in :func:`inertial.noise.dwells.dwell_covariance`."""
-    whole = itinerary(steps(recipe), station, recipe)
+    whole = schedule(steps(recipe), station, recipe)
     state = state_of(whole, station, recipe, history=True)
     covariance = dwell_covariance(state.time, recipe.dwell_s, noise, slowest=slowest)
-    return Planned(recipe, station, noise, whole, state, covariance)
+    return PlanContext(recipe, station, noise, whole, state, covariance)
 
 
-def plan(plan: Planned) -> dict[str, Any]:
+def plan(plan: PlanContext) -> dict[str, Any]:
     """How a recipe sees every effect of the catalogue, as a document with the keys that other programs read.
 
     Raises
@@ -82,7 +82,7 @@ def plan(plan: Planned) -> dict[str, Any]:
     }
 
 
-def identified(plan: Planned) -> Expected:
+def identified(plan: PlanContext) -> Expected:
     """The errors expected of a recipe's model; refused, in the user's words, where the recipe cannot identify it."""
     units = max(1, len(plan.recipe.units))
     try:
@@ -138,7 +138,7 @@ def _unit(effect: str, place: int) -> str:
     return unit_texts(known, "µg")[place] if isinstance(known, SensorEffect) else "µrad"
 
 
-def _row(sight: Sight, state: State, model: Sequence[str]) -> dict[str, Any]:
+def _row(sight: Visibility, state: State, model: Sequence[str]) -> dict[str, Any]:
     finite = bool(np.isfinite(sight.floor))
     return {
         "effect": sight.effect,

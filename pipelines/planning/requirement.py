@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from inertial.planning.discrimination import Parting
+    from inertial.planning.discrimination import Discrimination
     from inertial.planning.pose_exchange import Criterion
     from schemas.station import StationConfig
 
@@ -28,7 +28,7 @@ QUARTERS = 4
 
 
 @dataclass(frozen=True)
-class Wish:
+class Requirement:
     """What a recipe is wanted to do.
 
     wanted : (3, p), g per unit of the column, largest error of each coefficient of the model
@@ -50,7 +50,7 @@ class Wish:
     criterion: Criterion = "worst"
     verification: int = 1
     effects: tuple[str, ...] = ()
-    parting: Parting | None = None
+    parting: Discrimination | None = None
 
     def shortfall(self, matrix: Array) -> Array:
         """What is above one where normal matrices (..., 3, p, p) do not fulfil the wish yet: errors over those wanted."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 from itertools import pairwise, product
 from typing import TYPE_CHECKING
 
-from pipelines.schedule.timing import Standing, soaked
+from pipelines.schedule.timing import StationPose, soaked
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -71,4 +71,4 @@ def _back(order: Sequence[float]) -> bool:
 def soak_seconds(order: Sequence[float], station: StationConfig, shortest_s: float) -> float:
     """Station time of the soaks alone, s, from the room on; every one begins where the one before has settled."""
     room = station.simulation.room_C if station.simulation else station.pace.room_C
-    return sum(soaked(Standing(air=a, device=a), b, station, shortest_s)[0] for a, b in pairwise((room, *order)))
+    return sum(soaked(StationPose(air=a, device=a), b, station, shortest_s)[0] for a, b in pairwise((room, *order)))

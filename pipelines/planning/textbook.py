@@ -10,7 +10,7 @@ from inertial import poses
 from inertial.errors import NotIdentified
 from inertial.planning.expected import expected_errors
 from inertial.planning.visibility import sights
-from pipelines.planning.plan import identified, planned
+from pipelines.planning.plan import identified, plan_context
 from pipelines.planning.verification_poses import numbered
 from pipelines.schedule.planned_state import planned_state
 
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from inertial.state import State
-    from pipelines.planning.plan import Planned
+    from pipelines.planning.plan import PlanContext
     from schemas.recipe import Recipe
 
     Array = NDArray[np.float64]
@@ -52,7 +52,7 @@ def _up_and_down(levels: Sequence[float]) -> list[float]:
     return [*levels, *levels[-2::-1]]
 
 
-def reference_errors(against: Planned, recipe: Recipe) -> Array:
+def reference_errors(against: PlanContext, recipe: Recipe) -> Array:
     """Errors (3, p) in g per unit of the column that the textbook plan lets expect of a recipe's model.
 
     Coefficients of effects that it cannot identify at all, as faces cannot a cubic, have the errors of the recipe itself.
@@ -60,7 +60,7 @@ def reference_errors(against: Planned, recipe: Recipe) -> Array:
     try:
         return identified(against).errors
     except NotIdentified:
-        own = identified(planned(recipe, against.station, against.noise, slowest=float(against.state.time[-1])))
+        own = identified(plan_context(recipe, against.station, against.noise, slowest=float(against.state.time[-1])))
     model = list(recipe.effects)
     names = [name for name, _ in own.names[0]]
     for effect in _hidden(against.state, model):
@@ -81,7 +81,7 @@ def _hidden(state: State, model: Sequence[str]) -> list[str]:
     return [effect for effect in model if effect not in kept]
 
 
-def seen_by(against: Planned, levels: Sequence[float]) -> tuple[str, ...]:
+def seen_by(against: PlanContext, levels: Sequence[float]) -> tuple[str, ...]:
     """Effects that the textbook plan sees beside its model, as far as these temperatures allow it, ageing and hysteresis too."""
     there = against.recipe.model_copy(update={"temperatures_C": _up_and_down(sorted(levels))})
     states = (against.state, planned_state(there, against.station, history=True))

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from inertial.state import State
-    from pipelines.report.residuals import Left, Series
+    from pipelines.report.residuals import DriverValues, Left
 
     Array = NDArray[np.float64]
 
@@ -149,7 +149,7 @@ def _map(place: Axes, poses: Array, means: Array, largest: float) -> None:
     place.set_yticks([])
 
 
-def driver_plots(left: Left, drivers: list[Series], temperature: Array | None) -> str:
+def driver_plots(left: Left, drivers: list[DriverValues], temperature: Array | None) -> str:
     """Residuals of the shown unit against each driver, axis by axis, before and after, with smooth bands."""
     with mpl.rc_context(STYLE):
         figure = Figure(figsize=(WIDTH_IN, 2.45 * len(drivers) + 0.3), layout="constrained")

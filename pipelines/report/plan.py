@@ -9,10 +9,10 @@ from pipelines.report.plan_plots import alias_plot, sight_plot, sphere_plot, tem
 from pipelines.report.templates import template
 
 if TYPE_CHECKING:
-    from pipelines.planning.plan import Planned
+    from pipelines.planning.plan import PlanContext
 
 
-def render_plan(document: dict[str, Any], course: Planned) -> str:
+def render_plan(document: dict[str, Any], course: PlanContext) -> str:
     """The page as one HTML text that needs no other file.
 
     Parameters
@@ -31,7 +31,7 @@ def render_plan(document: dict[str, Any], course: Planned) -> str:
     )
 
 
-def pictures(document: dict[str, Any], course: Planned) -> dict[str, str]:
+def pictures(document: dict[str, Any], course: PlanContext) -> dict[str, str]:
     """The pictures of a plan by name, as SVG texts: the poses, the temperatures, what it sees, what it takes for what."""
     return {
         "sphere": sphere_plot(course),

@@ -18,8 +18,8 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from numpy.typing import NDArray
 
-    from pipelines.planning.plan import Planned
-    from pipelines.schedule.timing import Stretch
+    from pipelines.planning.plan import PlanContext
+    from pipelines.schedule.timing import Activity
 
     Array = NDArray[np.float64]
 
@@ -27,7 +27,7 @@ FIT, CHECK, WAY = "#0072b2", "#d55e00", "#9aa7b5"
 VIEWS = ((25.0, 20.0, "seen from +x, above"), (25.0, 200.0, "seen from −x, above"), (-90.0, 0.0, "seen from −z"))
 
 
-def sphere_plot(course: Planned) -> str:
+def sphere_plot(course: PlanContext) -> str:
     """Where specific force points in the fixture in every pose: the sphere from three sides, with the way of the first soak."""
     fit, check = (_directions(course.stretches, kind) for kind in ("dwell", "verification"))
     first = [s for s in course.stretches if s.kind == "dwell" and s.step.soak == course.stretches[0].step.soak]
@@ -47,7 +47,7 @@ def sphere_plot(course: Planned) -> str:
         return svg(figure)
 
 
-def _directions(stretches: list[Stretch], kind: str) -> Array:
+def _directions(stretches: list[Activity], kind: str) -> Array:
     """Directions (n, 3) of specific force in the fixture."""
     angles = [(s.step.pose.outer_deg, s.step.pose.inner_deg) for s in stretches if s.kind == kind]
     if not angles:
@@ -108,7 +108,7 @@ def _dots(place: Axes, way: Array, fit: Array, check: Array, view: Array) -> Non
         )
 
 
-def temperature_plot(course: Planned) -> str:
+def temperature_plot(course: PlanContext) -> str:
     """Chamber and slowest device over the station's time, with what is measured when."""
     time, air, device = np.array(temperatures(course.stretches, course.station)).T / np.array([[60.0], [1.0], [1.0]])
     with mpl.rc_context(STYLE):
@@ -130,16 +130,16 @@ def temperature_plot(course: Planned) -> str:
         return svg(figure)
 
 
-def _spans(stretches: list[Stretch], kind: str) -> list[tuple[float, float]]:
+def _spans(stretches: list[Activity], kind: str) -> list[tuple[float, float]]:
     """From the first to the last record of a kind at every soak, min."""
-    soaks: dict[int, list[Stretch]] = {}
+    soaks: dict[int, list[Activity]] = {}
     for stretch in stretches:
         if stretch.kind == kind:
             soaks.setdefault(stretch.step.soak, []).append(stretch)
     return [(own[0].start / 60.0, (own[-1].start + own[-1].seconds) / 60.0) for own in soaks.values()]
 
 
-def alias_plot(course: Planned) -> str:
+def alias_plot(course: PlanContext) -> str:
     """How far what one effect leaves lies within another's: the cosine of the row's effect with the column's."""
     names, cosines = likeness(course.state, course.recipe.effects)
     if not names:

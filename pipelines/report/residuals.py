@@ -48,7 +48,7 @@ class Left:
 
 
 @dataclass(frozen=True)
-class Series:
+class DriverValues:
     """A driver's values (units, n), or (units, n, 3) where it is one per axis, with a label for people."""
 
     name: str
@@ -87,7 +87,7 @@ LABELS = {
 }
 
 
-def drivers_shown(diagnosis: Diagnosis) -> list[Series]:
+def drivers_shown(diagnosis: Diagnosis) -> list[DriverValues]:
     """Drivers worth a picture: those the model fails along, then temperature, time, rate and wait where they vary."""
     state = diagnosis.problem.lot.state
     known = {d.name: d.values for d in drivers_of(diagnosis.problem)}
@@ -96,13 +96,13 @@ def drivers_shown(diagnosis: Diagnosis) -> list[Series]:
     first = [] if diagnosis.unexplained is None else [diagnosis.unexplained.driver]
     told = [*first, *(p.driver for p in diagnosis.where[:5])]
     wanted = dict.fromkeys([*told, *ALWAYS])
-    found: list[Series] = []
+    found: list[DriverValues] = []
     for name in wanted:
         values = known.get(name)
         still = name not in told and values is not None and float(np.ptp(values)) < STILL.get(name, 0.0)
         if values is not None and not still and not any(_alike(values, other.values) for other in found):
             found.append(
-                Series(name, LABELS.get(name, name), values / (3600.0 if "/ h" in LABELS.get(name, "") else 1.0))
+                DriverValues(name, LABELS.get(name, name), values / (3600.0 if "/ h" in LABELS.get(name, "") else 1.0))
             )
     return found[:_MOST]
 

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from pipelines.archive import Archive
 
 
-class Remembering(Run):
+class BufferedRun(Run):
     """A run that keeps its tables in memory, as they are in its files, and its new files until they are flushed."""
 
     def __init__(self, archive: Archive, run_id: str) -> None:

@@ -27,8 +27,8 @@ if TYPE_CHECKING:
 
     import pandas as pd
 
-    from pipelines.jobs.model_change import Wanted
-    from pipelines.rerun.partition import Part
+    from pipelines.jobs.model_change import ModelChange
+    from pipelines.rerun.partition import Batch
     from pipelines.rerun.selection import Entry
 
 Sums = dict[str, tuple[float, int]]
@@ -51,7 +51,7 @@ class Side:
 
 
 @dataclass(frozen=True)
-class Judged:
+class LotComparison:
     """A lot under the old and the new model; without sides where it could not be judged."""
 
     entry: Entry
@@ -66,7 +66,7 @@ class FreshTask:
 
     archive: str
     run: str
-    wanted: Wanted
+    wanted: ModelChange
     earlier: tuple[tuple[tuple[str, ...], Calibration | None, Calibration | None], ...]
 
 
@@ -79,7 +79,7 @@ class Fresh:
     new: Sums = field(default_factory=dict[str, tuple[float, int]])
 
 
-def judged(part: Part) -> list[Judged]:
+def judged(part: Batch) -> list[LotComparison]:
     """Every run of a portion under both models; what cannot be judged says why."""
     archive = Archive(part.archive)
     part.wanted.use()
@@ -87,16 +87,16 @@ def judged(part: Part) -> list[Judged]:
         return [_judged(Run(archive, run_id), part.wanted) for run_id in part.runs]
 
 
-def _judged(run: Run, wanted: Wanted) -> Judged:
+def _judged(run: Run, wanted: ModelChange) -> LotComparison:
     entry = entry_of(run.id, run.about)
     try:
         old, new = _both(run, wanted)
     except (TumblelineError, InertialError) as problem:
-        return Judged(entry, error=str(problem))
-    return Judged(entry, old, new)
+        return LotComparison(entry, error=str(problem))
+    return LotComparison(entry, old, new)
 
 
-def _both(run: Run, wanted: Wanted) -> tuple[Side, Side]:
+def _both(run: Run, wanted: ModelChange) -> tuple[Side, Side]:
     if "grades" not in run.tables() or not run.about.get("capture"):
         message = f"run {run.id}: it has no grades to compare with; run it again with limits first"
         raise DataRejected(message)

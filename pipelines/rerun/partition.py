@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 
 from inertial.errors import InertialError
 from pipelines.archive import Archive
-from pipelines.jobs.model_change import Wanted
-from pipelines.rerun.reproduce import Checked, check
+from pipelines.jobs.model_change import ModelChange
+from pipelines.rerun.reproduce import Reproduction, check
 from pipelines.rerun.rerun import Outcome, again
 from schemas.errors import TumblelineError
 
@@ -20,43 +20,45 @@ MOST = 32
 
 
 @dataclass(frozen=True)
-class Part:
+class Batch:
     """Some runs of an archive, and what is to be done to them."""
 
     archive: str
     runs: tuple[str, ...]
-    wanted: Wanted = field(default_factory=Wanted)
+    wanted: ModelChange = field(default_factory=ModelChange)
     report: bool = False
 
 
-def parts(archive: Archive, runs: Sequence[str], wanted: Wanted, workers: int, *, report: bool = False) -> list[Part]:
+def parts(
+    archive: Archive, runs: Sequence[str], wanted: ModelChange, workers: int, *, report: bool = False
+) -> list[Batch]:
     """The runs in portions, several for each worker, the same for the same runs."""
     size = min(MOST, max(1, -(-len(runs) // (4 * max(workers, 1)))))
     portions = [tuple(runs[start : start + size]) for start in range(0, len(runs), size)]
-    return [Part(archive.address, portion, wanted, report) for portion in portions]
+    return [Batch(archive.address, portion, wanted, report) for portion in portions]
 
 
-def run_again(part: Part) -> list[Outcome]:
+def run_again(part: Batch) -> list[Outcome]:
     """What became of every run of a portion; what cannot be run again says why, and the others go on."""
     archive = Archive(part.archive)
     return [_one(archive, run_id, part) for run_id in part.runs]
 
 
-def _one(archive: Archive, run_id: str, part: Part) -> Outcome:
+def _one(archive: Archive, run_id: str, part: Batch) -> Outcome:
     try:
         return again(archive, run_id, part.wanted, report=part.report)
     except (TumblelineError, InertialError) as problem:
         return Outcome(run_id, error=str(problem))
 
 
-def checked(part: Part) -> list[Checked]:
+def checked(part: Batch) -> list[Reproduction]:
     """Whether every run of a portion comes out the same again."""
     archive = Archive(part.archive)
     return [_check(archive, run_id) for run_id in part.runs]
 
 
-def _check(archive: Archive, run_id: str) -> Checked:
+def _check(archive: Archive, run_id: str) -> Reproduction:
     try:
         return check(archive, run_id)
     except (TumblelineError, InertialError) as problem:
-        return Checked(run_id, error=str(problem))
+        return Reproduction(run_id, error=str(problem))

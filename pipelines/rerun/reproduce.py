@@ -11,20 +11,20 @@ from threadpoolctl import threadpool_limits
 
 from pipelines.archive import Archive, Run, files, parquet
 from pipelines.archive.keys import libraries
-from pipelines.jobs.model_change import Wanted
+from pipelines.jobs.model_change import ModelChange
 from pipelines.rerun.rerun import raw_samples
 from pipelines.rerun.steps import RAW, plan_of
 from schemas import tables
 from schemas.errors import DataRejected
 
 if TYPE_CHECKING:
-    from pipelines.rerun.steps import Step
+    from pipelines.rerun.steps import StageCall
 
 SAME, OTHER, LEFT_OUT = "same bytes", "other bytes", "not checked"
 
 
 @dataclass(frozen=True)
-class Checked:
+class Reproduction:
     """What a check of one run found.
 
     tables : by name, whether its bytes came out again
@@ -44,16 +44,16 @@ class Checked:
         return not self.error and not self.differences
 
 
-def check(archive: Archive, run_id: str) -> Checked:
+def check(archive: Archive, run_id: str) -> Reproduction:
     """Every stage of a run worked out anew from the inputs that are stored, compared byte for byte; nothing is written.
 
     A stage whose inputs are stored and whose outputs come out again proves itself; all stages together prove the run from
     the raw samples on.
     """
     run = Run(archive, run_id)
-    plan, raw = plan_of(run, Wanted()), raw_samples(run)
+    plan, raw = plan_of(run, ModelChange()), raw_samples(run)
     there = set(run.tables())
-    found = Checked(run_id)
+    found = Reproduction(run_id)
     with threadpool_limits(1):
         for step in plan.steps:
             if step.name == "import" or not there.issuperset(step.outputs):
@@ -73,7 +73,7 @@ def _static(run: Run) -> bool:
     return bool((run.table("readings")["kind"] == "allan").any())
 
 
-def _compare(run: Run, step: Step, found: Checked) -> None:
+def _compare(run: Run, step: StageCall, found: Reproduction) -> None:
     for name, frame in step.call(run).items():
         made = parquet.table_bytes(name, tables.check(name, frame, where=f"{step.name} → {name}"), tables.VERSION)
         stored = run.manifest(name)["sha256"]
@@ -83,7 +83,7 @@ def _compare(run: Run, step: Step, found: Checked) -> None:
             found.differences.append(f"{name}: {_difference(run.table(name), frame)}")
 
 
-def _changed(run: Run, step: Step, changed: list[str]) -> None:
+def _changed(run: Run, step: StageCall, changed: list[str]) -> None:
     """What is not as it was when the stage was run, each said once."""
     manifest = run.manifest(step.outputs[0])
     if manifest.get("code", "") != step.code:

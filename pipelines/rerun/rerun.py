@@ -12,13 +12,13 @@ from threadpoolctl import ThreadpoolController
 from pipelines.archive import Archive, Run, files, stage_key
 from pipelines.archive.locks import alone
 from pipelines.chain.chain import RECORDS
-from pipelines.rerun.buffered_run import Remembering
+from pipelines.rerun.buffered_run import BufferedRun
 from pipelines.rerun.steps import RAW, plan_of
 from schemas.errors import DataRejected
 
 if TYPE_CHECKING:
-    from pipelines.jobs.model_change import Wanted
-    from pipelines.rerun.steps import Plan, Step
+    from pipelines.jobs.model_change import ModelChange
+    from pipelines.rerun.steps import Plan, StageCall
 
 THERE, TAKEN, KEPT, COMPUTED = "there", "taken over", "kept", "computed"
 """What became of a stage: in the new run already; from the old run, whose key is the same; from the old run, because the raw
@@ -37,7 +37,7 @@ class Outcome:
     error: str = ""
 
 
-def again(archive: Archive, run_id: str, wanted: Wanted, *, report: bool = False) -> Outcome:
+def again(archive: Archive, run_id: str, wanted: ModelChange, *, report: bool = False) -> Outcome:
     """Run an archived run again, going on where an interrupted re-run was.
 
     Raises
@@ -51,10 +51,10 @@ def again(archive: Archive, run_id: str, wanted: Wanted, *, report: bool = False
     plan = plan_of(old, wanted)
     raw = raw_samples(old)
     because = changes(old, plan, raw=raw)
-    new = Remembering(archive, _opened(archive, old, plan, because).id if because else old.id)
+    new = BufferedRun(archive, _opened(archive, old, plan, because).id if because else old.id)
     with _libraries().limit(limits=1), alone(new.path, wait=True):
         files.sweep(new.path)
-        work = _Work(old, new, raw=raw)
+        work = StageRunner(old, new, raw=raw)
         try:
             stages = {step.name: work.do(step) for step in plan.steps}
         finally:
@@ -145,7 +145,7 @@ def _opened(archive: Archive, old: Run, plan: Plan, because: list[dict[str, str]
     return archive.open_run(plan.name, {**plan.about, **told}, plan.decisive)
 
 
-class _Work:
+class StageRunner:
     """The stages of one run, each there, taken over or worked out."""
 
     def __init__(self, old: Run, new: Run, *, raw: bool) -> None:
@@ -153,7 +153,7 @@ class _Work:
         self._records = ""
         self._before = set(old.tables())
 
-    def do(self, step: Step) -> str:
+    def do(self, step: StageCall) -> str:
         """What became of a stage; its outputs are in the new run now."""
         if step.name == "import" or (step.name in {"capture", *RAW[:2]} and not self.raw):
             return self._keep(step)
@@ -169,7 +169,7 @@ class _Work:
         self.new.save(step.name, key, step.call(self.new), about)
         return COMPUTED
 
-    def _keep(self, step: Step) -> str:
+    def _keep(self, step: StageCall) -> str:
         if not self._before.issuperset(step.outputs):
             missing = ", ".join(name for name in step.outputs if name not in self._before)
             message = (
@@ -192,7 +192,7 @@ class _Work:
             self._records = before.get(RECORDS) or ("" if records is None else records.hash())
         return self._records
 
-    def _refuse_without_samples(self, step: Step) -> None:
+    def _refuse_without_samples(self, step: StageCall) -> None:
         if step.name != "noise" or self.raw:
             return
         readings = self.new.table("readings")

@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
     from pipelines.archive import Run
-    from pipelines.jobs.model_change import Wanted
+    from pipelines.jobs.model_change import ModelChange
 
 CAPTURED = ("readings", "history")
 RAW = ("validate", "reduce", "noise")
@@ -37,7 +37,7 @@ PROVENANCE = ("who", "where", "when", "software", "libraries", ENTRY, "rerun_of"
 
 
 @dataclass(frozen=True)
-class Step:
+class StageCall:
     """One stage for one run: as :class:`pipelines.chain.chain.Stage`, with everything that the job decides filled in."""
 
     name: str
@@ -56,7 +56,7 @@ class Plan:
     """
 
     name: str
-    steps: tuple[Step, ...]
+    steps: tuple[StageCall, ...]
     about: dict[str, Any]
     decisive: dict[str, Any]
 
@@ -77,12 +77,12 @@ class ArchivedJob(Job):
         return {**self.told, **decided, "lot": self.lot.model_dump(mode="json")}
 
 
-def plan_of(run: Run, wanted: Wanted) -> Plan:
+def plan_of(run: Run, wanted: ModelChange) -> Plan:
     """What is to be done to a run, with another model or other limits where they are wanted."""
     return _captured(run, wanted) if run.about.get("capture") else _imported(run, wanted)
 
 
-def archived_job(run: Run, wanted: Wanted) -> ArchivedJob:
+def archived_job(run: Run, wanted: ModelChange) -> ArchivedJob:
     """The job of a captured run, with another model or other limits where they are wanted."""
     about = run.about
     try:
@@ -102,18 +102,18 @@ def archived_job(run: Run, wanted: Wanted) -> ArchivedJob:
     return job
 
 
-def _dumped(wanted: Wanted) -> dict[str, Any]:
+def _dumped(wanted: ModelChange) -> dict[str, Any]:
     keys = wanted.of_model()
     return {**keys, "formulas": [f.model_dump(mode="json") for f in wanted.formulas]} if keys else {}
 
 
-def _captured(run: Run, wanted: Wanted) -> Plan:
+def _captured(run: Run, wanted: ModelChange) -> Plan:
     job = archived_job(run, wanted)
     steps = [_capture_step(run, job)]
     for stage in STAGES:
         call = _called(stage.call, job)
         steps.append(
-            Step(stage.name, stage.inputs, stage.outputs, stage.parameters(job), code_hash(stage.modules), call)
+            StageCall(stage.name, stage.inputs, stage.outputs, stage.parameters(job), code_hash(stage.modules), call)
         )
     code = {stage.name: code_hash(stage.modules) for stage in STAGES}
     decisive = {key: value for key, value in job.about.items() if key != "station"}
@@ -124,7 +124,7 @@ def _called(call: Callable[[Job, Run], Tables], job: Job) -> Callable[[Run], Tab
     return lambda run: call(job, run)
 
 
-def _capture_step(run: Run, job: ArchivedJob) -> Step:
+def _capture_step(run: Run, job: ArchivedJob) -> StageCall:
     """What the run keeps of its capture: all that it has, which for runs of earlier versions is less than today."""
     there = run.tables()
     more = tuple(name for name in ("events", "soaks") if name in there or "readings" not in there)
@@ -133,10 +133,10 @@ def _capture_step(run: Run, job: ArchivedJob) -> Step:
         tables = captured_tables(new.archive.capture(job.capture_id))
         return {name: tables[name] for name in (*CAPTURED, *more)}
 
-    return Step("capture", (RECORDS,), (*CAPTURED, *more), {"capture": job.capture_id}, "", gathered)
+    return StageCall("capture", (RECORDS,), (*CAPTURED, *more), {"capture": job.capture_id}, "", gathered)
 
 
-def _imported(run: Run, wanted: Wanted) -> Plan:
+def _imported(run: Run, wanted: ModelChange) -> Plan:
     """Fit, verification and, where limits are known, grades of dwells that were imported."""
     about = run.about
     dwells = _fit_for_a_fit(run)
@@ -173,7 +173,7 @@ def _fit_for_a_fit(run: Run) -> pd.DataFrame:
     return dwells
 
 
-def _model_of(run: Run, dwells: pd.DataFrame, wanted: Wanted) -> dict[str, Any]:
+def _model_of(run: Run, dwells: pd.DataFrame, wanted: ModelChange) -> dict[str, Any]:
     known = run.about.get("recipe", {})
     if wanted.effects is not None:
         return _dumped(wanted)
@@ -182,16 +182,16 @@ def _model_of(run: Run, dwells: pd.DataFrame, wanted: Wanted) -> dict[str, Any]:
     return {"effects": default_model(dwells), "formulas": [], "model_name": "", "model_version": 0}
 
 
-def _import_step(history: bool) -> Step:  # noqa: FBT001 - whether the import has one
+def _import_step(history: bool) -> StageCall:  # noqa: FBT001 - whether the import has one
     names = ("dwells", *(("history",) if history else ()))
-    return Step("import", (), names, {}, "", lambda run: {name: run.table(name) for name in names})
+    return StageCall("import", (), names, {}, "", lambda run: {name: run.table(name) for name in names})
 
 
 def _history(run: Run) -> pd.DataFrame:
     return run.table("history") if "history" in run.tables() else empty_table(texts="unit", numbers="time_s unit_C")
 
 
-def _fit_step(model: dict[str, Any], history: bool) -> Step:  # noqa: FBT001
+def _fit_step(model: dict[str, Any], history: bool) -> StageCall:  # noqa: FBT001
     stage = BY_NAME["fit"]
     parameters = {"effects": model["effects"], "formulas": model["formulas"]}
     inputs = stage.inputs if history else tuple(name for name in stage.inputs if name != "history")
@@ -199,10 +199,10 @@ def _fit_step(model: dict[str, Any], history: bool) -> Step:  # noqa: FBT001
     def call(run: Run) -> Tables:
         return fit(run.table("dwells"), _history(run), model["effects"])
 
-    return Step("fit", inputs, stage.outputs, parameters, code_hash(stage.modules), call)
+    return StageCall("fit", inputs, stage.outputs, parameters, code_hash(stage.modules), call)
 
 
-def _verify_step(history: bool) -> Step:  # noqa: FBT001
+def _verify_step(history: bool) -> StageCall:  # noqa: FBT001
     stage = BY_NAME["verify"]
     inputs = stage.inputs if history else tuple(name for name in stage.inputs if name != "history")
 
@@ -210,10 +210,10 @@ def _verify_step(history: bool) -> Step:  # noqa: FBT001
         names = ("coefficients", "covariance", "predictions")
         return verify(run.table("dwells"), _history(run), *(run.table(name) for name in names))
 
-    return Step("verify", inputs, stage.outputs, {}, code_hash(stage.modules), call)
+    return StageCall("verify", inputs, stage.outputs, {}, code_hash(stage.modules), call)
 
 
-def _grade_step(limits: Limits) -> Step:
+def _grade_step(limits: Limits) -> StageCall:
     stage = BY_NAME["grade"]
     names = ("coefficients", "covariance", "residuals", "verification", "verification_poses")
 
@@ -224,6 +224,6 @@ def _grade_step(limits: Limits) -> Step:
         noise = empty_table(texts="unit axis term unit_text", numbers="value low high", flags="identified")
         return grade(Evidence(verdicts=pd.DataFrame(sound), **tables, noise=noise), limits)
 
-    return Step(
+    return StageCall(
         "grade", names, stage.outputs, {"limits": limits.model_dump(mode="json")}, code_hash(stage.modules), call
     )

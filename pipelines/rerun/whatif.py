@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections import defaultdict
 from typing import TYPE_CHECKING, Any
 
-from pipelines.rerun.lot_comparison import FreshTask, Judged
+from pipelines.rerun.lot_comparison import FreshTask, LotComparison
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from pipelines.jobs.model_change import Wanted
+    from pipelines.jobs.model_change import ModelChange
     from pipelines.rerun.lot_comparison import Fresh, Side, Sums
 
 FALLS = 0.005
@@ -18,9 +18,9 @@ FALLS = 0.005
 BETTER, WORSE, EQUAL, NOTHING = "better", "worse", "no better", "nothing to judge"
 
 
-def fresh_tasks(found: Sequence[Judged], archive: str, wanted: Wanted) -> list[FreshTask]:
+def fresh_tasks(found: Sequence[LotComparison], archive: str, wanted: ModelChange) -> list[FreshTask]:
     """For every run, the calibrations of the run before in which each of its units was measured."""
-    last: dict[str, Judged] = {}
+    last: dict[str, LotComparison] = {}
     tasks: list[FreshTask] = []
     for judged in found:
         if judged.old is None or judged.new is None:
@@ -37,15 +37,15 @@ def fresh_tasks(found: Sequence[Judged], archive: str, wanted: Wanted) -> list[F
     return tasks
 
 
-def _calibrations(judged: Judged) -> tuple[Any, Any]:
+def _calibrations(judged: LotComparison) -> tuple[Any, Any]:
     return (judged.old.calibration if judged.old else None, judged.new.calibration if judged.new else None)
 
 
-def summary(found: Sequence[Judged], fresh: Sequence[Fresh]) -> dict[str, Any]:
+def summary(found: Sequence[LotComparison], fresh: Sequence[Fresh]) -> dict[str, Any]:
     """The what-if as a document: total, by station and device, units that flip, lots that could not be judged, and a verdict."""
     by_run = {one.run: one for one in fresh}
     whole = [judged for judged in found if judged.old is not None and judged.new is not None]
-    groups: dict[tuple[str, str], list[Judged]] = defaultdict(list)
+    groups: dict[tuple[str, str], list[LotComparison]] = defaultdict(list)
     for judged in whole:
         groups[judged.entry.station, judged.entry.device].append(judged)
     rows = [
@@ -65,7 +65,7 @@ def summary(found: Sequence[Judged], fresh: Sequence[Fresh]) -> dict[str, Any]:
     }
 
 
-def _figures(found: Sequence[Judged], fresh: dict[str, Fresh]) -> dict[str, Any]:
+def _figures(found: Sequence[LotComparison], fresh: dict[str, Fresh]) -> dict[str, Any]:
     """Yield and root mean square errors of some lots, each [old, new]."""
     sides = [[judged.old for judged in found], [judged.new for judged in found]]
     again = [fresh[judged.entry.id] for judged in found if judged.entry.id in fresh]
@@ -92,7 +92,7 @@ def _rms(parts: Sequence[Sums]) -> float | None:
     return (squares / count) ** 0.5 if count else None
 
 
-def _flips(found: Sequence[Judged]) -> dict[str, list[dict[str, str]]]:
+def _flips(found: Sequence[LotComparison]) -> dict[str, list[dict[str, str]]]:
     """Units that would no longer pass, and those that would."""
     flips: dict[str, list[dict[str, str]]] = {"to_fail": [], "to_pass": []}
     for judged in found:

@@ -10,7 +10,7 @@ from inertial.fits.linear import fit_lot
 from inertial.frames import force_from_angles
 from inertial.state import History, State
 from pipelines.schedule.steps import steps
-from pipelines.schedule.timing import itinerary, temperatures
+from pipelines.schedule.timing import schedule, temperatures
 from pipelines.tables.dwells import HISTORY_POINTS
 from schemas.station import load_station
 from schemas.units import STANDARD_GRAVITY_M_S2
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from pipelines.schedule.timing import Stretch
+    from pipelines.schedule.timing import Activity
     from schemas.recipe import Recipe
     from schemas.station import StationConfig
 
@@ -43,11 +43,11 @@ def planned_state(recipe: Recipe, station: StationConfig | None = None, *, histo
     history : whether the temperatures between the dwells go along, as a station records them
     """
     config = station or load_station()
-    whole = itinerary(steps(recipe), config, recipe)
+    whole = schedule(steps(recipe), config, recipe)
     return state_of(whole, config, recipe, history=history)
 
 
-def state_of(stretches: Sequence[Stretch], station: StationConfig, recipe: Recipe, *, history: bool = False) -> State:
+def state_of(stretches: Sequence[Activity], station: StationConfig, recipe: Recipe, *, history: bool = False) -> State:
     """The dwells of the fit among what a station does, see :func:`planned_state`."""
     dwells = [s for s in stretches if s.kind == "dwell"]
     outer, inner = np.radians([(s.step.pose.outer_deg, s.step.pose.inner_deg) for s in dwells]).T
@@ -79,13 +79,13 @@ def state_of(stretches: Sequence[Stretch], station: StationConfig, recipe: Recip
     )
 
 
-def _since_power(stretches: Sequence[Stretch], time: Array) -> Array:
+def _since_power(stretches: Sequence[Activity], time: Array) -> Array:
     """Seconds since the devices were last switched on, at some times: a move with the power off before it ends that pause."""
     on = np.array([0.0, *(s.start + s.step.off_s for s in stretches if s.kind == "move" and s.step.off_s > 0.0)])
     return time - on[np.searchsorted(on, time, side="right") - 1]
 
 
-def _history(stretches: Sequence[Stretch], station: StationConfig) -> History:
+def _history(stretches: Sequence[Activity], station: StationConfig) -> History:
     """Temperatures of a device between the dwells; at the dwells it is where the recipe wants it."""
     time, _, device = np.array(temperatures(stretches, station)).T
     grid = np.linspace(time[0], time[-1], min(HISTORY_POINTS, time.size))

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from schemas.recipe import Pose, Recipe
     from schemas.station import StationConfig
 
-StretchKind = Literal["soak", "move", "dwell", "verification", "allan"]
+ActivityKind = Literal["soak", "move", "dwell", "verification", "allan"]
 
 _POLL_S = 0.25
 """How often the table is asked whether it stands."""
@@ -44,7 +44,7 @@ class Minutes:
 
 
 @dataclass(frozen=True)
-class Standing:
+class StationPose:
     """Where a station stands: table in degrees, air and slowest device in °C, and the soak that it has reached."""
 
     outer: float = 0.0
@@ -55,18 +55,18 @@ class Standing:
 
 
 @dataclass(frozen=True)
-class Stretch:
+class Activity:
     """One thing that a station does for a step: from ``start`` s on for ``seconds``; air and device as it begins and ends."""
 
-    kind: StretchKind
+    kind: ActivityKind
     step: Step
     start: float
     seconds: float
-    begin: Standing
-    end: Standing
+    begin: StationPose
+    end: StationPose
 
 
-def minutes(steps: Sequence[Step], station: StationConfig, recipe: Recipe, start: Standing | None = None) -> Minutes:
+def minutes(steps: Sequence[Step], station: StationConfig, recipe: Recipe, start: StationPose | None = None) -> Minutes:
     """Station time of steps in order; a change of their ``soak`` is a soak, as capture does it.
 
     Parameters
@@ -76,27 +76,27 @@ def minutes(steps: Sequence[Step], station: StationConfig, recipe: Recipe, start
     recipe : for the shortest soak, the settling after a move and the durations
     start : where the station stands; in the room, level and not soaked where None
     """
-    return spent(itinerary(steps, station, recipe, start))
+    return spent(schedule(steps, station, recipe, start))
 
 
-def spent(stretches: Sequence[Stretch]) -> Minutes:
+def spent(stretches: Sequence[Activity]) -> Minutes:
     """Station time of what a station does."""
-    total = dict.fromkeys(get_args(StretchKind), 0.0)
+    total = dict.fromkeys(get_args(ActivityKind), 0.0)
     for stretch in stretches:
         total[stretch.kind] += stretch.seconds / 60.0
     return Minutes(total["move"], total["soak"], total["dwell"] + total["verification"], total["allan"])
 
 
-def itinerary(
-    steps: Sequence[Step], station: StationConfig, recipe: Recipe, start: Standing | None = None
-) -> list[Stretch]:
+def schedule(
+    steps: Sequence[Step], station: StationConfig, recipe: Recipe, start: StationPose | None = None
+) -> list[Activity]:
     """What a station does for steps in order: soaks, moves with their settling, records; see :func:`minutes`."""
     room = station.simulation.room_C if station.simulation else station.pace.room_C
-    now, clock = start or Standing(air=room, device=room), 0.0
-    found: list[Stretch] = []
+    now, clock = start or StationPose(air=room, device=room), 0.0
+    found: list[Activity] = []
     for step in steps:
         begin = now
-        parts: list[tuple[StretchKind, float, Standing]] = []
+        parts: list[tuple[ActivityKind, float, StationPose]] = []
         if step.soak != now.soak and not step.settled:
             now = replace(now, soak=step.soak)  # read on the way: nobody waits
         elif step.soak != now.soak:
@@ -112,13 +112,13 @@ def itinerary(
         parts.append(("move", going, there))
         parts.append((step.kind, lasting, _later(there, step.temperature, lasting, station)))
         for what, seconds, end in parts:
-            found.append(Stretch(what, step, clock, seconds, begin, end))
+            found.append(Activity(what, step, clock, seconds, begin, end))
             clock, begin = clock + seconds, end
         now = begin
     return found
 
 
-def temperatures(stretches: Sequence[Stretch], station: StationConfig) -> list[tuple[float, float, float]]:
+def temperatures(stretches: Sequence[Activity], station: StationConfig) -> list[tuple[float, float, float]]:
     """Time in s, air and slowest device in °C along what a station does, as often as it looks at a soak.
 
     What a settled device is still away from its target is no temperature that a plan may count on: it is taken off.
@@ -143,7 +143,7 @@ def temperatures(stretches: Sequence[Stretch], station: StationConfig) -> list[t
     return [*found, (last.start + last.seconds, air, device)]
 
 
-def move_seconds(now: Standing, pose: Pose, station: StationConfig) -> float:
+def move_seconds(now: StationPose, pose: Pose, station: StationConfig) -> float:
     """Seconds from the command to a pose until both axes say that they stand there."""
     limits = station.limits
     way = max(abs(pose.outer_deg - now.outer), abs(pose.inner_deg - now.inner))
@@ -157,7 +157,7 @@ def axis_seconds(way: float, speed: float, acceleration: float) -> float:
     return 0.0 if ramp == 0.0 else ramp + way / (acceleration * ramp)
 
 
-def soaked(now: Standing, target: float, station: StationConfig, shortest: float) -> tuple[float, Standing]:
+def soaked(now: StationPose, target: float, station: StationConfig, shortest: float) -> tuple[float, StationPose]:
     """Seconds until the slowest device has settled at ``target`` °C by the station's rule, and how it stands then."""
     waited, device = _soak(now.air, now.device, target, shortest, _thermal(station))
     return waited, replace(now, air=target, device=device)
@@ -227,7 +227,7 @@ def _followed(air: float, device: float, target: float, seconds: float, thermal:
     return air, air - behind
 
 
-def _later(now: Standing, target: float, seconds: float, station: StationConfig) -> Standing:
+def _later(now: StationPose, target: float, seconds: float, station: StationConfig) -> StationPose:
     """How the station stands some seconds later, while its air is at ``target`` °C or on the way there."""
     air, device = _followed(now.air, now.device, target, seconds, _thermal(station))
     return replace(now, air=air, device=device)

@@ -9,7 +9,7 @@ import numpy as np
 import pandas as pd
 
 from inertial.noise.allan import AllanCurve, overlapping
-from inertial.noise.terms import FLICKER_FLOOR, Terms, fit_terms, model_deviation
+from inertial.noise.terms import FLICKER_FLOOR, NoiseTerms, fit_terms, model_deviation
 from pipelines.tables.calibration import read_calibration
 from pipelines.tables.frames import empty_table
 from pipelines.tables.samples import by_record
@@ -44,7 +44,7 @@ def noise(
     calibration = read_calibration(coefficients, covariance)
     records = set(static["record"])
     size = -(-int(static.loc[static["unit"].isin(calibration.units), "n"].max()) // MOST_SAMPLES)
-    series = Series(calibration.units, size)
+    series = StaticRecord(calibration.units, size)
     for record, tables in by_record(samples):
         for table in tables:
             if record in records:
@@ -59,7 +59,7 @@ def noise(
     return {"allan": _curve_rows(calibration.units, curve, terms), "noise": _term_rows(calibration.units, terms)}
 
 
-def limits_where_unexplained(curve: AllanCurve, terms: Terms) -> Terms:
+def limits_where_unexplained(curve: AllanCurve, terms: NoiseTerms) -> NoiseTerms:
     """The terms, with mere upper limits for channels whose curve no mixture of the five terms explains.
 
     Each term alone can be no larger than the whole curve anywhere: N ≤ min σ·√τ, B ≤ min σ/0.664, K ≤ min σ·√(3/τ), …
@@ -82,7 +82,7 @@ def limits_where_unexplained(curve: AllanCurve, terms: Terms) -> Terms:
     )
 
 
-class Series:
+class StaticRecord:
     """Outputs of the static record, gathered table by table; of a long one the means of ``size`` samples each.
 
     The Allan deviation of means is that of the samples themselves, from an averaging time of ``size`` samples on.
@@ -110,7 +110,7 @@ class Series:
         return np.stack([one[:shortest].T for one in series])
 
 
-def _curve_rows(units: tuple[str, ...], curve: AllanCurve, terms: Terms) -> pd.DataFrame:
+def _curve_rows(units: tuple[str, ...], curve: AllanCurve, terms: NoiseTerms) -> pd.DataFrame:
     u, a, t = (i.ravel() for i in np.meshgrid(*(np.arange(s) for s in curve.deviation.shape), indexing="ij"))
     return pd.DataFrame(
         {
@@ -125,13 +125,13 @@ def _curve_rows(units: tuple[str, ...], curve: AllanCurve, terms: Terms) -> pd.D
     )
 
 
-def _fitted(curve: AllanCurve, terms: Terms) -> NDArray[np.float64]:
+def _fitted(curve: AllanCurve, terms: NoiseTerms) -> NDArray[np.float64]:
     """Deviation of the fitted terms; NaN for channels that they do not explain."""
     identified = np.any(np.isfinite(terms.value), axis=-1)[..., None]
     return np.where(identified, model_deviation(terms, curve.tau), np.nan)
 
 
-def _term_rows(units: tuple[str, ...], terms: Terms) -> pd.DataFrame:
+def _term_rows(units: tuple[str, ...], terms: NoiseTerms) -> pd.DataFrame:
     rows = []
     for u, unit in enumerate(units):
         for a, axis in enumerate(AXES):

@@ -33,7 +33,7 @@ TURNED_G = 0.5  # a follow-up may stay in a few poses: an axis that they hardly 
 SAMPLES_KEPT = 0.99
 
 
-class Fault(NamedTuple):
+class DataFault(NamedTuple):
     """One thing wrong with one unit's data."""
 
     unit: str
@@ -73,7 +73,7 @@ def validate(
     return _verdicts(faults, units)
 
 
-def _verdicts(faults: list[Fault], units: Sequence[Unit]) -> pd.DataFrame:
+def _verdicts(faults: list[DataFault], units: Sequence[Unit]) -> pd.DataFrame:
     rows = []
     for unit in units:
         own = [fault for fault in faults if fault.unit == unit.serial]
@@ -97,7 +97,7 @@ def _first_of(reasons: list[str]) -> str:
     return reasons[0] + (f" (and {others} more like it)" if others else "")
 
 
-def _silent(readings: pd.DataFrame, units: Sequence[Unit]) -> list[Fault]:
+def _silent(readings: pd.DataFrame, units: Sequence[Unit]) -> list[DataFault]:
     """Units without a reading for every record that was made."""
     made = set(readings["record"])
     faults = []
@@ -105,20 +105,20 @@ def _silent(readings: pd.DataFrame, units: Sequence[Unit]) -> list[Fault]:
         missing = made - set(readings.loc[readings["unit"] == unit.serial, "record"])
         if missing:
             reason = f"no reading for {len(missing)} of {len(made)} records, all are needed; check the slot's contacts"
-            faults.append(Fault(unit.serial, "stopped_answering", reason))
+            faults.append(DataFault(unit.serial, "stopped_answering", reason))
     return faults
 
 
-def _reading_faults(readings: pd.DataFrame) -> list[Fault]:
+def _reading_faults(readings: pd.DataFrame) -> list[DataFault]:
     faults = []
     for row in readings[readings["status"] != "ok"].itertuples():
         reason = f"stopped answering at record {row.record} (pose {row.pose}): {row.status}; check the slot's contacts"
-        faults.append(Fault(str(row.unit), "stopped_answering", reason))
+        faults.append(DataFault(str(row.unit), "stopped_answering", reason))
     for row in readings[readings["overflow"] & (readings["status"] == "ok")].itertuples():
         reason = (
             f"buffer overflow in record {row.record} (pose {row.pose}): samples are lost; read faster or lower the rate"
         )
-        faults.append(Fault(str(row.unit), "overflow", reason))
+        faults.append(DataFault(str(row.unit), "overflow", reason))
     return faults
 
 
@@ -146,13 +146,13 @@ def _means(sums: pd.DataFrame) -> pd.DataFrame:
     return total[list(AXES)].div(total["n"], axis=0).reset_index()
 
 
-def _sample_faults(here: pd.DataFrame, signals: dict[str, Signal]) -> list[Fault]:
-    faults: list[Fault] = []
+def _sample_faults(here: pd.DataFrame, signals: dict[str, Signal]) -> list[DataFault]:
+    faults: list[DataFault] = []
     for row in here.itertuples():
         found = _fault_of(signals[str(row.unit)], str(row.out_unit), int(row.n))  # pyright: ignore[reportArgumentType]
         if found:
             place = f"in record {row.record} (pose {row.pose})"
-            faults.append(Fault(str(row.unit), found[0], f"{found[1]} {place}; {found[2]}"))
+            faults.append(DataFault(str(row.unit), found[0], f"{found[1]} {place}; {found[2]}"))
     return faults
 
 
@@ -173,7 +173,7 @@ def _fault_of(signal: Signal, unit: str, n: int) -> tuple[str, str, str] | None:
     return None
 
 
-def _stale_temperatures(readings: pd.DataFrame) -> list[Fault]:
+def _stale_temperatures(readings: pd.DataFrame) -> list[DataFault]:
     soaks = readings.groupby(["unit", "soak"])[["chamber_C", "unit_C"]].mean().groupby("unit")
     spans = soaks.max() - soaks.min()
     # where records are taken on a ramp, the means of soaks say little: a device behind the chamber crosses them alike
@@ -185,7 +185,7 @@ def _stale_temperatures(readings: pd.DataFrame) -> list[Fault]:
         & (crossed["unit_C"] < FOLLOWED_SHARE * crossed["chamber_C"])
     ]
     return [
-        Fault(
+        DataFault(
             str(unit),
             "stale_temperature",
             f"the unit's temperature moved {own:.2f} K while the chamber moved {chamber:.1f} K, at least "
@@ -195,9 +195,9 @@ def _stale_temperatures(readings: pd.DataFrame) -> list[Fault]:
     ]
 
 
-def _frozen_temperatures(readings: pd.DataFrame) -> list[Fault]:
+def _frozen_temperatures(readings: pd.DataFrame) -> list[DataFault]:
     return [
-        Fault(
+        DataFault(
             unit,
             "frozen_temperature",
             f"the unit's temperature is {value:.6g} °C to the last digit in the last {count} records, one that moves as before "
@@ -207,13 +207,13 @@ def _frozen_temperatures(readings: pd.DataFrame) -> list[Fault]:
     ]
 
 
-def _table(output: pd.DataFrame, readings: pd.DataFrame, units: Sequence[Unit], unsound: set[str]) -> list[Fault]:
+def _table(output: pd.DataFrame, readings: pd.DataFrame, units: Sequence[Unit], unsound: set[str]) -> list[DataFault]:
     """Every unit, where the sound ones say that the table did not stand where its encoders said."""
     reason = contradicts(pointing_of(output[~output["unit"].isin(unsound)], readings))
-    return [Fault(unit.serial, "table_angles", reason) for unit in units] if reason else []
+    return [DataFault(unit.serial, "table_angles", reason) for unit in units] if reason else []
 
 
-def _dead_channels(means: pd.DataFrame, readings: pd.DataFrame) -> list[Fault]:
+def _dead_channels(means: pd.DataFrame, readings: pd.DataFrame) -> list[DataFault]:
     """Axes whose mean output over the poses is not a linear function of the specific force."""
     columns = ["unit", "record", "kind", "outer_deg", "inner_deg", "soak"]
     joined = means.merge(readings.loc[readings["kind"] != "allan", columns], on=["unit", "record"])
@@ -229,7 +229,7 @@ def _dead_channels(means: pd.DataFrame, readings: pd.DataFrame) -> list[Fault]:
                 f"dead channel {axis}: the specific force explains {explained[dead[0]]:.0%} of its output over "
                 f"{len(rows)} dwells, at least {FORCE_EXPLAINS:.0%} is needed; replace the unit or mend the slot"
             )
-            faults.append(Fault(str(unit), "dead_channel", reason))
+            faults.append(DataFault(str(unit), "dead_channel", reason))
     return faults
 
 

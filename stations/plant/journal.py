@@ -15,7 +15,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, get_args
 
 from schemas.errors import ArchiveUnusable, DataRejected
-from schemas.fault import Fault
+from schemas.fault import FaultOrder
 from schemas.profile import Space
 
 if TYPE_CHECKING:
@@ -53,7 +53,7 @@ class Injection:
     """A fault arranged at a time of the plant."""
 
     at_us: int
-    fault: Fault
+    fault: FaultOrder
 
 
 Event = Write | Said | Injection
@@ -117,7 +117,7 @@ class Journal:
         for item in content["events"]:
             plant.advance(int(item["at_us"]) - plant.now_us)
             if "fault" in item:
-                plant.inject(Fault.model_validate(item["fault"]))
+                plant.inject(FaultOrder.model_validate(item["fault"]))
             elif "line" in item:
                 plant.say(item["device_id"], item["line"])
             else:

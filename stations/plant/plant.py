@@ -31,10 +31,10 @@ from stations.profile_files import load_profile
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
-    from schemas.fault import Fault
+    from schemas.fault import FaultOrder
     from schemas.profile import Space
     from schemas.recipe import Lot
-    from stations.plant.faults.base import Trouble
+    from stations.plant.faults.base import Fault
     from stations.plant.hidden import HiddenEffect
 
 Array = NDArray[np.float64]
@@ -87,7 +87,7 @@ class Plant:
         registers = fifo.registers if fifo is not None else 0
         self.sampler = Sampler(self.physics, len(self.slots), self.preset.packing, registers)
         self._devices = config.devices
-        self.troubles: list[Trouble] = []
+        self.troubles: list[Fault] = []
         self._due: list[tuple[int, int, Callable[[Plant], None]]] = []  # what begins or ends, and when, in µs
         self.clock_off_s = 0.0
         self.frozen: dict[int, float] = {}
@@ -137,7 +137,7 @@ class Plant:
         """Words, or bits, of every register that a span touches, each with its address, as the device tells them now."""
         found = self.banks[device_id].read(address, count, space)
         for trouble in self._now(device_id):
-            found = [(first, trouble.told(self.now_us, first, words)) for first, words in found]
+            found = [(first, trouble.on_read(self.now_us, first, words)) for first, words in found]
         return found
 
     def write(self, device_id: int, address: int, words: list[int], space: Space = "holding") -> int:
@@ -147,7 +147,7 @@ class Plant:
             for trouble in self._now(device_id):
                 held = [word for _, part in bank.read(address, len(words), space) for word in part]
                 whole = held if len(held) == len(words) else None
-                code = trouble.taken(words, whole, partial(bank.write, address, space=space))
+                code = trouble.on_write(words, whole, partial(bank.write, address, space=space))
                 break
             else:
                 bank.write(address, words, space)
@@ -164,13 +164,13 @@ class Plant:
                 self.journal.add(Said(self.now_us, device_id, line))
             return answer
 
-    def inject(self, fault: Fault) -> None:
+    def inject(self, fault: FaultOrder) -> None:
         """Arranges a fault."""
         with self.lock:
             self._arrange(fault)
             self.journal.add(Injection(self.now_us, fault))
 
-    def _arrange(self, fault: Fault) -> None:
+    def _arrange(self, fault: FaultOrder) -> None:
         trouble = trouble_of(fault, self.serials)
         trouble.device_id = self._id_of(fault)
         trouble.unit = self.serials.index(fault.serial) if fault.serial else 0
@@ -181,7 +181,7 @@ class Plant:
             heapq.heappush(self._due, (round(fault.until_s * 1e6), order + 1, trouble.ends))
         self.advance(0)
 
-    def _now(self, device_id: int) -> list[Trouble]:
+    def _now(self, device_id: int) -> list[Fault]:
         """Troubles that a device has now."""
         now = self.now
         return [t for t in self.troubles if t.device_id == device_id and t.fault.at_s <= now < t.fault.until_s]
@@ -190,7 +190,7 @@ class Plant:
         """The exception code with which the device behind an id answers everything now; 0 where it answers as always."""
         return next((code for trouble in self._now(device_id) if (code := trouble.answers())), 0)
 
-    def _id_of(self, fault: Fault) -> int:
+    def _id_of(self, fault: FaultOrder) -> int:
         """The device id that a fault is about; 0 where it is about none."""
         if fault.device:
             return int(getattr(self._devices, fault.device).device_id)

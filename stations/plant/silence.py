@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from stations.plant.plant import Plant
 
 
-class Silence:
+class IdleStop:
     """Stops what has not been asked for ``seconds``; a device that nobody has asked yet waits for its first question."""
 
     def __init__(self, plant: Plant, devices: Devices, seconds: float) -> None:

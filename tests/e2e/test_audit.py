@@ -24,7 +24,7 @@ from pipelines.audit.index import up_to_date
 from pipelines.audit.rules import load_rules
 from pipelines.audit.sql import ask
 from pipelines.cli import main
-from pipelines.tables.json_values import plain
+from pipelines.tables.json_values import json_value
 from schemas.errors import RecipeInvalid, WrongUse
 
 UNTIL = "2022-01-31"
@@ -54,7 +54,7 @@ def typed(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]):
 def told(folder: Path) -> str:
     """The whole document of an audit, as text."""
     found = audit(Archive(folder), load_rules(), Scope(day_of("2021-01-01"), day_of(UNTIL)))
-    return json.dumps(plain(document(found, findings(found), "archive")), sort_keys=True)
+    return json.dumps(json_value(document(found, findings(found), "archive")), sort_keys=True)
 
 
 def test_the_command_tells_findings_by_who_must_act_and_leaves_one(made, typed, tmp_path):
@@ -266,7 +266,7 @@ def test_an_archive_in_an_object_store_gives_the_same_audit_and_answers(made, mo
                 place.write_bytes(path.read_bytes())
         scope = Scope(day_of("2021-01-01"), day_of(UNTIL))
         found = audit(store, load_rules(), scope)
-        assert json.dumps(plain(document(found, findings(found), "archive")), sort_keys=True) == told(made)
+        assert json.dumps(json_value(document(found, findings(found), "archive")), sort_keys=True) == told(made)
         assert up_to_date(store).made == 0
         for question in (
             "SELECT run, unit, bias_x FROM parameters ORDER BY ALL",

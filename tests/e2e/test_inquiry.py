@@ -14,8 +14,8 @@ from typer.testing import CliRunner
 
 from pipelines.archive import Archive
 from pipelines.cli import app
-from pipelines.inquiry.inquiry import Finding, Inquiry, Move
-from pipelines.inquiry.loop import Consent, Table, Terms, play
+from pipelines.inquiry.inquiry import FollowUp, Inquiry, JointDiagnosis
+from pipelines.inquiry.loop import Consent, Participants, Settings, play
 from pipelines.rerun.selection import selected
 from schemas.errors import WrongUse
 
@@ -23,9 +23,11 @@ ROOT = Path(__file__).resolve().parents[2]
 CUBIC = {"hardening": 150e-6}
 
 
-def played(folder: Path, table: Table | None = None, terms: Terms | None = None, **job: object) -> dict:
+def played(folder: Path, table: Participants | None = None, terms: Settings | None = None, **job: object) -> dict:
     wanted = job or CUBIC
-    return play(inquiries.job_of(folder, **wanted), Archive(folder / "archive"), terms or Terms(), table or Table())
+    return play(
+        inquiries.job_of(folder, **wanted), Archive(folder / "archive"), terms or Settings(), table or Participants()
+    )
 
 
 @pytest.fixture(scope="module")
@@ -95,7 +97,7 @@ def test_a_follow_up_is_no_model_of_its_own(told_apart: tuple[Path, dict]) -> No
 def test_the_same_inquiry_again_measures_nothing(told_apart: tuple[Path, dict]) -> None:
     folder, before = told_apart
     done = []
-    again = played(folder, Table(told=done.append))
+    again = played(folder, Participants(told=done.append))
     assert all(one.reused for one in done)
     assert again["runs"] == before["runs"]
     assert again["classes"] == before["classes"]
@@ -118,7 +120,7 @@ def test_an_inquiry_that_was_killed_goes_on_and_no_finished_dwell_is_measured_tw
     times = {k: (stored.path / f"{k:05d}" / "record.json").stat().st_mtime_ns for k in stored.finished()}
     assert set(times) == {0, 1}
     asked = []
-    document = played(tmp_path / "killed", Table(approve=lambda *_: asked.append(1) or "go"))
+    document = played(tmp_path / "killed", Participants(approve=lambda *_: asked.append(1) or "go"))
     assert all((stored.path / f"{k:05d}" / "record.json").stat().st_mtime_ns == t for k, t in times.items())
     assert len(asked) == len(document["rounds"]) - 1
     assert document["runs"] == whole["runs"]
@@ -127,13 +129,13 @@ def test_an_inquiry_that_was_killed_goes_on_and_no_finished_dwell_is_measured_tw
 
 @pytest.mark.slow
 def test_without_consent_nothing_more_is_measured(tmp_path: Path) -> None:
-    seen: list[Move] = []
+    seen: list[FollowUp] = []
 
-    def no(inquiry: Inquiry, finding: Finding, move: Move) -> Consent:
+    def no(inquiry: Inquiry, finding: JointDiagnosis, move: FollowUp) -> Consent:
         seen.append(move)
         return "stop"
 
-    document = played(tmp_path, Table(approve=no))
+    document = played(tmp_path, Participants(approve=no))
     assert document["ended"] == "declined"
     assert len(document["runs"]) == 1
     assert seen[0].minutes > 0.0
@@ -142,7 +144,7 @@ def test_without_consent_nothing_more_is_measured(tmp_path: Path) -> None:
 
 @pytest.mark.slow
 def test_a_budget_that_is_too_small_says_what_it_takes(tmp_path: Path) -> None:
-    document = played(tmp_path, terms=Terms(budget=0.1))
+    document = played(tmp_path, terms=Settings(budget=0.1))
     assert document["ended"] == "budget"
     assert "give --budget" in document["text"]
     assert len(document["runs"]) == 1
@@ -151,7 +153,7 @@ def test_a_budget_that_is_too_small_says_what_it_takes(tmp_path: Path) -> None:
 @pytest.mark.slow
 def test_what_faces_cannot_see_is_measured_where_it_is_asked_for(tmp_path: Path) -> None:
     hidden = {"kind": "pendulous_mass", "plan": "orthogonal24", "compliance": 80e-6}
-    document = played(tmp_path, terms=Terms(unseen=True, budget=5.0), **hidden)
+    document = played(tmp_path, terms=Settings(unseen=True, budget=5.0), **hidden)
     assert document["recommended"] == ["cross_coupling"]
     assert "β in 90° steps makes fx·fy zero: Kip is invisible" in document["rounds"][0]["why"][0]
 

@@ -18,7 +18,7 @@ from pipelines.cli import app
 from pipelines.cli.terminal import scanned
 from pipelines.flows.local import local_server
 from schemas.errors import OperatorNeeded
-from schemas.fault import Fault
+from schemas.fault import FaultOrder
 from schemas.station import with_faults
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -35,7 +35,7 @@ class Told:
         return self.answers.pop(0) if self.answers else "go"
 
 
-def attended(folder: Path, operator: Told, measure: object = None, fault: Fault | None = None) -> None:
+def attended(folder: Path, operator: Told, measure: object = None, fault: FaultOrder | None = None) -> None:
     job = small_job(folder)
     if fault is not None:
         job = type(job)(job.recipe, job.limits, job.lot, with_faults(job.station, [fault]))
@@ -55,7 +55,7 @@ def test_units_are_asked_for_before_and_after_and_not_again_when_a_run_goes_on(t
 def test_seats_that_are_not_as_the_slot_map_says_are_asked_for_until_somebody_stops(tmp_path: Path) -> None:
     operator = Told("go", "go", "stop")
     with pytest.raises(OperatorNeeded, match="stopped at 'confirm'"):
-        attended(tmp_path, operator, fault=Fault(kind="swapped_slots", serial="A1"))
+        attended(tmp_path, operator, fault=FaultOrder(kind="swapped_slots", serial="A1"))
     assert [prompt.kind for prompt in operator.asked] == ["load", "confirm", "confirm"]
     assert "slot 0: 'A2' sits there, 'A1' is needed; slot 1: 'A1' sits there" in operator.asked[1].text
 

@@ -14,8 +14,8 @@ from pipelines.cli import app
 from pipelines.jobs.recipe_text import limits_from, recipe_text
 from pipelines.jobs.recipes import load_recipe, sample_names
 from pipelines.planning.lower_bound import least
-from pipelines.planning.plan import planned
-from pipelines.planning.requirement import Wish, candidates
+from pipelines.planning.plan import plan_context
+from pipelines.planning.requirement import Requirement, candidates
 from pipelines.planning.soak_orders import orders, soak_seconds
 from pipelines.planning.textbook import reference_errors, textbook
 from pipelines.planning.verification_poses import apart
@@ -48,8 +48,8 @@ def test_the_recipe_that_is_written_is_what_was_told(found):
     assert told["minutes"] == document["minutes"]
     assert told["dwells"] == document["dwells"]
     assert recipe.temperatures_C == document["temperatures_C"]
-    planned = minutes(steps(recipe), load_station(), recipe)
-    assert planned.total == pytest.approx(document["minutes"]["total"], abs=0.05)
+    plan_context = minutes(steps(recipe), load_station(), recipe)
+    assert plan_context.total == pytest.approx(document["minutes"]["total"], abs=0.05)
 
 
 def test_every_coefficient_is_as_good_as_wanted_in_less_time(found):
@@ -186,8 +186,10 @@ def test_no_recipe_is_quicker_than_the_bound_of_dwells_without_end():
     base = load_recipe().model_copy(update={"effects": THERMAL.split(","), "static_record_s": 0.0})
     shares: dict[float, float] = {}
     for bias in (30.0, 150.0):
-        against = planned(textbook(base, (-10.0, 60.0)), load_station(), DwellNoise(1e-7, bias * 1e-6))
-        wish = Wish(reference_errors(against, base), (), (-10.0, 60.0), candidates(against.station), legal=(25.0,))
+        against = plan_context(textbook(base, (-10.0, 60.0)), load_station(), DwellNoise(1e-7, bias * 1e-6))
+        wish = Requirement(
+            reference_errors(against, base), (), (-10.0, 60.0), candidates(against.station), legal=(25.0,)
+        )
         shares[bias] = least(base, against, wish).share
     # the errors wanted grow with the flicker: the same part of the time
     assert shares[30.0] == pytest.approx(shares[150.0], abs=0.011)

@@ -7,13 +7,13 @@ import inquiries
 import numpy as np
 import pytest
 
-from inertial.planning.sequences import Step
+from inertial.planning.sequences import SequenceStep
 from inertial.power import switched
 from pipelines.archive import Archive
 from pipelines.chain.chain import ORDER
 from pipelines.chain.runner import Runner
 from pipelines.inquiry.followup import follow_up
-from pipelines.inquiry.inquiry import FOLLOW_UP, Move, begin
+from pipelines.inquiry.inquiry import FOLLOW_UP, FollowUp, begin
 from schemas.progress import silent
 
 UP, DOWN = (0.0, 0.0), (math.pi, 0.0)
@@ -27,9 +27,9 @@ def test_warm_up_is_named_by_what_follows_a_power_on_whatever_the_bias_has_come_
     for name in ORDER:
         runner.stage(name)
     inquiry = begin(archive, job, runner.run, (), None)
-    alternating = [Step(*(UP, DOWN)[k % 2], 25.0, wait=8.0) for k in range(24)]
-    wanted = [Step(*UP, 25.0), Step(*DOWN, 25.0), Step(*UP, 25.0, off=1200.0), *alternating]
-    move = Move(follow_up(wanted, job, job, inquiry.lineage.ids, "why"), (), ("why",), 30.0)
+    alternating = [SequenceStep(*(UP, DOWN)[k % 2], 25.0, wait=8.0) for k in range(24)]
+    wanted = [SequenceStep(*UP, 25.0), SequenceStep(*DOWN, 25.0), SequenceStep(*UP, 25.0, off=1200.0), *alternating]
+    move = FollowUp(follow_up(wanted, job, job, inquiry.lineage.ids, "why"), (), ("why",), 30.0)
     follower = inquiry.runner(move, silent)
     for name in FOLLOW_UP:
         follower.stage(name)
@@ -40,7 +40,7 @@ def test_warm_up_is_named_by_what_follows_a_power_on_whatever_the_bias_has_come_
     assert switched(finding.state) == [first + 2]
     assert finding.state.power_off.max() == pytest.approx(1200.0, abs=2.0)
     assert [t.effect.id for t in finding.diagnosis.base.terms][-1] == "turn_on_bias"
-    assert ["warm_up"] in [group["effects"] for group in finding.told["classes"]]
+    assert ["warm_up"] in [group["effects"] for group in finding.document["classes"]]
     assert inquiry.rounds[0]["minutes"] > 20.0
 
     dwells = follower.run.table("dwells")

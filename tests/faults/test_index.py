@@ -21,7 +21,7 @@ from benchmarks.generated_archive import write_archive
 from pipelines.archive import Archive
 from pipelines.archive.cleaning import clean
 from pipelines.audit import index
-from pipelines.audit.index import Index, up_to_date
+from pipelines.audit.index import AuditIndex, up_to_date
 from pipelines.audit.run_rows import TABLES
 from schemas.errors import ArchiveUnusable
 
@@ -74,7 +74,7 @@ def archive(made: Path, tmp_path: Path) -> Archive:
     return Archive(tmp_path / "archive")
 
 
-def rows(found: Index) -> dict[str, list]:
+def rows(found: AuditIndex) -> dict[str, list]:
     """All rows of an index, without what only tells how it came to be."""
     tables = {name: found.table(name) for name in TABLES}
     tables["runs"] = tables["runs"].drop_columns(["stamp"])

@@ -6,7 +6,7 @@ from small_station import MemorySink, lot_of, quiet_progress, short_recipe
 from pipelines.capture.capture import capture
 from schemas.errors import StationRefused
 from schemas.event import MemoryLog
-from schemas.fault import Fault
+from schemas.fault import FaultOrder
 from schemas.station import load_station
 from stations.opening import make_plant, serve_plant
 from stations.plant.faults import wire
@@ -122,7 +122,7 @@ def test_a_slot_that_forgets_what_was_taken_is_refused() -> None:
 def test_words_in_the_wrong_order_are_no_identity() -> None:
     config, lot = load_station(), lot_of(1)
     plant = make_plant(config, lot)
-    plant.inject(Fault(kind="swapped_words", serial="U000"))
+    plant.inject(FaultOrder(kind="swapped_words", serial="U000"))
     with serve_plant(config, lot, plant) as station, pytest.raises(StationRefused, match="word order"):
         station.reader.slots[0].identity()
 
@@ -130,6 +130,6 @@ def test_words_in_the_wrong_order_are_no_identity() -> None:
 def test_a_reader_that_does_not_start_is_refused() -> None:
     config, lot = load_station(), lot_of(1)
     plant = make_plant(config, lot)
-    plant.inject(Fault(kind="exceptions_off", device="reader"))
+    plant.inject(FaultOrder(kind="exceptions_off", device="reader"))
     with serve_plant(config, lot, plant) as station, pytest.raises(StationRefused, match="sampling is stopped"):
         station.reader.start(100.0)

@@ -21,7 +21,7 @@ from schemas.errors import (
     WrongUse,
 )
 from schemas.event import MemoryLog
-from schemas.fault import Fault
+from schemas.fault import FaultOrder
 from schemas.recipe import Pose
 from schemas.station import load_station
 from stations.links.modbus import ModbusLink
@@ -173,7 +173,7 @@ def test_a_move_asked_while_moving_is_refused_as_busy_and_not_queued():
 def test_a_write_whose_answer_is_lost_is_sent_once():
     config, lot = load_station(), lot_of(1)
     plant = make_plant(config, lot)
-    plant.inject(Fault(kind="mute", serial="U000"))
+    plant.inject(FaultOrder(kind="mute", serial="U000"))
     with PlantServer(plant) as server:
         link = ModbusLink(server.host, server.port, timeout_s=0.3, read_attempts=3)
         with pytest.raises(StationTimeout, match=r"device 11: no answer to 'write tail"):

@@ -14,7 +14,7 @@ from inertial.criticism.model import Model, Term
 from inertial.criticism.problem import Lot, Problem
 from inertial.criticism.proposals import Circumstances, proposal, rivals_in
 from inertial.criticism.separation import separations, smallest
-from inertial.planning.sequences import Pace, Step
+from inertial.planning.sequences import SequenceStep, StationPace
 from inertial.state import State
 
 NOISE = 11.4e-6
@@ -82,12 +82,12 @@ def information(model, group, steps):
 
 def again(plan, count):
     angles = np.radians(poses.plan(plan))
-    return [Step(float(o), float(i), 25.0) for o, i in angles[np.arange(count) % len(angles)]]
+    return [SequenceStep(float(o), float(i), 25.0) for o, i in angles[np.arange(count) % len(angles)]]
 
 
 def test_the_proposal_brings_five_times_the_information_of_repeating_the_plan():
     model, group = ambiguous(measured())
-    found = proposal(model, group, Circumstances(budget=3.0, pace=Pace(dwell_s=10.0)))
+    found = proposal(model, group, Circumstances(budget=3.0, pace=StationPace(dwell_s=10.0)))
     count = len(found.steps)
     assert 3 <= count <= 12
     got = information(model, group, found.steps)

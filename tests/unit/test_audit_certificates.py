@@ -13,7 +13,7 @@ from pipelines.audit.certificates import Certificates, certificates_of
 from pipelines.audit.due import due, uncertified
 from pipelines.audit.parameters import NAMES
 from pipelines.audit.rules import load_rules
-from pipelines.certificates import Event, Ledger
+from pipelines.certificates import Ledger, LedgerEntry
 from schemas.errors import WrongUse
 
 DAY = "2026-06-30"
@@ -32,13 +32,13 @@ def measured(*rows: tuple[str, str, str], outcome: str = "pass") -> Calibrations
     return Calibrations(run, unit, kind, station, np.zeros(n, dtype=np.int64), outcomes, days, values, values + 1.0)
 
 
-def known(root: Path, *events: Event, captures: dict[str, str] | None = None) -> Certificates:
+def known(root: Path, *events: LedgerEntry, captures: dict[str, str] | None = None) -> Certificates:
     """A ledger with these events, each as it was written on its first day."""
     count: dict[str, int] = {}
     for one in events:
         count[one.serial] = count.get(one.serial, 0) + 1
         own = {**one.__dict__, "sequence": count[one.serial], "when": one.when or f"{one.start}T12:00:00+00:00"}
-        Ledger(root).write_bulk([Event(**own)])
+        Ledger(root).write_bulk([LedgerEntry(**own)])
     return certificates_of(root, UNTIL, captures or {})
 
 

@@ -5,7 +5,7 @@ from itertools import product
 import numpy as np
 import pytest
 
-from inertial.planning.pose_exchange import CRITERIA, Slots, exchanged, ratios
+from inertial.planning.pose_exchange import CRITERIA, PlanSlots, exchanged, ratios
 
 
 def line(levels, n, weight=None, travel=None, seconds=1000.0):
@@ -13,7 +13,7 @@ def line(levels, n, weight=None, travel=None, seconds=1000.0):
     x = np.asarray(levels, dtype=float)
     rows = np.stack([np.ones_like(x), x], axis=-1)
     c = x.size
-    return Slots(
+    return PlanSlots(
         rows=np.broadcast_to(rows[None, :, None, :], (n, c, 3, 2)).copy(),
         weight=np.eye(n) if weight is None else weight,
         travel=np.zeros((c, c)) if travel is None else travel,

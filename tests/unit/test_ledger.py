@@ -13,7 +13,7 @@ from ledger_events import event
 from typer.testing import CliRunner
 
 from pipelines.archive import Run
-from pipelines.certificates import Event, Ledger
+from pipelines.certificates import Ledger, LedgerEntry
 from pipelines.certificates.days import day_of, months_after
 from pipelines.certificates.validity import calibrations_of, overlapped
 from pipelines.cli import app
@@ -172,7 +172,7 @@ STEPS = st.lists(st.tuples(st.sampled_from(["certify", "supersede", "revoke"]), 
 @given(STEPS)
 @settings(max_examples=300, deadline=None)
 def test_no_two_calibrations_of_a_unit_hold_on_one_day_whatever_is_written(steps: list[tuple[str, str, str]]) -> None:
-    events: list[Event] = []
+    events: list[LedgerEntry] = []
     for number, (action, start, until) in enumerate(steps, 1):
         known = calibrations_of(events)
         made = event(start=start, until=until, run=f"r-{number}", sequence=len(events) + 1)

@@ -9,7 +9,7 @@ from small_station import MemorySink, lot_of, quiet_progress, short_recipe, stat
 from pipelines.capture.capture import capture
 from pipelines.schedule.planned_state import planned_state
 from pipelines.schedule.steps import steps
-from pipelines.schedule.timing import Standing, minutes
+from pipelines.schedule.timing import StationPose, minutes
 from schemas.recipe import Pose, SoakPart
 from stations.opening import open_station
 
@@ -55,7 +55,7 @@ def test_parts_of_the_planned_time_are_told_apart():
 def test_a_station_that_is_soaked_already_only_moves_and_dwells():
     recipe = short_recipe(1)
     first = steps(recipe)[0]
-    standing = Standing(outer=0.0, inner=0.0, air=25.0, device=25.0, soak=first.soak)
+    standing = StationPose(outer=0.0, inner=0.0, air=25.0, device=25.0, soak=first.soak)
     planned = minutes([first], station_of(), recipe, standing)
     assert planned.soaks == 0.0
     assert planned.dwells > 0.0

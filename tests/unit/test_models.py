@@ -6,7 +6,7 @@ import pytest
 
 from inertial import effects
 from pipelines.diagnosis.model_history import evolution
-from pipelines.jobs.model_files import Step, chosen_effects, extended, new_model, read_model, versions
+from pipelines.jobs.model_files import ModelStep, chosen_effects, extended, new_model, read_model, versions
 from schemas.errors import RecipeInvalid, WrongUse
 
 NOW = datetime(2026, 5, 4, 12, 0, tzinfo=UTC)
@@ -31,7 +31,7 @@ def forgotten():
 
 
 def step(effect, **more):
-    return Step(effect, "A. Tester", NOW, "the residuals say so", **more)
+    return ModelStep(effect, "A. Tester", NOW, "the residuals say so", **more)
 
 
 def test_the_next_version_keeps_comments_and_says_who_when_and_why():

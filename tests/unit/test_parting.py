@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from inertial import design, frames, poses
-from inertial.planning.discrimination import Parting
-from inertial.planning.pose_exchange import Slots, exchanged
+from inertial.planning.discrimination import Discrimination
+from inertial.planning.pose_exchange import PlanSlots, exchanged
 from inertial.state import State
 
 MODEL = ("bias", "scale", "misalignment", "third_order", "odd_quadratic")
@@ -22,7 +22,7 @@ def columns(angles):
 
 
 def parting(size=3e-5, wanted=50.0):
-    return Parting(BASE, (CUBIC, ODD), (np.full((3, 1), size), np.full((3, 1), size)), wanted)
+    return Discrimination(BASE, (CUBIC, ODD), (np.full((3, 1), size), np.full((3, 1), size)), wanted)
 
 
 def normal(rows):
@@ -59,7 +59,7 @@ def test_a_plan_that_does_not_determine_the_model_parts_nothing():
 def test_exchanges_part_rivals_half_as_far_again_as_spread_directions():
     angles = poses.fibonacci(60)
     rows, n = columns(angles), 24
-    slots = Slots(
+    slots = PlanSlots(
         rows=np.broadcast_to(np.swapaxes(rows, 0, 1)[None], (n, len(angles), 3, rows.shape[-1])).copy(),
         weight=np.eye(n) / ERROR**2,
         travel=np.zeros((len(angles), len(angles))),

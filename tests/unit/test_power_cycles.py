@@ -14,7 +14,7 @@ from inertial.criticism.problem import Lot
 from inertial.criticism.proposals import Proposal
 from inertial.frames import force_from_angles
 from inertial.planning.reasons import begins_again
-from inertial.planning.sequences import Pace, Step, extended
+from inertial.planning.sequences import SequenceStep, StationPace, extended
 from inertial.power import coldness, switched
 from inertial.state import History, State
 from pipelines.inquiry.explanation import what
@@ -39,8 +39,8 @@ def run_of(count: int = 40, units: int = 3, *, powered: float = 900.0) -> State:
 
 def switched_off(state: State, off: float, count: int = 30) -> State:
     """The same with the devices off for ``off`` s, and two opposed poses in turn afterwards."""
-    first = Step(*UP, 25.0, off=off)
-    return extended(state, [first, *(Step(*(DOWN, UP)[k % 2], 25.0) for k in range(count - 1))])
+    first = SequenceStep(*UP, 25.0, off=off)
+    return extended(state, [first, *(SequenceStep(*(DOWN, UP)[k % 2], 25.0) for k in range(count - 1))])
 
 
 def test_a_device_that_was_off_for_long_is_cold_and_one_that_was_off_for_a_moment_is_not():
@@ -94,8 +94,8 @@ def test_steps_after_a_history_begin_when_it_ends_where_the_station_still_stands
     run = run_of()
     later = History(np.linspace(100.0, 3000.0, 50), np.full((3, 50), 25.0))
     with_history = replace(run, history=later, memory={})
-    step = [Step(*UP, 25.0)]
-    standing = extended(with_history, step, Pace(start=Step(*UP, 25.0)))
+    step = [SequenceStep(*UP, 25.0)]
+    standing = extended(with_history, step, StationPace(start=SequenceStep(*UP, 25.0)))
     between = extended(with_history, step)
     assert standing.time[0, -1] > 3000.0
     assert between.time[0, -1] < run.time[0, -1] + 60.0
@@ -147,7 +147,7 @@ def test_what_happens_after_a_power_on_parts_warm_up_from_ageing(truth, rng):
 
 def test_power_is_switched_only_where_the_station_can_and_the_devices_say_since_when_they_have_it():
     run = run_of()
-    best = [Step(*UP, 25.0), Step(*DOWN, 25.0)]
+    best = [SequenceStep(*UP, 25.0), SequenceStep(*DOWN, 25.0)]
     kinds = [
         {c.kind for c in courses(state, Reach(power=power), best, 25.0)}
         for state, power in ((run, True), (run, False), (replace(run, since_power=None), True))
@@ -157,12 +157,12 @@ def test_power_is_switched_only_where_the_station_can_and_the_devices_say_since_
 
 def test_a_power_order_reaches_the_recipe_the_minutes_and_the_words(tmp_path):
     job = job_of(tmp_path, hardening=1e-4)
-    wanted = [Step(*UP, 25.0), Step(*UP, 25.0, off=600.0), Step(*DOWN, 25.0)]
+    wanted = [SequenceStep(*UP, 25.0), SequenceStep(*UP, 25.0, off=600.0), SequenceStep(*DOWN, 25.0)]
     follower = follow_up(wanted, job, job, ("first",), "why")
     assert follower.recipe.off_at(0) == [0.0, 600.0, 0.0]
     assert circumstances(job, job, 30.0).reach.power
     place = place_after(job)
-    plain = [Step(*UP, 25.0), Step(*UP, 25.0), Step(*DOWN, 25.0)]
+    plain = [SequenceStep(*UP, 25.0), SequenceStep(*UP, 25.0), SequenceStep(*DOWN, 25.0)]
     assert station_minutes(wanted, job, place) - station_minutes(plain, job, place) == pytest.approx(10.0, abs=0.02)
     told = Proposal(("power",), tuple(wanted), ("warm_up", "aging_log"), ("warm_up", "aging_log"), 10.0, 1.0, 50.0, 1.0)
     assert what(run_of(), told) == "Switching the units off for 10 min: warm_up begins again, aging_log goes on"

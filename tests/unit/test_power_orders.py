@@ -8,7 +8,7 @@ from small_station import QUIET, MemorySink, lot_of, plant_of, quiet_progress, s
 
 from pipelines.capture.capture import capture
 from pipelines.capture.power_cycling import Power
-from pipelines.capture.supervision import Guard
+from pipelines.capture.supervision import Supervisor
 from pipelines.schedule.steps import steps
 from pipelines.schedule.timing import minutes
 from schemas.errors import OperatorNeeded, StationRefused
@@ -131,11 +131,11 @@ def test_devices_that_a_killed_run_left_without_power_are_switched_on_and_their_
     config, lot = station_of(preset_overrides=COLD), lot_of(2)
     plant, events, step = make_plant(config, lot), MemoryLog(), steps(recipe_with_power_off())[1]
     with serve_plant(config, lot, plant) as station:
-        guard = Guard(station, events)
+        guard = Supervisor(station, events)
         guard.note("power", step.record, "the recipe asks for it", "devices off")
         station.reader.switch("off")  # and the process is gone
         plant.advance(90_000_000)
-        again = Power(station, Guard(station, events), ordered=True)
+        again = Power(station, Supervisor(station, events), ordered=True)
         again.require_on()
         assert station.reader.powered()
         assert again.off_before(step) == pytest.approx(90.0, abs=1.0)

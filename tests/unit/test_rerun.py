@@ -12,9 +12,9 @@ from capture_double import CaptureDouble, small_job, small_run
 from pipelines.archive import Archive, Run, code_hash
 from pipelines.chain.chain import ORDER
 from pipelines.chain.runner import Runner
-from pipelines.jobs.model_change import Wanted, wanted
+from pipelines.jobs.model_change import ModelChange, wanted
 from pipelines.rerun import steps
-from pipelines.rerun.partition import Part, run_again
+from pipelines.rerun.partition import Batch, run_again
 from pipelines.rerun.reproduce import LEFT_OUT, SAME, check
 from pipelines.rerun.rerun import again
 from pipelines.rerun.selection import selected
@@ -51,7 +51,7 @@ def files_of(run: Run) -> dict[str, bytes]:
 
 def test_nothing_is_done_where_nothing_changed(run: Run) -> None:
     before = files_of(run)
-    outcome = again(run.archive, run.id, Wanted())
+    outcome = again(run.archive, run.id, ModelChange())
     assert outcome.new == run.id
     assert set(outcome.stages.values()) == {"there"}
     assert files_of(run) == before
@@ -80,7 +80,7 @@ def test_another_model_begins_at_the_fit_and_says_so(run: Run) -> None:
 
 def test_changed_code_of_one_stage_leaves_the_stages_before_it(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
     other_code(monkeypatch, "verify")
-    outcome = again(run.archive, run.id, Wanted())
+    outcome = again(run.archive, run.id, ModelChange())
     computed = [name for name, how in outcome.stages.items() if how == "computed"]
     assert computed == ["verify"]  # its tables come out with the same bytes, so the key of the grade is the same
     assert [b["what"] for b in outcome.because] == ["code"]
@@ -135,7 +135,7 @@ def test_an_old_capture_keeps_its_name_whatever_names_are_made_of_today(
 def test_without_raw_samples_it_begins_at_the_dwells(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
     shutil.rmtree(run.archive.root / "captures")
     other_code(monkeypatch, "reduce", "grade")
-    outcome = again(run.archive, run.id, Wanted())
+    outcome = again(run.archive, run.id, ModelChange())
     assert outcome.stages["reduce"] == "kept"
     assert [(b["stage"], b["what"]) for b in outcome.because] == [("grade", "code")]
 
@@ -150,7 +150,7 @@ def test_refuses_a_capture_that_is_not_finished(run: Run) -> None:
     capture = run.archive.root / "captures" / run.about["capture"]
     (capture / "complete.json").unlink()
     with pytest.raises(DataRejected, match=r"its capture has \d+ records and is not finished"):
-        again(run.archive, run.id, Wanted())
+        again(run.archive, run.id, ModelChange())
 
 
 def test_one_run_that_cannot_be_run_again_does_not_stop_the_others(run: Run) -> None:
@@ -158,7 +158,7 @@ def test_one_run_that_cannot_be_run_again_does_not_stop_the_others(run: Run) -> 
     broken.mkdir()
     about = {**run.about, "recipe": {**run.about["recipe"], "dwell_s": -1.0}}
     (broken / "run.json").write_text(json.dumps(about))
-    outcomes = run_again(Part(run.archive.address, ("broken", run.id)))
+    outcomes = run_again(Batch(run.archive.address, ("broken", run.id)))
     assert "run broken: key 'dwell_s': found -1.0" in outcomes[0].error
     assert not outcomes[1].error
 
@@ -255,13 +255,13 @@ def imported(tmp_path: Path) -> Run:
 
 
 def test_imported_dwells_are_fitted_with_the_plain_model(imported: Run) -> None:
-    outcome = again(imported.archive, imported.id, Wanted())
+    outcome = again(imported.archive, imported.id, ModelChange())
     new = imported.archive.run(outcome.new)
     assert outcome.because[0]["what"] == "not fitted yet"
     bias = new.table("coefficients").query("effect == 'bias'")
     assert bias["value"].to_numpy() == pytest.approx(0.01, abs=5e-4)
     assert check(new.archive, new.id).same
-    assert again(new.archive, new.id, Wanted()).new == new.id
+    assert again(new.archive, new.id, ModelChange()).new == new.id
 
 
 def test_imported_dwells_are_graded_where_limits_are_named(imported: Run, tmp_path: Path) -> None:

@@ -3,13 +3,13 @@
 from dataclasses import replace
 
 from inertial.criticism.proposals import Proposal
-from inertial.planning.sequences import Step
+from inertial.planning.sequences import SequenceStep
 from pipelines.diagnosis.next_measurement import rows_of
 
-STEP = Step(0.1, 0.2, 25.0)
+STEP = SequenceStep(0.1, 0.2, 25.0)
 
 
-def proposed(*steps: Step) -> Proposal:
+def proposed(*steps: SequenceStep) -> Proposal:
     return Proposal(("poses",), steps, ("warm_up", "aging_log"), ("warm_up", "aging_log"), 12.0, 1.0, 30.0, 1.0)
 
 

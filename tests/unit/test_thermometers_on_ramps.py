@@ -5,7 +5,7 @@ import pandas as pd
 import pytest
 
 from inertial.operators import first_order_lag
-from pipelines.inquiry.lineage import Lineage
+from pipelines.inquiry.lineage import RunSequence
 from pipelines.stages.validate import _stale_temperatures
 from schemas.errors import DataRejected
 
@@ -47,4 +47,4 @@ def test_a_follow_up_that_refused_every_unit_is_told() -> None:
     with pytest.raises(
         DataRejected, match=r"no unit was accepted by all of follow-up.*refused 2 of 2 \(constant output\)"
     ):
-        Lineage((Refused(),)).dwells()  # type: ignore[arg-type]
+        RunSequence((Refused(),)).dwells()  # type: ignore[arg-type]

@@ -11,11 +11,11 @@ from pipelines.archive import Archive
 from pipelines.chain.chain import ORDER
 from pipelines.chain.runner import Runner
 from pipelines.jobs.job import Request
-from pipelines.jobs.model_change import Wanted, wanted
+from pipelines.jobs.model_change import ModelChange, wanted
 from pipelines.jobs.recipes import load_recipe
 from pipelines.jobs.releases import evidence_for, keep_evidence, line_model, release, released, releases
 from pipelines.rerun.lot_comparison import applied, fresh, judged
-from pipelines.rerun.partition import Part
+from pipelines.rerun.partition import Batch
 from pipelines.rerun.rerun import again
 from pipelines.rerun.whatif import fresh_tasks, summary
 from pipelines.tables.calibration import read_calibration
@@ -57,19 +57,19 @@ def model_file(folder: Path, effects: tuple[str, ...] = GOOD) -> Path:
     return path
 
 
-def what_if(archive: Archive, change: Wanted) -> dict:
+def what_if(archive: Archive, change: ModelChange) -> dict:
     runs = [info.id for info in archive.runs() if "rerun_of" not in archive.run(info.id).about]
-    found = judged(Part(archive.address, tuple(runs), change))
+    found = judged(Batch(archive.address, tuple(runs), change))
     return summary(found, fresh(fresh_tasks(found, archive.address, change)))
 
 
 @pytest.fixture(scope="module")
-def better(archive: Archive, tmp_path_factory: pytest.TempPathFactory) -> tuple[Wanted, dict]:
+def better(archive: Archive, tmp_path_factory: pytest.TempPathFactory) -> tuple[ModelChange, dict]:
     change = wanted("", model_file(tmp_path_factory.mktemp("model")))
     return change, what_if(archive, change)
 
 
-def test_a_model_with_the_missing_effect_is_better_on_fresh_runs_and_in_yield(better: tuple[Wanted, dict]) -> None:
+def test_a_model_with_the_missing_effect_is_better_on_fresh_runs_and_in_yield(better: tuple[ModelChange, dict]) -> None:
     _, document = better
     total = document["total"]
     assert document["verdict"] == "better"
@@ -81,10 +81,10 @@ def test_a_model_with_the_missing_effect_is_better_on_fresh_runs_and_in_yield(be
     assert [(row["device"], row["station"]) for row in document["groups"]] == [("adxl355", "simulated")]
 
 
-def test_the_new_side_is_what_a_rerun_makes(archive: Archive, better: tuple[Wanted, dict]) -> None:
+def test_the_new_side_is_what_a_rerun_makes(archive: Archive, better: tuple[ModelChange, dict]) -> None:
     change, _ = better
     run = archive.runs()[0].id
-    side = judged(Part(archive.address, (run,), change))[0].new
+    side = judged(Batch(archive.address, (run,), change))[0].new
     made = archive.run(again(archive, run, change).new)
     assert side is not None
     assert side.calibration is not None
@@ -138,7 +138,9 @@ def test_a_release_needs_evidence_or_force_and_a_reason(archive: Archive, tmp_pa
     assert record.evidence == ""
 
 
-def test_a_release_rests_on_a_what_if_of_its_device_and_station(tmp_path: Path, better: tuple[Wanted, dict]) -> None:
+def test_a_release_rests_on_a_what_if_of_its_device_and_station(
+    tmp_path: Path, better: tuple[ModelChange, dict]
+) -> None:
     change, document = better
     own = Archive(tmp_path / "archive")
     name = keep_evidence(own, change, document, ["a"])
@@ -149,7 +151,7 @@ def test_a_release_rests_on_a_what_if_of_its_device_and_station(tmp_path: Path, 
     assert release(own, change, since, device="ADXL355", reason="fresh error falls").evidence == name
 
 
-def test_a_what_if_that_says_worse_does_not_release(tmp_path: Path, better: tuple[Wanted, dict]) -> None:
+def test_a_what_if_that_says_worse_does_not_release(tmp_path: Path, better: tuple[ModelChange, dict]) -> None:
     change, document = better
     own = Archive(tmp_path / "archive")
     keep_evidence(own, change, {**document, "verdict": "worse", "words": "it rises"}, ["a"])

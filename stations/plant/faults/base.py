@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, ClassVar
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from schemas.fault import Fault
+    from schemas.fault import FaultOrder
     from stations.plant.faults.proxy import Meddling
     from stations.plant.plant import Plant
     from stations.plant.table import Axis
@@ -20,7 +20,7 @@ MUTE = -1  # an answer of this code is none at all
 
 
 @dataclass
-class Trouble:
+class Fault:
     """One fault of one plant, while it lasts. The fields of a kind are its figures.
 
     ``about`` says who may be meant: ``unit`` (by its serial number), the station's devices by name; nobody where it is empty.
@@ -31,7 +31,7 @@ class Trouble:
     kind: ClassVar[str] = ""
     about: ClassVar[tuple[str, ...]] = ()
 
-    fault: Fault = field(init=False, repr=False)
+    fault: FaultOrder = field(init=False, repr=False)
     device_id: int = field(init=False, default=0, repr=False)
     unit: int = field(init=False, default=0, repr=False)
 
@@ -45,12 +45,12 @@ class Trouble:
         """The exception code with which the device answers everything; 0 where it answers as always."""
         return 0
 
-    def told(self, now_us: int, address: int, words: list[int]) -> list[int]:
+    def on_read(self, now_us: int, address: int, words: list[int]) -> list[int]:
         """The words that the device tells where it should tell ``words``."""
         del now_us, address
         return words
 
-    def taken(self, words: list[int], held: list[int] | None, write: Callable[[list[int]], None]) -> int:
+    def on_write(self, words: list[int], held: list[int] | None, write: Callable[[list[int]], None]) -> int:
         """Does with the words of a write what the device then does, and gives the exception code of its answer.
 
         ``held`` are the words that the registers hold now, None where they cannot be read.
@@ -59,7 +59,7 @@ class Trouble:
         write(words)
         return 0
 
-    def meddles(self) -> Meddling | None:
+    def wire_action(self) -> Meddling | None:
         """What happens to frames on the wire."""
         return None
 

@@ -11,30 +11,30 @@ from typing import TYPE_CHECKING
 
 from schemas.errors import RecipeInvalid, did_you_mean
 from stations.plant import faults
-from stations.plant.faults.base import UNIT, Trouble
+from stations.plant.faults.base import UNIT, Fault
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-    from schemas.fault import Fault
+    from schemas.fault import FaultOrder
 
 
 @cache
-def kinds() -> Mapping[str, type[Trouble]]:
+def kinds() -> Mapping[str, type[Fault]]:
     """Every kind by its name, in order of the names."""
-    found: dict[str, type[Trouble]] = {}
+    found: dict[str, type[Fault]] = {}
     for module in pkgutil.iter_modules(faults.__path__):
         content = vars(import_module(f"{faults.__name__}.{module.name}")).values()
-        found |= {one.kind: one for one in content if isinstance(one, type) and issubclass(one, Trouble) and one.kind}
+        found |= {one.kind: one for one in content if isinstance(one, type) and issubclass(one, Fault) and one.kind}
     return MappingProxyType(dict(sorted(found.items())))
 
 
-def figures(kind: type[Trouble]) -> dict[str, float]:
+def figures(kind: type[Fault]) -> dict[str, float]:
     """The figures of a kind with their usual values."""
     return {f.name: float(f.default) for f in fields(kind) if f.init and isinstance(f.default, int | float)}
 
 
-def trouble_of(fault: Fault, serials: Sequence[str]) -> Trouble:
+def trouble_of(fault: FaultOrder, serials: Sequence[str]) -> Fault:
     """The trouble that a fault makes; a kind, figure or unit that is not there is refused, and one that means nobody."""
     known = kinds()
     if fault.kind not in known:
@@ -52,7 +52,7 @@ def trouble_of(fault: Fault, serials: Sequence[str]) -> Trouble:
     return made
 
 
-def _refuse_nobody(fault: Fault, kind: type[Trouble], serials: Sequence[str]) -> None:
+def _refuse_nobody(fault: FaultOrder, kind: type[Fault], serials: Sequence[str]) -> None:
     meant = UNIT if fault.serial else fault.device
     if meant not in (kind.about or ("",)):
         wanted = ", ".join("serial=…" if one == UNIT else f"device={one}" for one in kind.about) or "neither"

@@ -5,14 +5,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, ClassVar
 
-from stations.plant.faults.base import Trouble
+from stations.plant.faults.base import Fault
 
 if TYPE_CHECKING:
     from stations.plant.plant import Plant
 
 
 @dataclass
-class ChamberOvershoot(Trouble):
+class ChamberOvershoot(Fault):
     """The controller's integral winds up while the actuator is at its end, so that the air goes far beyond the set point."""
 
     kind: ClassVar[str] = "chamber_overshoot"
@@ -27,7 +27,7 @@ class ChamberOvershoot(Trouble):
 
 
 @dataclass
-class ChamberPower(Trouble):
+class ChamberPower(Fault):
     """The chamber loses the power for heating and cooling; its controller goes on answering."""
 
     kind: ClassVar[str] = "chamber_power"
@@ -42,7 +42,7 @@ class ChamberPower(Trouble):
 
 
 @dataclass
-class ChamberUnsettled(Trouble):
+class ChamberUnsettled(Fault):
     """The controller hunts: its working set point swings by ``swing_K`` with a period of ``period_s``."""
 
     kind: ClassVar[str] = "chamber_unsettled"
@@ -60,7 +60,7 @@ class ChamberUnsettled(Trouble):
 
 
 @dataclass
-class Door(Trouble):
+class Door(Fault):
     """The chamber's door is opened."""
 
     kind: ClassVar[str] = "door"
@@ -75,7 +75,7 @@ class Door(Trouble):
 
 
 @dataclass
-class EmergencyStop(Trouble):
+class EmergencyStop(Fault):
     """The emergency stop is pressed: both axes stop where they are and hold."""
 
     kind: ClassVar[str] = "emergency_stop"
@@ -94,7 +94,7 @@ class EmergencyStop(Trouble):
 
 
 @dataclass
-class Vibration(Trouble):
+class Vibration(Fault):
     """Something shakes the fixture: a fork-lift, a press next door."""
 
     kind: ClassVar[str] = "vibration"

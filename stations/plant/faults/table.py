@@ -5,14 +5,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, ClassVar
 
-from stations.plant.faults.base import AXES, Trouble
+from stations.plant.faults.base import AXES, Fault
 
 if TYPE_CHECKING:
     from stations.plant.plant import Plant
 
 
 @dataclass
-class Backlash(Trouble):
+class Backlash(Fault):
     """A worn gear: the shaft stays ``play_deg`` behind the encoder, on the side that it comes from."""
 
     kind: ClassVar[str] = "backlash"
@@ -30,7 +30,7 @@ class Backlash(Trouble):
 
 
 @dataclass
-class LostHome(Trouble):
+class LostHome(Fault):
     """A drive loses its reference: its angles are off by ``offset_deg``, and its home flag is down unless ``admitted`` is 0."""
 
     kind: ClassVar[str] = "lost_home"
@@ -53,7 +53,7 @@ class LostHome(Trouble):
 
 
 @dataclass
-class StuckEncoder(Trouble):
+class StuckEncoder(Fault):
     """An encoder keeps saying the angle that it had; the shaft turns."""
 
     kind: ClassVar[str] = "stuck_encoder"
@@ -70,7 +70,7 @@ class StuckEncoder(Trouble):
 
 
 @dataclass
-class TableStall(Trouble):
+class TableStall(Fault):
     """An axis is held up in its move; when it is free it goes on to its target."""
 
     kind: ClassVar[str] = "table_stall"

@@ -5,14 +5,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, ClassVar
 
-from stations.plant.faults.base import UNIT, Trouble
+from stations.plant.faults.base import UNIT, Fault
 
 if TYPE_CHECKING:
     from stations.plant.plant import Plant
 
 
 @dataclass
-class ClockJump(Trouble):
+class ClockJump(Fault):
     """The clock of the computer that drives the station jumps by ``step_s`` seconds."""
 
     kind: ClassVar[str] = "clock_jump"
@@ -25,7 +25,7 @@ class ClockJump(Trouble):
 
 
 @dataclass
-class Dead(Trouble):
+class Dead(Fault):
     """The outputs of a unit stay at their last count."""
 
     kind: ClassVar[str] = "dead"
@@ -41,7 +41,7 @@ class Dead(Trouble):
 
 
 @dataclass
-class DroppedSamples(Trouble):
+class DroppedSamples(Fault):
     """The reader's clock loses ``samples``: in their numbers where ``numbered`` is not 0, else only in their count."""
 
     kind: ClassVar[str] = "dropped_samples"
@@ -55,7 +55,7 @@ class DroppedSamples(Trouble):
 
 
 @dataclass
-class FifoOverflow(Trouble):
+class FifoOverflow(Fault):
     """The memory of a unit overflows once: samples that nobody has taken are written over."""
 
     kind: ClassVar[str] = "fifo_overflow"
@@ -67,7 +67,7 @@ class FifoOverflow(Trouble):
 
 
 @dataclass
-class FrozenTemperature(Trouble):
+class FrozenTemperature(Fault):
     """A thermometer keeps saying what it said: that of a unit, of the chamber, or all of the reader's."""
 
     kind: ClassVar[str] = "frozen_temperature"
@@ -89,7 +89,7 @@ class FrozenTemperature(Trouble):
 
 
 @dataclass
-class SupplySag(Trouble):
+class SupplySag(Fault):
     """The supply of a unit, or of all, falls by the part ``part``; outputs that follow it fall with it, others shift."""
 
     kind: ClassVar[str] = "supply_sag"
@@ -110,7 +110,7 @@ class SupplySag(Trouble):
 
 
 @dataclass
-class SwappedSlots(Trouble):
+class SwappedSlots(Fault):
     """A unit and the next one of the lot change places: each slot has the other's serial number and samples."""
 
     kind: ClassVar[str] = "swapped_slots"
