@@ -112,22 +112,20 @@ def _in_processes(function: Callable[[Part], Result], partitions: Sequence[Part]
         try:
             return [future.result() for future in futures]
         except BrokenProcessPool:
-            message = (
+            raise ArchiveUnusable(
                 f"partitions: one of {workers} worker processes was killed, each needs memory for a partition; "
                 "give fewer workers, and the work goes on where it was"
-            )
-            raise ArchiveUnusable(message) from None
+            ) from None
         finally:
             pool.shutdown(cancel_futures=True)
 
 
 def _refuse_address(dask: str) -> None:
     if dask != LOCAL and not dask.startswith(SCHEMES):
-        message = (
+        raise WrongUse(
             f"--dask: '{dask}' is no address of a scheduler, tcp://HOST:PORT is needed, or '{LOCAL}' for a cluster on this "
             "machine; start one with 'dask scheduler' and 'dask worker'"
         )
-        raise WrongUse(message)
 
 
 @contextmanager

@@ -42,11 +42,11 @@ class Carried(Strict):
             given = {} if self.link == wanted else self.model_dump(include=set(names), exclude_defaults=True)
             stray = [name for name in names if name in given]
             if stray:
-                message = f"{', '.join(stray)}: for link {wanted}, the link is {self.link}; leave it out, or set link"
-                raise ValueError(message)
+                raise ValueError(
+                    f"{', '.join(stray)}: for link {wanted}, the link is {self.link}; leave it out, or set link"
+                )
         if bool(self.key_file) != bool(self.certificate_file):
-            message = "certificate_file, key_file: one without the other; name both, or none"
-            raise ValueError(message)
+            raise ValueError("certificate_file, key_file: one without the other; name both, or none")
         return self
 
     def missing(self) -> str:

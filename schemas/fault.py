@@ -39,11 +39,10 @@ class FaultOrder(BaseModel):
     @model_validator(mode="after")
     def _means_one(self) -> FaultOrder:
         if self.serial and self.device:
-            message = (
+            raise ValueError(
                 f"fault {self.kind}: serial '{self.serial}' and device '{self.device}', one of the two can be meant; "
                 "correct the fault"
             )
-            raise ValueError(message)
         return self
 
     @property
@@ -64,14 +63,14 @@ def parse_fault(text: str) -> FaultOrder:
     for pair in pairs:
         key, equals, value = pair.partition("=")
         if not equals or not key or not value:
-            message = f"fault '{text}': found '{pair}', key=value is needed; write kind:key=value:key=value"
-            raise WrongUse(message)
+            raise WrongUse(f"fault '{text}': found '{pair}', key=value is needed; write kind:key=value:key=value")
         (given if key in FaultOrder.model_fields and key != "figures" else figures)[key] = value
     try:
         return FaultOrder.model_validate({**given, "figures": figures})
     except ValidationError as problem:
-        message = f"fault '{text}': {_sentence(problem.errors(include_url=False)[0])}; write kind:key=value:key=value"
-        raise WrongUse(message) from None
+        raise WrongUse(
+            f"fault '{text}': {_sentence(problem.errors(include_url=False)[0])}; write kind:key=value:key=value"
+        ) from None
 
 
 def _sentence(detail: ErrorDetails) -> str:

@@ -72,19 +72,17 @@ class Limits(Strict):
     def _known(cls, figures: dict[str, Limit]) -> dict[str, Limit]:
         for name in figures:
             if name not in FIGURES:
-                message = f"unknown figure '{name}'; {did_you_mean(name, FIGURES)}"
-                raise ValueError(message)
+                raise ValueError(f"unknown figure '{name}'; {did_you_mean(name, FIGURES)}")
         return figures
 
     @model_validator(mode="after")
     def _units_agree(self) -> Limits:
         for name, limit in self.figures.items():
             if limit.unit != FIGURES[name]:
-                message = (
+                raise ValueError(
                     f"figures.{name}: the limit is in {limit.unit}, the figure is in {FIGURES[name]}; "
                     f"give the limit in {FIGURES[name]}"
                 )
-                raise ValueError(message)
         return self
 
 

@@ -45,23 +45,21 @@ class ModelFile(Strict):
         effects = self.model.effects
         twice = sorted({e for e in effects if effects.count(e) > 1})
         if twice:
-            message = f"model.effects: {', '.join(twice)} is there twice, each may be there once; remove the second"
-            raise ValueError(message)
+            raise ValueError(
+                f"model.effects: {', '.join(twice)} is there twice, each may be there once; remove the second"
+            )
         formulas = [formula.id for formula in self.formula]
         again = sorted({f for f in formulas if formulas.count(f) > 1})
         if again:
-            message = f"formula: {', '.join(again)} is there twice, each may be there once; rename the second"
-            raise ValueError(message)
+            raise ValueError(f"formula: {', '.join(again)} is there twice, each may be there once; rename the second")
         versions = [change.version for change in self.change]
         if versions != sorted(set(versions)):
-            message = f"change: versions {versions} do not rise; write one [[change]] per version, oldest first"
-            raise ValueError(message)
+            raise ValueError(f"change: versions {versions} do not rise; write one [[change]] per version, oldest first")
         if versions and versions[-1] != self.model.version:
-            message = (
+            raise ValueError(
                 f"model.version: {self.model.version}, but the last [[change]] led to {versions[-1]}; "
                 "every version needs its [[change]]"
             )
-            raise ValueError(message)
         return self
 
 

@@ -81,19 +81,19 @@ class Register(Strict):
     @model_validator(mode="after")
     def _fits(self) -> Register:
         if self.end > ADDRESSES:
-            message = f"{self.name}: ends at address {self.end}, the last one is {ADDRESSES - 1}; move or shorten it"
-            raise ValueError(message)
+            raise ValueError(
+                f"{self.name}: ends at address {self.end}, the last one is {ADDRESSES - 1}; move or shorten it"
+            )
         if (self.space in BITS) != (self.type == "bit"):
-            message = (
+            raise ValueError(
                 f"{self.name}: type {self.type} in space {self.space}; coils and discrete inputs hold bits, others none"
             )
-            raise ValueError(message)
         if self.space in READ_ONLY and self.writable:
-            message = f"{self.name}: access {self.access} in space {self.space}, which can only be read; correct one"
-            raise ValueError(message)
+            raise ValueError(
+                f"{self.name}: access {self.access} in space {self.space}, which can only be read; correct one"
+            )
         if (self.enumeration or self.bits) and self.type in {"float32", "string"}:
-            message = f"{self.name}: {self.type} cannot hold an enumeration or bits; use an integer type"
-            raise ValueError(message)
+            raise ValueError(f"{self.name}: {self.type} cannot hold an enumeration or bits; use an integer type")
         return self
 
 
@@ -155,8 +155,9 @@ class Profile(Strict):
         spoken = self.links == ["ascii"]
         if not (self.commands if spoken else self.registers) or (self.registers if spoken else self.commands):
             carriers = ", ".join(self.links)
-            message = f"links {carriers}: a device on ascii has commands alone, any other registers alone; correct it"
-            raise ValueError(message)
+            raise ValueError(
+                f"links {carriers}: a device on ascii has commands alone, any other registers alone; correct it"
+            )
         _refuse_overlaps(self)
         for register in self.registers:
             if register.scaled_by:
@@ -170,16 +171,19 @@ class Profile(Strict):
         for register in self.registers:
             if register.name == name:
                 return register
-        message = f"profile {self.name}: no register '{name}'; {did_you_mean(name, (r.name for r in self.registers))}"
-        raise RecipeInvalid(message, key=name)
+        raise RecipeInvalid(
+            f"profile {self.name}: no register '{name}'; {did_you_mean(name, (r.name for r in self.registers))}",
+            key=name,
+        )
 
     def command(self, name: str) -> Command:
         """The command of that name; an unknown one is refused with what looks like it."""
         for command in self.commands:
             if command.name == name:
                 return command
-        message = f"profile {self.name}: no command '{name}'; {did_you_mean(name, (c.name for c in self.commands))}"
-        raise RecipeInvalid(message, key=name)
+        raise RecipeInvalid(
+            f"profile {self.name}: no command '{name}'; {did_you_mean(name, (c.name for c in self.commands))}", key=name
+        )
 
     def entry(self, name: str) -> Register | Command:
         """The register or command of that name."""
@@ -209,24 +213,26 @@ def _refuse_overlaps(profile: Profile) -> None:
     spans.sort()
     for (space, _, end, name), (next_space, start, _, following) in pairwise(spans):
         if space == next_space and start < end:
-            message = f"registers {name} and {following} overlap at address {start}; each needs its own; correct one"
-            raise ValueError(message)
+            raise ValueError(
+                f"registers {name} and {following} overlap at address {start}; each needs its own; correct one"
+            )
     names = [entry.name for entry in (*profile.registers, *profile.commands)]
     twice = sorted({name for name in names if names.count(name) > 1})
     if twice:
-        message = f"register {', '.join(twice)} is there twice, each name may be there once; rename one"
-        raise ValueError(message)
+        raise ValueError(f"register {', '.join(twice)} is there twice, each name may be there once; rename one")
 
 
 def _refuse_gaps(group: str, registers: list[Register]) -> None:
     """A group is written in one request, so its registers follow each other without a gap."""
     for left, right in pairwise(registers):
         if left.end != right.address or left.space != right.space:
-            message = f"group {group}: {right.name} does not follow {left.name} ({left.end} is needed); order them"
-            raise ValueError(message)
+            raise ValueError(
+                f"group {group}: {right.name} does not follow {left.name} ({left.end} is needed); order them"
+            )
     if sum(r.words for r in registers) > LONGEST_WRITE:
-        message = f"group {group}: more than {LONGEST_WRITE} registers cannot be written in one request; split it"
-        raise ValueError(message)
+        raise ValueError(
+            f"group {group}: more than {LONGEST_WRITE} registers cannot be written in one request; split it"
+        )
 
 
 def parse_profile(text: str, source: str) -> Profile:
@@ -234,7 +240,6 @@ def parse_profile(text: str, source: str) -> Profile:
     try:
         return Profile.model_validate(tomllib.loads(text))
     except tomllib.TOMLDecodeError as problem:
-        message = f"{source}: not valid TOML: {problem}; correct the file"
-        raise RecipeInvalid(message) from None
+        raise RecipeInvalid(f"{source}: not valid TOML: {problem}; correct the file") from None
     except ValidationError as problem:
         raise explain(problem, source, Profile) from None

@@ -99,8 +99,9 @@ class Lot(Strict):
             texts = [str(value) for value in values]
             twice = sorted({text for text in texts if texts.count(text) > 1})
             if twice:
-                message = f"{what} {', '.join(twice)} is there twice, each may be there once; correct the list of units"
-                raise ValueError(message)
+                raise ValueError(
+                    f"{what} {', '.join(twice)} is there twice, each may be there once; correct the list of units"
+                )
         return self
 
 
@@ -145,18 +146,19 @@ class _Measurement(Strict):
     @model_validator(mode="after")
     def _usable(self) -> _Measurement:
         if self.soak_min_s < SHORTEST_SOAK_S and not self.allow_short_soak:
-            message = (
+            raise ValueError(
                 f"soak_min_s: {self.soak_min_s:g} s, the recipe needs {SHORTEST_SOAK_S:g} s; soak longer, or set "
                 "allow_short_soak = true and answer for the temperature gradients"
             )
-            raise ValueError(message)
         if self.soaks and [s.temperature_C for s in self.soaks] != self.temperatures_C:
-            message = "soaks, temperatures_C: they say different temperatures, one of the two is enough; remove temperatures_C"
-            raise ValueError(message)
+            raise ValueError(
+                "soaks, temperatures_C: they say different temperatures, one of the two is enough; remove temperatures_C"
+            )
         samples = int(self.dwell_s * self.rate_hz)
         if samples < FEWEST_SAMPLES:
-            message = f"dwell_s: {samples} samples per pose, a mean needs {FEWEST_SAMPLES}; raise dwell_s or rate_hz"
-            raise ValueError(message)
+            raise ValueError(
+                f"dwell_s: {samples} samples per pose, a mean needs {FEWEST_SAMPLES}; raise dwell_s or rate_hz"
+            )
         return self
 
     @field_validator("temperatures_C")
@@ -164,10 +166,9 @@ class _Measurement(Strict):
     def _no_soak_twice_in_a_row(cls, values: list[float]) -> list[float]:
         again = sorted({f"{a:g}" for a, b in pairwise(values) if a == b})
         if again:
-            message = (
+            raise ValueError(
                 f"{', '.join(again)} °C is there twice in a row, a soak goes to another temperature; remove the second"
             )
-            raise ValueError(message)
         return values
 
     @field_validator("effects", "units")
@@ -175,8 +176,7 @@ class _Measurement(Strict):
     def _no_repeats(cls, values: list[Any]) -> list[Any]:
         twice = sorted({str(v) for v in values if values.count(v) > 1})
         if twice:
-            message = f"{', '.join(twice)} is there twice, each may be there once; remove the second"
-            raise ValueError(message)
+            raise ValueError(f"{', '.join(twice)} is there twice, each may be there once; remove the second")
         return values
 
 
@@ -206,8 +206,7 @@ class RecipeFile(_Measurement):
     @model_validator(mode="after")
     def _one_model(self) -> RecipeFile:
         if bool(self.model) == bool(self.effects):
-            message = "effects, model: one of the two is needed; list the effects, or name a model file"
-            raise ValueError(message)
+            raise ValueError("effects, model: one of the two is needed; list the effects, or name a model file")
         return self
 
 
@@ -227,18 +226,16 @@ class Recipe(_Measurement):
             for key, listed in (("poses", self.poses), ("verification", self.verification)):
                 beyond = [k for k in getattr(part, key) or [] if k > len(listed)]
                 if beyond:
-                    message = (
+                    raise ValueError(
                         f"soaks: soak {number} names {key} {beyond[0]}, there are {len(listed)}; correct the number"
                     )
-                    raise ValueError(message)
             for key, what in (("waits_s", "waits"), ("off_s", "times without power")):
                 given, count = getattr(part, key), len(self.poses_at(number - 1))
                 if given is not None and len(given) != count:
-                    message = (
+                    raise ValueError(
                         f"soaks: soak {number} has {len(given)} {what} for {count} poses, each pose needs one; "
                         f"correct {key}"
                     )
-                    raise ValueError(message)
         return self
 
     def waits_at(self, soak: int) -> list[float]:
@@ -290,8 +287,9 @@ def read_text(path: Path, what: str, form: str = "TOML") -> str:
         return path.read_text(encoding="utf-8")
     except (OSError, UnicodeDecodeError) as problem:
         reason = problem.strerror if isinstance(problem, OSError) else "not UTF-8 text"
-        message = f"{what}: {path} cannot be read ({reason}); give the path of a {what} file in {form}"
-        raise RecipeInvalid(message) from None
+        raise RecipeInvalid(
+            f"{what}: {path} cannot be read ({reason}); give the path of a {what} file in {form}"
+        ) from None
 
 
 def parse_toml(text: str, source: str) -> dict[str, Any]:
@@ -299,8 +297,7 @@ def parse_toml(text: str, source: str) -> dict[str, Any]:
     try:
         return tomllib.loads(text)
     except tomllib.TOMLDecodeError as problem:
-        message = f"{source}: not valid TOML: {problem}; correct the file"
-        raise RecipeInvalid(message) from None
+        raise RecipeInvalid(f"{source}: not valid TOML: {problem}; correct the file") from None
 
 
 def explain(problem: ValidationError, source: str, model: type[BaseModel]) -> RecipeInvalid:

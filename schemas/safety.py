@@ -50,11 +50,10 @@ class Safety(Strict):
     @model_validator(mode="after")
     def _notices_in_time(self) -> Safety:
         if self.lapse_s < 2.0 * self.heartbeat_s:
-            message = (
+            raise ValueError(
                 f"lapse_s: {self.lapse_s:g} s, two heartbeats of {self.heartbeat_s:g} s are needed at least; raise lapse_s, "
                 "or lower heartbeat_s"
             )
-            raise ValueError(message)
         return self
 
 

@@ -17,8 +17,7 @@ def refuse_unprintable(serials: Iterable[str], where: str) -> None:
     for serial in serials:
         bad = next((letter for letter in serial if letter in SEPARATORS or not letter.isprintable()), "")
         if bad:
-            message = (
+            raise DataRejected(
                 f"{where}: serial {serial!r} has {bad!r} in it, letters, digits and signs without separators of paths and line "
                 "ends are needed; correct it, or give another with --unit"
             )
-            raise DataRejected(message)

@@ -43,11 +43,10 @@ class Slots(Carried):
     def _addressable(self) -> Slots:
         last = self.device_id + self.count - 1
         if last > LAST_DEVICE_ID:
-            message = (
+            raise ValueError(
                 f"count: {self.count} slots from device_id {self.device_id} end at {last}, {LAST_DEVICE_ID} is the last id "
                 "that Modbus has; begin lower"
             )
-            raise ValueError(message)
         return self
 
 
@@ -80,8 +79,7 @@ class Limits(Strict):
             ("temperature_C", self.temperature_C),
         ):
             if low >= high:
-                message = f"limits.{name}: {low} is not below {high}; give the lower bound first"
-                raise ValueError(message)
+                raise ValueError(f"limits.{name}: {low} is not below {high}; give the lower bound first")
         return self
 
 
@@ -162,23 +160,20 @@ class StationConfig(Strict):
     def _can_be_safe(self) -> StationConfig:
         low, high = self.limits.temperature_C
         if self.safety.chamber == "set_point" and not low <= self.safety.temperature_C <= high:
-            message = (
+            raise ValueError(
                 f"safety.temperature_C: {self.safety.temperature_C:g} °C, {low:g} to {high:g} °C is allowed by [limits]; "
                 "choose one inside, or another safety.chamber"
             )
-            raise ValueError(message)
         return self
 
     @model_validator(mode="after")
     def _complete(self) -> StationConfig:
         if self.kind == "simulated" and self.simulation is None:
-            message = "simulation: missing, a station of kind simulated needs it; add [simulation]"
-            raise ValueError(message)
+            raise ValueError("simulation: missing, a station of kind simulated needs it; add [simulation]")
         if self.kind == "modbus":
             for name in Devices.model_fields:
                 if missing := getattr(self.devices, name).missing():
-                    message = f"devices.{name}.{missing}: empty, a station of kind modbus needs one; add it"
-                    raise ValueError(message)
+                    raise ValueError(f"devices.{name}.{missing}: empty, a station of kind modbus needs one; add it")
         return self
 
 
@@ -188,8 +183,7 @@ def with_faults(config: StationConfig, faults: Sequence[FaultOrder]) -> StationC
         return config
     if config.kind != "simulated" or config.simulation is None:
         found = f"fault {faults[0].kind} on kind {config.kind}"
-        message = f"station {config.name}: {found}, a simulated station is needed; leave it out"
-        raise WrongUse(message)
+        raise WrongUse(f"station {config.name}: {found}, a simulated station is needed; leave it out")
     simulation = config.simulation.model_copy(update={"faults": [*config.simulation.faults, *faults]})
     return config.model_copy(update={"simulation": simulation})
 
@@ -204,7 +198,6 @@ def load_station(path: Path | None = None) -> StationConfig:
     try:
         return StationConfig.model_validate(tomllib.loads(text))
     except tomllib.TOMLDecodeError as problem:
-        message = f"{source}: not valid TOML: {problem}; correct the file"
-        raise RecipeInvalid(message) from None
+        raise RecipeInvalid(f"{source}: not valid TOML: {problem}; correct the file") from None
     except ValidationError as problem:
         raise explain(problem, source, StationConfig) from None

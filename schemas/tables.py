@@ -338,8 +338,9 @@ def _refuse_missing_columns(table: Table, frame: pd.DataFrame, source: str) -> N
     missing = [column for column in table.columns if column not in frame.columns]
     if missing:
         found = ", ".join(map(str, frame.columns)) or "none"
-        message = f"{source}: column {', '.join(missing)} is missing, found {found}; add it, or map it to its name"
-        raise DataRejected(message)
+        raise DataRejected(
+            f"{source}: column {', '.join(missing)} is missing, found {found}; add it, or map it to its name"
+        )
 
 
 def _refuse_not_finite(table: Table, frame: pd.DataFrame, source: str) -> None:
@@ -353,11 +354,10 @@ def _refuse_not_finite(table: Table, frame: pd.DataFrame, source: str) -> None:
         bad = np.flatnonzero(~np.isfinite(values))
         if bad.size:
             index = rows.index[bad[0]]
-            message = (
+            raise DataRejected(
                 f"{source}: {_row(rows, index)}, column {column}: found {rows[column].loc[index]}, a finite number is "
                 f"needed ({bad.size} such rows); measure again or leave the row out"
             )
-            raise DataRejected(message)
 
 
 def _refuse_twice(table: Table, frame: pd.DataFrame, source: str) -> None:
@@ -367,8 +367,9 @@ def _refuse_twice(table: Table, frame: pd.DataFrame, source: str) -> None:
     if twice.any():
         index = frame.index[int(np.flatnonzero(twice.to_numpy())[0])]
         named = ", ".join(f"{column} {frame[column].loc[index]}" for column in table.key)
-        message = f"{source}: row {index}: {named} is there twice, it may be there once; remove one of the two"
-        raise DataRejected(message)
+        raise DataRejected(
+            f"{source}: row {index}: {named} is there twice, it may be there once; remove one of the two"
+        )
 
 
 def _explain(problem: SchemaError, frame: pd.DataFrame, source: str) -> str:

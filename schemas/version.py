@@ -15,5 +15,6 @@ def refuse_newer(version: object, where: str) -> None:
     where : names the file in a message.
     """
     if isinstance(version, int) and version > VERSION:
-        message = f"archive: {where} has schema {version}, this version knows up to {VERSION}; use a newer version"
-        raise ArchiveUnusable(message)
+        raise ArchiveUnusable(
+            f"archive: {where} has schema {version}, this version knows up to {VERSION}; use a newer version"
+        )

@@ -41,8 +41,9 @@ def encode(register: Register, order: WordOrder, value: Value) -> list[int]:
         return _encode_text(register, value)
     values = value if isinstance(value, list) else [value]
     if len(values) != register.count:
-        message = f"{register.name}: {len(values)} values, the register holds {register.count}; give that many"
-        raise NotEncodable(message)
+        raise NotEncodable(
+            f"{register.name}: {len(values)} values, the register holds {register.count}; give that many"
+        )
     return [word for one in values for word in _encode_number(register, order, one)]
 
 
@@ -58,8 +59,9 @@ def decode(register: Register, order: WordOrder, words: Sequence[int]) -> Value:
 
 def _encode_text(register: Register, value: Value) -> list[int]:
     if not isinstance(value, str) or not value.isascii() or len(value) > 2 * register.count:
-        message = f"{register.name}: {value!r} is not an ASCII text of at most {2 * register.count} characters"
-        raise NotEncodable(message)
+        raise NotEncodable(
+            f"{register.name}: {value!r} is not an ASCII text of at most {2 * register.count} characters"
+        )
     raw = value.encode("ascii").ljust(2 * register.count, b"\0")
     return list(struct.unpack(f">{register.count}H", raw))
 
@@ -72,8 +74,9 @@ def _encode_number(register: Register, order: WordOrder, value: float | str) -> 
         raw = round(number / register.scale)
         low, high = _RANGE[register.type]
         if not low <= raw <= high:
-            message = f"{register.name}: {value} {register.unit} does not fit {register.type}; give a smaller value"
-            raise NotEncodable(message)
+            raise NotEncodable(
+                f"{register.name}: {value} {register.unit} does not fit {register.type}; give a smaller value"
+            )
         if register.type == "bit":
             return (int(raw),)
     packed = struct.pack(_FORMAT[register.type], raw)
@@ -91,13 +94,13 @@ def _number(register: Register, value: float | str) -> float:
     """The number behind a value, inside the register's limits."""
     if isinstance(value, str):
         if value not in register.enumeration:
-            message = f"{register.name}: '{value}' is none of {', '.join(register.enumeration) or 'nothing named'}"
-            raise NotEncodable(message)
+            raise NotEncodable(
+                f"{register.name}: '{value}' is none of {', '.join(register.enumeration) or 'nothing named'}"
+            )
         return register.enumeration[value] * register.scale
     low, high = register.minimum, register.maximum
     if (low is not None and not value >= low) or (high is not None and not value <= high):
-        message = f"{register.name}: {value} {register.unit} is outside {low} to {high}; give a value inside"
-        raise NotEncodable(message)
+        raise NotEncodable(f"{register.name}: {value} {register.unit} is outside {low} to {high}; give a value inside")
     return value
 
 

@@ -175,11 +175,11 @@ def tighter(bounds: tuple[float, float], profile: Profile, name: str) -> tuple[f
     low = bounds[0] if own.minimum is None else max(bounds[0], own.minimum)
     high = bounds[1] if own.maximum is None else min(bounds[1], own.maximum)
     if low >= high:
-        message = (
+        raise RecipeInvalid(
             f"profile {profile.name}: {name} from {own.minimum} to {own.maximum} {own.unit}, the station's limits are "
-            f"{bounds[0]:g} to {bounds[1]:g}: nothing is allowed by both; correct [limits] in the station's file"
+            f"{bounds[0]:g} to {bounds[1]:g}: nothing is allowed by both; correct [limits] in the station's file",
+            key="limits",
         )
-        raise RecipeInvalid(message, key="limits")
     return low, high
 
 

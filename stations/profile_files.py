@@ -32,7 +32,6 @@ def profile_of(device: Carried) -> Profile:
 def load_profile(name: str) -> Profile:
     """The profile of that name; an unknown one is refused with what looks like it."""
     if name not in profile_names():
-        message = f"profile: no '{name}'; {did_you_mean(name, profile_names())}"
-        raise RecipeInvalid(message, key="profile")
+        raise RecipeInvalid(f"profile: no '{name}'; {did_you_mean(name, profile_names())}", key="profile")
     source = f"stations/profiles/{name}.toml"
     return parse_profile(files("stations").joinpath("profiles", f"{name}.toml").read_text("utf-8"), source)

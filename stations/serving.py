@@ -84,8 +84,9 @@ def serve(
     unless a client starts it.
     """
     if config.kind != "simulated":
-        message = f"station {config.name}: kind {config.kind}, only a simulated station can be served; give such a file"
-        raise WrongUse(message)
+        raise WrongUse(
+            f"station {config.name}: kind {config.kind}, only a simulated station can be served; give such a file"
+        )
     from stations.clock import WallClock  # noqa: PLC0415 - only serving needs these
     from stations.opening import make_plant  # noqa: PLC0415
     from stations.plant.line_server import LineServer  # noqa: PLC0415
@@ -126,8 +127,7 @@ def look(config: StationConfig, lot: Lot | None) -> list[Reading]:
     once = config.model_copy(update={"link": config.link.model_copy(update={"read_attempts": 1})})
     if config.kind == "simulated":
         if lot is None:
-            message = f"station {config.name}: simulated, it needs a lot of units to look at; give one"
-            raise WrongUse(message)
+            raise WrongUse(f"station {config.name}: simulated, it needs a lot of units to look at; give one")
         from stations.opening import make_plant, serve_devices  # noqa: PLC0415 - hardware needs no plant
 
         with serve_devices(once, make_plant(config, lot)) as links:

@@ -50,15 +50,13 @@ class Answer:
 
 def get(self: object, url: str, **_: object) -> Answer:
     if url.rstrip("/") != CONTEXT:
-        message = f"the network was asked for {url}"
-        raise OSError(message)
+        raise OSError(f"the network was asked for {url}")
     return Answer()
 
 
 def source(url: object, *_: object, **__: object) -> object:
     if str(url) != CONTEXT:
-        message = f"the network was asked for {url}"
-        raise OSError(message)
+        raise OSError(f"the network was asked for {url}")
     return DOCUMENT, None
 
 

@@ -67,18 +67,16 @@ class Archive:
             return
         files.sweep(self.root)  # a first command that was killed leaves a name of ours, not files of others
         if self.root.is_dir() and any(self.root.iterdir()):
-            message = f"archive: {self.root} holds other files and no archive; give an empty or new folder"
-            raise ArchiveUnusable(message)
+            raise ArchiveUnusable(f"archive: {self.root} holds other files and no archive; give an empty or new folder")
         files.publish(mark, self.mark)
 
     def refuse_none(self) -> None:
         """Refuse a place that holds no archive, or one of another format."""
         mark = self.root / "archive.json"
         if not mark.is_file():
-            message = (
+            raise ArchiveUnusable(
                 f"archive: {self.root} holds no archive, one is needed; name it with --archive or TUMBLELINE_ARCHIVE"
             )
-            raise ArchiveUnusable(message)
         self._refuse_other_format(files.read_json(mark))
 
     def open_run(self, name: str, about: Mapping[str, Any], decisive: object) -> Run:
@@ -145,15 +143,13 @@ class Archive:
         """Refuse a signing key that lies in the archive: whoever edits the one could use the other."""
         key = key_place()
         if key is not None and isinstance(self.root, Path) and key.resolve().is_relative_to(self.root.resolve()):
-            message = (
+            raise ArchiveUnusable(
                 f"archive: signing key {key} lies in archive {self.root}, one outside is needed; move it elsewhere"
             )
-            raise ArchiveUnusable(message)
 
     def _refuse_other_format(self, mark: Mapping[str, Any]) -> None:
         if mark.get("format") != FORMAT:
-            message = (
+            raise ArchiveUnusable(
                 f"archive: {self.root} has format {mark.get('format')}, this version writes {FORMAT}; "
                 "use the version that wrote it, or another folder"
             )
-            raise ArchiveUnusable(message)

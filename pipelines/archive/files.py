@@ -44,11 +44,10 @@ def writing(path: Place, what: str = "archive", remedy: str = IN_ARCHIVE) -> Gen
     try:
         yield
     except OSError as problem:
-        message = (
+        raise ArchiveUnusable(
             f"{what}: {path} cannot be written ({first_line(problem)}), a folder with write permission and free space is "
             f"needed; {remedy}"
-        )
-        raise ArchiveUnusable(message) from None
+        ) from None
 
 
 def sha256(path: Place) -> str:

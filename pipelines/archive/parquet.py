@@ -63,25 +63,27 @@ def read_table(path: Place, name: str, expected: str | None = None) -> pd.DataFr
     try:
         data = path.read_bytes()
     except (FileNotFoundError, IsADirectoryError):
-        message = (
+        raise ArchiveUnusable(
             f"archive: {path} is not there, table '{name}' is needed; if the run was stopped, give its command again "
             "and it goes on"
-        )
-        raise ArchiveUnusable(message) from None
+        ) from None
     try:
         table = decoded(data)
     except (pa.ArrowInvalid, OSError) as problem:
-        message = f"archive: {path} ({len(data)} bytes) is not a whole Parquet file ({first_line(problem)}); {remedy}"
-        raise ArchiveUnusable(message) from None
+        raise ArchiveUnusable(
+            f"archive: {path} ({len(data)} bytes) is not a whole Parquet file ({first_line(problem)}); {remedy}"
+        ) from None
     marks = table.schema.metadata or {}
     mark = marks.get(TABLE_MARK, b"").decode(errors="replace")
     if mark != name:
         found = f"holds table '{mark}'" if mark else "was not written by this archive"
-        message = f"archive: {path} {found}, table '{name}' is needed; import foreign files with 'tumbleline import'"
-        raise ArchiveUnusable(message)
+        raise ArchiveUnusable(
+            f"archive: {path} {found}, table '{name}' is needed; import foreign files with 'tumbleline import'"
+        )
     if expected is not None and hash_of(data) != expected:
-        message = f"archive: {path} has changed since it was written (its hash is not its manifest's); {remedy}"
-        raise ArchiveUnusable(message)
+        raise ArchiveUnusable(
+            f"archive: {path} has changed since it was written (its hash is not its manifest's); {remedy}"
+        )
     from schemas.upgrades import upgraded
 
     return upgraded(name, table.to_pandas(use_threads=False), int(marks.get(SCHEMA_MARK, b"1")), str(path))

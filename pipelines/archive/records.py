@@ -122,11 +122,10 @@ class Records:
             return None
         content = state.read_bytes()
         if files.read_json(last / "record.json").get("state", files.hash_of(content)) != files.hash_of(content):
-            message = (
+            raise ArchiveUnusable(
                 f"archive: {state} is not the station's state that record {last.name} was stored with; restore it from a copy, "
                 "or measure the lot anew"
             )
-            raise ArchiveUnusable(message)
         return content
 
     def hash(self) -> str:

@@ -86,11 +86,10 @@ class Run:
             path, manifest = other.path / f"{name}.parquet", other.manifest(name)
             data = path.read_bytes()
             if files.hash_of(data) != manifest["sha256"]:
-                message = (
+                raise ArchiveUnusable(
                     f"archive: {path} has changed since it was written (its hash is not its manifest's); restore it from a "
                     "copy before the run is run again"
                 )
-                raise ArchiveUnusable(message)
             self._put(f"{name}.parquet", data)
             follows = self._manifests(manifest.get("inputs", {}))
             kept = {key: value for key, value in manifest.items() if key != ENTRY}  # what is told anew is signed anew
@@ -133,8 +132,7 @@ class Run:
         from schemas import tables
 
         if name not in tables.TABLES:
-            message = f"archive: no table is called '{name}'; {did_you_mean(name, tables.TABLES)}"
-            raise WrongUse(message)
+            raise WrongUse(f"archive: no table is called '{name}'; {did_you_mean(name, tables.TABLES)}")
         return read_table(path, name, self.manifest(name)["sha256"] if path.is_file() else None)
 
     def manifest(self, name: str) -> dict[str, Any]:
@@ -176,11 +174,10 @@ class Run:
         if not path.is_file() or self._manifest_key(name) != key:
             return False
         if files.sha256(path) != self.manifest(name)["sha256"]:
-            message = (
+            raise ArchiveUnusable(
                 f"archive: {path} ({path.stat().st_size} bytes) is truncated or has changed since it was written; "
                 "restore it from a copy, or remove it and its manifest to have the stage run again"
             )
-            raise ArchiveUnusable(message)
         return True
 
     def _manifest_key(self, name: str) -> str:

@@ -106,11 +106,13 @@ def make_key(place: Path) -> Ed25519PublicKey:
         with os.fdopen(os.open(place, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600), "wb") as file:
             file.write(pem)
     except FileExistsError:
-        message = f"archive key: {place} is there already, a new file is needed; keep it, or name another with --output"
-        raise WrongUse(message) from None
+        raise WrongUse(
+            f"archive key: {place} is there already, a new file is needed; keep it, or name another with --output"
+        ) from None
     except OSError as problem:
-        message = f"archive key: {place} cannot be written ({problem.strerror}); name another file with --output"
-        raise WrongUse(message) from None
+        raise WrongUse(
+            f"archive key: {place} cannot be written ({problem.strerror}); name another file with --output"
+        ) from None
     return key.public_key()
 
 
@@ -133,16 +135,16 @@ def _private(place: str) -> tuple[Ed25519PrivateKey, str]:
     try:
         key = load_pem_private_key(Path(place).read_bytes(), None)
     except OSError as problem:
-        message = f"archive: signing key {place} cannot be read ({problem.strerror}); correct {VARIABLE}, or unset it"
-        raise ArchiveUnusable(message) from None
+        raise ArchiveUnusable(
+            f"archive: signing key {place} cannot be read ({problem.strerror}); correct {VARIABLE}, or unset it"
+        ) from None
     except (ValueError, TypeError):
         key = None
     if not isinstance(key, Ed25519PrivateKey):
-        message = (
+        raise ArchiveUnusable(
             f"archive: {place} is no signing key, an Ed25519 key in PEM without a passphrase is needed; make one with "
             "'tumbleline archive key'"
         )
-        raise ArchiveUnusable(message)
     return key, name_of(key.public_key())
 
 
@@ -158,6 +160,7 @@ def _public(text: str) -> Ed25519PublicKey:
     except (OSError, ValueError):
         key = None
     if not isinstance(key, Ed25519PublicKey):
-        message = f"verify: '{text}' is no public key, an Ed25519 key in PEM or 64 hexadecimal digits are needed; correct --key"
-        raise WrongUse(message)
+        raise WrongUse(
+            f"verify: '{text}' is no public key, an Ed25519 key in PEM or 64 hexadecimal digits are needed; correct --key"
+        )
     return key

@@ -187,10 +187,9 @@ class ObjectPath:
         except FileNotFoundError:
             raise
         except OSError as problem:
-            message = (
+            raise ArchiveUnusable(
                 f"archive: {self} cannot be reached ({first_line(problem)}), a store that answers is needed; {REMEDY}"
-            )
-            raise ArchiveUnusable(message) from None
+            ) from None
 
 
 Place: TypeAlias = Path | ObjectPath
@@ -212,11 +211,10 @@ def place_of(address: str | Path | ObjectPath) -> Place:
         system, key = FileSystem.from_uri(address)
     except (pa.ArrowInvalid, pa.ArrowNotImplementedError, OSError) as problem:
         shown = _without_secrets(address)
-        message = (
+        raise ArchiveUnusable(
             f"archive: address '{shown}' cannot be used ({first_line(problem).replace(address, shown)}), a folder or an address "
             "such as s3://bucket/folder?endpoint_override=host:port&scheme=http is needed; correct it"
-        )
-        raise ArchiveUnusable(message) from None
+        ) from None
     return ObjectPath(system, key, scheme, address)
 
 

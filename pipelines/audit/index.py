@@ -100,8 +100,9 @@ class AuditIndex:
             ]
         except (OSError, pa.ArrowInvalid) as problem:
             where = self.parts[0].parent
-            message = f"archive: index {where} cannot be read ({first_line(problem)}); remove {where}, it is made again by itself"
-            raise ArchiveUnusable(message) from None
+            raise ArchiveUnusable(
+                f"archive: index {where} cannot be read ({first_line(problem)}); remove {where}, it is made again by itself"
+            ) from None
         if not found:
             return pa.table({n: pa.array([], SCHEMAS[name].field(n).type) for n in chosen})
         return pa.concat_tables(found).unify_dictionaries()

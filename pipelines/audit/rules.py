@@ -64,10 +64,9 @@ class Rules(Strict):
     @model_validator(mode="after")
     def _ordered(self) -> Rules:
         if self.shortest_months > self.longest_months:
-            message = (
+            raise ValueError(
                 f"shortest_months: {self.shortest_months} is above longest_months, {self.longest_months}; exchange them"
             )
-            raise ValueError(message)
         return self
 
     def months(self, device: str) -> int:
@@ -113,11 +112,9 @@ def _checked(tolerances: dict[str, Tolerance]) -> dict[str, Tolerance]:
     for name, tolerance in tolerances.items():
         if name not in FAMILIES or not FAMILIES[name].own:
             own = [family for family, content in FAMILIES.items() if content.own]
-            message = f"unknown parameter '{name}'; {did_you_mean(name, own)}"
-            raise ValueError(message)
+            raise ValueError(f"unknown parameter '{name}'; {did_you_mean(name, own)}")
         if tolerance.unit != FAMILIES[name].unit:
-            message = (
+            raise ValueError(
                 f"tolerance.{name}: found {tolerance.unit}, the parameter is in {FAMILIES[name].unit}; give it in that"
             )
-            raise ValueError(message)
     return tolerances

@@ -106,8 +106,7 @@ def _about(files: RunFiles) -> dict[str, Any]:
         raise ValueError(files.trouble)
     content = json.loads(files.content[START])
     if not isinstance(content, dict):
-        message = f"{START} holds no manifest"
-        raise ValueError(message)  # noqa: TRY004 - what stands in a file, not what a caller gave
+        raise ValueError(f"{START} holds no manifest")  # noqa: TRY004 - what stands in a file, not what a caller gave
     return content
 
 
@@ -120,18 +119,15 @@ def _tables(files: RunFiles) -> dict[str, pa.Table]:
 def _table(name: str, content: Mapping[str, bytes]) -> pa.Table:
     data, wanted = content[f"{name}.parquet"], READ[name]
     if f"{name}.json" not in content:
-        message = f"{name}.parquet has no manifest"
-        raise ValueError(message)
+        raise ValueError(f"{name}.parquet has no manifest")
     if hashlib.sha256(data).hexdigest() != json.loads(content[f"{name}.json"])["sha256"]:
-        message = f"{name}.parquet has changed since it was written"
-        raise ValueError(message)
+        raise ValueError(f"{name}.parquet has changed since it was written")
     texts = [field.name for field in wanted if field.type == _FEW]
     file = pq.ParquetFile(pa.BufferReader(data), read_dictionary=texts, pre_buffer=False)
     marks = file.schema_arrow.metadata or {}
     mark = marks.get(TABLE_MARK, b"").decode(errors="replace")
     if mark != name:
-        message = f"{name}.parquet holds '{mark or 'a foreign table'}'"
-        raise ValueError(message)
+        raise ValueError(f"{name}.parquet holds '{mark or 'a foreign table'}'")
     version = int(marks.get(SCHEMA_MARK, b"1"))
     if version == VERSION:
         table = file.read(columns=wanted.names, use_threads=False)  # threads cost more than so few rows

@@ -89,8 +89,9 @@ def _one_reading_statement(sql: str) -> str:
     kinds = [statement.type.name for statement in statements]
     if len(kinds) != 1 or kinds[0] not in READING:
         found = ", ".join(kinds).lower() or "no statement"
-        message = f"query: found {found}, one SELECT is needed (the archive is only read); ask one question at a time"
-        raise WrongUse(message)
+        raise WrongUse(
+            f"query: found {found}, one SELECT is needed (the archive is only read); ask one question at a time"
+        )
     return str(statements[0].query)
 
 
@@ -138,8 +139,7 @@ def _of_runs(archive: Archive, name: str) -> Callable[[duckdb.DuckDBPyConnection
             connection.execute(f"CREATE VIEW {name} AS SELECT * FROM {name}_rows")  # noqa: S608 - our own names
             return
         if next(runs.glob(f"*/{name}.parquet"), None) is None:
-            message = f"query: no run in {archive.root} has a table '{name}'; there is nothing to ask"
-            raise WrongUse(message)
+            raise WrongUse(f"query: no run in {archive.root} has a table '{name}'; there is nothing to ask")
         source = f"read_parquet({_text(f'{runs}/*/{name}.parquet')}, filename = true, union_by_name = true)"
         run = "split_part(filename, '/', -2) AS run"
         connection.execute(f"CREATE VIEW {name} AS SELECT {run}, * EXCLUDE (filename) FROM {source}")  # noqa: S608

@@ -79,17 +79,17 @@ class Acquisition:
                     self.lose(unit.serial, fault_text(unit.slot, problem))
                 continue
             if identity.serial != unit.serial:
-                message = (
+                raise OperatorNeeded(
                     f"slot {unit.slot}: '{identity.serial}' sits there, '{unit.serial}' is needed; "
                     "seat the unit, or correct the lot"
                 )
-                raise OperatorNeeded(message)
             self.identities[unit.serial] = identity
             if unit.serial in lost:
                 self.lost[unit.serial] = lost[unit.serial]
         if not self.identities:
-            message = "reader: no unit of the lot answers, one is needed at least; check reader, power and cables"
-            raise OperatorNeeded(message)
+            raise OperatorNeeded(
+                "reader: no unit of the lot answers, one is needed at least; check reader, power and cables"
+            )
 
     @property
     def slots(self) -> list[int]:
@@ -106,10 +106,9 @@ class Acquisition:
         self.lost[serial] = text
         self.guard.note("unit_lost", max(self.at, 0), text, f"unit {serial} is refused, the others go on")
         if not self.answering and self.at != NO_RECORD:
-            message = (
+            raise OperatorNeeded(
                 f"reader: no unit of the lot is left ({text}), one is needed at least; check reader, power and cables"
             )
-            raise OperatorNeeded(message)
 
     def lose_slots(self, slots: Sequence[int], text: str) -> None:
         """Gives the units of these slots up."""

@@ -43,11 +43,10 @@ class Soundness:
                 yield unit, problem
                 continue
             if not same:
-                message = (
+                raise OperatorNeeded(
                     f"slot {unit.slot}: '{unit.serial}' does not sit there any more; seat the units as they were, or measure "
                     "the lot anew"
                 )
-                raise OperatorNeeded(message)
 
     def refuse_strays(self, record: Record, units: Sequence[Unit]) -> None:
         """Suspends a record with a sample that cannot be the unit's."""

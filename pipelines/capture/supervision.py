@@ -122,11 +122,10 @@ class Supervisor:
         """Axes that do not stand where they were told; one that still says so when it is asked again needs a person."""
         away = self._away(pose, angles)
         if away and (still := self._away(pose, self.station.table.angles())):
-            message = (
+            raise OperatorNeeded(
                 f"{still[0].text}, and nothing moved it: either the axis was pushed or its zero is lost; look at the table, home "
                 "the axis at the drive and check its zero"
             )
-            raise OperatorNeeded(message)
         return away
 
     def _away(self, pose: Pose, angles: tuple[float, float]) -> list[Reason]:

@@ -22,15 +22,15 @@ def coefficients_of(run: Run, calibration: Calibration) -> list[dict[str, Any]]:
     try:
         data = place.read_bytes()
         if hashlib.sha256(data).hexdigest() != calibration.event.coefficients:
-            message = (
+            raise ArchiveUnusable(
                 f"calibrations: {place} is not the table that certificate {calibration.certificate} was given for (its hash is "
                 "another); restore it from a copy"
             )
-            raise ArchiveUnusable(message)
         # read_table imports pandas; and a pool of threads that is still starting when so short a process ends aborts it
         table = pq.ParquetFile(pa.BufferReader(data), pre_buffer=False).read(use_threads=False)
     except (OSError, pa.ArrowInvalid) as problem:
-        message = f"calibrations: {place} cannot be read ({first_line(problem)}); restore it from a copy"
-        raise ArchiveUnusable(message) from None
+        raise ArchiveUnusable(
+            f"calibrations: {place} cannot be read ({first_line(problem)}); restore it from a copy"
+        ) from None
     # table.take would make an array of the row numbers, and pyarrow asks pandas whether they are a series
     return [row for row in table.to_pylist() if row["unit"] == calibration.serial]

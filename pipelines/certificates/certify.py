@@ -61,10 +61,9 @@ def certify(
     first = day_of(start, "--from") if start else today()
     last = day_of(until, "--until") if until else months_after(first, months)
     if first >= last:
-        message = (
+        raise WrongUse(
             f"certify: valid from {first} until {last}, a day after the first is needed; correct --from or --until"
         )
-        raise WrongUse(message)
     proposals, result = _proposals(run, units, first, last, reason)
     for proposal in proposals:
         refuse_two_at_once(ledger, run, proposal.serial)
@@ -91,24 +90,23 @@ def _proposals(
     proposals: list[LedgerEntry] = []
     for serial in units or tuple(grades):
         if serial not in grades:
-            message = f"certify: no unit {serial!r} in run {run.id}; {did_you_mean(serial, grades)}"
-            raise WrongUse(message)
+            raise WrongUse(f"certify: no unit {serial!r} in run {run.id}; {did_you_mean(serial, grades)}")
         row = grades[serial]
         if row["outcome"] == "pass":
             proposals.append(_blank(serial, grade=str(row["grade"]), **shared))
             continue
         why = f"{row['outcome']}: {row['reasons']}"
         if units:
-            message = f"certify: unit {serial} of run {run.id} did not pass ({why}); only what passed is certified"
-            raise WrongUse(message)
+            raise WrongUse(
+                f"certify: unit {serial} of run {run.id} did not pass ({why}); only what passed is certified"
+            )
         result.left_out[serial] = why
     return proposals, result
 
 
 def _grades(run: Run) -> Any:
     if "grades" not in run.tables():
-        message = f"certify: run {run.id} has no grades, they are needed; it was imported, or it is not finished"
-        raise WrongUse(message)
+        raise WrongUse(f"certify: run {run.id} has no grades, they are needed; it was imported, or it is not finished")
     run.table("coefficients")  # refuses one that was changed since it was graded
     return run.table("grades")
 
@@ -126,12 +124,11 @@ def refuse_overdue(run: Run) -> None:
     day = str(about.get("measured") or about["when"])[:10]
     for standard in (about.get("station") or {}).get("reference", []):
         if str(standard["due"]) <= day:
-            message = (
+            raise WrongUse(
                 f"certify: run {run.id} was measured on {day}, reference standard {standard['id']} (certificate "
                 f"{standard['certificate']}) was due on {standard['due']}; have it calibrated, enter its new certificate in the "
                 "station's file, and measure again"
             )
-            raise WrongUse(message)
 
 
 def refuse_two_at_once(ledger: Ledger, run: Run, serial: str) -> None:
@@ -147,11 +144,10 @@ def refuse_two_at_once(ledger: Ledger, run: Run, serial: str) -> None:
             continue
         theirs = _measured(other)
         if own and theirs and own[0] < theirs[1] and theirs[0] < own[1]:
-            message = (
+            raise WrongUse(
                 f"certify: unit {serial} was measured in run {run.id} from {own[0]} to {own[1]} and in run {other.id} from "
                 f"{theirs[0]} to {theirs[1]}: two units have one serial; find out which is which, and give one another"
             )
-            raise WrongUse(message)
 
 
 def _measured(run: Run) -> tuple[str, str] | None:

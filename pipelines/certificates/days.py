@@ -22,8 +22,7 @@ def day_of(text: str, where: str) -> str:
         moment = datetime.fromisoformat(text)
         utc = moment.astimezone(UTC) if moment.tzinfo else moment
     except (ValueError, OverflowError):  # a zone can lead out of the calendar
-        message = f"{where}: found {text!r}, a date such as 2026-05-01 is needed; correct it"
-        raise WrongUse(message) from None
+        raise WrongUse(f"{where}: found {text!r}, a date such as 2026-05-01 is needed; correct it") from None
     return utc.date().isoformat()
 
 

@@ -74,14 +74,14 @@ def event_of(content: Mapping[str, Any], where: str) -> LedgerEntry:
     """
     schema = content.get("schema")
     if isinstance(schema, int) and schema > SCHEMA:
-        message = f"calibrations: {where} has schema {schema}, this version knows up to {SCHEMA}; use a newer version"
-        raise ArchiveUnusable(message)
+        raise ArchiveUnusable(
+            f"calibrations: {where} has schema {schema}, this version knows up to {SCHEMA}; use a newer version"
+        )
     known = {("start" if name == "from" else name): value for name, value in content.items()}
     missing = sorted(_NAMES - known.keys())
     if missing or known["action"] not in get_args(Action):
         found = f"no {missing[0]}" if missing else f"action {known['action']!r}"
-        message = f"calibrations: {where} is no event of this ledger ({found}); restore it from a copy"
-        raise ArchiveUnusable(message)
+        raise ArchiveUnusable(f"calibrations: {where} is no event of this ledger ({found}); restore it from a copy")
     known["ends"] = tuple(known["ends"])
     known["evidence"] = tuple(sorted(known["evidence"].items()))
     return LedgerEntry(**{name: known[name] for name in _NAMES})

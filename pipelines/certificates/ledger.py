@@ -75,8 +75,7 @@ class Ledger:
 
         found = histories_of(self.root)
         for folder, problem in found.problems.items():
-            message = f"calibrations: {folder} {problem}"
-            raise ArchiveUnusable(message)
+            raise ArchiveUnusable(f"calibrations: {folder} {problem}")
         return found.units
 
     def certify(
@@ -127,8 +126,7 @@ class Ledger:
         certificate : sequence of the one that is meant; 0 for all that hold today or later.
         """
         if not reason.strip():
-            message = "revoke: no reason is given, one is needed for those who relied on it; add --reason"
-            raise WrongUse(message)
+            raise WrongUse("revoke: no reason is given, one is needed for those who relied on it; add --reason")
 
         def decided(events: Sequence[LedgerEntry]) -> LedgerEntry:
             known = [one for one in calibrations_of(events) if one.start < one.until]
@@ -199,10 +197,9 @@ class Ledger:
         for event, _ in found:
             if event.serial != serial:
                 where = self._folder(serial)
-                message = (
+                raise ArchiveUnusable(
                     f"calibrations: {where} holds unit {event.serial!r}, {serial!r} is needed; restore it from a copy"
                 )
-                raise ArchiveUnusable(message)
         return found
 
 
@@ -219,8 +216,9 @@ def _events(folder: Place) -> list[tuple[LedgerEntry, str]]:
         data = place.read_bytes()
         event = event_of(files.parsed(data, place), str(place))
         if event.sequence != count or name != f"{count:06d}.json":
-            message = f"calibrations: {folder} has event {name} where number {count} is due; restore what is missing from a copy"
-            raise ArchiveUnusable(message)
+            raise ArchiveUnusable(
+                f"calibrations: {folder} has event {name} where number {count} is due; restore what is missing from a copy"
+            )
         found.append((event, hashlib.sha256(data).hexdigest()))
     return found
 
@@ -231,11 +229,10 @@ def _stamped(event: LedgerEntry, known: Sequence[tuple[LedgerEntry, str]]) -> Le
     if known:
         last = known[-1][0]
         if datetime.fromisoformat(by["when"]) < datetime.fromisoformat(last.when) - CLOCK_SLACK:
-            message = (
+            raise ArchiveUnusable(
                 f"calibrations: the clock says {by['when']}, the last event of unit {event.serial} was written at {last.when}; "
                 "set this host's clock, then give the command again (nothing was written)"
             )
-            raise ArchiveUnusable(message)
     stamp = {key: by[key] for key in ("who", "where", "when")}
     return replace(event, sequence=len(known) + 1, previous=known[-1][1] if known else "", **stamp)
 

@@ -21,22 +21,20 @@ SERIAL = re.compile(r"[A-Za-z0-9][A-Za-z0-9._+-]{0,63}")
 def refuse_serial(serial: str, where: str) -> None:
     """Refuse what cannot be printed on a device: line ends, separators of paths and the like."""
     if not SERIAL.fullmatch(serial):
-        message = (
+        raise WrongUse(
             f"{where}: serial {serial!r}, one of letters, digits and . _ + - is needed (1 to 64, the first a letter or digit); "
             "correct the serial where it was entered"
         )
-        raise WrongUse(message)
 
 
 def refuse_other_device(known: Sequence[Calibration], event: LedgerEntry) -> None:
     """Refuse a serial that the ledger knows as another kind of device, unless those calibrations were revoked."""
     devices = {one.event.device for one in known if one.state != "revoked"} - {event.device}
     if devices:
-        message = (
+        raise WrongUse(
             f"certify: unit {event.serial} of run {event.run} is a device {event.device}, the ledger knows this serial as "
             f"{', '.join(sorted(devices))}: two units have one serial; find out which is which, and give one another"
         )
-        raise WrongUse(message)
 
 
 def nothing_to_revoke(serial: str, known: Sequence[Calibration], certificate: int, day: str) -> str:

@@ -115,9 +115,8 @@ def overlapped(known: Sequence[Calibration], start: str, until: str, *, supersed
     later = [one for one in clash if one.start > start]
     if later and not supersede:
         one = later[0]
-        message = (
+        raise WrongUse(
             f"certify: unit {one.serial}: {start} to {until} overlaps calibration {one.certificate} of run {one.run}, valid "
             f"from {one.start} to {one.until}, and begins before it; choose other dates, or end that one with --supersede"
         )
-        raise WrongUse(message)
     return tuple(one.event.sequence for one in clash)

@@ -71,8 +71,9 @@ class Attendance:
     def _need(self, kind: Kind, text: str, *, lot: bool = False) -> None:
         slots = tuple((unit.slot, unit.serial) for unit in self.job.lot.units) if lot else ()
         if self.operator.ask(Prompt(kind, self.run, text, slots)) == "stop":
-            message = f"run {self.run}: stopped at '{kind}' by the operator ({text}); give the command again to go on"
-            raise OperatorNeeded(message)
+            raise OperatorNeeded(
+                f"run {self.run}: stopped at '{kind}' by the operator ({text}); give the command again to go on"
+            )
 
 
 def seated_otherwise(job: Job) -> list[str]:

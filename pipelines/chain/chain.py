@@ -44,8 +44,7 @@ class Stage:
 def _records(run: Run) -> Records:
     records = run.records
     if records is None:
-        message = f"run {run.id} has no captured records"
-        raise LookupError(message)
+        raise LookupError(f"run {run.id} has no captured records")
     return records
 
 

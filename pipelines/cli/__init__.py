@@ -90,8 +90,7 @@ class _Commands(TyperGroup):
     def resolve_command(self, ctx: Context, args: list[str]) -> tuple[str | None, Command | None, list[str]]:
         """The command that the arguments begin with; one that is not there is told with close matches."""
         if args and args[0] not in COMMANDS and not args[0].startswith("-"):
-            message = f"no command is called '{args[0]}'; {did_you_mean(args[0], COMMANDS)}"
-            raise WrongUse(message)
+            raise WrongUse(f"no command is called '{args[0]}'; {did_you_mean(args[0], COMMANDS)}")
         return super().resolve_command(ctx, args)
 
     def get_command(self, ctx: Context, cmd_name: str) -> Command | None:

@@ -69,16 +69,14 @@ def key(
     if public:
         place = output or signatures.key_place()
         if place is None:
-            message = "archive key: there is no key yet, one is needed; make it with 'tumbleline archive key'"
-            raise WrongUse(message)
+            raise WrongUse("archive key: there is no key yet, one is needed; make it with 'tumbleline archive key'")
         made = signatures.private_key(place).public_key()
     else:
         within = next((one for one in place.resolve().parents if (one / "archive.json").is_file()), None)
         if within is not None:
-            message = (
+            raise WrongUse(
                 f"archive key: {place} lies in archive {within}, a place outside is needed; name another with --output"
             )
-            raise WrongUse(message)
         made = signatures.make_key(place)
     hexadecimal = made.public_bytes_raw().hex()
     if as_json:

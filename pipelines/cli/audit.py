@@ -76,8 +76,9 @@ def scope_of(since: str, until: str, device: str, station: str) -> Scope:
     first = day_of(checked(since or FIRST, "--since"))
     last = day_of(checked(until or today(), "--until")) + 1.0
     if first >= last:
-        message = f"audit: --since {since} is after --until {until or today()}, a period is needed; exchange the two"
-        raise WrongUse(message)
+        raise WrongUse(
+            f"audit: --since {since} is after --until {until or today()}, a period is needed; exchange the two"
+        )
     return Scope(first, last, device, station, day_of(today()) + 1.0)
 
 
@@ -93,11 +94,11 @@ def _refuse_nothing(found: Audit, root: str) -> None:
     ):
         if name and len(found.all) and name not in there:
             known = [str(one) for one in np.unique(there.astype(str))]
-            message = f"audit: {option} '{name}' has no calibration in {root}; {did_you_mean(name, known)}"
-            raise WrongUse(message)
+            raise WrongUse(f"audit: {option} '{name}' has no calibration in {root}; {did_you_mean(name, known)}")
     if not len(found.all) and not found.problems:
-        message = f"audit: {root} has no calibration in this time, one at least is needed; make a run, or give another --until"
-        raise WrongUse(message)
+        raise WrongUse(
+            f"audit: {root} has no calibration in this time, one at least is needed; make a run, or give another --until"
+        )
 
 
 def _write_page(page: Path, found: Audit, told: list[AuditFinding], root: str) -> None:

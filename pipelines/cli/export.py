@@ -42,8 +42,7 @@ def command(
 
     form = "json" if as_json else form
     if form not in FORMATS:
-        message = f"export: no format is called '{form}'; {did_you_mean(form, FORMATS)}"
-        raise WrongUse(message)
+        raise WrongUse(f"export: no format is called '{form}'; {did_you_mean(form, FORMATS)}")
     found = Archive(archive).run(run)
     use_formulas_of(found)
     serials = tuple(serial.strip() for serial in units.split(",")) if units else ()
@@ -56,8 +55,9 @@ def command(
     try:
         output.write_text(text, encoding="utf-8")
     except OSError as problem:
-        message = f"export: {output} cannot be written ({problem.strerror}); give another file with --output"
-        raise WrongUse(message) from None
+        raise WrongUse(
+            f"export: {output} cannot be written ({problem.strerror}); give another file with --output"
+        ) from None
 
 
 def _tell_certificates(run: Run, chosen: Sequence[UnitCalibration]) -> None:

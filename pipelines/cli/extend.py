@@ -88,10 +88,9 @@ def _start(model: Path, effects: str, step: Any) -> tuple[str, bool]:
 
     if model.exists():
         if effects:
-            message = (
+            raise WrongUse(
                 f"extend: {model} is there, --effects is for a new file; leave --effects out, or name another file"
             )
-            raise WrongUse(message)
         return model_text(model), False
     names = [part.strip() for part in effects.split(",") if part.strip()] or list(STARTING_MODEL)
     return new_model(model, list(dict.fromkeys(names)), step.by, step.at), True

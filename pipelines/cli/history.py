@@ -74,11 +74,11 @@ def _refuse_picture(picture: Path | None, dwells: str) -> None:
     if picture is None:
         return
     if not dwells:
-        message = "history: --picture shows errors, they need --dwells; name the dwells too"
-        raise WrongUse(message)
+        raise WrongUse("history: --picture shows errors, they need --dwells; name the dwells too")
     if picture.suffix.lower() not in {".png", ".svg", ".pdf"}:
-        message = f"history: --picture {picture}: '{picture.suffix}' cannot be drawn; name a .png, .svg or .pdf file"
-        raise WrongUse(message)
+        raise WrongUse(
+            f"history: --picture {picture}: '{picture.suffix}' cannot be drawn; name a .png, .svg or .pdf file"
+        )
 
 
 def _print(rows: list[dict[str, Any]], name: str) -> None:

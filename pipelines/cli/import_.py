@@ -90,22 +90,19 @@ def _refuse_unmapped(path: Path, wanted: dict[str, Any]) -> None:
     from pipelines.importers.mapping import OUTPUT_UNITS
 
     if "columns" in wanted:
-        message = (
+        raise WrongUse(
             f"import: the output's unit is not told, one of {', '.join(OUTPUT_UNITS)} is needed; add --units output=…"
         )
-        raise WrongUse(message)
     table, _ = files.read(path)
-    message = (
+    raise WrongUse(
         f"import: no column of {path.name} is mapped, x, y and z are needed at least (its columns: "
         f"{', '.join(map(str, table.columns))}); add --map time=…,x=…,y=…,z=… and --units output=…, or --mapping FILE.toml"
     )
-    raise WrongUse(message)
 
 
 def _refuse_unknown_fit(fit: str) -> None:
     if fit and fit not in METHODS:
-        message = f"--fit: found '{fit}', one of {', '.join(METHODS)} is needed; {did_you_mean(fit, METHODS)}"
-        raise WrongUse(message)
+        raise WrongUse(f"--fit: found '{fit}', one of {', '.join(METHODS)} is needed; {did_you_mean(fit, METHODS)}")
 
 
 def _import_one(path: Path, how: Mapping, fit: str, archive: str | None) -> dict[str, Any]:

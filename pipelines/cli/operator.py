@@ -29,8 +29,7 @@ def command(
     from schemas.errors import WrongUse
 
     if go and stop:
-        message = "operator: --go and --stop, one answer is needed; leave one out"
-        raise WrongUse(message)
+        raise WrongUse("operator: --go and --stop, one answer is needed; leave one out")
     _reach(archive)
     from pipelines.flows.operator import answer, waiting
 
@@ -65,10 +64,9 @@ def _reach(archive: str | None) -> None:
         return
     found = environment_of(Archive(archive))
     if not found:
-        message = (
+        raise WrongUse(
             "operator: no orchestrator answers beside this archive, so that nothing waits there; name its --archive"
         )
-        raise WrongUse(message)
     os.environ.update(found)
 
 
@@ -77,8 +75,7 @@ def _one(found: list[Waiting], run: str) -> Waiting:
 
     if len(found) != 1:
         names = ", ".join(one.name for one in found) or "none"
-        message = (
+        raise WrongUse(
             f"operator: {len(found)} waiting runs begin with '{run}' ({names}), one is needed; write more of its name"
         )
-        raise WrongUse(message)
     return found[0]

@@ -188,8 +188,7 @@ def levels_of(base: Recipe, temperatures: str) -> tuple[float, ...]:
     try:
         given = [float(part) for part in temperatures.split(",")] if temperatures else base.temperatures_C
     except ValueError:
-        message = f"plan: --temperatures '{temperatures}' is no list of numbers; write -10,25,60"
-        raise WrongUse(message) from None
+        raise WrongUse(f"plan: --temperatures '{temperatures}' is no list of numbers; write -10,25,60") from None
     return tuple(sorted(set(given)))
 
 
@@ -203,10 +202,10 @@ def _parts(asked: OptimiseOptions) -> bool:
     )
     for option, given in other.items():
         if given:
-            message = f"plan: {option} does not go with --criterion {asked.criterion}; leave one of the two out" + (
-                "" if parts else ", or write --criterion T"
+            raise WrongUse(
+                f"plan: {option} does not go with --criterion {asked.criterion}; leave one of the two out"
+                + ("" if parts else ", or write --criterion T")
             )
-            raise WrongUse(message)
     return parts
 
 
@@ -216,8 +215,7 @@ def _parted(asked: OptimiseOptions, against: PlanContext, levels: tuple[float, .
 
     rivals, see = _names(asked.part), _names(asked.see)
     if not rivals:
-        message = "plan: --criterion T needs the effects to tell apart; write --part third_order,odd_quadratic"
-        raise WrongUse(message)
+        raise WrongUse("plan: --criterion T needs the effects to tell apart; write --part third_order,odd_quadratic")
     refuse_unknown_effects(rivals, "plan: --part")
     refuse_unknown_effects(see, "plan: --see")
     _refuse_unknown_plan(asked.poses)
@@ -240,8 +238,7 @@ def _refuse_unknown_plan(name: str) -> None:
     from inertial.poses import NAMED
 
     if name and name not in NAMED:
-        message = f"plan: no plan of poses is called '{name}'; {did_you_mean(name, list(NAMED))}"
-        raise WrongUse(message)
+        raise WrongUse(f"plan: no plan of poses is called '{name}'; {did_you_mean(name, list(NAMED))}")
 
 
 def _wish(asked: OptimiseOptions, base: Recipe, against: PlanContext, levels: tuple[float, ...]) -> Requirement:
@@ -254,8 +251,7 @@ def _wish(asked: OptimiseOptions, base: Recipe, against: PlanContext, levels: tu
     criteria = {name.lower(): name for name in get_args(Criterion)}
     if asked.criterion.lower() not in criteria:
         known = [*get_args(Criterion), "T"]
-        message = f"plan: no criterion '{asked.criterion}'; {did_you_mean(asked.criterion, known)}"
-        raise WrongUse(message)
+        raise WrongUse(f"plan: no criterion '{asked.criterion}'; {did_you_mean(asked.criterion, known)}")
     _refuse_unknown_plan(asked.poses)
     see = _names(asked.see)
     refuse_unknown_effects(see, "plan: --see")
@@ -285,9 +281,7 @@ def _limits(wanted: tuple[str, ...], model: list[str]) -> dict[str, float]:
         except ValueError:
             limits[effect] = 0.0
         if effect not in model:
-            message = f"plan: --wanted '{text}': '{effect}' is not in the model; {did_you_mean(effect, model)}"
-            raise WrongUse(message)
+            raise WrongUse(f"plan: --wanted '{text}': '{effect}' is not in the model; {did_you_mean(effect, model)}")
         if not limits[effect] > 0.0:
-            message = f"plan: --wanted '{text}': a positive error in µg is needed; write {effect}=50"
-            raise WrongUse(message)
+            raise WrongUse(f"plan: --wanted '{text}': a positive error in µg is needed; write {effect}=50")
     return limits

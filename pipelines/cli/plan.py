@@ -227,8 +227,9 @@ def _save(path: Path, text: str) -> None:
     try:
         path.write_text(text, encoding="utf-8")
     except OSError as problem:
-        message = f"plan: {path} cannot be written ({problem.strerror}); give a file in a folder that is there"
-        raise WrongUse(message) from None
+        raise WrongUse(
+            f"plan: {path} cannot be written ({problem.strerror}); give a file in a folder that is there"
+        ) from None
 
 
 def with_model(recipe: str, effects: str, model: Path | None, archive: str | None, station: str) -> Recipe:

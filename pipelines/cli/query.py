@@ -36,8 +36,7 @@ def command(
     from pipelines.audit.sql import ask
 
     if as_json and as_csv:
-        message = "query: --json and --csv are both given, one is needed; leave one out"
-        raise WrongUse(message)
+        raise WrongUse("query: --json and --csv are both given, one is needed; leave one out")
     answer = ask(Archive(archive), sql, compact=compact)
     if as_json:
         print_json(

@@ -64,15 +64,13 @@ def _released(
 
     if model is None or not since:
         missing = "a model file" if model is None else "--from DATE"
-        message = f"release: {missing} is missing, both are needed; name the model and from when, or give --list"
-        raise WrongUse(message)
+        raise WrongUse(f"release: {missing} is missing, both are needed; name the model and from when, or give --list")
     return release(store, wanted("", model, "", effect_file, where="release"), moment(since, "--from"), **how)
 
 
 def _refuse_both(model: Path | None) -> None:
     if model is not None:
-        message = f"release: --list and the model {model.name} are both given, one is needed; leave one out"
-        raise WrongUse(message)
+        raise WrongUse(f"release: --list and the model {model.name} are both given, one is needed; leave one out")
 
 
 def _list(store: Archive, *, as_json: bool) -> None:

@@ -88,11 +88,10 @@ def _refuse_check_of_another(refused: bool) -> None:
     from schemas.errors import WrongUse
 
     if refused:
-        message = (
+        raise WrongUse(
             "rerun: --check with another model or limits has nothing to compare with; leave --effects, --model and --limits "
             "out, or leave --check out and compare with 'tumbleline diff'"
         )
-        raise WrongUse(message)
 
 
 def _mapped(

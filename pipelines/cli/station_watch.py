@@ -85,8 +85,7 @@ def _source(run: str, station: Path | None, archive: str | None) -> Generator[Lo
         found = Archive(archive).run(run)
         records = found.records
         if records is None:
-            message = f"run {found.id}: its data were imported, there is no station to watch; name a captured run"
-            raise WrongUse(message)
+            raise WrongUse(f"run {found.id}: its data were imported, there is no station to watch; name a captured run")
         yield lambda: of_records(found.id, records)
         return
     from schemas.station import load_station

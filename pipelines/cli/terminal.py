@@ -45,8 +45,7 @@ def scanned(slots: int) -> Seating:
         slots, lambda slot: _line(f"slot {slot:>2}: "), lambda words: out.print(words, style="yellow", markup=False)
     )
     if not found.units:
-        message = "scan: no unit was scanned, one is needed at least; give the command again"
-        raise WrongUse(message)
+        raise WrongUse("scan: no unit was scanned, one is needed at least; give the command again")
     return found
 
 
@@ -72,8 +71,7 @@ def _line(question: str) -> str:
     error_console().print(question, end="", markup=False)
     line = sys.stdin.readline()
     if not line:
-        message = (
+        raise WrongUse(
             "operator: standard input ended before an answer, a line is needed; run with --no-prompts where nobody is"
         )
-        raise WrongUse(message)
     return line.strip()

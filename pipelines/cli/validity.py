@@ -22,10 +22,9 @@ def show_validity(archive: Archive, serial: str, at: str, known: str, *, as_json
     day = day_of(at, "--at") if at else today()
     history = Ledger(archive).calibrations(serial, day_of(known, "--known") if known else "")
     if not history:
-        message = (
+        raise WrongUse(
             f"show: unit {serial!r} has no calibration in archive {archive.root}; certify one with 'tumbleline certify'"
         )
-        raise WrongUse(message)
     valid = next((one for one in history if one.holds(day)), None)
     if as_json:
         shown = None if valid is None else {**valid.document(), **_made(archive, valid)}

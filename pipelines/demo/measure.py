@@ -135,8 +135,7 @@ def _station(chosen: Scene, seed: int) -> StationConfig:
     simulation = plain.simulation
     steady = {} if len(chosen.temperatures) > 1 else {"bias_tempco_ug_per_K": 2.0, "scale_tempco_ppm_per_K": 4.0}
     if simulation is None:
-        message = "demo: the built-in station is not a simulated one; restore stations/simulated.toml"
-        raise WrongUse(message)
+        raise WrongUse("demo: the built-in station is not a simulated one; restore stations/simulated.toml")
     hidden = [Hidden(kind=chosen.kind, figures=chosen.figures)]
     changed = simulation.model_copy(update={"seed": seed, "hidden": hidden, "preset_overrides": QUIET | steady})
     return plain.model_copy(update={"simulation": changed, "soak": chosen.soak})

@@ -124,5 +124,4 @@ def scene(name: str, seed: int) -> Scene:
         if name in {found.kind, found.effect}:
             return found
     known = {s.kind for s in SCENES} | {s.effect for s in SCENES}
-    message = f"demo: nothing to hide is called '{name}'; {did_you_mean(name, [*known, 'random'])}"
-    raise WrongUse(message)
+    raise WrongUse(f"demo: nothing to hide is called '{name}'; {did_you_mean(name, [*known, 'random'])}")

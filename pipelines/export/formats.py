@@ -77,11 +77,10 @@ def export_text(name: str, units: Sequence[UnitCalibration], run: str, nominal: 
 def _refuse_left_out(name: str, units: Sequence[UnitCalibration]) -> None:
     left = units[0].left_out
     if left:
-        message = (
+        raise WrongUse(
             f"export: effect {', '.join(left)} has no place in format {name}, which knows bias, scale, misalignment and "
             "their temperature; export json, or fit a model without it"
         )
-        raise WrongUse(message)
 
 
 def _json(units: Sequence[UnitCalibration], run: str, nominal: float | None) -> str:
@@ -159,11 +158,10 @@ def _parameters(
     units: Sequence[UnitCalibration], run: str, nominal: float | None, names: tuple[str, str], between: str
 ) -> str:
     if nominal is None or nominal <= 0.0:
-        message = (
+        raise WrongUse(
             f"export: nominal scale {nominal}, a positive output per g is needed for autopilot parameters (their driver "
             "divides by it); give it with --nominal"
         )
-        raise WrongUse(message)
     lines: list[str] = []
     for c in units:
         across = c.response[0] - np.diag(np.diag(c.response[0]))

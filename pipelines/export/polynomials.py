@@ -76,8 +76,9 @@ def unit_calibrations(
     allowed = ("pass", "fail") if failed else EXPORTABLE
     chosen = [u for u in (serials or tuple(grades.index)) if grades.loc[u, "outcome"] in allowed]
     if not chosen:
-        message = f"export: no unit of run {run.id} passed, at least one is needed; --failed hands out failed ones too"
-        raise WrongUse(message)
+        raise WrongUse(
+            f"export: no unit of run {run.id} passed, at least one is needed; --failed hands out failed ones too"
+        )
     certificates = stated(run, chosen)
     if not revoked:
         chosen = _not_revoked(run, chosen, certificates, named=bool(serials))
@@ -104,28 +105,24 @@ def _not_revoked(run: Run, chosen: list[str], certificates: Mapping[str, Stated]
     """Units whose calibration was not revoked; refused where one is named, or none is left."""
     gone = [unit for unit in chosen if unit in certificates and certificates[unit].state == "revoked"]
     if gone and (named or len(gone) == len(chosen)):
-        message = (
+        raise WrongUse(
             f"export: the calibration of unit {gone[0]} in run {run.id} was revoked ({certificates[gone[0]].reason}), one that "
             "was not is needed; measure the unit again, or hand the old coefficients out all the same with --revoked"
         )
-        raise WrongUse(message)
     return [unit for unit in chosen if unit not in gone]
 
 
 def _refuse(grades: pd.DataFrame, serials: tuple[str, ...], *, failed: bool) -> None:
     for unit in serials:
         if unit not in grades.index:
-            message = f"export: no unit {unit} in this run; there are {', '.join(grades.index)}"
-            raise WrongUse(message)
+            raise WrongUse(f"export: no unit {unit} in this run; there are {', '.join(grades.index)}")
         outcome, reasons = grades.loc[unit, "outcome"], grades.loc[unit, "reasons"]
         if outcome == "refused":
-            message = (
+            raise WrongUse(
                 f"export: the data of unit {unit} were refused ({reasons}), so it has no coefficients; measure it again"
             )
-            raise WrongUse(message)
         if outcome == "fail" and not failed:
-            message = f"export: unit {unit} failed ({reasons}); --failed hands its coefficients out nevertheless"
-            raise WrongUse(message)
+            raise WrongUse(f"export: unit {unit} failed ({reasons}); --failed hands its coefficients out nevertheless")
 
 
 def _one(

@@ -66,11 +66,11 @@ def _refuse_silent(address: str) -> None:
         with Client(address, timeout=CONNECT_S, set_as_default=False) as client:
             found = len(client.scheduler_info()["workers"])
     except (OSError, TimeoutError, ValueError) as problem:
-        message = (
+        raise LinkLost(
             f"--dask {address}: no Dask scheduler answers within {CONNECT_S} s ({type(problem).__name__}); start it with "
             "'dask scheduler', or correct the address"
-        )
-        raise LinkLost(message) from None
+        ) from None
     if not found:
-        message = f"--dask {address}: the scheduler has no worker, one at least is needed; start it with 'dask worker {address}'"
-        raise LinkLost(message)
+        raise LinkLost(
+            f"--dask {address}: the scheduler has no worker, one at least is needed; start it with 'dask worker {address}'"
+        )

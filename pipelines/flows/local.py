@@ -136,11 +136,10 @@ def _start(home: Path) -> int:
     end = time.monotonic() + STARTUP_S
     while not _answers(port):
         if process.poll() is not None or time.monotonic() > end:
-            message = (
+            raise StationTimeout(
                 f"orchestrator: its server does not answer after {STARTUP_S} s (status {process.poll()}); look into "
                 f"{home / 'server.log'}, or run with --direct"
             )
-            raise StationTimeout(message)
         time.sleep(POLL_S)
     (home / ADDRESS).write_text(json.dumps({"port": port, "pid": process.pid}), encoding="utf-8")
     return port

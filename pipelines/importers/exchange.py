@@ -97,11 +97,10 @@ def _is_run_like(source: str | Path) -> bool:
 def _from_run(source: str | Path, archive: str | Path | None, table: str) -> pd.DataFrame:
     store = Archive(archive)
     if not store.runs():
-        message = (
+        raise WrongUse(
             f"'{source}': neither a file nor a run (the archive {store.root} is empty); name a file of dwells, or give "
             "the archive with --archive"
         )
-        raise WrongUse(message)
     return store.table(str(source), table)
 
 
@@ -109,17 +108,15 @@ def _require(frame: pd.DataFrame, names: Iterable[str], where: str) -> None:
     missing = [name for name in names if name not in frame.columns]
     if missing:
         hints = "; ".join(f"{name}: {did_you_mean(name, map(str, frame.columns))}" for name in missing[:3])
-        message = (
+        raise DataRejected(
             f"{where}: column {', '.join(missing)} is missing; {hints}; rename it, or use 'tumbleline import --map'"
         )
-        raise DataRejected(message)
 
 
 def _texts(frame: pd.DataFrame, column: str, where: str) -> list[str]:
     names = ["" if pd.isna(value) else _name(value) for value in frame[column].tolist()]
     if "" in names:
-        message = f"{where}: row {names.index('')}, column {column}: empty, a name is needed; fill it in"
-        raise DataRejected(message)
+        raise DataRejected(f"{where}: row {names.index('')}, column {column}: empty, a name is needed; fill it in")
     refuse_unprintable(dict.fromkeys(names), where)
     return names
 
@@ -135,11 +132,10 @@ def _numbers(frame: pd.DataFrame, column: str, where: str) -> NDArray[np.float64
     needed = (*REQUIRED, *FORCE, *ANGLES)
     if bad.size and not (column not in needed and bool(np.all(pd.isna(frame[column])))):
         row = int(bad[0])
-        message = (
+        raise DataRejected(
             f"{where}: row {row} (unit {frame['unit'].iloc[row]}), column {column}: found {frame[column].iloc[row]}, a "
             f"finite number is needed ({bad.size} such rows); measure again, or leave the row or the column out"
         )
-        raise DataRejected(message)
     return values
 
 
@@ -148,10 +144,9 @@ def _whole(frame: pd.DataFrame, column: str, where: str) -> NDArray[np.int64]:
     bad = np.flatnonzero((values != np.rint(values)) | (values < 0))
     if bad.size:
         row = int(bad[0])
-        message = (
+        raise DataRejected(
             f"{where}: row {row}, column {column}: found {values[row]}, a whole number from 0 on is needed; correct it"
         )
-        raise DataRejected(message)
     return values.astype(np.int64)
 
 
@@ -159,25 +154,26 @@ def _all_or_none(frame: pd.DataFrame, names: tuple[str, ...], where: str) -> Non
     there = [name for name in names if name in frame.columns]
     if there and len(there) < len(names):
         missing = [name for name in names if name not in there]
-        message = f"{where}: {', '.join(there)} without {', '.join(missing)}; give all of {', '.join(names)} or none"
-        raise DataRejected(message)
+        raise DataRejected(
+            f"{where}: {', '.join(there)} without {', '.join(missing)}; give all of {', '.join(names)} or none"
+        )
 
 
 def _plausible(frame: pd.DataFrame, where: str) -> None:
     if FORCE[0] in frame.columns:
         size = float(np.median(np.linalg.norm(frame[list(FORCE)].to_numpy(dtype=np.float64), axis=1)))
         if not 0.0 < size < _LARGEST_FORCE or _METRES[0] < size < _METRES[1]:
-            message = (
+            raise DataRejected(
                 f"{where}: the reference force has a norm of {size:.4g}, about 1 is needed; give force_x, "
                 "force_y, force_z in g, not m/s² or counts"
             )
-            raise DataRejected(message)
     for column in DEVIATIONS:
         values = np.asarray(frame[column], dtype=np.float64) if column in frame.columns else np.zeros(1)
         row = int(values.argmin())
         if values[row] < 0.0:
-            message = f"{where}: row {row}, column {column}: found {values[row]}, 0 or more is needed; correct it"
-            raise DataRejected(message)
+            raise DataRejected(
+                f"{where}: row {row}, column {column}: found {values[row]}, 0 or more is needed; correct it"
+            )
     _countable(frame, where)
 
 
@@ -187,21 +183,20 @@ def _countable(frame: pd.DataFrame, where: str) -> None:
         values = np.asarray(frame["n"], dtype=np.float64)
         row = int(np.argmax(values < 1.0))
         if values[row] < 1.0:
-            message = f"{where}: row {row}, column n: found {values[row]:g}, a mean of 1 or more samples is needed; correct it"
-            raise DataRejected(message)
+            raise DataRejected(
+                f"{where}: row {row}, column n: found {values[row]:g}, a mean of 1 or more samples is needed; correct it"
+            )
     if "out_unit" in frame.columns:
         for name in sorted({str(value) for value in frame["out_unit"].dropna()}):
             if name not in tables.OUTPUT_UNITS:
                 known = ", ".join(tables.OUTPUT_UNITS)
-                message = f"{where}: column out_unit: found '{name}', one of {known} is needed; correct it"
-                raise DataRejected(message)
+                raise DataRejected(f"{where}: column out_unit: found '{name}', one of {known} is needed; correct it")
     for unit, rows in frame.groupby("unit", sort=False):
         if len(rows) > 1 and float(np.ptp(rows["time_s"])) == 0.0:
-            message = (
+            raise DataRejected(
                 f"{where}: column time_s: all {len(rows)} dwells of unit {unit} at {rows['time_s'].iloc[0]:g} s, the time of "
                 "each is needed, in s; record it"
             )
-            raise DataRejected(message)
 
 
 def _checked_history(frame: pd.DataFrame, where: str) -> pd.DataFrame:
@@ -209,8 +204,7 @@ def _checked_history(frame: pd.DataFrame, where: str) -> pd.DataFrame:
     heats = [name for name in ("unit_C", "chamber_C") if name in frame.columns]
     if not heats:
         hint = did_you_mean("unit_C", map(str, frame.columns))
-        message = f"{where}: neither unit_C nor chamber_C, a temperature is needed; {hint}"
-        raise DataRejected(message)
+        raise DataRejected(f"{where}: neither unit_C nor chamber_C, a temperature is needed; {hint}")
     frame = frame.copy()
     if "unit" in frame.columns:
         frame["unit"] = _texts(frame, "unit", where)
@@ -222,6 +216,7 @@ def _checked_history(frame: pd.DataFrame, where: str) -> pd.DataFrame:
     twice = frame.duplicated(order)
     if twice.any():
         row = int(np.flatnonzero(twice.to_numpy())[0])
-        message = f"{where}: time {frame['time_s'].iloc[row]} s is there twice, once is needed; remove one of the two"
-        raise DataRejected(message)
+        raise DataRejected(
+            f"{where}: time {frame['time_s'].iloc[row]} s is there twice, once is needed; remove one of the two"
+        )
     return frame

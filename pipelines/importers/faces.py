@@ -62,11 +62,10 @@ def _by_face(
     faces_there = {mapping.poses.get(str(label), ""): k for k, label in enumerate(dwells["pose"])}
     missing = [face for face in FACES if face not in faces_there]
     if missing or len(dwells) != len(FACES):
-        message = (
+        raise DataRejected(
             f"import: {len(dwells)} dwells, faces {', '.join(missing) or 'none'} missing; each of {', '.join(FACES)} is needed "
             "once; name them with --poses LABEL=+x,…"
         )
-        raise DataRejected(message)
     means = dwells[["out_x", "out_y", "out_z"]].to_numpy(dtype=np.float64)
     up, down = (means[[faces_there[f"{sign}{axis}"] for axis in AXES]] for sign in "+-")
     if not {"sd_x", "sd_y", "sd_z", "n"} <= set(dwells.columns):

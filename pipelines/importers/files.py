@@ -54,25 +54,23 @@ def read(path: Path) -> tuple[pd.DataFrame, SourceFile]:
     elif data.startswith(b"MATLAB 5.0"):
         form, table = "matlab", _matlab(path, data)
     elif data.startswith(_HDF5) or b"MATLAB 7.3" in data[:128]:
-        message = f"{path.name}: a MATLAB 7.3 (HDF5) file, which is not read; save it again with save(…, '-v7')"
-        raise DataRejected(message)
+        raise DataRejected(
+            f"{path.name}: a MATLAB 7.3 (HDF5) file, which is not read; save it again with save(…, '-v7')"
+        )
     else:
         form, table = "text", _text(path, data)
     if table.empty:
-        message = f"{path.name}: no rows of data were found, at least one is needed; check the file"
-        raise DataRejected(message)
+        raise DataRejected(f"{path.name}: no rows of data were found, at least one is needed; check the file")
     return table, SourceFile(str(path), hashlib.sha256(packed).hexdigest(), len(packed), form)
 
 
 def _bytes(path: Path) -> bytes:
     if path.is_dir():
-        message = f"{path}: a folder, a file is needed; name the file"
-        raise WrongUse(message)
+        raise WrongUse(f"{path}: a folder, a file is needed; name the file")
     try:
         return path.read_bytes()
     except OSError as problem:
-        message = f"{path}: cannot be read ({problem.strerror}); check the name"
-        raise WrongUse(message) from None
+        raise WrongUse(f"{path}: cannot be read ({problem.strerror}); check the name") from None
 
 
 def _unpacked(path: Path, data: bytes) -> bytes:
@@ -81,8 +79,9 @@ def _unpacked(path: Path, data: bytes) -> bytes:
     try:
         return gzip.decompress(data)
     except (OSError, EOFError) as problem:
-        message = f"{path.name}: a gzip file of {len(data)} bytes that does not unpack ({problem}); copy it again"
-        raise DataRejected(message) from None
+        raise DataRejected(
+            f"{path.name}: a gzip file of {len(data)} bytes that does not unpack ({problem}); copy it again"
+        ) from None
 
 
 def _parquet(path: Path, data: bytes) -> pd.DataFrame:
@@ -90,10 +89,9 @@ def _parquet(path: Path, data: bytes) -> pd.DataFrame:
         return pq.read_table(pa.BufferReader(data)).to_pandas()
     except (pa.ArrowInvalid, OSError) as problem:
         reason = str(problem).splitlines()[0]
-        message = (
+        raise DataRejected(
             f"{path.name}: {len(data)} bytes that begin as Parquet but are not a whole file ({reason}); copy it again"
-        )
-        raise DataRejected(message) from None
+        ) from None
 
 
 def _matlab(path: Path, data: bytes) -> pd.DataFrame:
@@ -101,8 +99,9 @@ def _matlab(path: Path, data: bytes) -> pd.DataFrame:
     try:
         content = loadmat(io.BytesIO(data), squeeze_me=True, struct_as_record=False)
     except (ValueError, TypeError, NotImplementedError, OSError) as problem:
-        message = f"{path.name}: a MATLAB file that cannot be read ({problem}); save it again with save(…, '-v7')"
-        raise DataRejected(message) from None
+        raise DataRejected(
+            f"{path.name}: a MATLAB file that cannot be read ({problem}); save it again with save(…, '-v7')"
+        ) from None
     columns = {
         name: column for key, value in content.items() if not key.startswith("__") for name, column in _flat(key, value)
     }
@@ -131,13 +130,13 @@ def _text(path: Path, data: bytes) -> pd.DataFrame:
     try:
         text = data.decode("utf-8-sig")
     except UnicodeDecodeError:
-        message = f"{path.name}: neither text (UTF-8), Parquet, MATLAB nor gzip; export it as one of these"
-        raise DataRejected(message) from None
+        raise DataRejected(
+            f"{path.name}: neither text (UTF-8), Parquet, MATLAB nor gzip; export it as one of these"
+        ) from None
     lines = text.splitlines()
     first = next((k for k, line in enumerate(lines) if line.strip() and not line.lstrip().startswith(_COMMENTS)), None)
     if first is None:
-        message = f"{path.name}: no rows of data were found, at least one is needed; check the file"
-        raise DataRejected(message)
+        raise DataRejected(f"{path.name}: no rows of data were found, at least one is needed; check the file")
     divider = _divider(lines[first])
     names = [
         name.strip().strip('"') for name in (lines[first].split() if divider == r"\s+" else lines[first].split(divider))
@@ -145,8 +144,7 @@ def _text(path: Path, data: bytes) -> pd.DataFrame:
     header = not all(_is_number(name) for name in names)
     if header and len(set(names)) < len(names):
         twice = next(name for name in names if names.count(name) > 1)
-        message = f"{path.name}: column '{twice}' is there twice, names must differ; rename one"
-        raise DataRejected(message)
+        raise DataRejected(f"{path.name}: column '{twice}' is there twice, names must differ; rename one")
     labels = names if header else [str(k + 1) for k in range(len(names))]
     body = "\n".join(line for line in lines[first + int(header) :] if not line.lstrip().startswith(_COMMENTS))
     return _parse(path, body, divider, labels, first + 1 + int(header))

@@ -29,25 +29,24 @@ class FitAnswer:
 def dwells_of(data: Imported) -> pd.DataFrame:
     """The dwells of an import of one unit."""
     if data.dwells is None:
-        message = "import: nothing stands still in this record, dwells are needed for a fit; record static positions"
-        raise DataRejected(message)
+        raise DataRejected(
+            "import: nothing stands still in this record, dwells are needed for a fit; record static positions"
+        )
     units = len(set(data.dwells["unit"]))
     if units > 1:
-        message = (
+        raise WrongUse(
             f"import: {units} units, a fit at import takes one; import them one by one, or without --fit and then "
             "'tumbleline rerun RUN --effects a,b,c'"
         )
-        raise WrongUse(message)
     return data.dwells
 
 
 def gravity_of(mapping: Mapping) -> float:
     """Gravity where it was measured, g."""
     if mapping.norm_g is None:
-        message = (
+        raise WrongUse(
             "import: gravity at the place of measurement is needed for this fit and has no default; give --local-g M/S2"
         )
-        raise WrongUse(message)
     return mapping.norm_g
 
 

@@ -98,21 +98,18 @@ class Mapping(BaseModel):
     def _complete(cls, value: dict[str, str]) -> dict[str, str]:
         missing = [name for name in NEEDED if name not in value]
         if missing:
-            message = f"{', '.join(missing)} not mapped; x, y and z are needed"
-            raise ValueError(message)
+            raise ValueError(f"{', '.join(missing)} not mapped; x, y and z are needed")
         for name in value:
             close = close_matches(name, KNOWN) if name not in KNOWN else ()
             if close and len(name) > 1:
-                message = f"'{name}' is not known, but close to one that is; did you mean {' or '.join(close)}?"
-                raise ValueError(message)
+                raise ValueError(f"'{name}' is not known, but close to one that is; did you mean {' or '.join(close)}?")
         return value
 
     @field_validator("axes")
     @classmethod
     def _each_once(cls, value: tuple[str, str, str]) -> tuple[str, str, str]:
         if len(set(value)) < len(value):
-            message = f"{','.join(value)}: every axis is needed once"
-            raise ValueError(message)
+            raise ValueError(f"{','.join(value)}: every axis is needed once")
         return value
 
     @field_validator("poses")
@@ -120,8 +117,7 @@ class Mapping(BaseModel):
     def _faces(cls, value: dict[str, str]) -> dict[str, str]:
         for label, face in value.items():
             if face not in FACES:
-                message = f"'{label}': found '{face}', one of {', '.join(FACES)} is needed"
-                raise ValueError(message)
+                raise ValueError(f"'{label}': found '{face}', one of {', '.join(FACES)} is needed")
         return value
 
     @property
@@ -153,8 +149,7 @@ def from_file(path: Path) -> dict[str, Any]:
     try:
         return tomllib.loads(path.read_text(encoding="utf-8"))
     except OSError as problem:
-        message = f"{path}: cannot be read ({problem.strerror}); check the name of the mapping file"
-        raise WrongUse(message) from None
+        raise WrongUse(f"{path}: cannot be read ({problem.strerror}); check the name of the mapping file") from None
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as problem:
         raise RecipeInvalid(f"{path}: not TOML: {problem}; correct that place") from None
 
@@ -165,17 +160,14 @@ def pairs(text: str, option: str) -> dict[str, str]:
     for part in filter(None, (piece.strip() for piece in text.split(","))):
         name, equals, value = (piece.strip() for piece in part.partition("="))
         if not (name and equals and value):
-            message = f"{option}: found '{part}', name=value is needed, divided by commas; correct it"
-            raise WrongUse(message)
+            raise WrongUse(f"{option}: found '{part}', name=value is needed, divided by commas; correct it")
         if name in found:
-            message = f"{option}: '{name}' is there twice, once is needed; remove one"
-            raise WrongUse(message)
+            raise WrongUse(f"{option}: '{name}' is there twice, once is needed; remove one")
         found[name] = value
     return found
 
 
 def _one_of(value: str, known: Any, what: str) -> str:
     if value not in known:
-        message = f"found '{value}', a known {what} is needed: {', '.join(known)}"
-        raise ValueError(message)
+        raise ValueError(f"found '{value}', a known {what} is needed: {', '.join(known)}")
     return value

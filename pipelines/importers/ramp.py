@@ -19,10 +19,9 @@ if TYPE_CHECKING:
 def ramp(data: Imported, mapping: Mapping) -> FitAnswer:
     """A cubic in temperature of a record in one pose; adequate only if what is left is sample noise."""
     if data.samples is None or "unit_C" not in data.samples.columns:
-        message = (
+        raise WrongUse(
             "import: --fit temperature works on samples with a temperature; map temperature=…, without --rows dwells"
         )
-        raise WrongUse(message)
     output = data.samples[list(AXES)].to_numpy(dtype=np.float64)
     fit = fit_temperature_curve(output, data.samples["unit_C"].to_numpy(dtype=np.float64))
     gravity = mapping.norm_g or 1.0

@@ -59,8 +59,9 @@ def imported(table: pd.DataFrame, mapping: Mapping, where: str) -> Imported:
         return _as_dwells(columns, output, serials, extras, mapping, where)
     time, remarks = _time(columns, mapping, where)
     if len(set(serials)) > 1:
-        message = f"{where}: samples of {len(set(serials))} units in one file, one unit is needed; divide the file"
-        raise DataRejected(message)
+        raise DataRejected(
+            f"{where}: samples of {len(set(serials))} units in one file, one unit is needed; divide the file"
+        )
     samples = pd.DataFrame({"unit": serials, "slot": 0, "record": 0, "kind": "dwell", "time_s": time})
     samples[list(AXES)] = output
     samples = samples.assign(**extras)
@@ -79,8 +80,9 @@ def _columns(table: pd.DataFrame, mapping: Mapping, where: str) -> dict[str, pd.
     named = table.set_axis(names, axis=1)
     for meaning, column in mapping.columns.items():
         if column not in names:
-            message = f"{where}: column '{column}' (for {meaning}) is not there; {did_you_mean(column, names)}"
-            raise DataRejected(message)
+            raise DataRejected(
+                f"{where}: column '{column}' (for {meaning}) is not there; {did_you_mean(column, names)}"
+            )
     return {meaning: pd.Series(named[column], name=column) for meaning, column in mapping.columns.items()}
 
 
@@ -89,11 +91,10 @@ def _finite(values: pd.Series, where: str, *, first_row: int = 1) -> NDArray[np.
     bad = np.flatnonzero(~np.isfinite(numbers))
     if bad.size:
         row = int(bad[0])
-        message = (
+        raise DataRejected(
             f"{where}: row {row + first_row}, column '{values.name}': found {values.iloc[row]}, a finite number is needed "
             f"({bad.size} such rows); repair the file or leave those rows out"
         )
-        raise DataRejected(message)
     return numbers
 
 
@@ -115,19 +116,17 @@ def _refuse_other_unit(output: NDArray[np.float64], out_unit: str, where: str) -
         other = next(
             (u for u, one in (*gravity.items(), ("mg", 1e3)) if _LIKELY[0] < size / one < _LIKELY[1]), "LSB or V"
         )
-        message = (
+        raise DataRejected(
             f"{where}: the norm of the output is {size:.5g}, about {gravity[out_unit]:.5g} is needed if its unit is "
             f"{out_unit}; the unit looks like {other}, say so with --units output={other.split()[0]}"
         )
-        raise DataRejected(message)
     whole = bool(np.all(output[:1000] == np.rint(output[:1000])))
     close = [unit for unit, one in gravity.items() if abs(size / one - 1.0) < _SURE]
     if out_unit == "LSB" and close and not whole:
-        message = (
+        raise DataRejected(
             f"{where}: the norm of the output is {size:.5g} and its values are no whole numbers, counts are needed if its "
             f"unit is LSB; the unit looks like {close[0]}, say so with --units output={close[0]}"
         )
-        raise DataRejected(message)
 
 
 def _serials(columns: dict[str, pd.Series], mapping: Mapping, where: str) -> list[str]:
@@ -136,8 +135,7 @@ def _serials(columns: dict[str, pd.Series], mapping: Mapping, where: str) -> lis
         refuse_unprintable(dict.fromkeys(serials), where)
         return serials
     if not mapping.unit:
-        message = f"{where}: whose record is it? no unit is mapped, a serial number is needed; give --unit SN"
-        raise WrongUse(message)
+        raise WrongUse(f"{where}: whose record is it? no unit is mapped, a serial number is needed; give --unit SN")
     refuse_unprintable([mapping.unit], where)
     return [mapping.unit] * len(columns["x"])
 
@@ -146,8 +144,9 @@ def _time(columns: dict[str, pd.Series], mapping: Mapping, where: str) -> tuple[
     """Seconds since the first sample."""
     if "time" not in columns or mapping.units.time == "samples":
         if mapping.rate_hz is None:
-            message = f"{where}: no time in seconds is mapped, a rate is needed then; map time=…, or give --rate HZ"
-            raise WrongUse(message)
+            raise WrongUse(
+                f"{where}: no time in seconds is mapped, a rate is needed then; map time=…, or give --rate HZ"
+            )
         count = _finite(columns["time"], where) if "time" in columns else np.arange(len(columns["x"]), dtype=np.float64)
         time = count / mapping.rate_hz
     else:
@@ -155,10 +154,9 @@ def _time(columns: dict[str, pd.Series], mapping: Mapping, where: str) -> tuple[
     back = np.flatnonzero(np.diff(time) < 0.0)
     if back.size and "dwell" not in columns:
         row = int(back[0]) + 1
-        message = (
+        raise DataRejected(
             f"{where}: row {row + 1}: time runs back by {time[row - 1] - time[row]:.4g} s, it must not; sort the rows"
         )
-        raise DataRejected(message)
     gaps = np.diff(time)
     typical = float(np.median(gaps))
     wide = int(np.sum(gaps > 5.0 * typical)) if typical > 0.0 else 0
@@ -215,8 +213,9 @@ def _wanted(
         return first, last, labels
     missing = [label for label in mapping.poses if label not in labels]
     if missing:
-        message = f"{where}: no dwell is labelled '{missing[0]}' (in --poses); {did_you_mean(missing[0], labels)}"
-        raise DataRejected(message)
+        raise DataRejected(
+            f"{where}: no dwell is labelled '{missing[0]}' (in --poses); {did_you_mean(missing[0], labels)}"
+        )
     kept = [k for k, label in enumerate(labels) if label in mapping.poses]
     return [first[k] for k in kept], [last[k] for k in kept], [labels[k] for k in kept]
 
@@ -276,8 +275,7 @@ def _finished(frame: pd.DataFrame, mapping: Mapping) -> pd.DataFrame:
     if not (mapping.poses or mapping.face):
         return frame
     if mapping.norm_g is None:
-        message = "import: poses are named, but not how strong gravity is, which is needed; give --local-g M/S2"
-        raise WrongUse(message)
+        raise WrongUse("import: poses are named, but not how strong gravity is, which is needed; give --local-g M/S2")
     up = [mapping.poses.get(label, mapping.face) for label in frame["pose"]]
     frame[["force_x", "force_y", "force_z"]] = np.array([FACES[face] for face in up]) * mapping.norm_g
     return frame

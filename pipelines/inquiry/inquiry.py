@@ -54,8 +54,7 @@ class JointDiagnosis:
     def state(self) -> State:
         """The dwells that physics was looked for in."""
         if self.diagnosis is None:
-            message = "an inquiry in which every unit has a data fault has no state"
-            raise LookupError(message)
+            raise LookupError("an inquiry in which every unit has a data fault has no state")
         return self.diagnosis.problem.lot.state
 
     @property

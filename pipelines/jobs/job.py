@@ -145,21 +145,18 @@ def job_of_run(run: Run, *, effects: Sequence[str] = (), model: Path | None = No
     """The job of an archived run, with another model or other limits where they are given."""
     about = run.about
     if not about.get("capture"):
-        message = (
+        raise WrongUse(
             f"run {run.id}: its data were imported, a captured run is needed; fit them with 'tumbleline rerun {run.id} "
             "--effects a,b,c', or at import with --fit"
         )
-        raise WrongUse(message)
     if about.get("parents"):
-        message = (
+        raise WrongUse(
             f"run {run.id}: it measured what run {about['parents'][0]} lacked, and has too few poses for a model of its own; "
             f"name run {about['parents'][0]}"
         )
-        raise WrongUse(message)
     recipe = Recipe.model_validate(about["recipe"])
     if effects and model is not None:
-        message = "fit: --effects and --model are both given, one is needed; leave one out"
-        raise WrongUse(message)
+        raise WrongUse("fit: --effects and --model are both given, one is needed; leave one out")
     if model is not None:
         file = read_model(model)
         effects, names = file.model.effects, {"model_name": file.model.name, "model_version": file.model.version}
@@ -193,18 +190,16 @@ def _refuse_more_units_than_slots(job: Job) -> None:
     if len(serials) > slots:
         found = fillings(serials, slots)
         commands = ", then ".join(f"--units {','.join(own)}" for own in found)
-        message = (
+        raise WrongUse(
             f"lot: {len(serials)} units, the fixture has {slots} slots; measure {len(found)} lots, one after the other: "
             f"{commands}"
         )
-        raise WrongUse(message)
     for unit in job.lot.units:
         if unit.slot >= slots:
-            message = (
+            raise WrongUse(
                 f"lot: unit {unit.serial} in slot {unit.slot}, the fixture of station {job.station.name} has slots 0 to "
                 f"{slots - 1}; correct the slot map"
             )
-            raise WrongUse(message)
 
 
 def fillings(serials: Sequence[str], slots: int) -> list[tuple[str, ...]]:
@@ -241,8 +236,8 @@ def _refuse_outside(key: str, values: Sequence[float], bounds: tuple[float, floa
     outside = [value for value in values if not low <= value <= high]
     if outside:
         unit, owner = what.split(", ", 1)
-        message = (
+        raise RecipeInvalid(
             f"recipe: key '{key}': {outside[0]:g} {unit}, {owner} reaches {low:g} to {high:g} {unit}; change the recipe, "
-            "or measure on another station"
+            "or measure on another station",
+            key=key.split(" ", 1)[0],
         )
-        raise RecipeInvalid(message, key=key.split(" ", 1)[0])

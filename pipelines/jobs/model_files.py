@@ -69,13 +69,14 @@ def use_formulas(formulas: Iterable[FormulaSpec], where: str) -> None:
     """
     for spec in formulas:
         if spec.id in effects.built_in():
-            message = f"{where}: formula '{spec.id}': the catalogue has an effect of that id; choose another id"
-            raise RecipeInvalid(message, key="formula.id")
+            raise RecipeInvalid(
+                f"{where}: formula '{spec.id}': the catalogue has an effect of that id; choose another id",
+                key="formula.id",
+            )
         try:
             made = Formula(spec.id, spec.columns, why=spec.why, symbol=spec.symbol, typical_ug=spec.typical_ug)
         except InertialError as problem:
-            message = f"{where}: {problem}"
-            raise RecipeInvalid(message, key="formula.columns") from None
+            raise RecipeInvalid(f"{where}: {problem}", key="formula.columns") from None
         effects.register(made)
 
 
@@ -91,21 +92,24 @@ def refuse_unknown_effects(names: Sequence[str], where: str) -> None:
         try:
             effects.get(name)
         except UnknownEffect as problem:
-            message = f"{where}: unknown effect '{name}'; {did_you_mean(name, effects.catalogue())}"
-            raise RecipeInvalid(message, key="effects", close=problem.close) from None
+            raise RecipeInvalid(
+                f"{where}: unknown effect '{name}'; {did_you_mean(name, effects.catalogue())}",
+                key="effects",
+                close=problem.close,
+            ) from None
 
 
 def chosen_effects(listed: str, model: Path | None, where: str) -> list[str] | None:
     """The model that a command was given, as a list of effects or as a file; None where it was given neither."""
     if listed and model is not None:
-        message = f"{where}: --effects and --model are both given, one is needed; leave one out"
-        raise WrongUse(message)
+        raise WrongUse(f"{where}: --effects and --model are both given, one is needed; leave one out")
     if model is not None:
         return list(read_model(model).model.effects)
     names = list(dict.fromkeys(part.strip() for part in listed.split(",") if part.strip()))
     if listed and not names:
-        message = f"{where}: --effects '{listed}' names no effect; list some (bias,scale,misalignment), or leave it out"
-        raise WrongUse(message)
+        raise WrongUse(
+            f"{where}: --effects '{listed}' names no effect; list some (bias,scale,misalignment), or leave it out"
+        )
     refuse_unknown_effects(names, where)
     return names or None
 
@@ -157,11 +161,11 @@ def extended(text: str, step: ModelStep, source: str) -> tuple[str, ModelFile]:
     model = parse_model(text, source)
     _use(model, source)
     if step.effect in model.model.effects:
-        message = (
+        raise RecipeInvalid(
             f"{source}: '{step.effect}' is in version {model.model.version} already; "
-            f"its effects are {', '.join(model.model.effects)}"
+            f"its effects are {', '.join(model.model.effects)}",
+            key="model.effects",
         )
-        raise RecipeInvalid(message, key="model.effects")
     refuse_unknown_effects([step.effect], source)
     document = tomlkit.parse(text)
     head = document["model"]

@@ -36,11 +36,10 @@ def recipe_text(recipe: Recipe, remarks: Iterable[str] = ()) -> str:
         The model has formulas of its own, which only a model file can hold.
     """
     if recipe.formulas:
-        message = (
+        raise WrongUse(
             f"recipe {recipe.name}: its model has the formula '{recipe.formulas[0].id}', a recipe file holds effects of the "
             "catalogue only; give the effects with --effects, and name the model file in the recipe that is written"
         )
-        raise WrongUse(message)
     lines = [f"# {remark}" for remark in remarks]
     for key in PLAIN:
         value = getattr(recipe, key)

@@ -91,17 +91,18 @@ def lot_of(
     """The lot to measure: the serials given, or else the recipe's, each in its slot or one slot after the other."""
     named = list(serials) or recipe.units
     if not named:
-        message = "lot: no unit is named, at least one is needed; give serial numbers with --units, or in the recipe"
-        raise WrongUse(message)
+        raise WrongUse(
+            "lot: no unit is named, at least one is needed; give serial numbers with --units, or in the recipe"
+        )
     bad = [s for s in named if not 0 < len(s) <= LONGEST_SERIAL or not set(s) <= _SERIAL or not s[0].isalnum()]
     if bad:
         needed = f"1 to {LONGEST_SERIAL} letters, digits and . _ + - are needed"
-        message = f"lot: serial {bad[0]!r} is not usable, {needed}; correct it"
-        raise WrongUse(message)
+        raise WrongUse(f"lot: serial {bad[0]!r} is not usable, {needed}; correct it")
     twice = sorted({serial for serial in named if named.count(serial) > 1})
     if twice:
-        message = f"lot: serial {', '.join(twice)} is there twice, each may be there once; correct the list of units"
-        raise WrongUse(message)
+        raise WrongUse(
+            f"lot: serial {', '.join(twice)} is there twice, each may be there once; correct the list of units"
+        )
     units = [Unit(serial=serial, slot=slot) for serial, slot in zip(named, slots or range(len(named)), strict=True)]
     return Lot(
         units=units,
@@ -131,19 +132,21 @@ def _recipe_text(name: str) -> tuple[str, str, Path]:
     built_in = files("schemas") / "samples" / f"{name}.toml"
     if name in sample_names() and built_in.is_file():
         return built_in.read_text(encoding="utf-8"), f"recipe {name}", Path()
-    message = f"recipe: no file and no built-in recipe is called '{name}'; {did_you_mean(name, sample_names())}"
-    raise RecipeInvalid(message, close=close_matches(name, sample_names()))
+    raise RecipeInvalid(
+        f"recipe: no file and no built-in recipe is called '{name}'; {did_you_mean(name, sample_names())}",
+        close=close_matches(name, sample_names()),
+    )
 
 
 def _model(file: RecipeFile, folder: Path, source: str, line: LineModel | None) -> dict[str, Any]:
     """Effects, formulas, name and version of the model; name and version are empty for a list of effects."""
     if file.model == LINE:
         if line is None:
-            message = (
+            raise RecipeInvalid(
                 f"{source}: key 'model': '{LINE}' is the model that is released in an archive, which this command does not ask; "
-                "name a model file or effects"
+                "name a model file or effects",
+                key="model",
             )
-            raise RecipeInvalid(message, key="model")
         return line(file.device)
     if not file.model:
         refuse_unknown_effects(file.effects, f"{source}: key 'effects'")
@@ -161,8 +164,11 @@ def _resolve(given: str | Sequence[Sequence[float]], letter: str, key: str, sour
     if isinstance(given, str):
         if given not in poses.NAMED:
             known = list(poses.NAMED)
-            message = f"{source}: key '{key}': no plan is called '{given}'; {did_you_mean(given, known)}"
-            raise RecipeInvalid(message, key=key, close=close_matches(given, known))
+            raise RecipeInvalid(
+                f"{source}: key '{key}': no plan is called '{given}'; {did_you_mean(given, known)}",
+                key=key,
+                close=close_matches(given, known),
+            )
         given = poses.plan(given).tolist()
     pairs = [(float(outer), float(inner)) for outer, inner in given]
     width = len(str(len(pairs)))
@@ -183,11 +189,11 @@ def _refuse_flat_plan(chosen: Sequence[Pose], needed_g: float) -> None:
     worst = int(np.argmin(spans))
     if spans[worst] < needed_g:
         axis = AXES[worst]
-        message = (
+        raise RecipeInvalid(
             f"fit: poses span {spans[worst]:.2f} g on {axis}, the recipe needs {needed_g:g} g; "
-            f"add poses with {axis} up and {axis} down"
+            f"add poses with {axis} up and {axis} down",
+            key="poses",
         )
-        raise RecipeInvalid(message, key="poses")
 
 
 def _refuse_coincidence(fit: Sequence[Pose], verification: Sequence[Pose], source: str) -> None:
@@ -198,8 +204,8 @@ def _refuse_coincidence(fit: Sequence[Pose], verification: Sequence[Pose], sourc
     apart = np.degrees(np.arccos(cosines))
     row, column = divmod(int(np.argmin(apart)), apart.shape[1])
     if apart[row, column] < SAME_POSE_DEG:
-        message = (
+        raise RecipeInvalid(
             f"{source}: key 'verification': pose {verification[row].name} lies {apart[row, column]:.2f}° from pose "
-            f"{fit[column].name} of the fit, at least {SAME_POSE_DEG:g}° is needed; choose directions between the fit's"
+            f"{fit[column].name} of the fit, at least {SAME_POSE_DEG:g}° is needed; choose directions between the fit's",
+            key="verification",
         )
-        raise RecipeInvalid(message, key="verification")

@@ -121,8 +121,7 @@ def release(
         not forced; or no reason is given.
     """
     if not reason.strip():
-        message = "release: no reason, one is needed; give --reason TEXT"
-        raise WrongUse(message)
+        raise WrongUse("release: no reason, one is needed; give --reason TEXT")
     evidence = evidence_for(archive, wanted, device, station)
     if not force:
         _refuse_without(evidence, wanted, device, station)
@@ -155,17 +154,15 @@ def _refuse_without(evidence: dict[str, Any] | None, wanted: ModelChange, device
     where = "".join([f" of {device}" if device else "", f" on {station}" if station else ""])
     name = wanted.model_name or "the model"
     if evidence is None:
-        message = (
+        raise WrongUse(
             f"release: nothing in the archive shows what {name} makes of lots{where}, a what-if is needed; run "
             "'tumbleline whatif', or give --force with a reason that says why not"
         )
-        raise WrongUse(message)
     if evidence["verdict"] != "better":
-        message = (
+        raise WrongUse(
             f"release: the what-if {evidence['name']} says {evidence['verdict']}: {evidence['words']}; a better model is needed; "
             "change it, or give --force with a reason that says why it is released"
         )
-        raise WrongUse(message)
 
 
 def releases(archive: Archive) -> list[Release]:
@@ -193,11 +190,11 @@ def line_model(archive: Archive, device: str, station: str, when: datetime | Non
     if found is None:
         there = releases(archive)
         known = ", ".join(f"{one.device or 'every device'} from {one.since:%Y-%m-%d}" for one in there) or "none"
-        message = (
+        raise RecipeInvalid(
             f"recipe: key 'model': '{LINE}' is asked for, and for {device} on {station} no model is released at {at:%Y-%m-%d} "
-            f"(released: {known}); release one with 'tumbleline release', or name effects in the recipe"
+            f"(released: {known}); release one with 'tumbleline release', or name effects in the recipe",
+            key="model",
         )
-        raise RecipeInvalid(message, key="model")
     return found.of_model()
 
 

@@ -83,16 +83,16 @@ def _csv_rows(content: str, path: Path) -> list[tuple[str, str]]:
     rows = list(csv.reader(io.StringIO(content)))
     head = [cell.strip().lower() for cell in rows[0]] if rows else []
     if head[:2] != COLUMNS:
-        message = f"slot map {path.name}: begins with '{','.join(head)}', a first line 'slot,serial' is needed; add it"
-        raise WrongUse(message)
+        raise WrongUse(
+            f"slot map {path.name}: begins with '{','.join(head)}', a first line 'slot,serial' is needed; add it"
+        )
     return [(row[0], row[1]) for row in rows[1:] if len(row) >= 2 and any(cell.strip() for cell in row)]
 
 
 def _toml_rows(content: str, path: Path) -> list[tuple[str, str]]:
     table = parse_toml(content, f"slot map {path.name}").get("slots")
     if not isinstance(table, dict):
-        message = f'slot map {path.name}: no table [slots], one with lines like 0 = "SN1" is needed; add it'
-        raise WrongUse(message)
+        raise WrongUse(f'slot map {path.name}: no table [slots], one with lines like 0 = "SN1" is needed; add it')
     return [(str(slot), str(serial)) for slot, serial in table.items()]
 
 
@@ -100,20 +100,18 @@ def _checked(rows: Sequence[tuple[str, str]], source: str) -> Seating:
     slots: list[int] = []
     for number, (slot, serial) in enumerate(rows, start=1):
         if not slot.strip().isdecimal():
-            message = (
+            raise WrongUse(
                 f"{source}: row {number}: slot '{slot.strip()}', a whole number from 0 on is needed; correct the row"
             )
-            raise WrongUse(message)
         if not serial.strip():
-            message = (
+            raise WrongUse(
                 f"{source}: row {number}: slot {slot.strip()} has no serial number; write it, or leave the row out"
             )
-            raise WrongUse(message)
         if int(slot) in slots:
-            message = f"{source}: row {number}: slot {int(slot)} is there twice, it can hold one unit; correct the map"
-            raise WrongUse(message)
+            raise WrongUse(
+                f"{source}: row {number}: slot {int(slot)} is there twice, it can hold one unit; correct the map"
+            )
         slots.append(int(slot))
     if not slots:
-        message = f"{source}: no slot has a unit, at least one is needed; fill it in"
-        raise WrongUse(message)
+        raise WrongUse(f"{source}: no slot has a unit, at least one is needed; fill it in")
     return Seating(tuple(serial.strip() for _, serial in rows), tuple(slots))

@@ -26,10 +26,9 @@ SETTINGS = ("recipe", "limits", "station")
 def write_crate(archive: Archive, found: Lineage, folder: Path) -> int:
     """How many files were copied into a new folder beside the crate's description."""
     if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
-        message = (
+        raise WrongUse(
             f"lineage: {folder} is there and not empty, a new folder is needed for the crate; name another with --crate"
         )
-        raise WrongUse(message)
     contents = _contents(archive, found.graph)
     for name, data in contents.items():
         files.publish(folder / name, data, "lineage", "name another folder with --crate")

@@ -98,8 +98,9 @@ def _of_file(archive: Archive, target: str) -> Lineage:
             gatherer.certificates_of(archive.run(name))
         focus = [node.id for node in gatherer.graph.nodes.values() if node.sha256 == wanted]
     if not focus:
-        message = f"lineage: the content of {target} is of no table and no source of archive {archive.root}; name another file"
-        raise ArchiveUnusable(message)
+        raise ArchiveUnusable(
+            f"lineage: the content of {target} is of no table and no source of archive {archive.root}; name another file"
+        )
     return Lineage(target, "file", tuple(focus), gatherer.graph.around(focus))
 
 

@@ -86,15 +86,15 @@ def design_names(model: Sequence[str]) -> tuple[str, ...]:
 
 def _refuse(rivals: Sequence[str], effects: Sequence[str]) -> None:
     if len(rivals) < 2:
-        message = f"plan: --part names {len(rivals)} effect, two or more are needed; write third_order,odd_quadratic"
-        raise WrongUse(message)
+        raise WrongUse(
+            f"plan: --part names {len(rivals)} effect, two or more are needed; write third_order,odd_quadratic"
+        )
     station = [effect.id for effect in design.split(effects)[1]]
     if station:
-        message = (
+        raise WrongUse(
             f"plan: --part {station[0]}: an effect of the station, effects of the device are needed; 'tumbleline investigate' "
             "parts those of the station"
         )
-        raise WrongUse(message)
 
 
 def _columns(effects: Sequence[str], course: PlanContext) -> Array:

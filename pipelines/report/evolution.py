@@ -34,8 +34,9 @@ def draw_evolution(rows: list[dict[str, Any]], path: Path, name: str) -> None:
         try:
             figure.savefig(path, dpi=150, metadata={"Date": None} if path.suffix.lower() == ".svg" else None)
         except OSError as problem:
-            message = f"history: {path} cannot be written ({problem.strerror}); name another file with --picture"
-            raise WrongUse(message) from None
+            raise WrongUse(
+                f"history: {path} cannot be written ({problem.strerror}); name another file with --picture"
+            ) from None
 
 
 def draw(place: Axes, rows: list[dict[str, Any]]) -> None:

@@ -53,8 +53,9 @@ def _table(run: Run, name: str) -> pd.DataFrame:
     if name in run.tables():
         return run.table(name)
     if name == "coefficients":
-        message = f"run {run.id}: it has no coefficients, a comparison needs them; finish it, or run it again first"
-        raise DataRejected(message)
+        raise DataRejected(
+            f"run {run.id}: it has no coefficients, a comparison needs them; finish it, or run it again first"
+        )
     return pd.DataFrame({"unit": [], "figure": [], "value": [], "uncertainty": [], "limit": [], "unit_text": []})
 
 
@@ -103,8 +104,9 @@ def _units(a: Run, b: Run, coefficients: pd.DataFrame) -> list[dict[str, Any]]:
     before, after = _grades(a), _grades(b)
     common = [unit for unit in before if unit in after]
     if not common:
-        message = f"diff: runs {a.id} and {b.id} have no unit in common, one is needed; name two runs of the same units"
-        raise DataRejected(message)
+        raise DataRejected(
+            f"diff: runs {a.id} and {b.id} have no unit in common, one is needed; name two runs of the same units"
+        )
     finite = coefficients[np.isfinite(coefficients["largest"].to_numpy(dtype=float))]
     largest = finite.groupby("unit")["largest"].max().to_dict()
     moved = set(coefficients["unit"])

@@ -98,8 +98,7 @@ def _judged(run: Run, wanted: ModelChange) -> LotComparison:
 
 def _both(run: Run, wanted: ModelChange) -> tuple[Side, Side]:
     if "grades" not in run.tables() or not run.about.get("capture"):
-        message = f"run {run.id}: it has no grades to compare with; run it again with limits first"
-        raise DataRejected(message)
+        raise DataRejected(f"run {run.id}: it has no grades to compare with; run it again with limits first")
     job = archived_job(run, wanted)
     names = ("verdicts", "grades", "coefficients", "covariance", "residuals", "verification", "noise")
     old = {name: run.table(name) for name in names}

@@ -64,8 +64,9 @@ def check(archive: Archive, run_id: str) -> Reproduction:
             _changed(run, step, found.changed)
             _compare(run, step, found)
     if not set(found.tables.values()) - {LEFT_OUT}:
-        message = f"run {run_id}: none of its tables can be worked out anew, one at least is needed; run it again first"
-        raise DataRejected(message)
+        raise DataRejected(
+            f"run {run_id}: none of its tables can be worked out anew, one at least is needed; run it again first"
+        )
     return found
 
 

@@ -86,11 +86,10 @@ def raw_samples(run: Run) -> bool:
     if records is None or records.is_complete():
         return records is not None
     if records.finished():
-        message = (
+        raise DataRejected(
             f"run {run.id}: its capture has {len(records.finished())} records and is not finished, all are needed; give its "
             "'tumbleline run' again and it goes on"
         )
-        raise DataRejected(message)
     return False
 
 
@@ -172,11 +171,10 @@ class StageRunner:
     def _keep(self, step: StageCall) -> str:
         if not self._before.issuperset(step.outputs):
             missing = ", ".join(name for name in step.outputs if name not in self._before)
-            message = (
+            raise DataRejected(
                 f"run {self.old.id}: neither {missing} nor the raw samples are in the archive, one of the two is needed; "
                 "bring the capture's folder back"
             )
-            raise DataRejected(message)
         if self.new.id == self.old.id or set(self.new.tables()).issuperset(step.outputs):
             return THERE
         self.new.adopt(self.old, step.outputs)
@@ -197,8 +195,7 @@ class StageRunner:
             return
         readings = self.new.table("readings")
         if (readings["kind"] == "allan").any():
-            message = (
+            raise DataRejected(
                 f"run {self.old.id}: its static record is not in the archive, the noise under other coefficients needs it; "
                 "bring the capture's folder back"
             )
-            raise DataRejected(message)

@@ -62,19 +62,17 @@ def selected(archive: Archive, words: Sequence[str]) -> list[Entry]:
     filters = [_filter(part) for part in parts if _key(part)]
     names = [part for part in parts if not _key(part)]
     if not known:
-        message = (
+        raise WrongUse(
             f"archive {archive.root}: there is no run yet; make one with 'tumbleline run', or name another archive"
         )
-        raise WrongUse(message)
     by_name = [name for name in names if name != ALL]
     chosen = _named(known, by_name, archive) if by_name else [entry for entry in known if not entry.derived]
     left = [entry for entry in chosen if all(_holds(entry, key, value) for key, value in filters)]
     if not left:
-        message = (
+        raise WrongUse(
             f"archive {archive.root}: none of {len(chosen)} runs is {' '.join(words)}; {_there_is(chosen, filters)}"
             " look with 'tumbleline list'"
         )
-        raise WrongUse(message)
     return left
 
 
@@ -84,16 +82,14 @@ def _key(part: str) -> str:
     if not colon:
         return ""
     if key not in KEYS:
-        message = f"selection: '{part}' is not known; {did_you_mean(key, KEYS)}"
-        raise WrongUse(message)
+        raise WrongUse(f"selection: '{part}' is not known; {did_you_mean(key, KEYS)}")
     return key
 
 
 def _filter(part: str) -> tuple[str, Any]:
     key, _, value = part.partition(":")
     if not value:
-        message = f"selection: '{part}' says nothing after the colon, a value is needed; write {key}:VALUE"
-        raise WrongUse(message)
+        raise WrongUse(f"selection: '{part}' says nothing after the colon, a value is needed; write {key}:VALUE")
     if key == "since":
         return key, moment(value, part)
     return (key, moment(value, part, end=True)) if key == "until" else (key, value)
@@ -106,8 +102,7 @@ def moment(text: str, where: str, *, end: bool = False) -> datetime:
         if len(text) <= len("2026-01-31"):
             found = datetime.combine(date.fromisoformat(text), time.max if end else time.min)
     except ValueError:
-        message = f"{where}: '{text}' is no date, YYYY-MM-DD is needed; correct it"
-        raise WrongUse(message) from None
+        raise WrongUse(f"{where}: '{text}' is no date, YYYY-MM-DD is needed; correct it") from None
     return found if found.tzinfo else found.replace(tzinfo=UTC)
 
 
@@ -117,8 +112,7 @@ def _named(known: list[Entry], names: list[str], archive: Archive) -> list[Entry
     for name in names:
         here = [ids[-1]] if name == LATEST else [i for i in ids if i == name] or [i for i in ids if i.startswith(name)]
         if not here:
-            message = f"archive {archive.root}: no run is called '{name}'; {did_you_mean(name, ids)}"
-            raise WrongUse(message)
+            raise WrongUse(f"archive {archive.root}: no run is called '{name}'; {did_you_mean(name, ids)}")
         chosen.update(here)
     return [entry for entry in known if entry.id in chosen]
 

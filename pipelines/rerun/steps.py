@@ -159,17 +159,17 @@ def _imported(run: Run, wanted: ModelChange) -> Plan:
 def _fit_for_a_fit(run: Run) -> pd.DataFrame:
     """The run's dwells, refused where the fit of a lot has nothing to work with."""
     if "dwells" not in run.tables():
-        message = f"run {run.id}: imported without dwells, a fit needs them; import it with poses, a face or --blocks"
-        raise DataRejected(message)
+        raise DataRejected(
+            f"run {run.id}: imported without dwells, a fit needs them; import it with poses, a face or --blocks"
+        )
     dwells = run.table("dwells")
     wanted = ("force_x", "force_y", "force_z", "sd_x", "sd_y", "sd_z", "n", "kind", "pose", "out_unit")
     missing = [name for name in wanted if name not in dwells.columns]
     if missing:
-        message = (
+        raise DataRejected(
             f"run {run.id}: its dwells have no {', '.join(missing)}, a fit in the chain needs them; import it again with the "
             "poses named, or judge it with 'tumbleline diagnose'"
         )
-        raise DataRejected(message)
     return dwells
 
 

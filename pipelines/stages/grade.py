@@ -54,8 +54,10 @@ def refuse_limits_without_figures(limits: Limits, recipe: Recipe) -> None:
         elif needed is not None and needed not in recipe.effects:
             missing = f"effect {needed} in the model"
         if missing:
-            message = f"limits {limits.name}: {name} needs {missing}, the recipe has none; add it, or drop the limit"
-            raise RecipeInvalid(message, key=f"figures.{name}")
+            raise RecipeInvalid(
+                f"limits {limits.name}: {name} needs {missing}, the recipe has none; add it, or drop the limit",
+                key=f"figures.{name}",
+            )
 
 
 def grade(evidence: Evidence, limits: Limits, zero_g: float = 0.0) -> dict[str, pd.DataFrame]:

@@ -168,8 +168,7 @@ def read_calibration(coefficients: pd.DataFrame, covariance: pd.DataFrame) -> Ca
     is_linear = np.array([pair in linear for pair in pairs], dtype=bool)
     own = coefficients["value"].to_numpy()[(coefficients["axis"].to_numpy(dtype=object) != ALL_AXES) & is_linear]
     if len(own) != len(units) * 3 * p:
-        message = f"coefficients: {len(own)} rows, the model needs {len(units) * 3 * p}; run the fit again"
-        raise DataRejected(message)
+        raise DataRejected(f"coefficients: {len(own)} rows, the model needs {len(units) * 3 * p}; run the fit again")
     matrix = np.zeros((len(units), 3, p, p))
     row, column = np.tril_indices(p)
     values = covariance["value"].to_numpy().reshape(len(units), 3, -1)

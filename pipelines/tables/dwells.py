@@ -297,15 +297,15 @@ def lot_arrays(
     rows = _Rows(dwells, kinds)
     units, numbers = rows.units, np.unique(rows.dwell)
     if not units or len(rows.dwell) != len(units) * len(numbers):
-        message = (
+        raise DataRejected(
             f"dwells: {len(rows.dwell)} rows for {len(units)} units and {len(numbers)} dwells, every unit needs every dwell; "
             "remove the units that lack some, or measure them again"
         )
-        raise DataRejected(message)
     out_units = sorted(set(rows.texts("out_unit")))
     if len(out_units) != 1:
-        message = f"dwells: outputs in {' and '.join(out_units)}, one lot has one unit; split the lot by device"
-        raise DataRejected(message)
+        raise DataRejected(
+            f"dwells: outputs in {' and '.join(out_units)}, one lot has one unit; split the lot by device"
+        )
     return LotArrays(
         units=units,
         dwells=numbers,

@@ -58,8 +58,8 @@ def _adapter(profile: Profile, kind: str, known: Mapping[str, type[Adapter]]) ->
         raise RecipeInvalid(f"{message}; {did_you_mean(profile.adapter, known)}", key="adapter")
     lacking = [name for name in adapter.needs if not profile.has(name)]
     if lacking:
-        message = (
-            f"profile {profile.name}: {', '.join(lacking)} missing, adapter {profile.adapter} needs them; add them"
+        raise RecipeInvalid(
+            f"profile {profile.name}: {', '.join(lacking)} missing, adapter {profile.adapter} needs them; add them",
+            key=lacking[0],
         )
-        raise RecipeInvalid(message, key=lacking[0])
     return adapter

@@ -64,10 +64,9 @@ class TableAxis(ABC):
     def check(self, target: float) -> None:
         """Refuses a target outside the station's limits; nothing has moved then."""
         if not self._low <= target <= self._high:
-            message = (
+            raise StationRefused(
                 f"{self.name}: target {target:g} deg, {self._low:g} to {self._high:g} deg is allowed; change the pose"
             )
-            raise StationRefused(message)
 
     def start(self, target: float) -> float:
         """Starts a move to ``target`` degrees and gives the seconds it should take.
@@ -117,15 +116,13 @@ class TableAxis(ABC):
             raise OperatorNeeded(f"{message} and check its zero")
         if not state.ready or state.moving:
             found = "busy with a move" if state.moving else "not ready"
-            message = (
+            raise StationRefused(
                 f"{self.name}: the drive is {found}, one that stands and is ready is needed; wait, or look at its panel"
             )
-            raise StationRefused(message)
 
     def _refuse_alarm(self, state: DriveState) -> None:
         if state.alarm:
-            message = f"{self.name}: {state.alarm}, none is needed; clear the cause and reset the drive"
-            raise OperatorNeeded(message)
+            raise OperatorNeeded(f"{self.name}: {state.alarm}, none is needed; clear the cause and reset the drive")
 
     def moving(self) -> bool:
         """Whether the drive says that it moves."""
@@ -158,8 +155,7 @@ class TableAxis(ABC):
         """Refuses to go on when the encoder says another angle than was asked."""
         found = self.position()
         if abs(found - target) > self._tolerance():
-            message = (
+            raise OperatorNeeded(
                 f"{self.name}: stands at {found:.4f} deg, {target:g} ± {self._limits.position_deg:g} deg is needed; "
                 "check load and brake of the table"
             )
-            raise OperatorNeeded(message)

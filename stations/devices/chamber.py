@@ -47,11 +47,10 @@ class ThermalChamber(ABC):
     def check(self, temperature: float) -> None:
         """Refuses a temperature outside the station's limits; nothing has been set then."""
         if not self._low <= temperature <= self._high:
-            message = (
+            raise StationRefused(
                 f"{self.name}: set point {temperature:g} °C, {self._low:g} to {self._high:g} °C is allowed; "
                 "change the recipe"
             )
-            raise StationRefused(message)
 
     def set_temperature(self, temperature: float) -> None:
         """Sets the target in °C and makes sure that the controller has taken it; where an answer was lost, that decides."""
@@ -65,11 +64,10 @@ class ThermalChamber(ABC):
                 raise
         found, mode = self._values.number("set_point"), self.mode()
         if not self._near(found, temperature) or mode != self.running:
-            message = (
+            raise StationRefused(
                 f"{self.name}: set point {found:g} °C in mode {mode}, {temperature:g} °C in {self.running} is needed; "
                 "check the controller's panel"
             )
-            raise StationRefused(message)
 
     def off(self) -> None:
         """Switches heating and cooling off."""
@@ -87,26 +85,23 @@ class ThermalChamber(ABC):
         """The air's temperature, °C; what no chamber can have is refused."""
         value = self._values.number("temperature")
         if not (math.isfinite(value) and PLAUSIBLE_C[0] < value < PLAUSIBLE_C[1]):
-            message = (
+            raise StationRefused(
                 f"{self.name}: air at {value:g} °C, {PLAUSIBLE_C[0]:g} to {PLAUSIBLE_C[1]:g} °C is possible; "
                 "check sensor and word order"
             )
-            raise StationRefused(message)
         return value
 
     def _switch(self, mode: str) -> None:
         profile = self._values.profile
         if not profile.has("mode") or not profile.entry("mode").writable:
-            message = (
+            raise StationRefused(
                 f"{self.name}: profile {profile.name} has nothing to write the mode to, which is needed to make it {mode}; "
                 "set safety.chamber to set_point or hold"
             )
-            raise StationRefused(message)
         self._values.write("mode", mode)
         found = self.mode()
         if found != mode:
-            message = f"{self.name}: in mode {found}, {mode} is needed; check the controller's panel"
-            raise StationRefused(message)
+            raise StationRefused(f"{self.name}: in mode {found}, {mode} is needed; check the controller's panel")
 
     def _require_inside(self, temperature: float) -> None:
         """Refuses what the controller itself is set up to refuse."""
@@ -114,11 +109,10 @@ class ThermalChamber(ABC):
             return
         low, high = (self._values.number(name) for name in OWN_LIMITS)
         if not low <= temperature <= high:
-            message = (
+            raise StationRefused(
                 f"{self.name}: set point {temperature:g} °C, the controller is set up for {low:g} to {high:g} °C; "
                 "change the recipe, or the controller's limits"
             )
-            raise StationRefused(message)
 
     def _holds(self, temperature: float) -> bool:
         return self._near(self._values.number("set_point"), temperature)
@@ -128,5 +122,4 @@ class ThermalChamber(ABC):
 
     def refuse(self, found: str, needed: str, remedy: str) -> None:
         """Raises that the controller is not as it must be; nothing has been set."""
-        message = f"{self.name}: {found}, {needed} is needed; {remedy}"
-        raise StationRefused(message)
+        raise StationRefused(f"{self.name}: {found}, {needed} is needed; {remedy}")

@@ -14,8 +14,9 @@ CELSIUS = "celsius"
 def _refuse_program(name: str, state: str) -> None:
     """A program that somebody started is not ended from here."""
     if state in RUNNING:
-        message = f"{name}: the controller's own program is in state {state}, none is needed; end it at the panel"
-        raise OperatorNeeded(message)
+        raise OperatorNeeded(
+            f"{name}: the controller's own program is in state {state}, none is needed; end it at the panel"
+        )
 
 
 class SetPointChamber(ThermalChamber):
@@ -48,8 +49,7 @@ class F4TChamber(ThermalChamber):
         if unit != CELSIUS:
             self.refuse(f"shows {unit}", CELSIUS, "set the controller's unit")
         if not alarm.startswith("inactive"):
-            message = f"{self.name}: alarm 1 in state {alarm}, none is needed; clear its cause at the panel"
-            raise OperatorNeeded(message)
+            raise OperatorNeeded(f"{self.name}: alarm 1 in state {alarm}, none is needed; clear its cause at the panel")
         _refuse_program(self.name, self._values.text("program_state"))
 
     def off(self) -> None:
@@ -144,8 +144,7 @@ class P300Chamber(ThermalChamber):
         """No alarm, no program."""
         count = int(self._values.number("alarms"))
         if count:
-            message = f"{self.name}: {count} alarms, none is needed; clear their cause at the panel"
-            raise OperatorNeeded(message)
+            raise OperatorNeeded(f"{self.name}: {count} alarms, none is needed; clear their cause at the panel")
         if self.mode().startswith(("RUN", "RMT")):
             _refuse_program(self.name, "runs")
 

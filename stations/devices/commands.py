@@ -42,8 +42,9 @@ class Commands:
         try:
             return float(text)
         except ValueError:
-            message = f"{self.name}: {name} is '{text}', a number is needed; check the device and its profile"
-            raise StationRefused(message) from None
+            raise StationRefused(
+                f"{self.name}: {name} is '{text}', a number is needed; check the device and its profile"
+            ) from None
 
     def step(self, name: str) -> float:
         """The last decimal of what is written."""

@@ -52,10 +52,9 @@ class Reader:
     def check(self, rate_hz: float) -> None:
         """Refuses a rate outside the station's limits."""
         if not 0.0 < rate_hz <= self._fastest:
-            message = (
+            raise StationRefused(
                 f"{self._registers.name}: {rate_hz:g} Hz, up to {self._fastest:g} Hz is allowed; change the recipe"
             )
-            raise StationRefused(message)
 
     def start(self, rate_hz: float) -> None:
         """Starts sampling in all slots at once; the first sample comes one period later."""
@@ -67,10 +66,9 @@ class Reader:
             registers.write("rate", rate_hz)
             found = registers.number("rate")
             if abs(found - rate_hz) > RATE_HZ:
-                message = (
+                raise StationRefused(
                     f"{registers.name}: samples at {found:g} Hz, {rate_hz:g} Hz is needed; choose a rate it can keep"
                 )
-                raise StationRefused(message)
         self._sample("running")
         for slot in self.slots.values():
             slot.begin()
@@ -84,8 +82,7 @@ class Reader:
         self._registers.write("sampling", wanted)
         found = self._registers.text("sampling")
         if found != wanted:
-            message = f"{self._registers.name}: sampling is {found}, {wanted} is needed; restart the reader"
-            raise StationRefused(message)
+            raise StationRefused(f"{self._registers.name}: sampling is {found}, {wanted} is needed; restart the reader")
 
     def sampling(self) -> str:
         """Whether samples are taken: ``running`` or ``stopped``."""
@@ -108,11 +105,10 @@ class Reader:
         wrong = [slot for slot in self.slots if not _possible(temperature[slot], supply[slot])]
         if (wrong and len(wrong) == len(self.slots)) or not 0.0 <= vibration < STRONGEST_G:
             first = min(self.slots, default=0)
-            message = (
+            raise StationRefused(
                 f"{self._registers.name}: slot {first} at {temperature[first]:g} °C and {supply[first]:g} V, vibration "
                 f"{vibration:g} g rms, possible values are needed; check supply, sensors, word order and counts"
             )
-            raise StationRefused(message)
         told = [math.nan if slot in wrong else value for slot, value in enumerate(temperature)]
         return Instruments(told, supply, vibration, guarded.door_open, guarded.stop_pressed)
 
@@ -122,8 +118,7 @@ class Reader:
         door, stop, vibration = values["door"], values["emergency_stop"], values["vibration"]
         if not isinstance(door, int) or not isinstance(stop, int) or not isinstance(vibration, int | float):
             found = f"door {door!r}, emergency stop {stop!r}, vibration {vibration!r}"
-            message = f"{self._registers.name}: {found}, numbers are needed; check the profile"
-            raise StationRefused(message)
+            raise StationRefused(f"{self._registers.name}: {found}, numbers are needed; check the profile")
         closed = named(profile.register("door"), door) == "closed"
         released = named(profile.register("emergency_stop"), stop) == "released"
         return Guarded(not closed, not released, float(vibration))
@@ -144,11 +139,10 @@ class Reader:
     def require_switch(self) -> None:
         """Refuses to switch the devices where the reader cannot."""
         if not self.switches:
-            message = (
+            raise StationRefused(
                 f"{self._registers.name}: profile {self._registers.profile.name} has no register 'power', one is needed to "
                 "switch the devices off and on; take off_s out of the recipe's soaks, or name the register of the supply's relay"
             )
-            raise StationRefused(message)
 
     def switch(self, wanted: Literal["on", "off"]) -> None:
         """Switches the supply of all devices: an absolute state, written once and read back; given twice it changes nothing."""

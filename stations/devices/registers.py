@@ -40,16 +40,18 @@ class Registers:
         """A register's number."""
         value = self.read(name)
         if not isinstance(value, int | float):
-            message = f"{self.name}: {name} is {value!r}, a number is needed; check profile {self.profile.name}"
-            raise StationRefused(message)
+            raise StationRefused(
+                f"{self.name}: {name} is {value!r}, a number is needed; check profile {self.profile.name}"
+            )
         return float(value)
 
     def numbers(self, name: str) -> list[float]:
         """The numbers of a register with a count."""
         value = self.read(name)
         if not isinstance(value, list):
-            message = f"{self.name}: {name} is {value!r}, a list is needed; check profile {self.profile.name}"
-            raise StationRefused(message)
+            raise StationRefused(
+                f"{self.name}: {name} is {value!r}, a list is needed; check profile {self.profile.name}"
+            )
         return value
 
     def text(self, name: str) -> str:
@@ -58,8 +60,9 @@ class Registers:
         if isinstance(value, str):
             return value
         if isinstance(value, list):
-            message = f"{self.name}: {name} is a list, one value is needed; check profile {self.profile.name}"
-            raise StationRefused(message)
+            raise StationRefused(
+                f"{self.name}: {name} is a list, one value is needed; check profile {self.profile.name}"
+            )
         return named(self.profile.register(name), value)
 
     def flags(self, name: str) -> dict[str, bool]:
@@ -69,8 +72,9 @@ class Registers:
     def flags_in(self, name: str, value: Value) -> dict[str, bool]:
         """The named bits in the value that a register had, as a group of them gave it."""
         if not isinstance(value, int | float):
-            message = f"{self.name}: {name} is {value!r}, a number is needed; check profile {self.profile.name}"
-            raise StationRefused(message)
+            raise StationRefused(
+                f"{self.name}: {name} is {value!r}, a number is needed; check profile {self.profile.name}"
+            )
         return {flag: bool(int(value) >> bit & 1) for flag, bit in self.profile.register(name).bits.items()}
 
     def names_in(self, group: str) -> dict[str, str]:
@@ -132,11 +136,10 @@ class Registers:
                 raise
         else:
             if not self._holds(name, value):
-                message = (
+                raise StationRefused(
                     f"{self.name}: {name} is {self.read(name)} after {value} was written, {value} is needed; "
                     "check the device's panel and its write protection"
                 )
-                raise StationRefused(message)
 
     def words(self, address: int, count: int, what: str) -> list[int]:
         """Raw words, for windows that have no names."""
@@ -161,5 +164,4 @@ class Registers:
         try:
             return encode(register, self.profile.order(register), value)
         except NotEncodable as problem:
-            message = f"{self.name}: {problem}"
-            raise StationRefused(message) from None
+            raise StationRefused(f"{self.name}: {problem}") from None

@@ -72,11 +72,10 @@ class Slot:
         lsb, full_scale = _number(values["lsb"]), _number(values["full_scale"])
         possible = lsb > 0.0 and FEWEST_COUNTS <= full_scale / lsb <= MOST_COUNTS
         if packing not in PACKINGS or unit not in UNITS or not possible:
-            message = (
+            raise StationRefused(
                 f"{self.name}: packing {packing}, unit {unit}, {lsb:g} per count, full scale {full_scale:g}; known names and a "
                 f"full scale of {FEWEST_COUNTS} to {MOST_COUNTS} counts are needed; check the reader's set-up and word order"
             )
-            raise StationRefused(message)
         return Identity(
             str(values["serial"]), PACKINGS[packing], UNITS[unit], lsb, full_scale, int(_number(values["capacity"]))
         )
@@ -91,10 +90,9 @@ class Slot:
         head, tail, overflow = self._progress()
         if tail > head or (self._taken is not None and tail != self._taken):
             wanted = f"{self._taken}" if self._taken is not None else f"at most {head}"
-            message = (
+            raise StationRefused(
                 f"{self.name}: says that {tail} samples of {head} were taken, {wanted} is right; restart the reader"
             )
-            raise StationRefused(message)
         first = max(tail, head - identity.capacity)
         counts = self._window(first, head, identity)
         if head > tail:
@@ -125,8 +123,9 @@ class Slot:
         """Counts (n, 3) of the samples numbered ``first`` to ``head`` − 1; numbers out of order are :class:`SamplesLost`."""
         fifo = self._registers.profile.fifo
         if fifo is None:
-            message = f"{self.name}: profile {self._registers.profile.name} has no fifo, a slot needs one; add it"
-            raise StationRefused(message)
+            raise StationRefused(
+                f"{self.name}: profile {self._registers.profile.name} has no fifo, a slot needs one; add it"
+            )
         width = WORDS_PER_SAMPLE[identity.packing]
         words: list[int] = []
         at = first
@@ -138,8 +137,9 @@ class Slot:
         counts, numbers = unpack_samples(np.array(words, dtype=np.uint16), identity.packing)
         wrong = np.flatnonzero(numbers != np.arange(first, head) % SEQUENCE[identity.packing])
         if len(wrong):
-            message = f"{self.name}: sample {first + int(wrong[0])} does not follow the one before; check the reader"
-            raise SamplesLost(message)
+            raise SamplesLost(
+                f"{self.name}: sample {first + int(wrong[0])} does not follow the one before; check the reader"
+            )
         return counts.astype(np.float64)
 
     def _named(self, name: str, value: Value) -> str:
@@ -150,5 +150,4 @@ def _number(value: Value) -> float:
     """The number that a register holds by its profile."""
     if isinstance(value, int | float):
         return value
-    message = f"{value!r} is not a number; check the slot's profile"
-    raise StationRefused(message)
+    raise StationRefused(f"{value!r} is not a number; check the slot's profile")

@@ -40,11 +40,10 @@ class TiltTable:
         give_up = self._clock.now() + PATIENCE * expected + GRACE_S
         while not (self._outer.arrived() and self._inner.arrived()):
             if self._clock.now() > give_up:
-                message = (
+                raise StationTimeout(
                     f"table: not at ({outer_deg:g}, {inner_deg:g}) deg after {PATIENCE * expected + GRACE_S:.0f} s, "
                     f"{expected:.0f} s should do; check drive and load"
                 )
-                raise StationTimeout(message)
             self._clock.sleep(POLL_S)
         self.still_since = self._clock.now()
         self._outer.confirm(outer_deg)
@@ -57,8 +56,9 @@ class TiltTable:
         give_up = self._clock.now() + REST_S
         while self._outer.moving() or self._inner.moving():
             if self._clock.now() > give_up:
-                message = f"table: an axis moves since {REST_S:.0f} s, standing is needed; stop it at the drive"
-                raise StationTimeout(message)
+                raise StationTimeout(
+                    f"table: an axis moves since {REST_S:.0f} s, standing is needed; stop it at the drive"
+                )
             self._clock.sleep(POLL_S)
 
     def angles(self) -> tuple[float, float]:

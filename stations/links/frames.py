@@ -69,16 +69,13 @@ def values_in(request: bytes, reply: bytes) -> list[int]:
     size = reply_size(request)
     if len(reply) != size or reply[0] != function:
         shown = f"function {reply[0]}, {len(reply)} bytes" if reply else "nothing"
-        message = f"{shown}; function {function}, {size} bytes are needed"
-        raise Malformed(message)
+        raise Malformed(f"{shown}; function {function}, {size} bytes are needed")
     if function in WRITES:
         if reply != request[:5]:
-            message = f"it confirms {reply[1:].hex()}; {request[1:5].hex()} is needed"
-            raise Malformed(message)
+            raise Malformed(f"it confirms {reply[1:].hex()}; {request[1:5].hex()} is needed")
         return []
     if reply[1] != size - 2:
-        message = f"it counts {reply[1]} bytes; {size - 2} are needed"
-        raise Malformed(message)
+        raise Malformed(f"it counts {reply[1]} bytes; {size - 2} are needed")
     if function in {READ["holding"], READ["input"]}:
         return list(struct.unpack(f">{(size - 2) // 2}H", reply[2:]))
     return unpack_bits(reply[2:], int.from_bytes(request[3:5], "big"))

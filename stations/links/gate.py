@@ -30,8 +30,9 @@ class GatedLink:
         """Writes once, whole writable registers of a known device; anything else is refused and never sent."""
         profile = self._profiles.get(device_id)
         if profile is None:
-            message = f"{self._where} device {device_id}: write {what}, the station's file names no such device; name it there"
-            raise StationRefused(message)
+            raise StationRefused(
+                f"{self._where} device {device_id}: write {what}, the station's file names no such device; name it there"
+            )
         if not profile.may_write(space, address, len(words)):
             found = f"write {what} ({len(words)} of {space} from {address})"
             message = (

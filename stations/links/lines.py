@@ -31,8 +31,9 @@ class LineLink:
             except (StationTimeout, LinkLost):
                 if attempt == self._attempts:
                     raise
-        message = f"{self._where}: no attempt to ask '{question}' was allowed; set read_attempts to 1 or more"
-        raise StationTimeout(message)
+        raise StationTimeout(
+            f"{self._where}: no attempt to ask '{question}' was allowed; set read_attempts to 1 or more"
+        )
 
     def tell(self, order: str, what: str) -> str:
         """The answer to an order, sent once: after a failure nobody knows whether it acted."""
@@ -51,17 +52,18 @@ class LineLink:
             answer = self._spoken(line)
         except TimeoutError:
             self.close()
-            message = f"{self._where}: no answer to {asked} in {self._timeout:g} s; check device and cable"
-            raise StationTimeout(message) from None
+            raise StationTimeout(
+                f"{self._where}: no answer to {asked} in {self._timeout:g} s; check device and cable"
+            ) from None
         except OSError as problem:
             self.close()
-            message = (
+            raise LinkLost(
                 f"{self._where}: connection lost at {asked} ({problem}), a listening device is needed; check power"
-            )
-            raise LinkLost(message) from None
+            ) from None
         if answer.startswith(REFUSED):
-            message = f"{self._where}: {asked} was answered with '{answer}'; check the device and its profile"
-            raise StationRefused(message)
+            raise StationRefused(
+                f"{self._where}: {asked} was answered with '{answer}'; check the device and its profile"
+            )
         return answer
 
     def _spoken(self, line: str) -> str:
@@ -77,11 +79,9 @@ class LineLink:
             self._socket.settimeout(left)
             more = self._socket.recv(CHUNK)
             if not more or len(data) > LONGEST:
-                message = "closed by the device" if not more else "a line without an end"
-                raise ConnectionError(message)
+                raise ConnectionError("closed by the device" if not more else "a line without an end")
             data += more
         text = data[: -len(END)]
         if END in text or not text.isascii():
-            message = f"{text!r} is not one line"
-            raise ConnectionError(message)
+            raise ConnectionError(f"{text!r} is not one line")
         return text.decode("ascii")

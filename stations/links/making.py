@@ -39,8 +39,10 @@ class Links:
         """The link to the registers of the device at a place of the station, such as ``outer`` or ``slots``."""
         device, profile = self._at(place)
         if device.link == "ascii":
-            message = f"devices.{place}.link: ascii, registers need tcp, rtu or tls; correct the station's file"
-            raise RecipeInvalid(message, key=f"devices.{place}.link")
+            raise RecipeInvalid(
+                f"devices.{place}.link: ascii, registers need tcp, rtu or tls; correct the station's file",
+                key=f"devices.{place}.link",
+            )
         key = self._key(device)
         if key not in self.made:
             wire = self._wire(device, key)
@@ -75,19 +77,21 @@ class Links:
         device: Carried = getattr(self.config.devices, place)
         profile = load_profile(device.profile)
         if device.link not in profile.links:
-            message = (
+            raise RecipeInvalid(
                 f"devices.{place}.link: {device.link}, profile {profile.name} is carried by {' or '.join(profile.links)}; "
-                "correct the station's file"
+                "correct the station's file",
+                key=f"devices.{place}.link",
             )
-            raise RecipeInvalid(message, key=f"devices.{place}.link")
         return device, profile
 
     def _key(self, device: Carried) -> Key:
         if self.config.kind == "simulated":
             if device.link not in self.simulated_at:
                 carriers = " or ".join(self.simulated_at)
-                message = f"link {device.link}: a simulated station's devices answer on {carriers}; correct the station's file"
-                raise RecipeInvalid(message, key="link")
+                raise RecipeInvalid(
+                    f"link {device.link}: a simulated station's devices answer on {carriers}; correct the station's file",
+                    key="link",
+                )
             return (device.link, *self.simulated_at[device.link])
         return ("rtu", device.serial, 0) if device.link == "rtu" else (device.link, device.host, device.port)
 
@@ -115,10 +119,10 @@ class Links:
             context = tls_context(Path(device.ca_file), files[1], files[2])
         except OSError as problem:
             named = ", ".join(str(name) for name in files if name is not None)
-            message = (
-                f"station {self.config.name}: {named}: {problem}, readable PEM files are needed; correct the paths"
-            )
-            raise RecipeInvalid(message, key="ca_file") from None
+            raise RecipeInvalid(
+                f"station {self.config.name}: {named}: {problem}, readable PEM files are needed; correct the paths",
+                key="ca_file",
+            ) from None
         return TcpWire(host, port, patience, tls=context, server_name=device.server_name)
 
     def _shared(self, place: str, profile: Profile) -> RecipeInvalid:

@@ -52,10 +52,9 @@ class WireLink:
             except (StationTimeout, LinkLost) as problem:
                 if attempt == self._attempts or isinstance(problem, _BehindGateway):
                     raise
-        message = (
+        raise StationTimeout(
             f"{self._wire.where} device {device_id}: no attempt to {asked} was allowed; set read_attempts to 1 or more"
         )
-        raise StationTimeout(message)
 
     def write(self, device_id: int, address: int, words: Sequence[int], what: str, space: Space = "holding") -> None:
         """Writes registers or bits in one request, sent once."""
@@ -71,15 +70,15 @@ class WireLink:
         try:
             return values_in(request, self._wire.exchange(device_id, request))
         except Silence:
-            message = f"{where}: no answer to '{asked}' in {self._wire.timeout_s:g} s; check device and cable"
-            raise StationTimeout(message) from None
+            raise StationTimeout(
+                f"{where}: no answer to '{asked}' in {self._wire.timeout_s:g} s; check device and cable"
+            ) from None
         except Broken as problem:
             message = f"{where}: connection lost at '{asked}' ({problem}), a listening device is needed"
             raise LinkLost(f"{message}; check power, network and port") from None
         except Malformed as problem:
             self._wire.close()
-            message = f"{where}: no answer to '{asked}' but {problem}; check gateway and cable"
-            raise LinkLost(message) from None
+            raise LinkLost(f"{where}: no answer to '{asked}' but {problem}; check gateway and cable") from None
         except Refused as problem:
             raise _refusal(where, asked, problem.code) from None
 

@@ -109,17 +109,16 @@ class SerialWire:
         deadline = time.monotonic() + self.timeout_s
         data = _read(port, EXCEPTION_FRAME, deadline)
         if data[0] != device_id or data[1] & ~EXCEPTION != request[0]:
-            message = f"device {data[0]}, function {data[1]}; device {device_id}, function {request[0]} are needed"
-            raise Malformed(message)
+            raise Malformed(
+                f"device {data[0]}, function {data[1]}; device {device_id}, function {request[0]} are needed"
+            )
         if not data[1] & EXCEPTION:
             data += _read(port, 1 + reply_size(request) + 2 - EXCEPTION_FRAME, deadline)
         self._heard = time.monotonic()
         if crc16(data[:-2]) != data[-2:]:
-            message = f"check {data[-2:].hex()}; {crc16(data[:-2]).hex()} is needed"
-            raise Malformed(message)
+            raise Malformed(f"check {data[-2:].hex()}; {crc16(data[:-2]).hex()} is needed")
         if port.in_waiting:
-            message = f"{port.in_waiting} bytes behind an answer; silence is needed"
-            raise Malformed(message)
+            raise Malformed(f"{port.in_waiting} bytes behind an answer; silence is needed")
         return data[1:-2]
 
 

@@ -112,14 +112,12 @@ class TcpWire:
                 connection.settimeout(left)
                 data = connection.recv(CHUNK)
                 if not data:
-                    message = "closed by the device"
-                    raise ConnectionError(message)
+                    raise ConnectionError("closed by the device")
                 self._buffer += data
             if int.from_bytes(frame[:2], "big") != self._number:
                 continue
             if frame[6] != device_id:
-                message = f"device {frame[6]}; device {device_id} is needed"
-                raise Malformed(message)
+                raise Malformed(f"device {frame[6]}; device {device_id} is needed")
             return frame[HEADER:]
 
     def _frame(self) -> bytes | None:
@@ -128,8 +126,7 @@ class TcpWire:
             return None
         protocol, length = struct.unpack(">HH", self._buffer[2:6])
         if protocol or not 2 < length <= LONGEST:
-            message = f"protocol {protocol}, length {length}; protocol 0, length 3 to {LONGEST} are needed"
-            raise Malformed(message)
+            raise Malformed(f"protocol {protocol}, length {length}; protocol 0, length 3 to {LONGEST} are needed")
         end = 6 + length
         if len(self._buffer) < end:
             return None

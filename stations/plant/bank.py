@@ -21,16 +21,14 @@ class Busy(Exception):
 
 def refuse_write(values: dict[str, Value]) -> None:
     """The sink of a device that takes no commands."""
-    message = f"{', '.join(values)}: not to be written"
-    raise NotEncodable(message)
+    raise NotEncodable(f"{', '.join(values)}: not to be written")
 
 
 def number(values: dict[str, Value], name: str) -> float:
     """The number that is written to a register."""
     value = values[name]
     if not isinstance(value, int | float):
-        message = f"{name}: {value!r} is not a number"
-        raise NotEncodable(message)
+        raise NotEncodable(f"{name}: {value!r} is not a number")
     return float(value)
 
 
@@ -47,8 +45,9 @@ class Bank:
         self._registers = [self._scaled(register) for register in profile.registers]
         missing = [r.name for r in profile.registers if r.access != "write" and r.name not in self._sources]
         if missing:
-            message = f"profile {profile.name}: the plant has nothing for {', '.join(missing)}; add a source for each"
-            raise LookupError(message)
+            raise LookupError(
+                f"profile {profile.name}: the plant has nothing for {', '.join(missing)}; add a source for each"
+            )
 
     def _scaled(self, register: Register) -> Register:
         """The register in the decimals that the device is set to."""
@@ -80,8 +79,7 @@ class Bank:
         first = register.address - address
         part = words[max(first, 0) : first + register.words]
         if register.access == "read" or first < 0 or len(part) != register.words:
-            message = f"{register.name}: read-only or cut in half; write whole registers that may be written"
-            raise NotEncodable(message)
+            raise NotEncodable(f"{register.name}: read-only or cut in half; write whole registers that may be written")
         order = self.profile.order(register)
         value = decode(register, order, part)
         encode(register, order, value)  # refuses what is outside the limits

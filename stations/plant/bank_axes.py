@@ -42,8 +42,7 @@ def _direct_data(plant: Plant, axis: Axis, profile: Profile) -> Bank:
         if "target" not in values:
             return
         if values.get("trigger") != 1 or values.get("operation_type") != ABSOLUTE:
-            message = "direct data: only absolute moves, triggered at once, are simulated"
-            raise NotEncodable(message)
+            raise NotEncodable("direct data: only absolute moves, triggered at once, are simulated")
         _go(plant, axis, profile, values)
 
     sources = {
@@ -70,8 +69,7 @@ def _step_data(plant: Plant, axis: Axis, profile: Profile) -> Bank:
         if values.get("start") != GO or not listening:
             return  # a drive that is not ready lets the start register be written, and stays where it is
         if kept["operation_type"] != ABSOLUTE:
-            message = "step data: only absolute moves are simulated"
-            raise NotEncodable(message)
+            raise NotEncodable("step data: only absolute moves are simulated")
         _go(plant, axis, profile, kept)
 
     def own(name: str) -> Callable[[], Value]:

@@ -50,8 +50,7 @@ def _f4t(chamber: Chamber, profile: Profile) -> tuple[Sources, Callable[[dict[st
         if "mode" in values:
             chosen = named(profile.register("mode"), number(values, "mode"))
             if chosen not in {"automatic", "off"}:
-                message = "mode: the simulated chamber knows automatic and off"
-                raise NotEncodable(message)
+                raise NotEncodable("mode: the simulated chamber knows automatic and off")
             chamber.running = chosen == "automatic"
         if "set_point" in values:
             chamber.set_point = number(values, "set_point")

@@ -81,8 +81,7 @@ def _slot(plant: Plant, unit: int, profile: Profile) -> Bank:
     def taken(values: dict[str, Value]) -> None:
         tail = int(number(values, "tail"))
         if not sampler.tail[unit] <= tail <= sampler.head:
-            message = f"tail: {tail}, {sampler.tail[unit]} to {sampler.head} is needed"
-            raise NotEncodable(message)
+            raise NotEncodable(f"tail: {tail}, {sampler.tail[unit]} to {sampler.head} is needed")
         sampler.tail[unit] = tail
 
     sources = {

@@ -109,11 +109,13 @@ class Journal:
         try:
             content: dict[str, Any] = json.loads(zlib.decompress(state))
         except (zlib.error, ValueError):
-            message = "station state: not readable, bytes of an earlier capture are needed; start the run afresh"
-            raise ArchiveUnusable(message) from None
+            raise ArchiveUnusable(
+                "station state: not readable, bytes of an earlier capture are needed; start the run afresh"
+            ) from None
         if content.get("version") != VERSION or content.get("belongs_to") != self._belongs_to:
-            message = "station state: it was taken from another station or lot; resume with the same files and units"
-            raise DataRejected(message)
+            raise DataRejected(
+                "station state: it was taken from another station or lot; resume with the same files and units"
+            )
         for item in content["events"]:
             plant.advance(int(item["at_us"]) - plant.now_us)
             if "fault" in item:

@@ -43,8 +43,9 @@ class LineServer:
         try:
             self._server = _Server((host, port), Conversation)
         except OSError as problem:
-            message = f"simulated station: {host}:{port} does not listen ({problem.strerror}); give a free port"
-            raise StationRefused(message) from None
+            raise StationRefused(
+                f"simulated station: {host}:{port} does not listen ({problem.strerror}); give a free port"
+            ) from None
         self.host, self.port = host, int(self._server.server_address[1])
 
     def __enter__(self) -> Self:

@@ -260,5 +260,6 @@ class Plant:
 def _refuse_slots(lot: Lot, count: int) -> None:
     for unit in lot.units:
         if unit.slot >= count:
-            message = f"lot: unit {unit.serial} sits in slot {unit.slot}, the fixture has 0 to {count - 1}; move it"
-            raise WrongUse(message)
+            raise WrongUse(
+                f"lot: unit {unit.serial} sits in slot {unit.slot}, the fixture has 0 to {count - 1}; move it"
+            )

@@ -77,8 +77,7 @@ def load_preset(name: str, overrides: Mapping[str, float] | None = None) -> Pres
     """The preset of that name (in any case), with some figures replaced; unknown names and keys are refused."""
     texts = {key.lower(): text for key, text in _texts().items()}
     if name.lower() not in texts:
-        message = f"device: no preset '{name}'; {did_you_mean(name, preset_names())}"
-        raise RecipeInvalid(message, key="device")
+        raise RecipeInvalid(f"device: no preset '{name}'; {did_you_mean(name, preset_names())}", key="device")
     figures = tomllib.loads(texts[name.lower()]) | dict(overrides or {})
     try:
         return Preset.model_validate(figures)

@@ -135,8 +135,7 @@ class PlantServer:
         logging.getLogger("pymodbus").setLevel(logging.CRITICAL)  # its errors reach the client as answers
         self._thread.start()
         if not self._ready.wait(START_S) or self._server is None:
-            message = f"simulated station: {self.host}:{self.port} does not listen; give a free port"
-            raise StationRefused(message)
+            raise StationRefused(f"simulated station: {self.host}:{self.port} does not listen; give a free port")
         return self
 
     def __exit__(
@@ -172,6 +171,5 @@ class PlantServer:
         """The port that a listening server has got."""
         transport = server.transport
         if not isinstance(transport, asyncio.Server):
-            message = "simulated station: the server does not listen; give a free port"
-            raise StationRefused(message)
+            raise StationRefused("simulated station: the server does not listen; give a free port")
         return int(transport.sockets[0].getsockname()[1])

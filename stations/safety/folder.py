@@ -22,11 +22,10 @@ def state_folder() -> Path:
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as problem:
-        message = (
+        raise StationRefused(
             f"leases: {folder} cannot be made ({problem.strerror}), a folder that can be written is needed; give one in "
             f"{VARIABLE}"
-        )
-        raise StationRefused(message) from None
+        ) from None
     return folder
 
 

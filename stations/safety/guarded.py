@@ -95,8 +95,7 @@ def _start(config: StationConfig, leases: Leases, folder: Path) -> subprocess.Po
         "wanted": leases.wanted,
     }
     if process.stdin is None or process.stdout is None:
-        message = "watchdog: started without its pipes; free some file handles and start again"
-        raise StationTimeout(message)
+        raise StationTimeout("watchdog: started without its pipes; free some file handles and start again")
     process.stdin.write(json.dumps(order).encode() + b"\n")
     process.stdin.flush()
     ready, _, _ = select.select([process.stdout], [], [], START_S)
@@ -107,8 +106,9 @@ def _start(config: StationConfig, leases: Leases, folder: Path) -> subprocess.Po
         process.stdin.close()
         process.wait()
         log = folder / "watchdog.err"
-        message = f"watchdog: it does not watch after {START_S:g} s, nothing is driven without it; look into {log}"
-        raise StationTimeout(message)
+        raise StationTimeout(
+            f"watchdog: it does not watch after {START_S:g} s, nothing is driven without it; look into {log}"
+        )
     return process
 
 

@@ -145,11 +145,10 @@ class Leases:
     def require(self) -> None:
         """Refuses to go on when the watchdog may have taken the station over."""
         if self._lapsed():
-            message = (
+            raise OperatorNeeded(
                 f"station {self.holder.station}: this run stood still for more than {self.lapse_s:g} s and its watchdog has "
                 "put the station into its safe state; give the command again: it goes on where it was"
             )
-            raise OperatorNeeded(message)
 
     def standing(self) -> list[Part]:
         """Parts whose lock a process still has in the name of this holder's token: it lives and stands still."""
@@ -200,15 +199,15 @@ class Leases:
         name = {"outer": "table", "inner": "table"}.get(part, part)
         where = self.wanted[part]
         if other is None:
-            message = f"station {self.holder.station}: the {name} at {where} is being taken by another run; try again"
-            raise OperatorNeeded(message)
+            raise OperatorNeeded(
+                f"station {self.holder.station}: the {name} at {where} is being taken by another run; try again"
+            )
         age = seconds_since_beat(self._file(part))
-        message = (
+        raise OperatorNeeded(
             f"station {self.holder.station}: the {name} at {where} is driven by {other.run} (process {other.pid} on {other.host} "
             f"since {other.since}, heard of {age:.0f} s ago), one run at a time can drive it; wait for it or stop it: its lease "
             f"is free at the latest {SAFE_WITHIN_S:g} s after its end"
         )
-        raise OperatorNeeded(message)
 
 
 def read_holder(path: Path) -> Holder | None:
@@ -219,8 +218,9 @@ def read_holder(path: Path) -> Holder | None:
     except FileNotFoundError:
         return None
     except (OSError, ValueError, TypeError):
-        message = f"leases: {path} cannot be read, a file of this program is needed; look who writes into its folder"
-        raise StationRefused(message) from None
+        raise StationRefused(
+            f"leases: {path} cannot be read, a file of this program is needed; look who writes into its folder"
+        ) from None
 
 
 def seconds_since_beat(path: Path) -> float:

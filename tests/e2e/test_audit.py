@@ -120,8 +120,7 @@ def test_an_archive_that_cannot_be_written_is_audited_too(made, tmp_path, monkey
     from schemas.errors import ArchiveUnusable
 
     def refuse(*_args: object, **_more: object):
-        message = "archive: read-only"
-        raise ArchiveUnusable(message)
+        raise ArchiveUnusable("archive: read-only")
 
     monkeypatch.setattr(index, "alone", refuse)
     monkeypatch.setattr(index.os, "access", lambda *_: False)

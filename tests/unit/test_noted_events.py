@@ -71,8 +71,7 @@ def test_a_ledger_that_may_only_be_read_is_told_all_the_same(
     ledger: Ledger, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def refuse(*_args: object) -> None:
-        message = "archive: read-only"
-        raise ArchiveUnusable(message)
+        raise ArchiveUnusable("archive: read-only")
 
     monkeypatch.setattr(module.files, "publish", refuse)
     assert len(list(ledger.all())) == 400

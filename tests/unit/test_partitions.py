@@ -25,8 +25,7 @@ def threads(_value: int) -> int:
 
 
 def refuse(value: int) -> int:
-    message = f"part {value}: no dwell, one is needed; measure it"
-    raise DataRejected(message)
+    raise DataRejected(f"part {value}: no dwell, one is needed; measure it")
 
 
 def test_results_come_in_the_order_of_the_partitions() -> None:

@@ -38,14 +38,12 @@ def trouble_of(fault: FaultOrder, serials: Sequence[str]) -> Fault:
     """The trouble that a fault makes; a kind, figure or unit that is not there is refused, and one that means nobody."""
     known = kinds()
     if fault.kind not in known:
-        message = f"fault: no kind '{fault.kind}'; {did_you_mean(fault.kind, known)}"
-        raise RecipeInvalid(message, key="faults")
+        raise RecipeInvalid(f"fault: no kind '{fault.kind}'; {did_you_mean(fault.kind, known)}", key="faults")
     kind = known[fault.kind]
     for name in fault.figures:
         if name not in figures(kind):
             close = did_you_mean(name, figures(kind)) if figures(kind) else "it has none"
-            message = f"fault {fault.kind}: no figure '{name}'; {close}"
-            raise RecipeInvalid(message, key="faults")
+            raise RecipeInvalid(f"fault {fault.kind}: no figure '{name}'; {close}", key="faults")
     _refuse_nobody(fault, kind, serials)
     made = kind(**fault.figures)
     made.fault = fault
@@ -56,8 +54,11 @@ def _refuse_nobody(fault: FaultOrder, kind: type[Fault], serials: Sequence[str])
     meant = UNIT if fault.serial else fault.device
     if meant not in (kind.about or ("",)):
         wanted = ", ".join("serial=…" if one == UNIT else f"device={one}" for one in kind.about) or "neither"
-        message = f"fault {fault.kind}: serial '{fault.serial}', device '{fault.device}'; {wanted} is needed; correct the fault"
-        raise RecipeInvalid(message, key="faults")
+        raise RecipeInvalid(
+            f"fault {fault.kind}: serial '{fault.serial}', device '{fault.device}'; {wanted} is needed; correct the fault",
+            key="faults",
+        )
     if fault.serial and fault.serial not in serials:
-        message = f"fault {fault.kind}: no unit '{fault.serial}'; {did_you_mean(fault.serial, serials)}"
-        raise RecipeInvalid(message, key="faults")
+        raise RecipeInvalid(
+            f"fault {fault.kind}: no unit '{fault.serial}'; {did_you_mean(fault.serial, serials)}", key="faults"
+        )

@@ -38,12 +38,15 @@ HIDDEN: Mapping[str, Callable[..., HiddenEffect]] = {
 def hidden_effect(kind: str, figures: Mapping[str, float]) -> HiddenEffect:
     """The hidden effect of that kind with these figures; unknown kinds and figures are refused."""
     if kind not in HIDDEN:
-        message = f"simulation.hidden: no effect '{kind}'; {did_you_mean(kind, HIDDEN)}"
-        raise RecipeInvalid(message, key="simulation.hidden")
+        raise RecipeInvalid(
+            f"simulation.hidden: no effect '{kind}'; {did_you_mean(kind, HIDDEN)}", key="simulation.hidden"
+        )
     make = HIDDEN[kind]
     known = [f.name for f in fields(make) if f.init] if isinstance(make, type) else list(figures)  # pyright: ignore[reportArgumentType]
     for name in figures:
         if name not in known:
-            message = f"simulation.hidden: {kind} has no '{name}'; {did_you_mean(name, known)}"
-            raise RecipeInvalid(message, key=f"simulation.hidden.{name}")
+            raise RecipeInvalid(
+                f"simulation.hidden: {kind} has no '{name}'; {did_you_mean(name, known)}",
+                key=f"simulation.hidden.{name}",
+            )
     return make(**figures)

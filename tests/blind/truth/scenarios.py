@@ -125,8 +125,7 @@ def _search(rng: np.random.Generator, build: Callable[[], Spec | None], *, visib
         run = make_run(spec, int(rng.integers(2**31)))
         if not spec.effects or _fits(run, visible=visible):
             return run
-    message = "scenarios: 400 tries gave no run that fits its row; loosen the row's homes"
-    raise RuntimeError(message)
+    raise RuntimeError("scenarios: 400 tries gave no run that fits its row; loosen the row's homes")
 
 
 def _hidden(rng: np.random.Generator, count: int, size: float, first: str | None = None, **extra: object) -> Run:
@@ -236,7 +235,6 @@ SCENARIOS: dict[str, Callable[[np.random.Generator, int], Run]] = {
 def case(scenario: str, index: int, seed: int) -> Run:
     """The `index`-th run of a scenario; the same seed gives the same run whatever else is made."""
     if scenario not in SCENARIOS:
-        message = f"scenarios: no scenario named {scenario!r}; needs one of {', '.join(SCENARIOS)}"
-        raise ValueError(message)
+        raise ValueError(f"scenarios: no scenario named {scenario!r}; needs one of {', '.join(SCENARIOS)}")
     entropy = np.random.SeedSequence([seed, zlib.crc32(scenario.encode()), index])
     return SCENARIOS[scenario](np.random.default_rng(entropy), STRIDE * index + seed)

@@ -40,8 +40,9 @@ class Spec:
 
     def __post_init__(self) -> None:
         if len(self.sizes) != len(self.effects):
-            message = f"Spec: {len(self.effects)} effects and {len(self.sizes)} sizes, needs one size per effect"
-            raise ValueError(message)
+            raise ValueError(
+                f"Spec: {len(self.effects)} effects and {len(self.sizes)} sizes, needs one size per effect"
+            )
 
 
 @dataclass(frozen=True)
