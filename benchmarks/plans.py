@@ -56,16 +56,16 @@ class Course:
     rate: float
 
 
-def course_of(plan_context: PlanContext) -> Course:
+def course_of(planned: PlanContext) -> Course:
     """The dwells of the fit among what a station does."""
-    dwells = [s for s in plan_context.stretches if s.kind == "dwell"]
+    dwells = [s for s in planned.stretches if s.kind == "dwell"]
     return Course(
         outer=np.array([s.step.pose.outer_deg for s in dwells]),
         inner=np.array([s.step.pose.inner_deg for s in dwells]),
         heat=np.array([s.step.temperature for s in dwells]),
         start=np.array([s.start for s in dwells]),
-        duration=plan_context.recipe.dwell_s,
-        rate=plan_context.recipe.rate_hz,
+        duration=planned.recipe.dwell_s,
+        rate=planned.recipe.rate_hz,
     )
 
 

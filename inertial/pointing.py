@@ -1,4 +1,4 @@
-"""FIXME."""
+"""Whether a table stood where its encoders said, judged from the outputs of a whole lot: every unit is an inclinometer."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
-"""A function over the partitions of an archive: in this process, in several here, or on Dask workers by Prefect's task runner.
+"""A function over the partitions of an archive: in this process, in several here, or wherever a ``Spread`` takes it.
 
-The results come back in the order of the partitions, whoever worked on them, and every partition is worked on with one
-BLAS thread: where the work is done changes no byte of what is made.
+The results come back in the order of the partitions, whichever process works on them, and every partition is worked on with one
+BLAS thread: where the work is done changes no byte of the results.
 """
 
 from __future__ import annotations
@@ -11,13 +11,11 @@ from concurrent.futures import ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
 from multiprocessing import get_context
-from pathlib import Path
-from tempfile import TemporaryDirectory
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any, Protocol, TypeVar
 
 from threadpoolctl import threadpool_limits
 
-from schemas.errors import ArchiveUnusable, WrongUse
+from schemas.errors import ArchiveUnusable
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Generator, Mapping, Sequence
@@ -25,18 +23,23 @@ if TYPE_CHECKING:
 Part = TypeVar("Part")
 Result = TypeVar("Result")
 
-LOCAL = "local"
-SCHEMES = ("tcp://", "tls://", "ucx://", "ws://", "wss://")
 ONE_THREAD = {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1", "MKL_NUM_THREADS": "1"}
+
+
+class Spread(Protocol):
+    """A way to spread work over other machines, such as :func:`pipelines.flows.spread.on_dask`."""
+
+    def __call__(self, function: Callable[[Any], Any], partitions: Sequence[Any], name: str) -> list[Any]:
+        """What the function makes of every partition, in order; ``name`` is that of the work in logs."""
+        ...
 
 
 def map_partitions(
     function: Callable[[Part], Result],
     partitions: Sequence[Part],
-    dask: str | None = None,
+    spread: Spread | None = None,
     *,
     workers: int = 1,
-    home: Path | None = None,
     name: str = "partitions",
 ) -> list[Result]:
     """What a function makes of every partition, in the order of the partitions.
@@ -45,24 +48,14 @@ def map_partitions(
     ----------
     function : of a module, not of a block: workers import it by its name
     partitions : values that can be pickled
-    dask : address of a Dask scheduler, or ``local`` for a cluster of processes on this machine; no Dask where empty or None
-    workers : processes on this machine, without Dask or in the local cluster
-    home : folder of the orchestrator that is started where PREFECT_API_URL names none; a temporary one where None
-    name : of the flow run
-
-    Raises
-    ------
-    WrongUse
-        The address is none.
+    spread : where the work is done instead of on this machine
+    workers : processes on this machine, where there is no spread
+    name : of the work in logs
     """
     if not partitions:
         return []
-    if dask:
-        _refuse_address(dask)
-        with _orchestrator(home):
-            from pipelines.flows.dask import run_on_dask  # Prefect reads its settings when it is imported
-
-            return run_on_dask(function, partitions, dask, workers, name)
+    if spread is not None:
+        return spread(function, partitions, name)
     if workers <= 1 or len(partitions) == 1:
         return [in_one_thread(function, part) for part in partitions]
     return _in_processes(function, partitions, min(workers, len(partitions)))
@@ -89,12 +82,12 @@ def processors() -> int:
 @contextmanager
 def one_thread_each() -> Generator[None, None, None]:
     """A block whose child processes begin with one BLAS thread."""
-    with _environment(ONE_THREAD):
+    with environment_of(ONE_THREAD):
         yield
 
 
 @contextmanager
-def _environment(values: Mapping[str, str]) -> Generator[None, None, None]:
+def environment_of(values: Mapping[str, str]) -> Generator[None, None, None]:
     """A block with these variables in the environment, which is as it was after it."""
     before = {key: os.environ.get(key) for key in values}
     os.environ.update(values)
@@ -118,31 +111,3 @@ def _in_processes(function: Callable[[Part], Result], partitions: Sequence[Part]
             ) from None
         finally:
             pool.shutdown(cancel_futures=True)
-
-
-def _refuse_address(dask: str) -> None:
-    if dask != LOCAL and not dask.startswith(SCHEMES):
-        raise WrongUse(
-            f"--dask: '{dask}' is no address of a scheduler, tcp://HOST:PORT is needed, or '{LOCAL}' for a cluster on this "
-            "machine; start one with 'dask scheduler' and 'dask worker'"
-        )
-
-
-@contextmanager
-def _orchestrator(home: Path | None) -> Generator[None, None, None]:
-    """A block with an orchestrator: the one that PREFECT_API_URL names, or one of our own for as long as it lasts."""
-    if os.environ.get("PREFECT_API_URL"):
-        yield
-        return
-    from pipelines.flows.local import local_server
-
-    with (
-        TemporaryDirectory(prefix="tumbleline-", ignore_cleanup_errors=True) as spare,
-        local_server(home or Path(spare)) as settings,
-        _environment(settings),
-    ):
-        from prefect.settings import temporary_settings
-
-        own: dict[Any, str] = {name: settings[name] for name in ("PREFECT_API_URL", "PREFECT_HOME")}
-        with temporary_settings(updates=own):  # in case that Prefect was imported before, with others
-            yield

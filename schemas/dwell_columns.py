@@ -1,4 +1,4 @@
-"""FIXME."""
+"""Columns of dwells in the exchange format."""
 
 from __future__ import annotations
 

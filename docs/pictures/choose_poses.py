@@ -1,4 +1,3 @@
-# ruff: noqa: INP001 - a script beside the pictures that it draws
 """Draws the pictures of docs/how-to/choose-poses.md: `python docs/pictures/choose_poses.py`."""
 
 from __future__ import annotations

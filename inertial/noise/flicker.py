@@ -1,8 +1,9 @@
-"""FIXME."""
-
-from __future__ import annotations
+"""Flicker (1/f) noise as a sum of Ornstein–Uhlenbeck processes whose time constants are a fixed ratio apart."""
 
 import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
 
 
 def flicker_kernel(time: Array, *, slowest: float = 4.0) -> Array:

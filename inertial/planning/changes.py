@@ -4,7 +4,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Literal
 
-from inertial.planning import cures as cures
+from inertial.planning import cures
 from inertial.planning import features as has
 from inertial.state import State
 

@@ -32,6 +32,7 @@ if TYPE_CHECKING:
 
     from pipelines.archive import Archive
     from pipelines.audit.rules import Rules
+    from pipelines.parallel import Spread
 
     Flags = NDArray[np.bool_]
 
@@ -89,16 +90,16 @@ class Audit:
     studies: tuple[Study, ...]
 
 
-def audit(archive: Archive, rules: Rules, scope: Scope, *, dask: str | None = None, workers: int = 1) -> Audit:
+def audit(archive: Archive, rules: Rules, scope: Scope, *, spread: Spread | None = None, workers: int = 1) -> Audit:
     """What an archive tells of its units, its stations and its population up to a day.
 
     Histories are looked at whole; ``since`` chooses which changes, signals and figures are told of.
 
     Parameters
     ----------
-    dask, workers : where the runs are read, see :func:`pipelines.parallel.map_partitions`
+    spread, workers : where the runs are read, see :func:`pipelines.parallel.map_partitions`
     """
-    index = up_to_date(archive, dask, workers)
+    index = up_to_date(archive, spread, workers)
     runs = runs_of(index, scope.until)
     all_ = load(index, runs)
     found = tuple(strangers(all_, rules))

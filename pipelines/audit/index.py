@@ -36,6 +36,7 @@ if TYPE_CHECKING:
 
     from pipelines.archive import Archive
     from pipelines.archive.store import Place
+    from pipelines.parallel import Spread
 
 FOLDER = "index"
 RUNS_PER_PART = 500
@@ -112,30 +113,30 @@ class AuditIndex:
         return [str(part / f"{name}.parquet") for part in self.parts]
 
 
-def up_to_date(archive: Archive, dask: str | None = None, workers: int = 1) -> AuditIndex:
+def up_to_date(archive: Archive, spread: Spread | None = None, workers: int = 1) -> AuditIndex:
     """The index of an archive with every run as it is now.
 
     Where the archive cannot be written the index is made in a temporary folder, for this once.
 
     Parameters
     ----------
-    dask, workers : where parts are made, see :func:`pipelines.parallel.map_partitions`
+    spread, workers : where parts are made, see :func:`pipelines.parallel.map_partitions`
     """
     place = archive.root / FOLDER
     if not (archive.root / "runs").is_dir():  # an address with a slip of the pen is not made into a folder
         return AuditIndex((), 0, 0)
     try:
         with alone(place, wait=True):
-            found = _refreshed(archive, place, dask, workers)
+            found = _refreshed(archive, place, spread, workers)
             return replace(found, holder=_Reading(place)) if isinstance(place, Path) else found
     except ArchiveUnusable:
         if isinstance(archive.root, Path) and os.access(archive.root, os.W_OK):
             raise
         holder = _Fleeting()
-        return replace(_refreshed(archive, holder.path, dask, workers), holder=holder)
+        return replace(_refreshed(archive, holder.path, spread, workers), holder=holder)
 
 
-def _refreshed(archive: Archive, place: Place, dask: str | None, workers: int) -> AuditIndex:
+def _refreshed(archive: Archive, place: Place, spread: Spread | None, workers: int) -> AuditIndex:
     stamps, version = stamps_of(archive.root), _version()
     parts = {part: _runs_of(part, version) for part in _folders(place)}
     _remove(place, [part for part, runs in parts.items() if not runs])  # one that is made anew may have its name
@@ -150,7 +151,7 @@ def _refreshed(archive: Archive, place: Place, dask: str | None, workers: int) -
     root = address_of(archive.root)
     own = "" if place == archive.root / FOLDER else str(place)
     portions = [Portion(root, own, tuple((r, stamps[r]) for r in chunk), version) for chunk in chunks]
-    new = [place / name for name in map_partitions(make_part, portions, dask, workers=workers, name="audit index")]
+    new = [place / name for name in map_partitions(make_part, portions, spread, workers=workers, name="audit index")]
     _remove(place, set(parts) - set(good) - set(new))
     return AuditIndex(tuple(sorted([*good, *new], key=str)), len(missing), len(there))
 

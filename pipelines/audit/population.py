@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from inertial.population.capability import AuditIndex as Capability
+from inertial.population.capability import Index as Capability
 from inertial.population.capability import cpk, fraction_interval, independent, sigma_within
 from inertial.population.comparison import TO_SIGMA, Comparison, compare, holm, outlier_limit, robust_z, unlike
 from inertial.population.two_way import group_medians

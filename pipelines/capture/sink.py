@@ -1,4 +1,4 @@
-"""FIXME."""
+"""The sink of a capture: where records go as they are taken."""
 
 from __future__ import annotations
 

@@ -4,4 +4,4 @@ from pipelines.certificates.entries import LedgerEntry
 from pipelines.certificates.ledger import Ledger
 from pipelines.certificates.validity import Calibration
 
-__all__ = ["Calibration", "LedgerEntry", "Ledger"]
+__all__ = ["Calibration", "Ledger", "LedgerEntry"]

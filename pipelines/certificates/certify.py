@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 from pipelines.archive import Run, files
 from pipelines.certificates.days import day_of, months_after, today
 from pipelines.certificates.entries import LedgerEntry
+from pipelines.certificates.refusals import END, START
 from pipelines.tables.frames import rows_of
 from schemas.errors import WrongUse, did_you_mean
 

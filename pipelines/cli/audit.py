@@ -51,10 +51,12 @@ def command(
     from pipelines.audit.document import document
     from pipelines.audit.findings import findings
     from pipelines.audit.rules import load_rules
+    from pipelines.flows.spread import on_dask
     from pipelines.parallel import processors
 
     store, scope = Archive(archive), scope_of(since, until, device, station)
-    found = audit(store, load_rules(rules), scope, dask=dask or None, workers=workers or processors())
+    count = workers or processors()
+    found = audit(store, load_rules(rules), scope, spread=on_dask(dask, count), workers=count)
     _refuse_nothing(found, str(store.root))
     told = findings(found)
     if page is not None:

@@ -105,6 +105,7 @@ def _mapped(
     """What a function makes of the runs, in their order, wherever it is done."""
     from pathlib import Path as LocalPath
 
+    from pipelines.flows.spread import on_dask
     from pipelines.parallel import map_partitions
     from pipelines.rerun.partition import parts
 
@@ -112,7 +113,9 @@ def _mapped(
     home = store.root.resolve() / "orchestrator" if isinstance(store.root, LocalPath) else None
     with error_console().status(f"running {len(runs)} runs again, {count} at a time"):
         portions = parts(store, runs, change, count, report=report)
-        done = map_partitions(function, portions, dask, workers=count, home=home, name=f"rerun of {len(runs)} runs")
+        done = map_partitions(
+            function, portions, on_dask(dask, count, home), workers=count, name=f"rerun of {len(runs)} runs"
+        )
     return [one for portion in done for one in portion]
 
 

@@ -79,6 +79,7 @@ def _judged(
     """Every lot under both models, and the fresh errors of those whose units were measured before."""
     from pathlib import Path as LocalPath
 
+    from pipelines.flows.spread import on_dask
     from pipelines.parallel import map_partitions, processors
     from pipelines.rerun.lot_comparison import fresh, judged
     from pipelines.rerun.partition import parts
@@ -86,14 +87,14 @@ def _judged(
 
     count = max(1, min(workers or processors(), len(runs)))
     home = store.root.resolve() / "orchestrator" if isinstance(store.root, LocalPath) else None
-    how: dict[str, Any] = {"workers": count, "home": home}
+    spread = on_dask(dask, count, home)
     with error_console().status(f"judging {len(runs)} lots, {count} at a time"):
-        portions = map_partitions(judged, parts(store, runs, change, count), dask, **how, name="what if")
+        portions = map_partitions(judged, parts(store, runs, change, count), spread, workers=count, name="what if")
         found = [one for portion in portions for one in portion]
         tasks = fresh_tasks(found, store.address, change)
         size = max(1, -(-len(tasks) // (4 * count)))
         chunks = [tasks[start : start + size] for start in range(0, len(tasks), size)]
-        done = map_partitions(fresh, chunks, dask, **how, name="what if, fresh runs")
+        done = map_partitions(fresh, chunks, spread, workers=count, name="what if, fresh runs")
     return found, [one for chunk in done for one in chunk]
 
 

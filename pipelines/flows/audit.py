@@ -20,6 +20,7 @@ from pipelines.audit.findings import findings
 from pipelines.audit.page import render
 from pipelines.audit.rules import load_rules
 from pipelines.certificates.days import today
+from pipelines.flows.spread import on_dask
 from pipelines.tables.json_values import json_value
 
 if TYPE_CHECKING:
@@ -34,7 +35,7 @@ MOST_ROWS = 500  # of the table of findings; the page and the document have all
 def look(archive: Archive, rules: Path | None, since: str, until: str, dask: str | None, workers: int) -> Audit:
     """What the archive tells, up to the end of a day."""
     scope = Scope(day_of(since or "0001-01-01"), day_of(until) + 1.0, tomorrow=day_of(today()) + 1.0)
-    return audit(archive, load_rules(rules), scope, dask=dask, workers=workers)
+    return audit(archive, load_rules(rules), scope, spread=on_dask(dask or "", workers), workers=workers)
 
 
 @task(task_run_name="tell", cache_policy=NO_CACHE, persist_result=False)
@@ -65,7 +66,7 @@ def audit_archive(
     ----------
     pages : folder for the page and the document of every audit
     since, until : dates; everything up to today where empty
-    dask, workers : where runs are read, see :func:`pipelines.parallel.map_partitions`
+    dask, workers : where runs are read, see :func:`pipelines.flows.spread.on_dask`
     """
     store = Archive(archive)
     found = look(store, Path(rules) if rules else None, since, until or today(), dask, workers)

@@ -8,6 +8,9 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from pathlib import Path
 
+LOCAL = "local"
+"""Instead of a Dask scheduler's address: a cluster of processes on this machine."""
+
 STARTUP_S = 120
 
 

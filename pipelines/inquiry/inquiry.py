@@ -45,7 +45,7 @@ class JointDiagnosis:
 
     lineage: RunSequence
     effects: tuple[str, ...]
-    told: dict[str, Any]
+    document: dict[str, Any]
     found: Measured
     diagnosis: Diagnosis | None
     following: Proposed

@@ -3,4 +3,4 @@
 from pipelines.lineage.graph import Activity, Graph, Node
 from pipelines.lineage.targets import Lineage, lineage
 
-__all__ = ["Graph", "Lineage", "Node", "Activity", "lineage"]
+__all__ = ["Activity", "Graph", "Lineage", "Node", "lineage"]

@@ -62,7 +62,7 @@ SPARE = 0.003
 class Optimum:
     """The recipe found, what it takes and expects, the one that it is held against, and what it lacks of the wish (≤ 1)."""
 
-    plan_context: PlanContext
+    planned: PlanContext
     expected: Expected
     against: PlanContext
     wish: Requirement
@@ -91,7 +91,8 @@ def optimise(
         than the one that it is held against
 
     Orders of soaks are ranked by the station time that a plain design needs in them, every soak with the dwells it needs; in
-    the best, poses are exchanged (:mod:`inertial.planning.pose_exchange`), and dwells are added or taken away until the wish is just fulfilled.
+    the best, poses are exchanged (:mod:`inertial.planning.pose_exchange`), and dwells are added or taken away until the
+    requirement is just fulfilled.
 
     Raises
     ------

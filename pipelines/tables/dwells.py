@@ -311,7 +311,7 @@ def lot_arrays(
         dwells=numbers,
         poses=tuple(rows.texts("pose", len(numbers))),
         kinds=np.asarray(rows.texts("kind", len(numbers)), dtype=np.str_),
-        state=_state(rows, history),
+        state=_lot_state(rows, history),
         output=rows.by_axis("out"),
         standard_error=rows.by_axis("sd") / np.sqrt(rows.grid("n"))[..., None],
         out_unit=out_units[0],
@@ -360,7 +360,7 @@ class _Rows:
         return [str(one) for one in (values if self._order is None else values[self._order])[:count]]
 
 
-def _state(rows: _Rows, history: pd.DataFrame | None) -> State:
+def _lot_state(rows: _Rows, history: pd.DataFrame | None) -> State:
     outer, inner, slot = (rows.optional(name) for name in ("outer_deg", "inner_deg", "slot"))
     return State(
         force=rows.by_axis("force"),
@@ -374,11 +374,11 @@ def _state(rows: _Rows, history: pd.DataFrame | None) -> State:
         since_move=rows.optional("since_move_s"),
         supply=rows.optional("supply_V"),
         vibration=rows.optional("vibration_g"),
-        history=None if history is None else _history(history, rows.units),
+        history=None if history is None else _lot_history(history, rows.units),
     )
 
 
-def _history(history: pd.DataFrame, units: tuple[str, ...]) -> History | None:
+def _lot_history(history: pd.DataFrame, units: tuple[str, ...]) -> History | None:
     """Temperatures of every unit on one time grid; None where a unit has none."""
     time, temperature = (np.array(history[name], dtype=np.float64) for name in ("time_s", "unit_C"))
     codes, names = history["unit"].factorize()

@@ -48,8 +48,8 @@ def test_the_recipe_that_is_written_is_what_was_told(found):
     assert told["minutes"] == document["minutes"]
     assert told["dwells"] == document["dwells"]
     assert recipe.temperatures_C == document["temperatures_C"]
-    plan_context = minutes(steps(recipe), load_station(), recipe)
-    assert plan_context.total == pytest.approx(document["minutes"]["total"], abs=0.05)
+    planned = minutes(steps(recipe), load_station(), recipe)
+    assert planned.total == pytest.approx(document["minutes"]["total"], abs=0.05)
 
 
 def test_every_coefficient_is_as_good_as_wanted_in_less_time(found):

@@ -5,6 +5,7 @@ import os
 import pytest
 from threadpoolctl import threadpool_info
 
+from pipelines.flows.spread import on_dask
 from pipelines.parallel import map_partitions
 from schemas.errors import DataRejected, LinkLost, WrongUse
 
@@ -33,7 +34,7 @@ def test_results_come_in_the_order_of_the_partitions() -> None:
 
 
 def test_nothing_to_do_starts_nothing() -> None:
-    assert map_partitions(square, [], "tcp://127.0.0.1:1") == []
+    assert map_partitions(square, [], on_dask("tcp://127.0.0.1:1")) == []
 
 
 def test_several_workers_are_other_processes_and_keep_the_order() -> None:
@@ -52,12 +53,12 @@ def test_what_a_partition_refuses_comes_out_of_a_worker_as_it_was() -> None:
 
 def test_refuses_an_address_that_is_none() -> None:
     with pytest.raises(WrongUse, match="'somewhere' is no address of a scheduler"):
-        map_partitions(square, [1], "somewhere")
+        on_dask("somewhere")
 
 
 @pytest.mark.slow
 def test_a_local_cluster_of_processes_gives_the_same_results(tmp_path) -> None:
-    assert map_partitions(square, list(range(5)), "local", workers=2, home=tmp_path) == [0, 1, 4, 9, 16]
+    assert map_partitions(square, list(range(5)), on_dask("local", 2, tmp_path)) == [0, 1, 4, 9, 16]
 
 
 @pytest.mark.slow
@@ -67,7 +68,7 @@ def test_a_cluster_at_an_address_gives_the_same_results(tmp_path) -> None:
     with LocalCluster(
         n_workers=2, threads_per_worker=1, dashboard_address=None, local_directory=str(tmp_path)
     ) as there:
-        found = map_partitions(square, list(range(5)), there.scheduler_address, home=tmp_path / "orchestrator")
+        found = map_partitions(square, list(range(5)), on_dask(there.scheduler_address, home=tmp_path / "orchestrator"))
     assert found == [0, 1, 4, 9, 16]
 
 
@@ -75,4 +76,4 @@ def test_a_cluster_at_an_address_gives_the_same_results(tmp_path) -> None:
 def test_says_that_no_scheduler_answers(tmp_path, monkeypatch) -> None:
     monkeypatch.setattr("pipelines.flows.dask.CONNECT_S", 1)
     with pytest.raises(LinkLost, match="no Dask scheduler answers"):
-        map_partitions(square, [1], "tcp://127.0.0.1:9", home=tmp_path)
+        map_partitions(square, [1], on_dask("tcp://127.0.0.1:9", home=tmp_path))

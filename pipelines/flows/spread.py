@@ -1,0 +1,74 @@
+"""Work of an archive spread over Dask workers by Prefect's task runner; nothing of Prefect is imported before there is work."""
+
+from __future__ import annotations
+
+import os
+from contextlib import contextmanager
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import TYPE_CHECKING, Any
+
+from pipelines.flows.local import local_server
+from pipelines.flows.settings import LOCAL
+from pipelines.parallel import environment_of
+from schemas.errors import WrongUse
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Generator, Sequence
+
+    from pipelines.parallel import Spread
+
+SCHEMES = ("tcp://", "tls://", "ucx://", "ws://", "wss://")
+
+
+def on_dask(address: str, workers: int = 1, home: Path | None = None) -> Spread | None:
+    """A spread over the workers of a Dask cluster; None where no address is given.
+
+    Parameters
+    ----------
+    address : of a Dask scheduler, or ``local`` for a cluster of processes on this machine
+    workers : processes of the local cluster
+    home : folder of the orchestrator that is started where PREFECT_API_URL names none; a temporary one where None
+
+    Raises
+    ------
+    WrongUse
+        The address is not one of a scheduler.
+    """
+    if not address:
+        return None
+    _refuse_address(address)
+
+    def spread(function: Callable[[Any], Any], partitions: Sequence[Any], name: str) -> list[Any]:
+        with _orchestrator(home):
+            from pipelines.flows.dask import run_on_dask  # Prefect reads its settings when it is imported
+
+            return run_on_dask(function, partitions, address, workers, name)
+
+    return spread
+
+
+def _refuse_address(dask: str) -> None:
+    if dask != LOCAL and not dask.startswith(SCHEMES):
+        raise WrongUse(
+            f"--dask: '{dask}' is no address of a scheduler, tcp://HOST:PORT is needed, or '{LOCAL}' for a cluster on this "
+            "machine; start one with 'dask scheduler' and 'dask worker'"
+        )
+
+
+@contextmanager
+def _orchestrator(home: Path | None) -> Generator[None, None, None]:
+    """A block with an orchestrator: the one that PREFECT_API_URL names, or one of our own for as long as it lasts."""
+    if os.environ.get("PREFECT_API_URL"):
+        yield
+        return
+    with (
+        TemporaryDirectory(prefix="tumbleline-", ignore_cleanup_errors=True) as spare,
+        local_server(home or Path(spare)) as settings,
+        environment_of(settings),
+    ):
+        from prefect.settings import temporary_settings
+
+        own: dict[Any, str] = {name: settings[name] for name in ("PREFECT_API_URL", "PREFECT_HOME")}
+        with temporary_settings(updates=own):  # in case that Prefect was imported before, with others
+            yield
