@@ -3,11 +3,15 @@
 from __future__ import annotations
 
 from pathlib import Path
+from pkgutil import iter_modules
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from pipelines.cli.options import ArchiveOption, JsonOption, RunArgument, error_console
+
+_FOLDER = Path(__file__).parent.parent / "export" / "formats"
+_NAMES = ", ".join(found.name for found in iter_modules([str(_FOLDER)]))  # their names, without importing them
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -18,7 +22,7 @@ if TYPE_CHECKING:
 
 def command(
     run: RunArgument = "latest",
-    form: Annotated[str, typer.Option("--format", help="json, csv, c, ardupilot or px4.")] = "json",
+    form: Annotated[str, typer.Option("--format", help=f"{_NAMES}.")] = "json",
     units: Annotated[str, typer.Option("--units", metavar="SN,…", help="Only these; all that passed by default.")] = "",
     output: Annotated[
         Path | None, typer.Option("--output", "-o", metavar="FILE", help="Standard output by default.")

@@ -1,0 +1,37 @@
+"""CSV: one row per number, for spreadsheets."""
+
+from __future__ import annotations
+
+import csv
+import io
+from typing import TYPE_CHECKING
+
+from pipelines.export.polynomials import ORDER
+from schemas.units import AXES
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from pipelines.export.polynomials import UnitCalibration
+
+
+NAME = "csv"
+
+
+def write(units: Sequence[UnitCalibration], run: str, nominal: float | None) -> str:
+    """The table as text."""
+    del run, nominal
+    sink = io.StringIO()
+    writer = csv.writer(sink, lineterminator="\n")
+    writer.writerow(["unit", "quantity", "power_of_theta", "row", "column", "value", "unit_text", "certificate"])
+    for c in units:
+        said = c.certified
+        for k in range(ORDER):
+            per = "" if k == 0 else f"/K^{k}"
+            for i, row in enumerate(AXES):
+                writer.writerow([c.unit, "bias", k, row, "", repr(float(c.bias[k, i])), c.out_unit + per, said])
+            for i, row in enumerate(AXES):
+                for j, column in enumerate(AXES):
+                    value = repr(float(c.response[k, i, j]))
+                    writer.writerow([c.unit, "response", k, row, column, value, f"{c.out_unit}/g{per}", said])
+    return sink.getvalue()

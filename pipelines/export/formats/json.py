@@ -1,0 +1,34 @@
+"""JSON: every unit with its polynomials, outcome, grade and certificate; nothing is left out."""
+
+from __future__ import annotations
+
+import json
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from pipelines.export.polynomials import UnitCalibration
+
+
+NAME = "json"
+COMPLETE = True  # effects that have no polynomial are named in it
+
+
+def write(units: Sequence[UnitCalibration], run: str, nominal: float | None) -> str:
+    """The document as text, with a line end."""
+    del nominal
+    document = {
+        "run": run,
+        "correction": "a = inverse(sum response[k] θ^k) · (output − sum bias[k] θ^k), θ = T − 25 °C, a in g",
+        "units": [
+            {
+                "unit": c.unit, "outcome": c.outcome, "grade": c.grade, "out_unit": c.out_unit,
+                "temperatures_C": list(c.temperatures), "bias": c.bias.tolist(), "response": c.response.tolist(),
+                "not_included": list(c.left_out),
+                "certificate": None if c.certificate is None else c.certificate.document(),
+            }
+            for c in units
+        ],
+    }  # fmt: skip
+    return json.dumps(document, ensure_ascii=False, indent=1) + "\n"
