@@ -34,7 +34,7 @@ from pipelines.flows.partitions import map_partitions  # noqa: E402
 from pipelines.rerun.judged import judged  # noqa: E402
 from pipelines.rerun.partition import Part, parts, run_again  # noqa: E402
 from pipelines.rerun.wanted import Wanted, wanted  # noqa: E402
-from pipelines.stages.arrays import lot_arrays  # noqa: E402
+from pipelines.stages.measured import lot_arrays  # noqa: E402
 
 PER_LOT = 10
 MB = 1024.0

@@ -17,6 +17,7 @@ from inertial.changes import CHANGES, Change, Driver
 from inertial.effects import SensorEffect
 from inertial.effects.base import AnyEffect, excited
 from inertial.errors import MissingInput
+from inertial.quantities import column_of
 from inertial.sequences import Pace, Step, extended
 from inertial.signatures import signature, symbol
 from inertial.state import State
@@ -32,12 +33,6 @@ _BETTER = 1.5
 _ABSORBED = 0.05
 _ERROR = 1e-5
 _OFF_S = 600.0
-
-_COLUMNS = {
-    "theta": "unit_C", "temperature": "unit_C", "temperature (unit_C)": "unit_C", "chamber": "chamber_C",
-    "supply": "supply_V", "vibration": "vibration_g", "outer": "outer_deg", "inner": "inner_deg",
-    "since_move": "since_move_s", "since_power": "since_power_s", "temperature_rate": "unit_C",
-}  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -81,7 +76,7 @@ def cause(state: State, effect_id: str, base: Sequence[str], *, axis: int | None
     effect = catalogue.get(effect_id)
     lacking = _lacking(one, effect)
     if lacking:
-        carried = _COLUMNS.get(lacking, lacking)
+        carried = column_of(lacking)
         return Cause("", f"the dwells carry no {carried}", f"{symbol(effect)} is invisible", f"record {carried}")
     if _left(one, effect_id, base, axis) > planning.SEEN:
         return None

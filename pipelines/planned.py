@@ -9,8 +9,8 @@ import numpy as np
 from inertial.fits.linear import fit_lot
 from inertial.frames import force_from_angles
 from inertial.state import History, State
-from pipelines.stages.arrays import HISTORY_POINTS
 from pipelines.stages.capture import steps
+from pipelines.stages.dwell_table import HISTORY_POINTS
 from pipelines.stages.minutes import itinerary, temperatures
 from schemas.station import load_station
 from schemas.units import STANDARD_GRAVITY_M_S2

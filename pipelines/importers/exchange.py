@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pandas as pd
 
+from inertial.quantities import ANGLE_COLUMNS, FORCE_COLUMNS, KNOWN_COLUMNS, SPREAD_COLUMNS
 from pipelines.archive import Archive
 from pipelines.importers import files
 from schemas import tables
@@ -20,19 +21,10 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 REQUIRED = ("unit", "dwell", "time_s", "out_x", "out_y", "out_z")
-FORCE = ("force_x", "force_y", "force_z")
-ANGLES = ("outer_deg", "inner_deg")
-DEVIATIONS = ("sd_x", "sd_y", "sd_z")
-KNOWN = (
-    *REQUIRED,
-    *FORCE,
-    *ANGLES,
-    *DEVIATIONS,
-    *("slot", "n", "duration_s", "unit_C", "chamber_C", "since_move_s", "since_power_s", "power_off_s"),
-    *("supply_V", "vibration_g"),
-    *("kind", "pose", "soak", "record", "out_unit", "outer_command_deg", "inner_command_deg", "full_scale", "rate_hz"),
-)
-"""Columns with a meaning; every other numeric column is a covariate."""
+FORCE = FORCE_COLUMNS
+ANGLES = ANGLE_COLUMNS
+DEVIATIONS = SPREAD_COLUMNS
+KNOWN = KNOWN_COLUMNS
 
 _TEXTS = ("kind", "pose", "out_unit", "status")
 _LARGEST_FORCE = 1e3
@@ -94,11 +86,6 @@ def checked(frame: pd.DataFrame, *, where: str) -> pd.DataFrame:
     _plausible(frame, where)
     frame = tables.check("dwells", frame, where=where)
     return frame.sort_values(["unit", "dwell"], kind="stable").reset_index(drop=True)
-
-
-def covariates(frame: pd.DataFrame) -> list[str]:
-    """Names of the numeric columns without a meaning of their own: what a missing effect may depend on."""
-    return [name for name in frame.columns if name not in KNOWN and pd.api.types.is_numeric_dtype(frame[name])]
 
 
 def is_file(source: str | Path) -> bool:

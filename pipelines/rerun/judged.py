@@ -13,10 +13,10 @@ from inertial.errors import InertialError
 from pipelines.archive import Archive, Run
 from pipelines.rerun.selection import entry_of
 from pipelines.rerun.steps import archived_job
-from pipelines.stages.arrays import lot_arrays
 from pipelines.stages.calibration import Calibration, read_calibration
 from pipelines.stages.fit import KINDS, fit
 from pipelines.stages.grade import Evidence, grade
+from pipelines.stages.measured import lot_arrays
 from pipelines.stages.unit_rows import ByUnit
 from pipelines.stages.verify import verify
 from schemas.errors import DataRejected, TumblelineError

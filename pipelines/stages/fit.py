@@ -12,9 +12,9 @@ from inertial import design
 from inertial.errors import InertialError
 from inertial.fits.linear import LotFit, felt_force, fit_lot
 from inertial.fits.wander import WanderFit, fit_lot_with_wander, student
-from pipelines.stages.arrays import LotArrays, lot_arrays
 from pipelines.stages.calibration import coefficient_rows, covariance_rows
 from pipelines.stages.empty import empty_table
+from pipelines.stages.measured import KINDS, LotArrays, lot_arrays
 from pipelines.stages.profile import profiled
 from pipelines.stages.texts import picked
 from schemas.errors import DataRejected
@@ -27,7 +27,6 @@ if TYPE_CHECKING:
 
     Array = NDArray[np.float64]
 
-KINDS = ("dwell", "verification")
 FEWEST_TO_SPARE = 4  # degrees of freedom of the lot, below which nothing can be said of the kind of its noise
 
 

@@ -1,4 +1,8 @@
-"""A table of dwells as the arrays that criticism works on; units may lack dwells, and the reference may be angles or nothing."""
+"""Dwells as the arrays that the science works on: the one reader for fit, verification, diagnosis, comparison and rerun.
+
+:func:`measured` takes dwells as they are: units may lack some, and the reference may be angles or nothing. :func:`lot_arrays`
+needs every dwell of every unit and a reference force, as a fit in the output's own unit does. Both have the same state.
+"""
 
 from __future__ import annotations
 
@@ -6,24 +10,23 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import pandas as pd
 
-from inertial import frames
 from inertial.criticism.problem import Lot
 from inertial.criticism.readings import Readings
-from inertial.state import History, State
-from pipelines.importers.exchange import covariates
+from inertial.quantities import OUTPUT_COLUMNS, SPREAD_COLUMNS
+from inertial.state import State
+from pipelines.stages.dwell_table import DwellTable, state_of_table
 from schemas.errors import DataRejected
 
 if TYPE_CHECKING:
+    from collections.abc import Collection
+
+    import pandas as pd
     from numpy.typing import NDArray
 
     Array = NDArray[np.float64]
 
-OUT = ("out_x", "out_y", "out_z")
-SPREAD = ("sd_x", "sd_y", "sd_z")
-FORCE = ("force_x", "force_y", "force_z")
-_HISTORY_POINTS = 4000
+KINDS = ("dwell", "verification")
 
 
 @dataclass(frozen=True)
@@ -51,6 +54,28 @@ class Measured:
         return Measured(names, self.dwells, Readings(**picked), self.state.pick(index), self.reference)
 
 
+@dataclass(frozen=True)
+class LotArrays:
+    """Dwells of a lot without gaps.
+
+    units : serials, in order; dwells : (n,) numbers; poses, kinds : (n,) names
+    output, standard_error : (units, n, 3), output unit; the error is that of white noise, sd/√n
+    """
+
+    units: tuple[str, ...]
+    dwells: NDArray[np.int64]
+    poses: tuple[str, ...]
+    kinds: NDArray[np.str_]
+    state: State
+    output: NDArray[np.float64]
+    standard_error: NDArray[np.float64]
+    out_unit: str
+
+    def of_kind(self, kind: str) -> NDArray[np.bool_]:
+        """Which dwells are of a kind, (n,)."""
+        return np.asarray(self.kinds == kind)
+
+
 def measured(dwells: pd.DataFrame, history: pd.DataFrame | None = None) -> Measured:
     """The arrays of a table of dwells in the exchange format.
 
@@ -61,62 +86,68 @@ def measured(dwells: pd.DataFrame, history: pd.DataFrame | None = None) -> Measu
     """
     if dwells.empty:
         raise DataRejected("dwells: no rows; at least one unit with its dwells is needed")
-    if "kind" in dwells.columns:
-        dwells = dwells[dwells["kind"].isin(["dwell", "verification"])]
-    ordered = dwells.sort_values(["unit", "dwell"], kind="stable")
-    units = tuple(dict.fromkeys(ordered["unit"].astype(str)))
-    numbers = np.unique(ordered["dwell"].to_numpy())
-    place = {u: i for i, u in enumerate(units)}
-    rows = (
-        np.array([place[u] for u in ordered["unit"].astype(str)], dtype=np.intp),
-        np.searchsorted(numbers, ordered["dwell"].to_numpy()),
-    )
-    table = _Table(ordered, rows, (len(units), len(numbers)))
-    reference, force = _force(table)
+    table = DwellTable(dwells, KINDS)
+    reference, state = state_of_table(table, history)
     readings = Readings(
-        force=force,
-        output=table.raw(OUT),
-        time=table.raw(("time_s",))[..., 0],
-        spread=table.raw(SPREAD) if table.has(*SPREAD) else None,
-        count=table.one("n", filled=False),
-        duration=table.one("duration_s", filled=False),
-        temperature=table.one("unit_C", filled=False),
-        chamber=table.one("chamber_C", filled=False),
-        vibration=table.one("vibration_g", filled=False),
+        force=state.force,
+        output=table.by_axis(OUTPUT_COLUMNS),
+        time=table.grid("time_s"),
+        spread=table.by_axis(SPREAD_COLUMNS) if table.has(*SPREAD_COLUMNS) else None,
+        count=table.optional("n"),
+        duration=table.optional("duration_s"),
+        temperature=table.optional("unit_C"),
+        chamber=table.optional("chamber_C"),
+        vibration=table.optional("vibration_g"),
         unit_name=_stated_unit(dwells),
         history_end=None if history is None or history.empty else float(history["time_s"].max()),
     )
-    return Measured(units, numbers, readings, _state(table, force, units, history), reference)
+    return Measured(table.units, table.numbers, readings, state, reference)
 
 
-class _Table:
-    """Columns of a long table as (units, n, k) arrays; a missing dwell takes the other units' middle value where asked."""
+def lot_arrays(
+    dwells: pd.DataFrame, history: pd.DataFrame | None = None, kinds: Collection[str] | None = None
+) -> LotArrays:
+    """The dwells of a lot as arrays, for units that were all measured in the same dwells.
 
-    def __init__(
-        self, frame: pd.DataFrame, rows: tuple[NDArray[np.intp], NDArray[np.intp]], shape: tuple[int, int]
-    ) -> None:
-        self.frame, self.rows, self.shape = frame, rows, shape
+    Parameters
+    ----------
+    dwells : of all kinds, so that what an effect remembers of the dwell before is there
+    history : temperatures between the dwells
+    kinds : of the dwells that are wanted; all where None
 
-    def has(self, *names: str) -> bool:
-        return all(n in self.frame.columns and self.frame[n].notna().all() for n in names)
-
-    def raw(self, names: tuple[str, ...]) -> Array:
-        out = np.full((*self.shape, len(names)), np.nan)
-        out[self.rows] = self.frame[list(names)].to_numpy(dtype=float)
-        return out
-
-    def one(self, name: str, *, filled: bool = True) -> Array | None:
-        if not self.has(name):
-            return None
-        values = self.raw((name,))
-        return (_filled(values) if filled else values)[..., 0]
-
-
-def _filled(values: Array) -> Array:
-    if not np.isnan(values).any():
-        return values
-    middle = np.nanmedian(values, axis=0, keepdims=True)
-    return np.where(np.isnan(values), middle, values)
+    Raises
+    ------
+    DataRejected
+        A unit lacks a dwell that others have, units differ in the unit of their output, or there is no reference.
+    """
+    table = DwellTable(dwells, kinds)
+    if not table.units or not table.whole:
+        message = (
+            f"dwells: {table.rows} rows for {table.shape[0]} units and {table.shape[1]} dwells, every unit needs every dwell; "
+            "remove the units that lack some, or measure them again"
+        )
+        raise DataRejected(message)
+    out_units = sorted(set(table.texts("out_unit")))
+    if len(out_units) != 1:
+        message = f"dwells: outputs in {' and '.join(out_units)}, one lot has one unit; split the lot by device"
+        raise DataRejected(message)
+    reference, state = state_of_table(table, history)
+    if reference == "norm":
+        message = (
+            "dwells: no force_x, force_y, force_z and no angles, a reference is needed; add one of the two, or use a diagnosis, "
+            "which needs the norm of gravity only"
+        )
+        raise DataRejected(message)
+    return LotArrays(
+        units=table.units,
+        dwells=table.numbers,
+        poses=table.per_dwell("pose"),
+        kinds=np.asarray(table.per_dwell("kind"), dtype=np.str_),
+        state=state,
+        output=table.by_axis(OUTPUT_COLUMNS),
+        standard_error=table.by_axis(SPREAD_COLUMNS) / np.sqrt(table.grid("n"))[..., None],
+        out_unit=out_units[0],
+    )
 
 
 def _stated_unit(dwells: pd.DataFrame) -> str | None:
@@ -124,70 +155,6 @@ def _stated_unit(dwells: pd.DataFrame) -> str | None:
         return None
     stated = dwells["out_unit"].dropna().astype(str).unique()
     return str(stated[0]) if len(stated) == 1 else None
-
-
-def _force(table: _Table) -> tuple[str, Array]:
-    if table.has(*FORCE):
-        return "force", frames.without_rounding(_filled(table.raw(FORCE)))
-    if table.has("outer_deg", "inner_deg"):
-        angles = np.radians(_filled(table.raw(("outer_deg", "inner_deg"))))
-        return "angles", frames.force_from_angles(angles[..., 0], angles[..., 1])
-    return "norm", np.zeros((*table.shape, 3))
-
-
-def _state(table: _Table, force: Array, units: tuple[str, ...], history: pd.DataFrame | None) -> State:
-    angles = table.has("outer_deg", "inner_deg")
-    time = _filled(table.raw(("time_s",)))[..., 0]
-    temperature = table.one("unit_C")
-    if temperature is None:
-        temperature = table.one("chamber_C")
-    outer, inner = (table.one(n) if angles else None for n in ("outer_deg", "inner_deg"))
-    slot = table.one("slot")
-    return State(
-        force=force,
-        time=time,
-        temperature=temperature,
-        chamber=table.one("chamber_C"),
-        since_power=table.one("since_power_s"),
-        since_move=table.one("since_move_s"),
-        power_off=_power_off(table),
-        supply=table.one("supply_V"),
-        vibration=table.one("vibration_g"),
-        outer=None if outer is None else np.radians(outer),
-        inner=None if inner is None else np.radians(inner),
-        slot=None if slot is None else slot[:, 0],
-        covariates={n: v for n in covariates(table.frame) if (v := table.one(n)) is not None and np.ptp(v) > 0.0},
-        history=_history(history, units, time) if history is not None and temperature is not None else None,
-    )
-
-
-def _power_off(table: _Table) -> Array | None:
-    """Seconds without power before each dwell; None where no run switched its devices, or since when they have it is not known.
-
-    Runs that did not switch have no such column: beside one that did, their devices stayed on.
-    """
-    if "power_off_s" not in table.frame.columns or not table.has("since_power_s"):
-        return None
-    known = np.nan_to_num(table.raw(("power_off_s",))[..., 0], nan=0.0)
-    return np.broadcast_to(known.max(axis=0), known.shape).copy()  # one relay for all
-
-
-def _history(history: pd.DataFrame, units: tuple[str, ...], time: Array) -> History | None:
-    """Temperatures of every unit on one time grid; a history without units serves all of them."""
-    column = "unit_C" if "unit_C" in history.columns else "chamber_C"
-    low, high = float(history["time_s"].min()), float(history["time_s"].max())
-    if low > float(np.max(time)) or high < float(np.min(time)):
-        return None
-    count = min(_HISTORY_POINTS, max(2, history["time_s"].nunique()))
-    grid = np.linspace(low, high, count)
-    series: list[Array] = []
-    for unit in units:
-        own = history[history["unit"].astype(str) == unit] if "unit" in history.columns else history
-        if own.empty:
-            return None
-        own = own.groupby("time_s", as_index=False)[column].mean()
-        series.append(np.interp(grid, own["time_s"].to_numpy(dtype=float), own[column].to_numpy(dtype=float)))
-    return History(grid, np.stack(series))
 
 
 def lot_of(found: Measured, like: Measured | None = None, *, square: bool = False) -> Lot:

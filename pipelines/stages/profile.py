@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from pipelines.stages.arrays import LotArrays
+    from pipelines.stages.measured import LotArrays
 
 PLAIN = ("bias", "scale", "misalignment")
 

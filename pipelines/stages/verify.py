@@ -8,9 +8,9 @@ import numpy as np
 import pandas as pd
 
 from inertial.correction import correct, station_change
-from pipelines.stages.arrays import LotArrays, lot_arrays
 from pipelines.stages.calibration import read_calibration
 from pipelines.stages.empty import empty_table
+from pipelines.stages.measured import LotArrays, lot_arrays
 from pipelines.stages.texts import picked
 from schemas.units import AXES, MICRO
 

@@ -12,8 +12,8 @@ from capture_double import small_run
 from inertial.correction import correct
 from pipelines.archive import Run
 from pipelines.export import FORMATS, export_text, unit_calibrations
-from pipelines.stages.arrays import lot_arrays
 from pipelines.stages.calibration import read_calibration
+from pipelines.stages.measured import lot_arrays
 from schemas.errors import WrongUse
 
 MAIN = """

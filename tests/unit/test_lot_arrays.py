@@ -3,7 +3,7 @@
 import numpy as np
 import pandas as pd
 
-from pipelines.stages.arrays import lot_arrays
+from pipelines.stages.measured import lot_arrays
 from pipelines.stages.unit_rows import ByUnit
 
 UNITS, DWELLS = ("A1", "B2", "C3"), 5

@@ -9,9 +9,9 @@ from capture_double import LSB_PER_G, STANDARD_G, CaptureDouble, plan, small_job
 
 from inertial.frames import force_from_angles
 from pipelines.archive import Run
-from pipelines.stages.arrays import lot_arrays
 from pipelines.stages.calibration import read_calibration
 from pipelines.stages.fit import fit
+from pipelines.stages.measured import lot_arrays
 from pipelines.stages.reduce import reduce
 from pipelines.stages.validate import validate
 from schemas.errors import DataRejected
