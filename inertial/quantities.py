@@ -11,6 +11,11 @@ from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Literal
 
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
 Joined = Literal["mean", "max"]
 
 
@@ -56,6 +61,10 @@ class Quantity:
     usual: float = 0.0
     spread: float = 0.0
     reading: bool = False
+
+    def about(self, wander: Array) -> Array:
+        """Values about the usual one, for standard normal numbers; in the column's unit."""
+        return self.usual + self.spread * wander
 
     @property
     def axis_label(self) -> str:

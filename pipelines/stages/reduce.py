@@ -1,4 +1,4 @@
-"""Samples to dwells: one row per accepted unit and static dwell, in the exchange format."""
+"""Samples to dwells: one row per accepted unit and static dwell, in the exchange format, with all recorded covariates."""
 
 from __future__ import annotations
 
@@ -8,6 +8,8 @@ import numpy as np
 import pandas as pd
 
 from inertial.frames import force_from_angles
+from inertial.quantities import ANGLE_COLUMNS, BY_ATTRIBUTE
+from pipelines.stages.dwell_table import covariates
 from pipelines.stages.pieces import dwells_whole
 from schemas.units import AXES, STANDARD_GRAVITY_M_S2
 
@@ -15,28 +17,13 @@ if TYPE_CHECKING:
     from collections.abc import Iterable
 
 KEPT = (
-    *(
-        "unit",
-        "slot",
-        "record",
-        "kind",
-        "pose",
-        "soak",
-        "duration_s",
-        "outer_deg",
-        "inner_deg",
-    ),
-    *(
-        "chamber_C",
-        "unit_C",
-        "supply_V",
-        "vibration_g",
-        "since_move_s",
-        "since_power_s",
-        "out_unit",
-    ),
+    *("unit", "slot", "record", "kind", "pose", "soak", "duration_s"),
+    *ANGLE_COLUMNS,
+    *(BY_ATTRIBUTE[name].column for name in ("chamber", "temperature", "supply", "vibration")),
+    *(BY_ATTRIBUTE[name].column for name in ("since_move", "since_power")),
+    "out_unit",
 )
-WHERE_THERE = ("power_off_s",)
+WHERE_THERE = (BY_ATTRIBUTE["power_off"].column,)
 """Of runs that switch their devices off and on."""
 
 
@@ -60,7 +47,7 @@ def reduce(
     nothing = [_means(pd.DataFrame(columns=["unit", "record", *AXES]))]
     means = pd.concat([frame for frame in kept if len(frame)] or kept[:1] or nothing, ignore_index=True)
     static = readings[readings["unit"].isin(accepted) & (readings["kind"] != "allan")]
-    kept = [*KEPT, *(c for c in WHERE_THERE if c in static.columns)]
+    kept = [*KEPT, *(c for c in WHERE_THERE if c in static.columns), *covariates(readings)]
     columns = static[[*kept, "start_s"]].assign(time_s=static["start_s"] + 0.5 * static["duration_s"])
     dwells = columns.drop(columns="start_s").merge(means, on=["unit", "record"], validate="one_to_one")
     dwells = dwells.assign(
