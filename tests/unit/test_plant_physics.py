@@ -10,6 +10,7 @@ from schemas.recipe import Lot, Unit
 from stations.codec import unpack_samples
 from stations.plant.chamber import Chamber
 from stations.plant.hidden import HIDDEN, hidden_effect
+from stations.plant.moisture import Moisture
 from stations.plant.preset import load_preset
 from stations.plant.table import Axis, Move, turn
 
