@@ -11,6 +11,8 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from inertial.noise.flicker import flicker_kernel
+
 Array = NDArray[np.float64]
 
 LONGEST = 1500
@@ -18,22 +20,6 @@ LONGEST = 1500
 
 _EVEN = 1.3
 """White standard errors of a block that differ by less than this factor are taken as equal: one basis then serves a whole lot."""
-
-
-def flicker_kernel(time: Array, *, slowest: float = 4.0) -> Array:
-    """Correlation matrix of 1/f wander at times ``time`` (..., n) in s, (..., n, n).
-
-    Time constants run in octaves from a third of the typical spacing to ``slowest`` times the length of the record.
-    """
-    gap = np.abs(time[..., :, None] - time[..., None, :])
-    span = float(np.max(gap, initial=1.0))
-    spacing = max(float(np.median(np.diff(np.unique(time)))) if np.unique(time).size > 1 else 1.0, span / 1e5, 1e-6)
-    octaves = max(int(np.ceil(np.log2(slowest * span / (spacing / 3.0)))), 2)
-    taus = slowest * span * 0.5 ** np.arange(octaves)
-    kernel = np.zeros(gap.shape)
-    for tau in taus:
-        kernel += np.exp(-gap / tau)
-    return kernel / taus.size
 
 
 @dataclass(frozen=True)

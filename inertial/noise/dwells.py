@@ -6,15 +6,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import solve_triangular
 
+from inertial.noise.flicker import flicker_of_means
 from inertial.noise.terms import FLICKER_FLOOR
 
 Array = NDArray[np.float64]
-
-_FASTEST = 0.01
-"""Shortest time constant over the dwell: what is faster is averaged out within it."""
-
-_RATIO = 2.0
-"""Between time constants of the processes whose sum is the flicker."""
 
 
 @dataclass(frozen=True)
@@ -82,21 +77,3 @@ def whitener(covariance: Array) -> Array:
     """Inverse root (n, n) of a covariance: applied from the left it makes noise white and of variance one."""
     root = np.linalg.cholesky(covariance)
     return np.asarray(solve_triangular(root, np.eye(len(root)), lower=True), dtype=np.float64)
-
-
-def flicker_of_means(gap: Array, duration: float, slowest: float) -> Array:
-    """Covariance of means over ``duration`` s that are ``gap`` apart, for flicker with B = 1 and no slower than ``slowest`` s.
-
-    A process of variance v and time constant τ has the one-sided density 4vτ/(1 + (2πfτ)²); processes whose τ are a ratio r
-    apart sum up to v/(f·ln r), so that v = B²·ln r/π. The mean of such a process over T has the variance
-    2v·(τ/T)·(1 − (τ/T)·(1 − e^(−T/τ))), and two means the covariance v·(τ/T)²·(1 − e^(−T/τ))²·e^(−(gap − T)/τ).
-    """
-    octaves = max(2, int(np.ceil(np.log(slowest / (_FASTEST * duration)) / np.log(_RATIO))) + 1)
-    total = np.zeros(gap.shape)
-    apart = gap > 0.5 * duration
-    for tau in slowest * _RATIO ** -np.arange(octaves, dtype=np.float64):
-        share = tau / duration
-        fade = -np.expm1(-1.0 / share)
-        own = 2.0 * share * (1.0 - share * fade)
-        total += np.where(apart, (share * fade) ** 2 * np.exp(-np.maximum(gap - duration, 0.0) / tau), own)
-    return total * np.log(_RATIO) / np.pi

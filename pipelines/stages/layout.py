@@ -12,7 +12,8 @@ import numpy as np
 from inertial import design
 from inertial.exchange import Slots
 from inertial.frames import force_from_angles
-from inertial.noise.dwells import dwell_covariance, flicker_of_means
+from inertial.noise.dwells import dwell_covariance
+from inertial.noise.flicker import flicker_of_means
 from inertial.state import State
 from pipelines.stages.minutes import Standing, move_seconds, soaked
 from pipelines.stages.verification import numbered, turns

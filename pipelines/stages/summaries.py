@@ -27,8 +27,8 @@ def summarised(samples: Iterable[pd.DataFrame], readings: pd.DataFrame, zero_out
 
     Columns: ``unit``, ``record``, ``kind``, ``n``; mean ``out_x`` …, standard deviation ``sd_x`` … (n − 1 in its divisor),
     smallest ``low_x`` … and largest ``high_x`` … sample, in the output's unit; ``wild_count`` values that are not finite, the
-    first of them ``wild_value`` on axis ``wild_axis`` (0 to 2) in row ``wild_row``; ``clipped`` values at full scale, the first on
-    ``clipped_axis``.
+    first of them ``wild_value`` on axis ``wild_axis`` (0 to 2) in row ``wild_row``; ``clipped`` values at full scale, the
+    first on ``clipped_axis``.
 
     Parameters
     ----------
