@@ -6,7 +6,7 @@ import os
 from typing import TYPE_CHECKING, Any
 
 import tomlkit
-from tomlkit.items import Array, Table
+from tomlkit.items import Array
 
 from schemas.errors import WrongUse
 from schemas.recipe import RecipeFile
@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterable
     from pathlib import Path
 
-    from tomlkit.items import Item
+    from tomlkit.items import Item, Table
 
     from schemas.recipe import Pose, Recipe
 
@@ -53,7 +53,7 @@ def recipe_text(recipe: Recipe, remarks: Iterable[str] = ()) -> str:
     for key in sorted(written, key=lambda key: key in tables):
         if key == "poses":
             document.add(tomlkit.comment("poses: outer, inner in degrees; the numbers in soaks count them from 1"))
-        document.add(key, _wrapped(key, written[key]))
+        document.add(key, _item(key, written[key]))
     return tomlkit.dumps(document)
 
 
@@ -87,18 +87,23 @@ def limits_from(limits: str, home: Path, folder: Path) -> str:
     return os.path.relpath(beside, folder) if beside.is_file() else limits
 
 
-def _wrapped(key: str, value: Any) -> Item:
+def _item(key: str, value: Any) -> Item:
     """A value as an item of the document; lists that are too long for a line stand one entry a line."""
-    return _broken(key, tomlkit.item(value))
-
-
-def _broken(key: str, item: Item) -> Item:
+    if isinstance(value, list) and value and isinstance(value[0], dict):
+        several = tomlkit.aot()
+        for one in value:
+            several.append(_table(one))
+        return several
+    if isinstance(value, dict):
+        return _table(value)
+    item = tomlkit.item(value)
     if isinstance(item, Array) and len(f"{key} = {item.as_string()}") > WIDTH:
         item.multiline(multiline=True)
-    elif isinstance(item, Table):
-        for name, inner in item.value.items():
-            _broken(str(name), inner)
-    elif isinstance(item, tomlkit.items.AoT):
-        for table in item.body:
-            _broken(key, table)
     return item
+
+
+def _table(content: dict[str, Any]) -> Table:
+    table = tomlkit.table()
+    for key in sorted(content, key=lambda key: isinstance(content[key], dict)):
+        table.add(key, _item(key, content[key]))
+    return table

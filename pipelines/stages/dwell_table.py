@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 
 from inertial import frames
-from inertial.quantities import ANGLE_COLUMNS, FORCE_COLUMNS, RECORDED, is_covariate
+from inertial.quantities import ANGLE_COLUMNS, BY_ATTRIBUTE, FORCE_COLUMNS, RECORDED, is_covariate
 from inertial.state import History, State
 
 if TYPE_CHECKING:
@@ -145,9 +145,10 @@ def _power_off(table: DwellTable) -> Array | None:
 
     Runs that did not switch have no such column: beside one that did, their devices stayed on.
     """
-    if "power_off_s" not in table.frame.columns or not table.has("since_power_s"):
+    off, since = BY_ATTRIBUTE["power_off"].column, BY_ATTRIBUTE["since_power"].column
+    if off not in table.frame.columns or not table.has(since):
         return None
-    known = np.nan_to_num(table.grid("power_off_s"), nan=0.0)
+    known = np.nan_to_num(table.grid(off), nan=0.0)
     return np.broadcast_to(known.max(axis=0), known.shape).copy()  # one relay for all
 
 
