@@ -31,12 +31,12 @@ NEVER_NAMED = {
 }  # also columns of other tables than dwells
 HERE = {
     "inertial/quantities.py",
-    "schemas/tables.py",
-    "pipelines/stages/captured.py",
-    "stations/overview.py",
-    "pipelines/report/residuals.py",
+    "schemas/tables.py",  # the contract of readings, old ones too
+    "pipelines/stages/captured.py",  # what each instrument is called
+    "stations/overview.py",  # a live display
+    "pipelines/report/residuals.py",  # pictures that are always shown
 }
-"""Where a column may be written out: its row, the contract of old readings, what an instrument is called, a live display, the pictures that are always shown."""
+"""Where columns may be written out."""
 
 
 @pytest.mark.parametrize("row", RECORDED, ids=lambda row: row.column)

@@ -194,3 +194,12 @@ def test_a_summary_holds_what_a_look_at_the_samples_tells(tmp_path: Path) -> Non
             np.testing.assert_allclose(row[[f"{name}_{axis}" for axis in "xyz"]].astype(float), expected, rtol=1e-11)
     assert len(found) == frame.groupby(["unit", "record"]).ngroups
     assert not found[["wild_count", "clipped"]].to_numpy().any()
+
+
+def test_a_recorded_covariate_stays_in_the_dwells_unless_it_has_a_gap(tmp_path: Path) -> None:
+    samples, readings, verdicts = captured(tmp_path, "")
+    readings["humidity_pct"] = 45.0 + 0.1 * readings["record"]
+    dwells = reduce(samples, readings, verdicts, 9.81)
+    np.testing.assert_allclose(dwells["humidity_pct"], 45.0 + 0.1 * dwells["record"])
+    readings.loc[readings["record"] == 3, "humidity_pct"] = np.nan
+    assert "humidity_pct" not in reduce(samples, readings, verdicts, 9.81)
