@@ -1,5 +1,4 @@
 """Covariance of dwell means: white noise and a 1/f wander between the dwells, in real time.
-from inertial.noise.flicker import flicker_kernel
 
 The wander is a sum of Ornstein–Uhlenbeck processes of equal variance with time constants an octave apart: its spectrum is 1/f
 between the slowest and the fastest. In the basis that diagonalises it against the white part every covariance
@@ -11,6 +10,8 @@ from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
+
+from inertial.noise.flicker import flicker_kernel
 
 Array = NDArray[np.float64]
 
