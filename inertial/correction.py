@@ -44,7 +44,7 @@ def correct(effects: Sequence[str], state: State, output: Array, coefficients: A
     coefficients : (..., 3, p), as fitted
     nonlinear : values of nonlinear parameters and constants by effect id
     """
-    names = tuple(design.local_names(design.split(effects)[0], axis) for axis in range(3))
+    names = tuple(design.local_names(design.split(effects)[0], axis, nonlinear) for axis in range(3))
     response = response_matrix(coefficients, names)
     inverse = np.linalg.inv(response)
     force = np.zeros(np.broadcast_shapes(output.shape, state.force.shape))

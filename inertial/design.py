@@ -73,9 +73,12 @@ def shared_columns(effects: Sequence[StationEffect], state: State, values: Value
     return np.einsum("...ij,...njq->...inq", response, changes)
 
 
-def local_names(effects: Sequence[SensorEffect], axis: int) -> tuple[tuple[str, str], ...]:
-    """(effect id, coefficient name) of every local column of an axis."""
-    return tuple((e.id, name) for e in effects for name in e.names(axis))
+def local_names(
+    effects: Sequence[SensorEffect], axis: int, values: Values | None = None
+) -> tuple[tuple[str, str], ...]:
+    """(effect id, coefficient name) of every local column of an axis; all that there may be where no values are given."""
+    known: Values = values or {}
+    return tuple((e.id, name) for e in effects for name in e.names_at(axis, **on_axis(known, e.id, axis)))
 
 
 def shared_names(effects: Sequence[StationEffect]) -> tuple[tuple[str, str], ...]:

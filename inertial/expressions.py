@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inertial.errors import InertialError, MissingInput
+from inertial.quantities import formula_names
 from inertial.state import State
 
 Array = NDArray[np.float64]
@@ -36,24 +37,7 @@ FORCES: Mapping[str, str] = {
     "fk": "specific force along the axis after that, g",
 }
 
-QUANTITIES: Mapping[str, tuple[str, float, str]] = {
-    "theta": ("theta", 1.0, "temperature above 25 °C, K"),
-    "temperature": ("temperature", 1.0, "temperature of the sensor, °C"),
-    "unit_C": ("temperature", 1.0, "the same"),
-    "rate": ("temperature_rate", 1.0, "rate of temperature, K/min"),
-    "chamber": ("chamber", 1.0, "temperature of the chamber, °C"),
-    "chamber_C": ("chamber", 1.0, "the same"),
-    "hours": ("time", 1.0 / 3600.0, "time since the run began, h"),
-    "time_s": ("time", 1.0, "the same, s"),
-    "since_power": ("since_power", 1.0, "time since power-on, s"),
-    "since_power_s": ("since_power", 1.0, "the same"),
-    "since_move": ("since_move", 1.0, "time since the table last moved, s"),
-    "since_move_s": ("since_move", 1.0, "the same"),
-    "supply": ("supply", 1.0, "supply, V"),
-    "supply_V": ("supply", 1.0, "the same"),
-    "vibration": ("vibration", 1.0, "vibration, g rms"),
-    "vibration_g": ("vibration", 1.0, "the same"),
-}
+QUANTITIES: Mapping[str, tuple[str, float, str]] = formula_names()
 """Name in a formula: name in the state, factor, meaning."""
 
 NAMES = (*FORCES, *QUANTITIES)

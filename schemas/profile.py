@@ -38,7 +38,8 @@ class Register(Strict):
 
     ``value = raw · scale``, over ten to the power that the register ``scaled_by`` holds where one is named; ``minimum`` and
     ``maximum`` bound the value, in ``unit``. A string has ``count`` words of two characters. ``disputed`` says what sources
-    disagree about. ``source`` is the profile's where none is named.
+    disagree about. ``source`` is the profile's where none is named. ``column`` names the column under which a reader's value is
+    recorded beside every dwell: a covariate that a missing effect may depend on.
     """
 
     name: Annotated[str, Field(pattern=r"^[a-z][a-z0-9_]*$")]
@@ -58,6 +59,7 @@ class Register(Strict):
     bits: dict[str, int] = Field(default_factory=dict[str, int])
     source: str = ""
     disputed: str = ""
+    column: Annotated[str, Field(pattern=r"^([A-Za-z][A-Za-z0-9_]*)?$")] = ""
 
     @property
     def writable(self) -> bool:
@@ -91,6 +93,10 @@ class Register(Strict):
         if self.space in READ_ONLY and self.writable:
             raise ValueError(
                 f"{self.name}: access {self.access} in space {self.space}, which can only be read; correct one"
+            )
+        if self.column and (self.type in {"string", "bit"} or self.count > 1 or self.access == "write"):
+            raise ValueError(
+                f"{self.name}: column '{self.column}', one number that can be read is needed; record another register"
             )
         if (self.enumeration or self.bits) and self.type in {"float32", "string"}:
             raise ValueError(f"{self.name}: {self.type} cannot hold an enumeration or bits; use an integer type")

@@ -28,6 +28,11 @@ def profile_of(device: Carried) -> Profile:
     return profile.model_copy(update={"word_order": device.word_order, "registers": kept})
 
 
+def recorded_columns(reader: Carried) -> list[str]:
+    """Columns that a station's reader records beside every dwell, besides those that every reader records."""
+    return [register.column for register in profile_of(reader).registers if register.column]
+
+
 @cache
 def load_profile(name: str) -> Profile:
     """The profile of that name; an unknown one is refused with what looks like it."""

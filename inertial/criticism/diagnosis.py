@@ -10,7 +10,7 @@ from numpy.random import Generator
 from inertial import effects as catalogue
 from inertial.criticism.adequacy import adequacy
 from inertial.criticism.classes import EffectClass, class_of
-from inertial.criticism.drivers import Driver, Misfit, drivers_of, places
+from inertial.criticism.drivers import Driver, Misfit, drivers_of, places, varies
 from inertial.criticism.heldout import fit_rms, heldout_rms
 from inertial.criticism.model import Model, Term, refuse_without_freedom
 from inertial.criticism.penalty import PER_COEFFICIENT, cost_of_model, log_p_value
@@ -112,7 +112,11 @@ def _examined(problem: Problem, effects: Sequence[str], rng: Generator) -> Diagn
     base = Model(problem, with_turn_on(lot.state, terms_of(held, problem)))
     refuse_without_freedom(base)
     candidates = [e for e in catalogue.catalogue().values() if e.id not in set(effects)]
-    covariates = [Covariate(name) for name in lot.state.covariates if f"{COVARIATE_PREFIX}{name}" not in set(effects)]
+    covariates = [
+        Covariate(name)
+        for name, values in lot.state.covariates.items()
+        if varies(values) and f"{COVARIATE_PREFIX}{name}" not in set(effects)
+    ]
     field = Candidates(problem, [*candidates, *covariates])
     drivers = drivers_of(problem)
     unseen = _unseen(field, base, candidates)

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from inertial.criticism.penalty import log_p_value
 from inertial.criticism.problem import Problem
 from inertial.criticism.space import Candidate, Space
+from inertial.quantities import attribute_drivers, is_clock
 from inertial.state import State
 
 Array = NDArray[np.float64]
@@ -64,22 +65,9 @@ def drivers_of(problem: Problem) -> list[Driver]:
 
 def quantities(state: State) -> list[tuple[str, Array, int]]:
     """Name, values (units, n) and number of knots of every recorded quantity."""
-    fields: dict[str, Array | None] = {
-        "unit_C": state.temperature,
-        "temperature_rate": state.temperature_rate,
-        "chamber_C": state.chamber,
-        "time_s": state.time,
-        "since_move_s": state.since_move,
-        "since_power_s": state.since_power,
-        "supply_V": state.supply,
-        "vibration_g": state.vibration,
-    }
+    fields = {name: getattr(state, attribute) for name, attribute in attribute_drivers().items()}
     every: Mapping[str, Array | None] = {**fields, **state.covariates}
-    return [
-        (k, v, _TIME_KNOTS if k.startswith(("time", "since_power")) else _KNOTS)
-        for k, v in every.items()
-        if v is not None
-    ]
+    return [(k, v, _TIME_KNOTS if is_clock(k) else _KNOTS) for k, v in every.items() if v is not None]
 
 
 def varies(values: Array) -> bool:

@@ -14,6 +14,7 @@ from inertial.criticism.penalty import PER_COEFFICIENT, cost_of_model
 from inertial.criticism.problem import Problem
 from inertial.criticism.space import Candidate
 from inertial.effects.covariate import COVARIATE_PREFIX
+from inertial.quantities import is_clock
 
 Array = NDArray[np.float64]
 
@@ -61,11 +62,11 @@ def suspects(problem: Problem) -> list[Suspect]:
     found: list[Suspect] = []
     for name, values, _ in quantities(state):
         if varies(values) and not (name == "chamber_C" and _alike_to(values, state.temperature)):
-            knots = _TIME_KNOTS if name in {"time_s", "since_power_s"} else _KNOTS
+            knots = _TIME_KNOTS if is_clock(name) else _KNOTS
             each = _unit_range(values if problem.lot.radial else np.repeat(values, 3, axis=0))
             found.append(Suspect(name, _alike(problem, curve(values, knots)), each))
             # levels in time, one for each soak, would follow any memory of temperature: a dependence on time is smooth
-            steps = None if name in {"time_s", "since_power_s"} else _levels(values)
+            steps = None if is_clock(name) else _levels(values)
             if steps is not None:
                 found.append(Suspect(name, _alike(problem, steps)))
     if not problem.lot.radial:

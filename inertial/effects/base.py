@@ -121,6 +121,11 @@ class SensorEffect(Effect):
     def names(self, axis: int) -> tuple[str, ...]:
         """Names of the p coefficients of one axis."""
 
+    def names_at(self, axis: int, **nonlinear: float) -> tuple[str, ...]:
+        """Names of the coefficients of one axis where constants of the run decide how many there are."""
+        del nonlinear
+        return self.names(axis)
+
     def start_columns(self, state: State, axis: int, **nonlinear: float) -> Array:
         """What the state of a memory before the first dwell would add, (..., n, k); k = 0 without memory."""
         del axis, nonlinear

@@ -59,6 +59,11 @@ class Covariate(SensorEffect):
         del axis
         return tuple(f"kc{k + 1}" for k in range(_KNOTS.size - 1)) if self.curve else ("kc1",)
 
+    def names_at(self, axis: int, **nonlinear: float) -> tuple[str, ...]:
+        """Names of the coefficients that the column's values in the run allow."""
+        names = self.names(axis)
+        return names[: int(nonlinear.get("degree", len(names)))]
+
 
 def _natural(z: Array) -> list[Array]:
     """Curved functions of a natural cubic spline. Hastie, Tibshirani, Friedman: Elements of Statistical Learning, eq. 5.4."""

@@ -110,7 +110,7 @@ def fit_lot(
     for name, given in (nonlinear or {}).items():
         values[name] = {**values.get(name, {}), **given}
     z = np.swapaxes(output, -1, -2)
-    names = tuple(design.local_names(sensor, axis) for axis in range(3))
+    names = tuple(design.local_names(sensor, axis, values) for axis in range(3))
     weight = None if standard_error is None else 1.0 / np.swapaxes(standard_error, -1, -2)
     local = _Local(design.local_columns(sensor, state, values), weight, names)
     theta = local.solve(z)

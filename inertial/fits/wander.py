@@ -19,7 +19,7 @@ from inertial.design import Values
 from inertial.errors import NotIdentified
 from inertial.fits.generalised import Series, Solved
 from inertial.fits.linear import LotFit, fit_lot
-from inertial.noise.flicker import flicker_kernel
+from inertial.noise.flicker import SLOWEST_FITTED, flicker_kernel
 from inertial.state import State
 
 Array = NDArray[np.float64]
@@ -85,7 +85,7 @@ def wander_kernels(time: Array) -> tuple[Array, Array]:
 
     Wander slower than the record is, for the record, the bias itself.
     """
-    return flicker_kernel(time, slowest=1.0), walk_kernel(time)
+    return flicker_kernel(time, slowest=SLOWEST_FITTED), walk_kernel(time)
 
 
 def fit_lot_with_wander(

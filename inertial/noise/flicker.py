@@ -1,48 +1,75 @@
-"""Flicker (1/f) noise as a sum of Ornstein–Uhlenbeck processes whose time constants are a fixed ratio apart."""
+"""The one kernel of 1/f wander: a sum of Ornstein–Uhlenbeck processes of equal variance, their time constants an octave apart.
+
+A process of variance v and time constant τ has the one-sided density 4vτ/(1 + (2πfτ)²). Processes whose τ are a ratio r apart sum
+up to v/(f·ln r) between the slowest and the fastest: with bias instability B, whose density is B²/(π·f), v = B²·ln r/π. Fit and
+diagnosis look at the correlation, for which v is one over the number of processes; a plan starts from B.
+"""
 
 import numpy as np
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
+RATIO = 2.0
+"""Between time constants."""
 
-def flicker_kernel(time: Array, *, slowest: float = 4.0) -> Array:
-    """Correlation matrix of 1/f wander at times ``time`` (..., n) in s, (..., n, n).
+FASTEST_SPACING = 1.0 / 3.0
+"""Fastest time constant of wander between dwells over their typical spacing: what is faster is white from dwell to dwell."""
+
+FASTEST_WITHIN = 0.01
+"""Fastest time constant of wander within dwells over their duration: what is faster is averaged out."""
+
+SLOWEST_DIAGNOSED = 4.0
+"""Slowest time constant over the length of the record where drifts are to be told from wander."""
+
+SLOWEST_FITTED = 1.0
+"""The same where coefficients are fitted: what is slower than the record is, for the record, the bias itself."""
+
+
+def time_constants(slowest: float, octaves: int) -> Array:
+    """Time constants (octaves,), s, from the slowest down."""
+    return slowest * RATIO ** -np.arange(octaves, dtype=np.float64)
+
+
+def summed(gap: Array, constants: Array, duration: float = 0.0) -> Array:
+    """Covariance of a sum of processes of variance one, at times ``gap`` apart or of means over dwells whose middles are.
+
+    The mean over T has the variance 2·(τ/T)·(1 − (τ/T)·(1 − e^(−T/τ))), and two means the covariance
+    (τ/T)²·(1 − e^(−T/τ))²·e^(−(gap − T)/τ).
+
+    Parameters
+    ----------
+    gap : (...), s
+    constants : (k,), s
+    duration : s of each dwell; 0 for instants
+    """
+    total = np.zeros(gap.shape)
+    if duration <= 0.0:
+        for tau in constants:
+            total += np.exp(-gap / tau)
+        return total
+    apart = gap > 0.5 * duration
+    for tau in constants:
+        share = tau / duration
+        fade = -np.expm1(-1.0 / share)
+        own = 2.0 * share * (1.0 - share * fade)
+        total += np.where(apart, (share * fade) ** 2 * np.exp(-np.maximum(gap - duration, 0.0) / tau), own)
+    return total
+
+
+def flicker_kernel(time: Array, *, slowest: float = SLOWEST_DIAGNOSED) -> Array:
+    """Correlation matrix (..., n, n) of 1/f wander at times ``time`` (..., n) in s.
 
     Time constants run in octaves from a third of the typical spacing to ``slowest`` times the length of the record.
     """
     gap = np.abs(time[..., :, None] - time[..., None, :])
     span = float(np.max(gap, initial=1.0))
     spacing = max(float(np.median(np.diff(np.unique(time)))) if np.unique(time).size > 1 else 1.0, span / 1e5, 1e-6)
-    octaves = max(int(np.ceil(np.log2(slowest * span / (spacing / 3.0)))), 2)
-    taus = slowest * span * 0.5 ** np.arange(octaves)
-    kernel = np.zeros(gap.shape)
-    for tau in taus:
-        kernel += np.exp(-gap / tau)
-    return kernel / taus.size
-
-
-_FASTEST = 0.01
-"""Shortest time constant over the dwell: what is faster is averaged out within it."""
-
-
-_RATIO = 2.0
-"""Between time constants of the processes whose sum is the flicker."""
+    octaves = max(int(np.ceil(np.log2(slowest * span / (spacing * FASTEST_SPACING)))), 2)
+    return summed(gap, time_constants(slowest * span, octaves)) / octaves
 
 
 def flicker_of_means(gap: Array, duration: float, slowest: float) -> Array:
-    """Covariance of means over ``duration`` s that are ``gap`` apart, for flicker with B = 1 and no slower than ``slowest`` s.
-
-    A process of variance v and time constant τ has the one-sided density 4vτ/(1 + (2πfτ)²); processes whose τ are a ratio r
-    apart sum up to v/(f·ln r), so that v = B²·ln r/π. The mean of such a process over T has the variance
-    2v·(τ/T)·(1 − (τ/T)·(1 − e^(−T/τ))), and two means the covariance v·(τ/T)²·(1 − e^(−T/τ))²·e^(−(gap − T)/τ).
-    """
-    octaves = max(2, int(np.ceil(np.log(slowest / (_FASTEST * duration)) / np.log(_RATIO))) + 1)
-    total = np.zeros(gap.shape)
-    apart = gap > 0.5 * duration
-    for tau in slowest * _RATIO ** -np.arange(octaves, dtype=np.float64):
-        share = tau / duration
-        fade = -np.expm1(-1.0 / share)
-        own = 2.0 * share * (1.0 - share * fade)
-        total += np.where(apart, (share * fade) ** 2 * np.exp(-np.maximum(gap - duration, 0.0) / tau), own)
-    return total * np.log(_RATIO) / np.pi
+    """Covariance of means over ``duration`` s that are ``gap`` apart, for flicker with B = 1 and no slower than ``slowest`` s."""
+    octaves = max(2, int(np.ceil(np.log(slowest / (FASTEST_WITHIN * duration)) / np.log(RATIO))) + 1)
+    return summed(gap, time_constants(slowest, octaves), duration) * np.log(RATIO) / np.pi

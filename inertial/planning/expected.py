@@ -53,7 +53,7 @@ def expected_errors(effects: Sequence[str], state: State, covariance: Array, *, 
     values = design.starting_values([*sensor, *station], state)
     white = whitener(covariance)
     h = white @ design.local_columns(sensor, state, values)
-    inverse = np.stack([inverted(part, design.local_names(sensor, axis)) for axis, part in enumerate(h)])
+    inverse = np.stack([inverted(part, design.local_names(sensor, axis, values)) for axis, part in enumerate(h)])
     shared = np.zeros(0)
     if station:
         s = white @ design.shared_columns(station, state, values, np.eye(3))
@@ -64,7 +64,7 @@ def expected_errors(effects: Sequence[str], state: State, covariance: Array, *, 
         across = inverse @ (np.swapaxes(h, -1, -2) @ s)
         inverse = inverse + across @ square @ np.swapaxes(across, -1, -2)
     return Expected(
-        names=tuple(design.local_names(sensor, axis) for axis in range(3)),
+        names=tuple(design.local_names(sensor, axis, values) for axis in range(3)),
         errors=np.sqrt(np.diagonal(inverse, axis1=-2, axis2=-1)),
         shared_names=design.shared_names(station),
         shared_errors=shared,

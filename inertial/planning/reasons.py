@@ -20,6 +20,7 @@ from inertial.planning import visibility
 from inertial.planning.changes import CHANGES, Driver, PlanChange
 from inertial.planning.sequences import SequenceStep, StationPace, extended
 from inertial.planning.wording import signature, symbol
+from inertial.quantities import column_of
 from inertial.state import State
 
 Array = NDArray[np.float64]
@@ -33,12 +34,6 @@ _BETTER = 1.5
 _ABSORBED = 0.05
 _ERROR = 1e-5
 _OFF_S = 600.0
-
-_COLUMNS = {
-    "theta": "unit_C", "temperature": "unit_C", "temperature (unit_C)": "unit_C", "chamber": "chamber_C",
-    "supply": "supply_V", "vibration": "vibration_g", "outer": "outer_deg", "inner": "inner_deg",
-    "since_move": "since_move_s", "since_power": "since_power_s", "temperature_rate": "unit_C",
-}  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -82,7 +77,7 @@ def cause(state: State, effect_id: str, base: Sequence[str], *, axis: int | None
     effect = catalogue.get(effect_id)
     lacking = _lacking(one, effect)
     if lacking:
-        carried = _COLUMNS.get(lacking, lacking)
+        carried = column_of(lacking)
         return Cause("", f"the dwells carry no {carried}", f"{symbol(effect)} is invisible", f"record {carried}")
     if _left(one, effect_id, base, axis) > visibility.SEEN:
         return None

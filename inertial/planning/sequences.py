@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from inertial import frames
 from inertial.state import T_REFERENCE, History, State
+from inertial.timing import Air, Drive, SoakRule, followed, settling_s, soaked
 
 Array = NDArray[np.float64]
 
@@ -42,9 +43,10 @@ class SequenceStep:
 class StationPace:
     """How long a station takes, and where it goes on from.
 
-    move_s : s of a move of 90°; dwell_s : s of a dwell; overhead_s : s beside each, for commands
+    move_s : s of a move of 90°, where the drive is not known; dwell_s : s of a dwell; overhead_s : s beside each, for commands
     ramp : K/s of the air; lag : s by which the devices follow it
-    soak_s : s of the shortest soak; settled : K within which a device counts as settled
+    soak_s : s of the shortest soak; settled : K within which a device counts as settled, where the station's rule is not known
+    rule, drive : the station's rule for soaks, and how its table moves; None where they are not known
     last_dwell_s : s of the dwells so far; 0 where as long as the next ones
     start : where table and chamber stand; after the last dwell where None
     rest : s that have passed since the last dwell
@@ -60,6 +62,19 @@ class StationPace:
     last_dwell_s: float = 0.0
     start: SequenceStep | None = None
     rest: float = 0.0
+    rule: SoakRule | None = None
+    drive: Drive | None = None
+
+    @property
+    def temperatures(self) -> Air:
+        """Air and devices."""
+        return Air(self.ramp, self.lag)
+
+    def turning_s(self, turn: float) -> float:
+        """Seconds of a move over so many rad."""
+        if self.drive is not None:
+            return self.drive.seconds(math.degrees(turn))
+        return self.move_s * math.sqrt(turn / (0.5 * math.pi))
 
 
 @dataclass(frozen=True)
@@ -103,7 +118,7 @@ def timeline(steps: Sequence[SequenceStep], pace: StationPace, start: SequenceSt
             follow.target = step.temperature
         follow.go_on(step.off, pace)
         on = follow.now if step.off > 0.0 else on
-        follow.go_on(pace.overhead_s + pace.move_s * math.sqrt(turn / (0.5 * np.pi)), pace)
+        follow.go_on(pace.overhead_s + pace.turning_s(turn), pace)
         follow.go_on(step.wait + 0.5 * pace.dwell_s, pace)
         rows.append((follow.now, step.wait + 0.5 * pace.dwell_s, follow.now - on, follow.device, follow.air))
         follow.go_on(0.5 * pace.dwell_s, pace)
@@ -125,20 +140,19 @@ class _Follow:
         while self.now < end - 1e-9:
             moving = abs(self.target - self.air) + abs(self.air - self.device) > _STILL_K
             grain = min(_GRAIN_S if moving else _LONG_S, end - self.now)
-            reach = pace.ramp * grain
-            self.air += min(max(self.target - self.air, -reach), reach)
-            self.device += (self.air - self.device) * (1.0 - math.exp(-grain / pace.lag))
+            self.air, self.device = followed(self.air, self.device, self.target, grain, pace.temperatures)
             self.now += grain
             self.times.append(self.now)
             self.devices.append(self.device)
 
     def soak(self, target: float, pace: StationPace) -> None:
         """Goes to a temperature and stays until the devices have settled, the shortest soak at least."""
-        self.target, start = target, self.now
-        far = abs(target - self.device)
-        ramping = abs(target - self.air) / pace.ramp
-        settling = ramping + pace.lag * math.log(max(min(far, pace.ramp * pace.lag) / pace.settled, 1.0))
-        self.go_on(max(pace.soak_s, settling) - (self.now - start), pace)
+        self.target = target
+        if pace.rule is not None:
+            waited, _ = soaked(self.air, self.device, target, pace.soak_s, pace.temperatures, pace.rule)
+        else:
+            waited = max(pace.soak_s, settling_s(self.air, self.device, target, pace.settled, pace.temperatures))
+        self.go_on(waited, pace)
 
 
 def extended(

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pandas as pd
 
+from inertial.quantities import BY_ATTRIBUTE
 from schemas.units import AXES
 
 if TYPE_CHECKING:
@@ -20,7 +21,8 @@ if TYPE_CHECKING:
     from stations.devices.reader import Instruments
     from stations.devices.slot import Identity, Samples
 
-POWER_OFF = "power_off_s"
+POWER_OFF = BY_ATTRIBUTE["power_off"].column
+INSTRUMENTS = tuple(BY_ATTRIBUTE[name].column for name in ("chamber", "temperature", "supply", "vibration"))
 STRAY_SIGMA = 20.0
 STRAY_PART = 1e-3  # of the full scale: what is less moves a mean of a hundred samples by no more than a part in 100 000
 FEWEST_TO_STRAY = 20
@@ -66,6 +68,7 @@ class Record:
     since_power: float = 0.0
     power_off: float | None = None
     looks: list[NDArray[np.float64]] = field(default_factory=list)
+    recorded: dict[str, list[float]] = field(default_factory=dict)
     parts: dict[str, list[Samples]] = field(default_factory=dict)
     stored: dict[str, int] = field(default_factory=dict)
     lossy: set[str] = field(default_factory=set)
@@ -75,6 +78,8 @@ class Record:
         """Notes encoders, air and instruments of one instant."""
         row = (*angles, chamber, instruments.vibration_g, *instruments.temperature_C, *instruments.supply_V)
         self.looks.append(np.array(row))
+        for column, value in instruments.recorded.items():
+            self.recorded.setdefault(column, []).append(value)
 
     def seen(self, slot: int) -> dict[str, float]:
         """Means over the looks: what a unit's slot and the station showed."""
@@ -87,6 +92,7 @@ class Record:
             "unit_C": float(means[SHARED + slot]),
             "supply_V": float(means[SHARED + slots + slot]),
             "vibration_g": float(means[3]),
+            **{column: float(np.mean(values)) for column, values in self.recorded.items()},
         }
 
     def keep(self, serial: str, samples: Samples) -> None:
@@ -183,7 +189,7 @@ def readings_row(record: Record, unit: Unit, identity: Identity, status: str) ->
         "inner_deg": seen["inner_deg"],
         "outer_command_deg": record.pose.outer_deg,
         "inner_command_deg": record.pose.inner_deg,
-        **{name: seen[name] for name in ("chamber_C", "unit_C", "supply_V", "vibration_g")},
+        **{name: seen[name] for name in INSTRUMENTS},
         "since_move_s": record.since_move,
         "since_power_s": record.since_power,
         **({} if record.power_off is None else {POWER_OFF: record.power_off}),
@@ -195,4 +201,5 @@ def readings_row(record: Record, unit: Unit, identity: Identity, status: str) ->
         "status": status,
         "out_unit": identity.out_unit,
         "full_scale": identity.full_scale,
+        **{column: seen[column] for column in record.recorded},
     }

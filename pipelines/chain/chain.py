@@ -8,9 +8,10 @@ from typing import TYPE_CHECKING, Any
 from pipelines.stages.fit import fit
 from pipelines.stages.grade import Evidence, grade
 from pipelines.stages.noise import noise
-from pipelines.stages.reduce import reduce
-from pipelines.stages.validate import validate
+from pipelines.stages.reduce import dwells_of
+from pipelines.stages.validate import verdicts
 from pipelines.stages.verify import verify
+from pipelines.tables.summaries import summarised
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -48,13 +49,29 @@ def _records(run: Run) -> Records:
     return records
 
 
+_looked_at: dict[tuple[str, str, float], pd.DataFrame] = {}
+"""Summaries of the samples of the last run whose stages were worked out: they are decoded once for all stages of a run."""
+
+
+def _summaries(job: Job, run: Run) -> pd.DataFrame:
+    """The summaries of a run's samples; samples that change have another hash."""
+    records = _records(run)
+    key = (str(records.path), records.hash(), job.recipe.zero_output)
+    found = _looked_at.get(key)
+    if found is None:
+        found = summarised(records.samples(), run.table("readings"), job.recipe.zero_output)
+        _looked_at.clear()
+        _looked_at[key] = found
+    return found
+
+
 def _validate(job: Job, run: Run) -> Tables:
-    return {"verdicts": validate(_records(run).samples(), run.table("readings"), job.lot.units, job.recipe.zero_output)}
+    return {"verdicts": verdicts(_summaries(job, run), run.table("readings"), job.lot.units)}
 
 
 def _reduce(job: Job, run: Run) -> Tables:
     tables = run.table("readings"), run.table("verdicts")
-    return {"dwells": reduce(_records(run).samples(), *tables, job.recipe.local_gravity_m_s2)}
+    return {"dwells": dwells_of(_summaries(job, run), *tables, job.recipe.local_gravity_m_s2)}
 
 
 _VERIFIED = ("dwells", "history", "coefficients", "covariance", "predictions")

@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pandas as pd
 
+from inertial.quantities import BY_COLUMN
+
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
@@ -32,7 +34,7 @@ def condense(dwells: pd.DataFrame, most: int = MOST) -> pd.DataFrame:
     place = pd.Series(group, index=numbers)
     numeric = [c for c in dwells.columns if pd.api.types.is_numeric_dtype(dwells[c]) and c != "dwell"]
     how = {
-        c: "sum" if c in _SUMS else "max" if c == "power_off_s" else "mean" if c in numeric else "first"
+        c: "sum" if c in _SUMS else BY_COLUMN[c].joined if c in BY_COLUMN else "mean" if c in numeric else "first"
         for c in dwells.columns
         if c not in ("unit", "dwell")
     }

@@ -7,22 +7,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from inertial.expressions import NAMES, QUANTITIES
+from inertial.quantities import formula_name
 
 if TYPE_CHECKING:
     from inertial.criticism.diagnosis import Unexplained
     from inertial.state import State
-
-DRIVERS = {
-    "temperature_rate": "rate",
-    "unit_C": "temperature",
-    "time_s": "hours",
-    "chamber_C": "chamber",
-    "supply_V": "supply",
-    "vibration_g": "vibration",
-    "since_move_s": "since_move",
-    "since_power_s": "since_power",
-}
-"""Names of drivers, and what a formula calls them."""
 
 
 def offer(unexplained: Unexplained, state: State) -> dict[str, Any] | None:
@@ -33,7 +22,7 @@ def offer(unexplained: Unexplained, state: State) -> dict[str, Any] | None:
     unexplained : as a diagnosis found it
     state : the dwells it was found in
     """
-    name = DRIVERS.get(unexplained.driver, unexplained.driver)
+    name = formula_name(unexplained.driver)
     values = _values(name, state)
     if values is None or not name.isidentifier():
         return None

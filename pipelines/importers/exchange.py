@@ -10,8 +10,8 @@ import pandas as pd
 
 from pipelines.archive import Archive
 from pipelines.importers import files
+from pipelines.tables.dwell_columns import ANGLES, DEVIATIONS, FORCE, KNOWN, REQUIRED
 from schemas import tables
-from schemas.dwell_columns import ANGLES, DEVIATIONS, FORCE, KNOWN, REQUIRED
 from schemas.errors import DataRejected, WrongUse, did_you_mean
 from schemas.serials import refuse_unprintable
 

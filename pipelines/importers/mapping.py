@@ -8,17 +8,13 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator
 
+from inertial.quantities import RECORDED
 from schemas.errors import RecipeInvalid, WrongUse, close_matches, did_you_mean
 from schemas.units import STANDARD_GRAVITY_M_S2
 
 NEEDED = ("x", "y", "z")
 MEANINGS: dict[str, str] = {
-    "temperature": "unit_C",
-    "chamber": "chamber_C",
-    "supply": "supply_V",
-    "vibration": "vibration_g",
-    "outer": "outer_deg",
-    "inner": "inner_deg",
+    **{row.mapped: row.column for row in RECORDED if row.mapped},
     "n": "n",
     "duration": "duration_s",
     "sd_x": "sd_x",

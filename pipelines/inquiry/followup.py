@@ -13,7 +13,7 @@ from inertial.planning.sequences import SequenceStep as Wanted
 from inertial.planning.sequences import StationPace
 from pipelines.jobs.job import Job
 from pipelines.schedule.steps import Step, steps
-from pipelines.schedule.timing import StationPose, axis_seconds, lag_of, minutes
+from pipelines.schedule.timing import StationPose, drive_of, lag_of, minutes, rule_of
 from schemas.recipe import Pose, Recipe, SoakPart
 from stations.profile_files import profile_of
 
@@ -21,7 +21,6 @@ if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
 VARIED_K = 5.0
-QUARTER_DEG = 90.0
 
 
 @dataclass(frozen=True)
@@ -69,14 +68,14 @@ def circumstances(base: Job, last: Job, budget: float) -> Circumstances:
         settle=recipe.settle_s,
         power=profile_of(station.devices.reader).has("power"),
     )
-    quarter = axis_seconds(QUARTER_DEG, limits.speed_deg_s, limits.acceleration_deg_s2)
     pace = StationPace(
-        move_s=quarter + station.pace.in_position_s,
         dwell_s=recipe.dwell_s,
         overhead_s=station.pace.record_s,
         ramp=station.pace.ramp_K_per_min / 60.0,
         lag=lag_of(station),
         soak_s=recipe.soak_min_s,
+        rule=rule_of(station),
+        drive=drive_of(station),
         start=place.step(),
     )
     return Circumstances(reach, pace, lambda wanted: station_minutes(wanted, base, place), budget)

@@ -12,11 +12,13 @@ from pipelines.jobs.model_files import read_model, refuse_unknown_effects, use_f
 from pipelines.jobs.recipes import MAIN_JOB, load_limits, load_recipe, lot_of, units_of
 from pipelines.schedule.planned_state import refuse_unidentified
 from pipelines.stages.grade import refuse_limits_without_figures
+from pipelines.tables.dwell_table import covariates
 from schemas.errors import RecipeInvalid, WrongUse
 from schemas.fault import parse_fault
 from schemas.limits import Limits
 from schemas.recipe import Lot, Recipe
 from schemas.station import StationConfig, load_station, with_faults
+from stations.profile_files import recorded_columns
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -131,7 +133,7 @@ class Request:
         _refuse_more_units_than_slots(job)
         _refuse_unknown_device(job)
         _refuse_beyond_station(job)
-        _refuse_inconsistent(job)
+        _refuse_inconsistent(job, recorded_columns(station.devices.reader))
         return job
 
     def _line_model(self, archive: Archive | None, device: str) -> dict[str, Any]:
@@ -171,15 +173,16 @@ def job_of_run(run: Run, *, effects: Sequence[str] = (), model: Path | None = No
         chosen = load_limits(recipe)
     station = StationConfig.model_validate(about["station"])
     job = Job(recipe, chosen, Lot.model_validate(about["lot"]), station, captured=about["capture"])
-    _refuse_inconsistent(job)
+    known = "readings" in run.tables()
+    _refuse_inconsistent(job, covariates(run.table("readings")) if known else recorded_columns(station.devices.reader))
     return job
 
 
-def _refuse_inconsistent(job: Job) -> None:
-    """Refuse a model that the plan cannot determine, and limits that neither can serve."""
+def _refuse_inconsistent(job: Job, recorded: Sequence[str]) -> None:
+    """Refuse a model that the plan cannot determine, or whose columns are not recorded, and limits that neither can serve."""
     refuse_limits_without_figures(job.limits, job.recipe)
     try:
-        refuse_unidentified(job.recipe)
+        refuse_unidentified(job.recipe, recorded)
     except InertialError as problem:
         raise RecipeInvalid(str(problem), key="effects") from None
 

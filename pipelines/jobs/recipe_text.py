@@ -1,10 +1,12 @@
-"""A resolved recipe as the text of a recipe file."""
+"""A resolved recipe as the text of a recipe file: the fields of the file's own model, written by a TOML library."""
 
 from __future__ import annotations
 
-import json
 import os
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
+
+import tomlkit
+from tomlkit.items import Array
 
 from schemas.errors import WrongUse
 from schemas.recipe import RecipeFile
@@ -13,14 +15,13 @@ if TYPE_CHECKING:
     from collections.abc import Iterable
     from pathlib import Path
 
-    from schemas.recipe import Pose, Recipe, SoakPart
+    from tomlkit.items import Item, Table
+
+    from schemas.recipe import Pose, Recipe
 
 WIDTH = 100
-PLAIN = (
-    *("name", "description", "device", "units", "seed", "local_gravity_m_s2", "zero_output"),
-    *("soak_min_s", "allow_short_soak", "settle_s", "dwell_s", "rate_hz", "static_record_s", "static_temperature_C"),
-    *("span_min_g", "limits"),
-)
+RESOLVED = {"poses", "verification", "static_pose", "model_name", "model_version", "formulas"}
+"""Fields of a resolved recipe that stand otherwise in a file."""
 
 
 def recipe_text(recipe: Recipe, remarks: Iterable[str] = ()) -> str:
@@ -40,35 +41,31 @@ def recipe_text(recipe: Recipe, remarks: Iterable[str] = ()) -> str:
             f"recipe {recipe.name}: its model has the formula '{recipe.formulas[0].id}', a recipe file holds effects of the "
             "catalogue only; give the effects with --effects, and name the model file in the recipe that is written"
         )
-    lines = [f"# {remark}" for remark in remarks]
-    for key in PLAIN:
-        value = getattr(recipe, key)
-        if value != RecipeFile.model_fields[key].default:
-            lines.append(f"{key} = {_value(value)}")
-    lines += ["", *_listed("effects", [json.dumps(effect) for effect in recipe.effects])]
-    lines += ["", "# outer, inner in degrees; numbers below count from 1", *_listed("poses", _angles(recipe.poses))]
+    document = tomlkit.document()
+    for line in (line for remark in remarks for line in remark.splitlines()):
+        document.add(tomlkit.comment(line))
+    written = recipe_file(recipe).model_dump(exclude_defaults=True, exclude_none=True)
+    tables = {key for key, value in written.items() if isinstance(value, list) and value and isinstance(value[0], dict)}
+    if "soaks" in tables:
+        written.pop("temperatures_C", None)  # the soaks say them
+    # a key behind a table would belong to the table
+    for key in sorted(written, key=lambda key: key in tables):
+        if key == "poses":
+            document.add(tomlkit.comment("poses: outer, inner in degrees; the numbers in soaks count them from 1"))
+        document.add(key, _item(key, written[key]))
+    return tomlkit.dumps(document)
+
+
+def recipe_file(recipe: Recipe) -> RecipeFile:
+    """The recipe as the content of a file: poses by their angles, repeated verification poses once."""
     once, times = _repeated(recipe.verification)
-    if once:
-        lines += _listed("verification", _angles(once))
-    if times > 1:
-        lines.append(f"verification_repeats = {times}")
-    if recipe.static_record_s > 0.0:
-        lines += _listed("static_pose", [str(recipe.static_pose.outer_deg), str(recipe.static_pose.inner_deg)])
-    if not recipe.soaks:
-        lines += _listed("temperatures_C", [str(t) for t in recipe.temperatures_C])
-    for part in recipe.soaks:
-        lines += _soak_lines(part)
-    return "\n".join(lines) + "\n"
-
-
-def _soak_lines(part: SoakPart) -> list[str]:
-    """The table of one soak."""
-    lines = ["", "[[soaks]]", f"temperature_C = {part.temperature_C}"]
-    for key in ("poses", "verification", "waits_s"):
-        numbers = getattr(part, key)
-        if numbers is not None:
-            lines += _listed(key, [str(k) for k in numbers])
-    return lines if part.settled else [*lines, "settled = false"]
+    return RecipeFile(
+        **recipe.model_dump(exclude=RESOLVED),
+        poses=[_angles(pose) for pose in recipe.poses],
+        verification=[_angles(pose) for pose in once],
+        verification_repeats=times,
+        static_pose=_angles(recipe.static_pose),
+    )
 
 
 def _repeated(poses: list[Pose]) -> tuple[list[Pose], int]:
@@ -79,30 +76,33 @@ def _repeated(poses: list[Pose]) -> tuple[list[Pose], int]:
     return (once, times) if poses == once * times else (poses, 1)
 
 
+def _angles(pose: Pose) -> list[float]:
+    return [pose.outer_deg, pose.inner_deg]
+
+
 def limits_from(limits: str, home: Path, folder: Path) -> str:
     """A recipe's limits as a recipe in another folder names them: built-in ones by name, a file by its way from there."""
     beside = home / limits
     return os.path.relpath(beside, folder) if beside.is_file() else limits
 
 
-def _value(value: object) -> str:
-    """A value as TOML writes it: JSON does for texts, numbers, yes and no, and lists of them."""
-    return json.dumps(value, ensure_ascii=False)
+def _item(key: str, value: Any) -> Item:
+    """A value as an item of the document; lists that are too long for a line stand one entry a line."""
+    if isinstance(value, list) and value and isinstance(value[0], dict):
+        several = tomlkit.aot()
+        for one in value:
+            several.append(_table(one))
+        return several
+    if isinstance(value, dict):
+        return _table(value)
+    item = tomlkit.item(value)
+    if isinstance(item, Array) and len(f"{key} = {item.as_string()}") > WIDTH:
+        item.multiline(multiline=True)
+    return item
 
 
-def _angles(poses: Iterable[Pose]) -> list[str]:
-    return [f"[{pose.outer_deg}, {pose.inner_deg}]" for pose in poses]
-
-
-def _listed(key: str, items: list[str]) -> list[str]:
-    """``key = [...]``, broken into lines where it is long."""
-    whole = f"{key} = [{', '.join(items)}]"
-    if len(whole) <= WIDTH:
-        return [whole]
-    lines, line = [f"{key} = ["], "   "
-    for item in items:
-        if len(line) + len(item) + 2 > WIDTH:
-            lines.append(line)
-            line = "   "
-        line += f" {item},"
-    return [*lines, line, "]"]
+def _table(content: dict[str, Any]) -> Table:
+    table = tomlkit.table()
+    for key in sorted(content, key=lambda key: isinstance(content[key], dict)):
+        table.add(key, _item(key, content[key]))
+    return table

@@ -41,8 +41,24 @@ def load_recipe(name: str = MAIN_JOB, line: LineModel | None = None) -> Recipe:
     line : the keys that say the line's model for a kind of device; refused where a recipe asks for it and it is None
     """
     text, source, folder = _recipe_text(name)
-    file = parse_recipe(text, source)
-    model = _model(file, folder, source, line)
+    return resolved(parse_recipe(text, source), source, folder, line)
+
+
+def resolved(file: RecipeFile, source: str, folder: Path | None = None, line: LineModel | None = None) -> Recipe:
+    """The content of a recipe file with every name in it resolved, and its poses checked.
+
+    Parameters
+    ----------
+    source : what messages call the file
+    folder : that names of model files are relative to; the working folder where None
+    line : see :func:`load_recipe`
+
+    Raises
+    ------
+    RecipeInvalid
+        A name is not known, or the poses cannot work.
+    """
+    model = _model(file, folder or Path(), source, line)
     fit_poses = _resolve(file.poses, "p", "poses", source)
     verification = _resolve(file.verification, "v", "verification", source)
     _refuse_flat_plan(fit_poses, file.span_min_g)

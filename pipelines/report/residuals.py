@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from inertial.criticism.comparison import estimate, residuals_of
 from inertial.criticism.drivers import curve, drivers_of
+from inertial.quantities import axis_labels, shown_factor
 from schemas.units import MICRO
 
 if TYPE_CHECKING:
@@ -74,17 +75,7 @@ def added(diagnosis: Diagnosis) -> list[str]:
     return [t.effect.id for t in diagnosis.final.terms if t.effect.id not in held]
 
 
-LABELS = {
-    "unit_C": "temperature of the unit / °C",
-    "chamber_C": "temperature of the chamber / °C",
-    "temperature_rate": "rate of temperature / K/min",
-    "time_s": "time / h",
-    "since_move_s": "time since the last move / s",
-    "since_power_s": "time since power-on / h",
-    "supply_V": "supply / V",
-    "vibration_g": "vibration / g rms",
-    "approach": "change of force at the move before / g",
-}
+LABELS = axis_labels() | {"approach": "change of force at the move before / g"}
 
 
 def drivers_shown(diagnosis: Diagnosis) -> list[DriverValues]:
@@ -101,9 +92,7 @@ def drivers_shown(diagnosis: Diagnosis) -> list[DriverValues]:
         values = known.get(name)
         still = name not in told and values is not None and float(np.ptp(values)) < STILL.get(name, 0.0)
         if values is not None and not still and not any(_alike(values, other.values) for other in found):
-            found.append(
-                DriverValues(name, LABELS.get(name, name), values / (3600.0 if "/ h" in LABELS.get(name, "") else 1.0))
-            )
+            found.append(DriverValues(name, LABELS.get(name, name), values * shown_factor(name)))
     return found[:_MOST]
 
 

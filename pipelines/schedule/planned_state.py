@@ -8,15 +8,17 @@ import numpy as np
 
 from inertial.fits.linear import fit_lot
 from inertial.frames import force_from_angles
+from inertial.quantities import BY_ATTRIBUTE, BY_COLUMN, Quantity
 from inertial.state import History, State
 from pipelines.schedule.steps import steps
 from pipelines.schedule.timing import schedule, temperatures
-from pipelines.tables.dwells import HISTORY_POINTS
+from pipelines.tables.dwell_table import HISTORY_POINTS
 from schemas.station import load_station
 from schemas.units import STANDARD_GRAVITY_M_S2
+from stations.profile_files import recorded_columns
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Iterable, Sequence
 
     from numpy.typing import NDArray
 
@@ -26,28 +28,38 @@ if TYPE_CHECKING:
 
     Array = NDArray[np.float64]
 
-NOMINAL_SUPPLY_V = 3.3
-SUPPLY_WANDER_V = 1e-3
-QUIET_G = 1e-3
 
-
-def planned_state(recipe: Recipe, station: StationConfig | None = None, *, history: bool = False) -> State:
+def planned_state(
+    recipe: Recipe,
+    station: StationConfig | None = None,
+    *,
+    history: bool = False,
+    recorded: Iterable[str] | None = None,
+) -> State:
     """The dwells of the fit in order of measurement, at the times at which a station gets to them.
 
-    Quantities that the plan does not set (supply, vibration) wander a little, as they do on a station, so that effects
-    of theirs are not refused.
+    Quantities that the plan does not set (supply, vibration, what the station's reader records besides) wander a little, as they
+    do on a station, so that effects of theirs are not refused.
 
     Parameters
     ----------
     station : the built-in simulated one where None
     history : whether the temperatures between the dwells go along, as a station records them
+    recorded : columns that are recorded besides; those of the station's reader where None
     """
     config = station or load_station()
     whole = schedule(steps(recipe), config, recipe)
-    return state_of(whole, config, recipe, history=history)
+    return state_of(whole, config, recipe, history=history, recorded=recorded)
 
 
-def state_of(stretches: Sequence[Activity], station: StationConfig, recipe: Recipe, *, history: bool = False) -> State:
+def state_of(
+    stretches: Sequence[Activity],
+    station: StationConfig,
+    recipe: Recipe,
+    *,
+    history: bool = False,
+    recorded: Iterable[str] | None = None,
+) -> State:
     """The dwells of the fit among what a station does, see :func:`planned_state`."""
     dwells = [s for s in stretches if s.kind == "dwell"]
     outer, inner = np.radians([(s.step.pose.outer_deg, s.step.pose.inner_deg) for s in dwells]).T
@@ -70,13 +82,23 @@ def state_of(stretches: Sequence[Activity], station: StationConfig, recipe: Reci
         since_power=_since_power(stretches, time),
         power_off=off if (off := np.array([s.step.off_s for s in dwells])).any() else None,
         since_move=(waits + 0.5 * recipe.dwell_s) * (1.0 + 0.01 * wander[0]),
-        supply=NOMINAL_SUPPLY_V + SUPPLY_WANDER_V * wander[1],
-        vibration=QUIET_G * (1.0 + 0.1 * np.abs(wander[0])),
+        supply=BY_ATTRIBUTE["supply"].about(wander[1]),
+        vibration=BY_ATTRIBUTE["vibration"].about(np.abs(wander[0])),
         outer=outer,
         inner=inner,
         slot=np.zeros(()),
+        covariates=_recorded(recorded_columns(station.devices.reader) if recorded is None else recorded, time.size),
         history=_history(stretches, station) if history else None,
     )
+
+
+def _recorded(columns: Iterable[str], count: int) -> dict[str, Array]:
+    """Recorded columns that nobody sets, each on its own way about its usual value."""
+    rng = np.random.default_rng(1)
+    known = {
+        column: BY_COLUMN.get(column, Quantity(column, "", "", column, usual=1.0, spread=0.1)) for column in columns
+    }
+    return {column: row.about(rng.standard_normal(count)) for column, row in known.items()}
 
 
 def _since_power(stretches: Sequence[Activity], time: Array) -> Array:
@@ -92,13 +114,19 @@ def _history(stretches: Sequence[Activity], station: StationConfig) -> History:
     return History(grid, np.interp(grid, time, device))
 
 
-def refuse_unidentified(recipe: Recipe) -> None:
+def refuse_unidentified(recipe: Recipe, recorded: Iterable[str] = ()) -> None:
     """Refuse a model that the planned poses and temperatures cannot determine.
+
+    Parameters
+    ----------
+    recorded : columns that are recorded beside every dwell, besides those that every station records
 
     Raises
     ------
     NotIdentified
         With the coefficients that cannot be told apart.
+    MissingInput
+        The model depends on a column that is not recorded.
     """
-    state = planned_state(recipe)
+    state = planned_state(recipe, recorded=recorded)
     fit_lot(recipe.effects, state, state.force.copy())

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import math
-from collections import deque
 from dataclasses import dataclass, replace
-from functools import lru_cache
 from typing import TYPE_CHECKING, Literal, get_args
+
+from inertial import timing
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -16,9 +16,6 @@ if TYPE_CHECKING:
     from schemas.station import StationConfig
 
 ActivityKind = Literal["soak", "move", "dwell", "verification", "allan"]
-
-_POLL_S = 0.25
-"""How often the table is asked whether it stands."""
 
 _FIRST_SOAK = -1
 
@@ -123,7 +120,7 @@ def temperatures(stretches: Sequence[Activity], station: StationConfig) -> list[
 
     What a settled device is still away from its target is no temperature that a plan may count on: it is taken off.
     """
-    thermal = _thermal(station)
+    pace, poll = air_of(station), station.soak.poll_s
     found: list[tuple[float, float, float]] = []
     for stretch in stretches:
         target = stretch.step.temperature
@@ -132,11 +129,11 @@ def temperatures(stretches: Sequence[Activity], station: StationConfig) -> list[
             found.append((stretch.start, target, target) if stretch.step.settled else (stretch.start, air, device))
             continue
         ends = (found[-1][2] - device if found else 0.0, target - stretch.end.device)
-        count = math.ceil(stretch.seconds / thermal.poll)
+        count = math.ceil(stretch.seconds / poll)
         for k in range(count):
             part = k / count
-            found.append((stretch.start + k * thermal.poll, air, device + (1.0 - part) * ends[0] + part * ends[1]))
-            air, device = _followed(air, device, target, thermal.poll, thermal)
+            found.append((stretch.start + k * poll, air, device + (1.0 - part) * ends[0] + part * ends[1]))
+            air, device = timing.followed(air, device, target, poll, pace)
     last = stretches[-1]
     target = last.step.temperature
     air, device = (target, target) if last.step.settled else (last.end.air, last.end.device)
@@ -145,42 +142,31 @@ def temperatures(stretches: Sequence[Activity], station: StationConfig) -> list[
 
 def move_seconds(now: StationPose, pose: Pose, station: StationConfig) -> float:
     """Seconds from the command to a pose until both axes say that they stand there."""
-    limits = station.limits
     way = max(abs(pose.outer_deg - now.outer), abs(pose.inner_deg - now.inner))
-    going = axis_seconds(way, limits.speed_deg_s, limits.acceleration_deg_s2) + station.pace.in_position_s
-    return math.ceil(going / _POLL_S) * _POLL_S
-
-
-def axis_seconds(way: float, speed: float, acceleration: float) -> float:
-    """Seconds of a trapezoidal move over ``way`` degrees."""
-    ramp = min(speed / acceleration, math.sqrt(way / acceleration))
-    return 0.0 if ramp == 0.0 else ramp + way / (acceleration * ramp)
+    return drive_of(station).seconds(way)
 
 
 def soaked(now: StationPose, target: float, station: StationConfig, shortest: float) -> tuple[float, StationPose]:
     """Seconds until the slowest device has settled at ``target`` °C by the station's rule, and how it stands then."""
-    waited, device = _soak(now.air, now.device, target, shortest, _thermal(station))
+    waited, device = timing.soaked(now.air, now.device, target, shortest, air_of(station), rule_of(station))
     return waited, replace(now, air=target, device=device)
 
 
-@dataclass(frozen=True)
-class _Thermal:
-    """Pace of chamber and devices, and the rule by which a soak counts as reached."""
-
-    lag: float
-    ramp: float
-    band: float
-    rate: float
-    window: float
-    limit: float
-    poll: float
+def air_of(station: StationConfig) -> timing.Air:
+    """Pace of chamber and devices."""
+    return timing.Air(station.pace.ramp_K_per_min / 60.0, lag_of(station))
 
 
-def _thermal(station: StationConfig) -> _Thermal:
-    rule, ramp = station.soak, station.pace.ramp_K_per_min / 60.0
-    return _Thermal(
-        lag_of(station), ramp, rule.band_K, rule.rate_K_per_min / 60.0, rule.window_s, rule.limit_s, rule.poll_s
-    )
+def rule_of(station: StationConfig) -> timing.SoakRule:
+    """The rule by which a soak counts as reached."""
+    rule = station.soak
+    return timing.SoakRule(rule.band_K, rule.rate_K_per_min / 60.0, rule.window_s, rule.limit_s, rule.poll_s)
+
+
+def drive_of(station: StationConfig) -> timing.Drive:
+    """How the table moves."""
+    limits = station.limits
+    return timing.Drive(limits.speed_deg_s, limits.acceleration_deg_s2, station.pace.in_position_s)
 
 
 def lag_of(station: StationConfig) -> float:
@@ -188,46 +174,7 @@ def lag_of(station: StationConfig) -> float:
     return station.simulation.slot_lag_s[1] if station.simulation else station.pace.lag_s
 
 
-@lru_cache(maxsize=4096)
-def _soak(air: float, device: float, target: float, shortest: float, thermal: _Thermal) -> tuple[float, float]:
-    """Seconds, and the device's temperature at the end: air ramps to the target, the device follows with its lag.
-
-    The rule is :meth:`stations.station.Station.soak`'s: all of the window inside the band, and its halves apart by less than
-    the rate allows. A soak that never settles is given up as the station would.
-    """
-    past: deque[float] = deque([device], maxlen=round(thermal.window / thermal.poll) + 1)
-    waited = 0.0
-    while waited < shortest or not _settled(past, target, thermal):
-        if waited > shortest + thermal.limit:
-            break
-        air, device = _followed(air, device, target, thermal.poll, thermal)
-        past.append(device)
-        waited += thermal.poll
-    return waited, device
-
-
-def _settled(past: deque[float], target: float, thermal: _Thermal) -> bool:
-    span = (len(past) - 1) * thermal.poll
-    if span < thermal.window - 1.5 * thermal.poll:
-        return False
-    rows = list(past)
-    half = len(rows) // 2
-    drift = abs(sum(rows[half:]) / (len(rows) - half) - sum(rows[:half]) / half)
-    return max(abs(t - target) for t in rows) <= thermal.band and drift / (span / 2.0) <= thermal.rate
-
-
-def _followed(air: float, device: float, target: float, seconds: float, thermal: _Thermal) -> tuple[float, float]:
-    """Air and device some seconds later: exact for a ramp that ends at the target, and a lag of first order behind it."""
-    ramping = min(seconds, abs(target - air) / thermal.ramp)
-    slope = math.copysign(thermal.ramp, target - air)
-    far = slope * thermal.lag  # how far the device is behind a ramp that never ends
-    behind = far + (air - device - far) * math.exp(-ramping / thermal.lag)
-    behind *= math.exp(-(seconds - ramping) / thermal.lag)
-    air = target if ramping < seconds else air + slope * ramping
-    return air, air - behind
-
-
 def _later(now: StationPose, target: float, seconds: float, station: StationConfig) -> StationPose:
     """How the station stands some seconds later, while its air is at ``target`` °C or on the way there."""
-    air, device = _followed(now.air, now.device, target, seconds, _thermal(station))
+    air, device = timing.followed(now.air, now.device, target, seconds, air_of(station))
     return replace(now, air=air, device=device)

@@ -14,7 +14,7 @@ from inertial.fits.linear import LotFit, felt_force, fit_lot
 from inertial.fits.wander import WanderFit, fit_lot_with_wander, student
 from pipelines.stages.nonlinear import profiled
 from pipelines.tables.calibration import coefficient_rows, covariance_rows
-from pipelines.tables.dwells import LotArrays, lot_arrays
+from pipelines.tables.dwells import KINDS, LotArrays, lot_arrays
 from pipelines.tables.frames import empty_table, picked
 from schemas.errors import DataRejected
 from schemas.units import AXES, MICRO
@@ -26,7 +26,6 @@ if TYPE_CHECKING:
 
     Array = NDArray[np.float64]
 
-KINDS = ("dwell", "verification")
 FEWEST_TO_SPARE = 4  # degrees of freedom of the lot, below which nothing can be said of the kind of its noise
 
 

@@ -1,66 +1,63 @@
-"""Samples to dwells: one row per accepted unit and static dwell, in the exchange format."""
+"""Samples to dwells: one row per accepted unit and static dwell, in the exchange format, with all recorded covariates."""
 
 from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
 import numpy as np
-import pandas as pd
 
 from inertial.frames import force_from_angles
-from pipelines.tables.samples import dwells_whole
+from inertial.quantities import ANGLE_COLUMNS, BY_ATTRIBUTE
+from pipelines.tables.dwell_table import covariates
+from pipelines.tables.summaries import MEANS, SPREADS, summarised
 from schemas.units import AXES, STANDARD_GRAVITY_M_S2
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
+    import pandas as pd
+
 KEPT = (
-    *(
-        "unit",
-        "slot",
-        "record",
-        "kind",
-        "pose",
-        "soak",
-        "duration_s",
-        "outer_deg",
-        "inner_deg",
-    ),
-    *(
-        "chamber_C",
-        "unit_C",
-        "supply_V",
-        "vibration_g",
-        "since_move_s",
-        "since_power_s",
-        "out_unit",
-    ),
+    *("unit", "slot", "record", "kind", "pose", "soak", "duration_s"),
+    *ANGLE_COLUMNS,
+    *(BY_ATTRIBUTE[name].column for name in ("chamber", "temperature", "supply", "vibration")),
+    *(BY_ATTRIBUTE[name].column for name in ("since_move", "since_power")),
+    "out_unit",
 )
-WHERE_THERE = ("power_off_s",)
+WHERE_THERE = (BY_ATTRIBUTE["power_off"].column,)
 """Of runs that switch their devices off and on."""
 
 
 def reduce(
-    samples: Iterable[pd.DataFrame],
-    readings: pd.DataFrame,
-    verdicts: pd.DataFrame,
-    local_gravity_m_s2: float,
+    samples: Iterable[pd.DataFrame], readings: pd.DataFrame, verdicts: pd.DataFrame, local_gravity_m_s2: float
+) -> pd.DataFrame:
+    """Dwells of samples that nobody has looked at yet, see :func:`dwells_of`.
+
+    Parameters
+    ----------
+    samples : one table per record, or several of a long one.
+    """
+    return dwells_of(summarised(samples, readings), readings, verdicts, local_gravity_m_s2)
+
+
+def dwells_of(
+    summaries: pd.DataFrame, readings: pd.DataFrame, verdicts: pd.DataFrame, local_gravity_m_s2: float
 ) -> pd.DataFrame:
     """Dwells of the accepted units, in order of measurement.
 
     Parameters
     ----------
-    samples : one table per record, or several of a long one.
+    summaries : of the samples, :func:`pipelines.tables.summaries.summarised`
     readings : of the whole run; the reference force comes from the encoders as they were read.
     verdicts : of the validate stage.
     local_gravity_m_s2 : at the station; the force is stated in standard g.
     """
     accepted = set(verdicts.loc[~verdicts["refused"], "unit"])
-    kept = [_means(record[record["unit"].isin(accepted)]) for record in dwells_whole(samples)]
-    nothing = [_means(pd.DataFrame(columns=["unit", "record", *AXES]))]
-    means = pd.concat([frame for frame in kept if len(frame)] or kept[:1] or nothing, ignore_index=True)
+    means = summaries.loc[summaries["unit"].isin(accepted), ["unit", "record", *MEANS, *SPREADS, "n"]]
     static = readings[readings["unit"].isin(accepted) & (readings["kind"] != "allan")]
-    kept = [*KEPT, *(c for c in WHERE_THERE if c in static.columns)]
+    # a covariate that a sensor has failed to tell once is of no use to any model, and stays in the readings
+    told = [column for column in covariates(readings) if static[column].notna().all()]
+    kept = [*KEPT, *(c for c in WHERE_THERE if c in static.columns), *told]
     columns = static[[*kept, "start_s"]].assign(time_s=static["start_s"] + 0.5 * static["duration_s"])
     dwells = columns.drop(columns="start_s").merge(means, on=["unit", "record"], validate="one_to_one")
     dwells = dwells.assign(
@@ -68,14 +65,6 @@ def reduce(
         **_forces(dwells, local_gravity_m_s2 / STANDARD_GRAVITY_M_S2),
     )
     return dwells.sort_values(["unit", "dwell"], ignore_index=True)
-
-
-def _means(samples: pd.DataFrame) -> pd.DataFrame:
-    """Mean, standard deviation and number of the samples of every unit in one record."""
-    groups = samples.groupby(["unit", "record"], sort=True)[list(AXES)]
-    out = groups.mean().add_prefix("out_")
-    spread = groups.std(ddof=1).add_prefix("sd_")
-    return pd.concat([out, spread, groups.size().rename("n")], axis=1).reset_index()
 
 
 def _forces(dwells: pd.DataFrame, magnitude_g: float) -> dict[str, np.ndarray]:

@@ -6,7 +6,7 @@ units go on.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 import pandas as pd
@@ -15,11 +15,12 @@ from inertial.frames import force_from_angles
 from inertial.pointing import contradicts
 from pipelines.stages.frozen import frozen
 from pipelines.stages.pointing import pointing_of
-from pipelines.tables.samples import STATIC, Signal, by_record
+from pipelines.tables.samples import STATIC
+from pipelines.tables.summaries import HIGHS, LOWS, means, summarised
 from schemas.units import AXES
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Sequence
+    from collections.abc import Iterable, Mapping, Sequence
 
     from numpy.typing import NDArray
 
@@ -44,30 +45,32 @@ class DataFault(NamedTuple):
 def validate(
     samples: Iterable[pd.DataFrame], readings: pd.DataFrame, units: Sequence[Unit], zero_output: float = 0.0
 ) -> pd.DataFrame:
-    """Verdicts: one row per unit of the lot with ``refused``, the fault found first, and all reasons.
+    """Verdicts on samples that nobody has looked at yet, see :func:`verdicts`.
 
     Parameters
     ----------
     samples : one table per record, or several of a long one.
-    readings : of the whole run.
-    units : the lot, so that a unit which never answered has a verdict too.
     zero_output : nominal output at 0 g, from which the full scale extends both ways; output unit.
     """
+    return verdicts(summarised(samples, readings, zero_output), readings, units)
+
+
+def verdicts(summaries: pd.DataFrame, readings: pd.DataFrame, units: Sequence[Unit]) -> pd.DataFrame:
+    """Verdicts: one row per unit of the lot with ``refused``, the fault found first, and all reasons.
+
+    Parameters
+    ----------
+    summaries : of the samples, :func:`pipelines.tables.summaries.summarised`
+    readings : of the whole run.
+    units : the lot, so that a unit which never answered has a verdict too.
+    """
     faults = [*_silent(readings, units), *_reading_faults(readings)]
-    means: list[pd.DataFrame] = []
-    for record, tables in by_record(samples):
-        here = readings[(readings["record"] == record) & (readings["status"] == "ok")]
-        signals = _signals(here, zero_output)
-        for table in tables:
-            _take_note(table, signals)
-            if table["kind"].iloc[0] != STATIC:
-                means.append(_sums(table))
-        faults += _sample_faults(here, signals)
     answered = readings[readings["status"] == "ok"]
+    faults += _sample_faults(answered, summaries)
     faults += _stale_temperatures(answered)
     faults += _frozen_temperatures(answered)
-    if means:
-        output = _means(pd.concat(means))
+    output = means(summaries, (STATIC,))
+    if len(output):
         faults += _dead_channels(output, answered)
         faults += _table(output, readings, units, {fault.unit for fault in faults})
     return _verdicts(faults, units)
@@ -122,54 +125,35 @@ def _reading_faults(readings: pd.DataFrame) -> list[DataFault]:
     return faults
 
 
-def _signals(here: pd.DataFrame, zero: float) -> dict[str, Signal]:
-    """An empty signal for every unit that answered in a record."""
-    return {str(unit): Signal(zero, float(full)) for unit, full in zip(here["unit"], here["full_scale"], strict=True)}
-
-
-def _take_note(table: pd.DataFrame, signals: dict[str, Signal]) -> None:
-    output = table[list(AXES)].to_numpy(dtype=float)
-    for unit, rows in table.groupby("unit", sort=False).indices.items():
-        if unit in signals:
-            signals[str(unit)].add(output[rows])
-
-
-def _sums(table: pd.DataFrame) -> pd.DataFrame:
-    """Sums and counts of the samples of every unit in one table."""
-    groups = table.groupby(["unit", "record"], sort=False)[list(AXES)]
-    return groups.mean().mul(groups.size(), axis=0).assign(n=groups.size()).reset_index()
-
-
-def _means(sums: pd.DataFrame) -> pd.DataFrame:
-    """Mean samples of every unit and record from the sums of their tables."""
-    total = sums.groupby(["unit", "record"], sort=False).sum()
-    return total[list(AXES)].div(total["n"], axis=0).reset_index()
-
-
-def _sample_faults(here: pd.DataFrame, signals: dict[str, Signal]) -> list[DataFault]:
+def _sample_faults(answered: pd.DataFrame, summaries: pd.DataFrame) -> list[DataFault]:
+    """Faults of the samples of every record that has any, record by record."""
+    known = {(row["record"], row["unit"]): row for row in summaries.to_dict("records")}
     faults: list[DataFault] = []
-    for row in here.itertuples():
-        found = _fault_of(signals[str(row.unit)], str(row.out_unit), int(row.n))  # pyright: ignore[reportArgumentType]
-        if found:
-            place = f"in record {row.record} (pose {row.pose})"
-            faults.append(DataFault(str(row.unit), found[0], f"{found[1]} {place}; {found[2]}"))
+    for record in summaries["record"].unique():
+        for row in answered[answered["record"] == record].to_dict("records"):
+            own = known.get((record, row["unit"]))
+            found = _fault_of(own, str(row["out_unit"]), int(row["n"]), float(row["full_scale"]))
+            if found:
+                place = f"in record {row['record']} (pose {row['pose']})"
+                faults.append(DataFault(str(row["unit"]), found[0], f"{found[1]} {place}; {found[2]}"))
     return faults
 
 
-def _fault_of(signal: Signal, unit: str, n: int) -> tuple[str, str, str] | None:
+def _fault_of(own: Mapping[Any, Any] | None, unit: str, n: int, full: float) -> tuple[str, str, str] | None:
     """Fault, finding and remedy of one unit's samples in one record; None where there is none."""
-    if signal.n < SAMPLES_KEPT * n or signal.n == 0:
-        return "dropped_samples", f"{signal.n} samples of {n}", "measure again"
-    if signal.wild is not None:
-        value, axis, row = signal.wild
-        return "not_finite", f"{value} on {AXES[axis]} in row {row} ({signal.wild_count} such values)", "measure again"
-    still = np.flatnonzero(signal.low == signal.high)
-    if signal.n >= FEWEST_TO_JUDGE and still.size:
-        finding = f"constant output {signal.low[still[0]]:g} {unit} on {AXES[still[0]]}"
+    there = 0 if own is None else own["n"]
+    if own is None or there < SAMPLES_KEPT * n or there == 0:
+        return "dropped_samples", f"{there} samples of {n}", "measure again"
+    if own["wild_count"]:
+        where = f"on {AXES[own['wild_axis']]} in row {own['wild_row']} ({own['wild_count']} such values)"
+        return "not_finite", f"{own['wild_value']} {where}", "measure again"
+    still = [k for k in range(len(AXES)) if own[LOWS[k]] == own[HIGHS[k]]]
+    if there >= FEWEST_TO_JUDGE and still:
+        finding = f"constant output {own[LOWS[still[0]]]:g} {unit} on {AXES[still[0]]}"
         return "stuck_output", finding, "check wiring and power of the slot"
-    if signal.clipped:
-        where = f"({signal.full:g} {unit} from zero) on {AXES[signal.clipped_axis]}"
-        return "clipped", f"{signal.clipped} samples at full scale {where}", "choose a wider range"
+    if own["clipped"]:
+        where = f"({full:g} {unit} from zero) on {AXES[own['clipped_axis']]}"
+        return "clipped", f"{own['clipped']} samples at full scale {where}", "choose a wider range"
     return None
 
 

@@ -23,6 +23,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    from inertial.design import Values
     from inertial.fits.linear import LotFit
 
 ALL_AXES = "*"
@@ -47,7 +48,7 @@ class Calibration:
     @cached_property
     def names(self) -> tuple[tuple[tuple[str, str], ...], ...]:
         """Per axis, (effect id, coefficient) of the p columns."""
-        return column_names(self.effects)
+        return column_names(self.effects, self.nonlinear)
 
     @cached_property
     def response(self) -> NDArray[np.float64]:
@@ -67,10 +68,10 @@ class Calibration:
         return [column for column, (name, _) in enumerate(self.names[axis]) if name == effect]
 
 
-def column_names(model: Sequence[str]) -> tuple[tuple[tuple[str, str], ...], ...]:
-    """Per axis, (effect id, coefficient) of a model's columns."""
+def column_names(model: Sequence[str], values: Values | None = None) -> tuple[tuple[tuple[str, str], ...], ...]:
+    """Per axis, (effect id, coefficient) of a model's columns; all that there may be where no values are given."""
     sensor, _ = design.split(model)
-    return tuple(design.local_names(sensor, axis) for axis in range(3))
+    return tuple(design.local_names(sensor, axis, values) for axis in range(3))
 
 
 def coefficient_rows(
@@ -116,7 +117,8 @@ class _Row(NamedTuple):
 def _with_units(names: Sequence[tuple[str, str]], texts: Mapping[str, Sequence[str]]) -> Iterator[tuple[str, str, str]]:
     """Effect, name and unit of every column of an axis."""
     for effect, columns in groupby(names, key=lambda pair: pair[0]):
-        yield from ((effect, name, text) for (_, name), text in zip(columns, texts[effect], strict=True))
+        own = [name for _, name in columns]
+        yield from ((effect, name, text) for name, text in zip(own, texts[effect][: len(own)], strict=True))
 
 
 def _beside(own: NDArray[np.float64], common: Sequence[float]) -> NDArray[np.float64]:
@@ -161,11 +163,12 @@ def read_calibration(coefficients: pd.DataFrame, covariance: pd.DataFrame) -> Ca
     """The calibration that :func:`coefficient_rows` and :func:`covariance_rows` wrote."""
     texts = {column: coefficients[column].to_numpy(dtype=object) for column in ("unit", "effect", "name")}
     units, model = (tuple(dict.fromkeys(texts[column].tolist())) for column in ("unit", "effect"))
-    names = column_names(model)
-    p = len(names[0])
-    linear = {pair for axis in names for pair in axis}
+    linear = {pair for axis in column_names(model) for pair in axis}
     pairs = zip(texts["effect"].tolist(), texts["name"].tolist(), strict=True)
     is_linear = np.array([pair in linear for pair in pairs], dtype=bool)
+    common = np.flatnonzero((texts["unit"] == units[0]) & ~is_linear)
+    shared, nonlinear = _read_shared(coefficients.iloc[common], model) if common.size else (np.zeros(0), {})
+    p = len(column_names(model, nonlinear)[0])
     own = coefficients["value"].to_numpy()[(coefficients["axis"].to_numpy(dtype=object) != ALL_AXES) & is_linear]
     if len(own) != len(units) * 3 * p:
         raise DataRejected(f"coefficients: {len(own)} rows, the model needs {len(units) * 3 * p}; run the fit again")
@@ -174,8 +177,6 @@ def read_calibration(coefficients: pd.DataFrame, covariance: pd.DataFrame) -> Ca
     values = covariance["value"].to_numpy().reshape(len(units), 3, -1)
     matrix[:, :, row, column] = values
     matrix[:, :, column, row] = values
-    common = np.flatnonzero((texts["unit"] == units[0]) & ~is_linear)
-    shared, nonlinear = _read_shared(coefficients.iloc[common], model) if common.size else (np.zeros(0), {})
     return Calibration(units, model, own.reshape(len(units), 3, p), matrix, nonlinear, shared)
 
 

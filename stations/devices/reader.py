@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Literal
 
 from schemas.errors import StationRefused
@@ -23,13 +23,17 @@ STRONGEST_G = 50.0
 
 @dataclass(frozen=True)
 class Instruments:
-    """The fixture's instruments at one instant: by slot °C and V, for all g rms; and whether somebody is at the station."""
+    """The fixture's instruments at one instant: by slot °C and V, for all g rms; and whether somebody is at the station.
+
+    recorded : values of the registers that the profile records beside every dwell, by column; NaN for what cannot be
+    """
 
     temperature_C: list[float]
     supply_V: list[float]
     vibration_g: float
     door_open: bool = False
     stop_pressed: bool = False
+    recorded: Mapping[str, float] = field(default_factory=dict[str, float])
 
 
 @dataclass(frozen=True)
@@ -110,7 +114,18 @@ class Reader:
                 f"{vibration:g} g rms, possible values are needed; check supply, sensors, word order and counts"
             )
         told = [math.nan if slot in wrong else value for slot, value in enumerate(temperature)]
-        return Instruments(told, supply, vibration, guarded.door_open, guarded.stop_pressed)
+        return Instruments(told, supply, vibration, guarded.door_open, guarded.stop_pressed, self._recorded())
+
+    def _recorded(self) -> dict[str, float]:
+        """What the profile records beside every dwell, by column; a value outside the register's bounds is none."""
+        found: dict[str, float] = {}
+        for register in self._registers.profile.registers:
+            if register.column:
+                value = self._registers.number(register.name)
+                low = -math.inf if register.minimum is None else register.minimum
+                high = math.inf if register.maximum is None else register.maximum
+                found[register.column] = value if low <= value <= high else math.nan
+        return found
 
     def guarded(self) -> Guarded:
         """Door, emergency stop and vibration now, in one request."""

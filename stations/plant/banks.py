@@ -67,6 +67,7 @@ def _reader(plant: Plant, profile: Profile, slots: int) -> Bank:
         "occupied": lambda: sum(1 << slot for slot in plant.slots),
         "temperature": plant.temperature_reading,
         "supply": plant.supply_reading,
+        "humidity": plant.humidity_reading,
     }
     return Bank(profile, sources, command)
 

@@ -17,6 +17,7 @@ if TYPE_CHECKING:
 
     from schemas.station import Simulation
     from stations.plant.hidden import HiddenEffect
+    from stations.plant.moisture import Moisture
 
 Array = NDArray[np.float64]
 
@@ -32,7 +33,12 @@ class Fixture:
     """
 
     def __init__(
-        self, sim: Simulation, slots: Sequence[int], air: np.random.Generator, hidden: Sequence[HiddenEffect]
+        self,
+        sim: Simulation,
+        slots: Sequence[int],
+        air: np.random.Generator,
+        hidden: Sequence[HiddenEffect],
+        moisture: Moisture,
     ) -> None:
         place = stream(sim.seed, "fixture")
         low, high = sim.slot_lag_s
@@ -42,12 +48,17 @@ class Fixture:
         self._air_stream = air
         self._unrest = np.zeros(len(slots))
         self._hidden = list(hidden)
+        self._moisture = moisture
         self.chamber = Chamber(room=sim.room_C, ramp_K_min=3.0, air=sim.room_C, wall=sim.room_C, working=sim.room_C)
         self.chamber.set_point = sim.room_C
         self.temperature = Grid(np.full(len(slots), sim.room_C))
         self.air = Grid(np.array(sim.room_C))
         self.vibration = Grid(np.array(self.chamber.vibration()))
         self.memory = [Grid(np.zeros((len(slots), 3))) for _ in self._hidden]
+
+    def humidity(self, time: Array) -> Array:
+        """Relative humidity of the air around the devices at instants (n,), %."""
+        return self._moisture.relative(time, self.air.at(time))
 
     def step_to(self, seconds: float, force: Callable[[float], Array]) -> None:
         """Computes the grid up to the whole second at or after ``seconds``; ``force(t)`` is (s, 3) in g."""

@@ -94,8 +94,10 @@ class Physics:
         felt = self._dynamics.respond(self.force(time) + swing[:, None, None] * VIBRATION_ALONG)
         temperature = self._fixture.temperature.at(time)
         out = self.devices.output(felt, temperature)
+        humidity = self._fixture.humidity(time) if self._hidden else time
         for effect, memory in zip(self._hidden, self._fixture.memory, strict=True):
-            out = out + effect.output(felt, Block(time, time - self._on_since, shaking, temperature, memory.at(time)))
+            block = Block(time, time - self._on_since, shaking, temperature, memory.at(time), humidity)
+            out = out + effect.output(felt, block)
         counts = self.devices.counts(out + self._noise.sample(len(time), rate))
         counts = counts if self._on else np.zeros_like(counts)
         self._sampled_until = float(time[-1])

@@ -21,6 +21,7 @@ from stations.plant.fixture import Fixture
 from stations.plant.hidden import hidden_effect
 from stations.plant.journal import Injection, Journal, Said, Write, fingerprint
 from stations.plant.keyed import keyed_normal
+from stations.plant.moisture import Moisture
 from stations.plant.noise import Noise
 from stations.plant.physics import Physics
 from stations.plant.preset import Preset, load_preset
@@ -39,11 +40,12 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-AIR, THERMOMETER, SUPPLY, VIBRATION, OUTER, INNER = 1, 2, 3, 4, 10, 20  # channels of keyed noise
+AIR, THERMOMETER, SUPPLY, VIBRATION, HUMIDITY, OUTER, INNER = 1, 2, 3, 4, 5, 10, 20  # channels of keyed noise
 STANDARD_G = 9.80665  # m/s², CGPM 1901
 AIR_NOISE_K = 0.01
 SUPPLY_NOISE = 2e-5
 VIBRATION_NOISE = 0.02
+HUMIDITY_NOISE_PCT = 0.1
 
 
 class Plant:
@@ -67,7 +69,8 @@ class Plant:
         effects = [*hidden, *(hidden_effect(h.kind, h.figures) for h in sim.hidden)]
         for number, effect in enumerate(effects):
             effect.begin(len(self.slots), stream(lot.seed, "hidden", number))
-        self.fixture = Fixture(sim, self.slots, stream(sim.seed, lot.seed, lot.repeat, "air"), effects)
+        air, water = (stream(sim.seed, lot.seed, lot.repeat, name) for name in ("air", "moisture"))
+        self.fixture = Fixture(sim, self.slots, air, effects, Moisture(water))
         self._supply = 1.0 + sim.supply_spread * stream(sim.seed, "supply").standard_normal(64)[self.slots]
         self._sag = np.ones(len(self.slots))
         self._truths = self._draw_truths(sim, lot)
@@ -246,6 +249,11 @@ class Plant:
         """The fixture's vibration, g rms."""
         noise = 1.0 + VIBRATION_NOISE * float(self._noise(VIBRATION, 1)[0])
         return float(self.fixture.vibration.at(np.array([self.now]))[0]) * noise
+
+    def humidity_reading(self) -> float:
+        """Relative humidity beside the fixture, %."""
+        true = float(self.fixture.humidity(np.array([self.now]))[0])
+        return min(100.0, max(0.0, true + HUMIDITY_NOISE_PCT * float(self._noise(HUMIDITY, 1)[0])))
 
     def _noise(self, channel: int, n: int) -> Array:
         return keyed_normal(self._key, channel, int(self.now), n)

@@ -131,3 +131,24 @@ def test_says_so_where_there_are_too_few_dwells_for_the_noise(rng: np.random.Gen
     found = fit(few, NO_HISTORY, ["bias", "scale", "misalignment"])
     assert set(found["wander"]["method"]) == {"birge"}
     assert np.isfinite(found["coefficients"]["standard_error"]).all()
+
+
+@pytest.mark.parametrize("levels", [0, 3], ids=["any value", "three levels"])
+def test_a_recorded_covariate_is_fitted_and_verified(rng: np.random.Generator, levels: int) -> None:
+    dwells, history = lot(rng, units=3, lagging=0.0)
+    humidity = 45.0 + 8.0 * np.sin(dwells["time_s"].to_numpy() / 700.0)
+    dwells["humidity_pct"] = np.round(humidity / 8.0) * 8.0 if levels else humidity
+    assert not levels or dwells["humidity_pct"].nunique() == levels
+    for axis in "xyz":
+        dwells[f"out_{axis}"] += 4e-5 * (dwells["humidity_pct"] - 45.0)
+    plain, humid = (fit(dwells, history, model) for model in (LINEAR, [*LINEAR, "covariate:humidity_pct"]))
+    left = [float(np.sqrt(np.mean(tables["residuals"]["residual_ug"] ** 2))) for tables in (plain, humid)]
+    assert left[0] > 100.0
+    assert left[1] < 1.3e6 * WHITE
+    calibration = read_calibration(humid["coefficients"], humid["covariance"])
+    line = calibration.value("covariate:humidity_pct")[..., 0]
+    if levels:
+        half = float(np.ptp(dwells.loc[dwells["kind"] == "dwell", "humidity_pct"])) / 2.0
+        np.testing.assert_allclose(line, 4e-5 * half, atol=2e-5)
+    errors = verify(dwells, history, humid["coefficients"], humid["covariance"], humid["predictions"])["verification"]
+    assert float(np.sqrt(np.mean(errors["error_ug"] ** 2))) < 60.0

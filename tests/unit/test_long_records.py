@@ -17,7 +17,7 @@ from pipelines.capture import capture as capture_stage
 from pipelines.stages import noise as noise_stage
 from pipelines.stages.reduce import reduce
 from pipelines.stages.validate import validate
-from pipelines.tables.samples import by_record, dwells_whole
+from pipelines.tables.samples import by_record
 from schemas.recipe import Unit
 from schemas.station import load_station
 from stations import open_station
@@ -119,10 +119,9 @@ def test_pieces_are_judged_as_the_whole_is(tmp_path: Path, fault: str, cuts: int
     )
 
 
-def test_tables_of_a_record_come_together_and_static_ones_stay_in_pieces(tmp_path: Path) -> None:
+def test_tables_of_a_record_come_together(tmp_path: Path) -> None:
     samples, _ = lot_in_memory(tmp_path, {})
     assert [(n, len(list(tables))) for n, tables in by_record(cut(samples, 3))] == [(n, 3) for n in range(10)]
-    assert [len(table) for table in dwells_whole(cut(samples, 3))] == [300] * 9
 
 
 def test_a_long_series_is_averaged_and_keeps_its_allan_deviation(rng: np.random.Generator) -> None:

@@ -4,9 +4,13 @@ import dataclasses
 
 import numpy as np
 import pytest
+from inquiries import job_of
 from small_station import MemorySink, lot_of, quiet_progress, short_recipe, station_of
 
+from inertial.planning.sequences import SequenceStep as Wanted
+from inertial.planning.sequences import timeline
 from pipelines.capture.capture import capture
+from pipelines.inquiry.followup import circumstances, place_after, station_minutes
 from pipelines.schedule.planned_state import planned_state
 from pipelines.schedule.steps import steps
 from pipelines.schedule.timing import StationPose, minutes
@@ -115,3 +119,31 @@ def test_devices_read_on_the_way_are_planned_at_the_temperatures_they_have_there
     assert np.interp(state.time[4:10], state.history.time, state.history.temperature) == pytest.approx(
         state.temperature[4:10], abs=0.5
     )
+
+
+def test_follow_ups_and_plans_take_the_same_time_and_the_same_temperatures(tmp_path):
+    """The same steps, as the science proposes them and as the station is asked for them: soaked, on the way, after a pause."""
+    job = job_of(tmp_path)
+    place = place_after(job)
+    wanted = [
+        Wanted(0.3, -1.0, 25.0, wait=5.0), Wanted(2.0, 2.5, 25.0, wait=5.0, off=90.0),
+        Wanted(1.0, 0.2, 55.0), Wanted(-1.5, 0.2, 55.0),
+        Wanted(0.0, 3.0, -5.0, soaked=False), Wanted(1.2, -2.0, -5.0, soaked=False),
+    ]  # fmt: skip
+    pace = circumstances(job, job, 100.0).pace
+    ran = timeline(wanted, pace, place.step(), place.temperature)
+    assert ran.end == pytest.approx(60.0 * station_minutes(wanted, job, place))
+    for count in range(1, len(wanted)):
+        assert ran.time[count - 1] + 0.5 * pace.dwell_s == pytest.approx(
+            60.0 * station_minutes(wanted[:count], job, place)
+        )
+    # the last two are read on the way: against the first-order lag, integrated in small steps from the soak at 55 °C on
+    air, device, now = 55.0, float(ran.device[3]), float(ran.time[3]) + 0.5 * pace.dwell_s
+    found = {}
+    while now < ran.end:
+        air += float(np.clip(-5.0 - air, -pace.ramp * 0.01, pace.ramp * 0.01))
+        device += (air - device) * 0.01 / pace.lag
+        now += 0.01
+        found |= {k: (air, device) for k in (4, 5) if k not in found and now >= ran.time[k]}
+    for k in (4, 5):
+        assert (ran.air[k], ran.device[k]) == pytest.approx(found[k], abs=0.02)

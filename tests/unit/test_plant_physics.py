@@ -10,6 +10,7 @@ from schemas.recipe import Lot, Unit
 from stations.codec import unpack_samples
 from stations.plant.chamber import Chamber
 from stations.plant.hidden import HIDDEN, hidden_effect
+from stations.plant.moisture import Moisture
 from stations.plant.preset import load_preset
 from stations.plant.table import Axis, Move, turn
 
@@ -170,7 +171,7 @@ def test_every_hidden_effect_moves_an_output_and_nothing_at_zero_size(kind):
         "cubic_transfer": "hardening", "pendulous_mass": "compliance", "hysteresis_play": "gain", "element_lag": "tempco",
         "creep": "size", "level_error": "about_x", "encoder_harmonic": "size", "slot_rotation": "size",
         "vibration_rectification": "coefficient", "warm_up": "size", "step_change": "size",
-        "stress_relaxation": "size",
+        "stress_relaxation": "size", "moisture_swelling": "swelling",
     }[kind]  # fmt: skip
     zero = {size: 0.0} | ({"about_y": 0.0} if kind == "level_error" else {})
 
@@ -205,3 +206,12 @@ def test_refuses_a_preset_that_does_not_exist_with_what_looks_like_it():
 def test_refuses_a_unit_in_a_slot_that_the_fixture_does_not_have():
     with pytest.raises(WrongUse, match="slot 8"):
         plant_of(lot=Lot(units=[Unit(serial="A", slot=8)], device="ADXL355"))
+
+
+def test_relative_humidity_falls_in_warmed_air_as_the_table_of_saturation_says():
+    """Saturation over water at 20 and 60 °C: 23.39 and 199.46 hPa (IAPWS, as in CRC Handbook, 6-5)."""
+    moisture = Moisture(np.random.default_rng(1))
+    time = np.zeros(3)
+    cool, warm, frost = moisture.relative(time, np.array([20.0, 60.0, -10.0]))
+    assert cool / warm == pytest.approx(199.46 / 23.39, rel=0.01)
+    assert frost == 100.0

@@ -4,6 +4,7 @@ import math
 from dataclasses import replace
 
 import numpy as np
+import pandas as pd
 import pytest
 from inquiries import job_of
 
@@ -19,7 +20,7 @@ from inertial.power import coldness, switched
 from inertial.state import History, State
 from pipelines.inquiry.explanation import what
 from pipelines.inquiry.followup import circumstances, follow_up, place_after, station_minutes
-from pipelines.tables.dwells import measured
+from pipelines.tables.dwells import lot_arrays, measured
 
 UP, DOWN = (0.0, 0.0), (math.pi, 0.0)
 
@@ -185,3 +186,24 @@ def test_dwells_of_runs_that_switched_nothing_stand_beside_those_of_one_that_did
     found = measured(rows).state
     assert switched(found) == [12]
     assert not found.covariates
+
+
+def test_warm_up_after_a_power_off_is_the_same_for_a_fit_as_for_a_diagnosis():
+    """Off for 600 s: the columns of both, against a body that warms and cools step by step."""
+    run, tau, off = switched_off(run_of(units=1), 600.0), 900.0, 600.0
+    n = run.time.shape[-1]
+    table = pd.DataFrame(
+        {"unit": "A", "dwell": range(n), "time_s": run.time[0], "since_power_s": run.since_power[0], "n": 100,
+         "power_off_s": run.power_off[0], "kind": "dwell", "pose": "p", "out_unit": "g", "slot": 0,
+         **{f"force_{a}": run.force[0, :, i] for i, a in enumerate("xyz")},
+         **{f"out_{a}": run.force[0, :, i] for i, a in enumerate("xyz")}, **{f"sd_{a}": 1e-5 for a in "xyz"}}
+    )  # fmt: skip
+    fitted, judged = lot_arrays(table).state, measured(table).state
+    warm_up = catalogue.get("warm_up")
+    found, other = (warm_up.columns(state, 0, tau=tau)[0, :, 0] for state in (fitted, judged))
+    np.testing.assert_array_equal(found, other)
+    # on since 1680 s when it goes off: e^(-1680/900) is lacking then, and all but the rest of its warmth is gone after 600 s
+    on = float(run.time[0, 40] - run.since_power[0, 40] - off - (run.time[0, 0] - run.since_power[0, 0]))
+    lacking = 1.0 - (1.0 - math.exp(-on / tau)) * math.exp(-off / tau)
+    assert found[40] / math.exp(-run.since_power[0, 40] / tau) == pytest.approx(lacking, rel=1e-9)
+    assert 0.4 < lacking < 0.6

@@ -14,6 +14,7 @@ from schemas.errors import RecipeInvalid, did_you_mean
 from stations.plant.hidden.age import StepChange, StressRelaxation
 from stations.plant.hidden.base import Block, HiddenEffect, Untouched
 from stations.plant.hidden.heat import ElementLag, HysteresisPlay, WarmUp
+from stations.plant.hidden.moisture import MoistureSwelling
 from stations.plant.hidden.springs import Creep, CubicTransfer, PendulousMass, VibrationRectification
 from stations.plant.hidden.table import EncoderHarmonic, LevelError, SlotRotation
 
@@ -30,6 +31,7 @@ HIDDEN: Mapping[str, Callable[..., HiddenEffect]] = {
     "slot_rotation": SlotRotation,
     "vibration_rectification": VibrationRectification,
     "warm_up": WarmUp,
+    "moisture_swelling": MoistureSwelling,
     "stress_relaxation": StressRelaxation,
     "step_change": StepChange,
 }

@@ -18,7 +18,7 @@ class Block:
 
     Parameters
     ----------
-    time, since_power, vibration : (n,), s, s, g rms
+    time, since_power, vibration, humidity : (n,), s, s, g rms, % of the air around the devices
     temperature : (n, s), °C of the sensing element
     memory : (n, s, 3), what the effect's own ``slow`` gave for these instants
     """
@@ -28,6 +28,7 @@ class Block:
     vibration: Array
     temperature: Array
     memory: Array
+    humidity: Array
 
 
 class HiddenEffect(Protocol):

@@ -1,0 +1,228 @@
+"""Recorded quantities: what a station notes beside the outputs of every dwell. One row each; every list of them follows.
+
+A quantity with an ``attribute`` is an array of :class:`inertial.state.State` of that name. One without is a covariate: a recorded
+column that effects and formulas call by its name. A column that has no row here is a covariate, too; a row adds its label, its
+unit and a usual value.
+"""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from types import MappingProxyType
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+Joined = Literal["mean", "max"]
+
+
+@dataclass(frozen=True)
+class Quantity:
+    """A recorded quantity.
+
+    Attributes
+    ----------
+    column : of the tables and of the exchange format
+    attribute : of the state; empty for a covariate
+    unit : of the column
+    label : for pictures, without the unit
+    factor : state = factor · column
+    once : whether a unit has one value for all its dwells (its slot)
+    driver : whether a dependence of the residuals on it is looked for
+    formula : name in formulas beside the column's own; empty where there is none
+    formula_factor, meaning : value in a formula = factor · state; what it is, for people
+    column_meaning : of the column's own name in formulas, which has the state's value
+    mapped : name in the mapping of a foreign file; empty where it is not asked for
+    clock : whether it only grows with time: it is followed by a curve, never by levels
+    shown : factor and unit in pictures, where they are not the column's
+    joined : how the values of neighbouring dwells become one
+    usual, spread : a value that a plan may take for granted, and how far it wanders about it on a station
+    reading : whether every station reads it beside its records
+    """
+
+    column: str
+    attribute: str
+    unit: str
+    label: str
+    factor: float = 1.0
+    once: bool = False
+    driver: bool = True
+    formula: str = ""
+    formula_factor: float = 1.0
+    meaning: str = ""
+    column_meaning: str = "the same"
+    mapped: str = ""
+    clock: bool = False
+    shown: tuple[float, str] | None = None
+    joined: Joined = "mean"
+    usual: float = 0.0
+    spread: float = 0.0
+    reading: bool = False
+
+    def about(self, wander: Array) -> Array:
+        """Values about the usual one, for standard normal numbers; in the column's unit."""
+        return self.usual + self.spread * wander
+
+    @property
+    def axis_label(self) -> str:
+        """Label and unit for the axis of a picture."""
+        return f"{self.label} / {self.unit if self.shown is None else self.shown[1]}"
+
+
+HOURS = (1.0 / 3600.0, "h")
+
+RECORDED: tuple[Quantity, ...] = (
+    Quantity(
+        "unit_C", "temperature", "°C", "temperature of the unit",
+        formula="temperature", meaning="temperature of the sensor, °C", mapped="temperature", usual=25.0, reading=True,
+    ),
+    Quantity(
+        "chamber_C", "chamber", "°C", "temperature of the chamber",
+        formula="chamber", meaning="temperature of the chamber, °C", mapped="chamber", usual=25.0, reading=True,
+    ),
+    Quantity(
+        "time_s", "time", "s", "time", clock=True, shown=HOURS,
+        formula="hours", formula_factor=1.0 / 3600.0, meaning="time since the run began, h", column_meaning="the same, s",
+    ),
+    Quantity(
+        "since_move_s", "since_move", "s", "time since the last move",
+        formula="since_move", meaning="time since the table last moved, s", usual=2.0, reading=True,
+    ),
+    Quantity(
+        "since_power_s", "since_power", "s", "time since power-on", clock=True, shown=HOURS,
+        formula="since_power", meaning="time since power-on, s", usual=600.0, reading=True,
+    ),
+    Quantity(
+        "supply_V", "supply", "V", "supply",
+        formula="supply", meaning="supply, V", mapped="supply", usual=3.3, spread=1e-3, reading=True,
+    ),
+    Quantity(
+        "vibration_g", "vibration", "g rms", "vibration",
+        formula="vibration", meaning="vibration, g rms", mapped="vibration", usual=1e-3, spread=1e-4, reading=True,
+    ),
+    # of runs that switch their devices off and on: it tells apart what a power-on changes, and is no driver by itself
+    Quantity("power_off_s", "power_off", "s", "time without power", driver=False, joined="max"),
+    Quantity(
+        "outer_deg", "outer", "°", "outer angle", factor=math.pi / 180.0, driver=False, mapped="outer",
+    ),
+    Quantity(
+        "inner_deg", "inner", "°", "inner angle", factor=math.pi / 180.0, driver=False, mapped="inner",
+    ),
+    Quantity("slot", "slot", "", "slot", once=True, driver=False),
+    Quantity("humidity_pct", "", "% RH", "relative humidity", usual=45.0, spread=3.0),
+    Quantity("pressure_hPa", "", "hPa", "air pressure", usual=1013.0, spread=3.0),
+)  # fmt: skip
+"""In the order in which drivers and formulas are listed."""
+
+BY_COLUMN: Mapping[str, Quantity] = MappingProxyType({row.column: row for row in RECORDED})
+BY_ATTRIBUTE: Mapping[str, Quantity] = MappingProxyType({row.attribute: row for row in RECORDED if row.attribute})
+
+
+@dataclass(frozen=True)
+class Derived:
+    """A quantity that follows from recorded ones.
+
+    name : as a driver; attribute : of the state; column : that it follows from; the rest as of :class:`Quantity`
+    """
+
+    name: str
+    attribute: str
+    column: str
+    unit: str
+    label: str
+    formula: str
+    meaning: str
+    driver: bool = True
+
+    @property
+    def axis_label(self) -> str:
+        """Label and unit for the axis of a picture."""
+        return f"{self.label} / {self.unit}"
+
+
+DERIVED: tuple[Derived, ...] = (
+    Derived("theta", "theta", "unit_C", "K", "temperature above 25 °C", "theta", "temperature above 25 °C, K", False),
+    Derived(
+        "temperature_rate", "temperature_rate", "unit_C", "K/min", "rate of temperature", "rate",
+        "rate of temperature, K/min",
+    ),
+)  # fmt: skip
+
+OUTPUT_COLUMNS = ("out_x", "out_y", "out_z")
+SPREAD_COLUMNS = ("sd_x", "sd_y", "sd_z")
+FORCE_COLUMNS = ("force_x", "force_y", "force_z")
+ANGLE_COLUMNS = ("outer_deg", "inner_deg")
+BOOKKEEPING = (
+    *("unit", "dwell", "record", "kind", "pose", "soak", "status", "out_unit", "n", "overflow"),
+    *("start_s", "duration_s", "rate_hz", "full_scale", "outer_command_deg", "inner_command_deg"),
+)
+"""Columns that say which dwell it is and how it was taken."""
+KNOWN_COLUMNS = frozenset(
+    (
+        *BOOKKEEPING,
+        *OUTPUT_COLUMNS,
+        *SPREAD_COLUMNS,
+        *FORCE_COLUMNS,
+        *(row.column for row in RECORDED if row.attribute),
+    )
+)
+"""Columns with a meaning of their own; every other column of numbers is a covariate."""
+
+
+def is_covariate(column: str) -> bool:
+    """Whether a recorded column of numbers is a covariate."""
+    return column not in KNOWN_COLUMNS
+
+
+def attribute_drivers() -> dict[str, str]:
+    """Names of the drivers that every lot may have, with the state's attribute of each; a derived one follows its source."""
+    found: dict[str, str] = {}
+    for row in RECORDED:
+        if row.driver and row.attribute:
+            found[row.column] = row.attribute
+        found |= {one.name: one.attribute for one in DERIVED if one.driver and one.column == row.column}
+    return found
+
+
+def is_clock(driver: str) -> bool:
+    """Whether a driver only grows with time."""
+    return driver in BY_COLUMN and BY_COLUMN[driver].clock
+
+
+def axis_labels() -> dict[str, str]:
+    """Labels with units of drivers, for the axes of pictures."""
+    return {row.column: row.axis_label for row in RECORDED} | {row.name: row.axis_label for row in DERIVED}
+
+
+def shown_factor(driver: str) -> float:
+    """Factor from a driver's values in the state to those of its picture."""
+    row = BY_COLUMN.get(driver)
+    return 1.0 if row is None or row.shown is None else row.shown[0]
+
+
+def formula_names() -> dict[str, tuple[str, float, str]]:
+    """Names in formulas: the state's attribute, the factor, what it is."""
+    found: dict[str, tuple[str, float, str]] = {}
+    for row in RECORDED:
+        if row.formula:
+            found[row.formula] = (row.attribute, row.formula_factor, row.meaning)
+            found[row.column] = (row.attribute, 1.0, row.column_meaning)
+        found |= {one.formula: (one.attribute, 1.0, one.meaning) for one in DERIVED if one.column == row.column}
+    return found
+
+
+def formula_name(driver: str) -> str:
+    """What a formula calls a driver; the driver's own name where there is no other."""
+    names = {row.name: row.formula for row in DERIVED} | {row.column: row.formula for row in RECORDED if row.formula}
+    return names.get(driver, driver)
+
+
+def column_of(quantity: str) -> str:
+    """The column to record for a quantity that an effect lacks, by the name that it asked for."""
+    name = quantity.split(" ", maxsplit=1)[0]
+    if name in BY_ATTRIBUTE:
+        return BY_ATTRIBUTE[name].column
+    return next((row.column for row in DERIVED if name == row.attribute), quantity)

@@ -1,0 +1,189 @@
+"""The one way from a table of dwells to arrays: units side by side, every column taken out of the table once."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pandas as pd
+
+from inertial import frames
+from inertial.quantities import ANGLE_COLUMNS, BY_ATTRIBUTE, FORCE_COLUMNS, RECORDED, is_covariate
+from inertial.state import History, State
+
+if TYPE_CHECKING:
+    from collections.abc import Collection
+
+    from numpy.typing import NDArray
+
+    Array = NDArray[np.float64]
+
+HISTORY_POINTS = 4000
+FEWEST_POINTS = 2
+
+
+def covariates(frame: pd.DataFrame) -> list[str]:
+    """Names of the columns of numbers without a meaning of their own: what a missing effect may depend on."""
+    numbers = (name for name in frame.columns if pd.api.types.is_numeric_dtype(frame[name]))
+    return [str(name) for name in numbers if is_covariate(str(name)) and frame[name].dtype != np.bool_]
+
+
+class DwellTable:
+    """Rows of a table of dwells in order of unit and number.
+
+    units : serials in order; numbers : (n,), of all dwells; whole : whether every unit has every dwell
+
+    Parameters
+    ----------
+    frame : in the exchange format
+    kinds : of the dwells that are wanted; all where None, and where the table does not say kinds
+    """
+
+    def __init__(self, frame: pd.DataFrame, kinds: Collection[str] | None = None) -> None:
+        codes, found_names = frame["unit"].factorize()
+        names = [str(name) for name in found_names]
+        rank = np.argsort(np.argsort(np.asarray(names, dtype=object), kind="stable"))
+        place, dwell = rank[codes], frame["dwell"].to_numpy()
+        order = np.lexsort((dwell, place))
+        if kinds is not None and "kind" in frame.columns:
+            order = order[frame["kind"].isin(list(kinds)).to_numpy()[order]]
+        self.frame = frame
+        self._order = None if np.array_equal(order, np.arange(len(frame))) else order
+        found, unit = np.unique(place[order], return_inverse=True)
+        by_rank = dict(zip(rank.tolist(), names, strict=True))
+        self.units = tuple(str(by_rank[one]) for one in found.tolist())
+        self.numbers, number = np.unique(dwell[order], return_inverse=True)
+        self._rows = (unit, number)
+        self.shape = (len(self.units), len(self.numbers))
+        self.rows = len(order)
+        self.whole = self.rows == self.shape[0] * self.shape[1]
+
+    def has(self, *names: str) -> bool:
+        """Whether the table has these columns, and a value in each of their rows."""
+        return all(name in self.frame.columns and self._full(name) for name in names)
+
+    def _full(self, name: str) -> bool:
+        values = self.frame[name].to_numpy()
+        values = values if self._order is None else values[self._order]
+        return not pd.isna(values).any()
+
+    def grid(self, name: str) -> Array:
+        """A column of numbers, (units, n); NaN where a unit lacks a dwell."""
+        values = np.array(self.frame[name], dtype=np.float64)  # a copy: sums over it must not depend on the table
+        values = values if self._order is None else values[self._order]
+        if self.whole:
+            return values.reshape(self.shape)
+        out = np.full(self.shape, np.nan)
+        out[self._rows] = values
+        return out
+
+    def filled(self, name: str) -> Array:
+        """A column of numbers, (units, n); where a unit lacks a dwell, the middle of the others' values."""
+        values = self.grid(name)
+        if self.whole or not np.isnan(values).any():
+            return values
+        return np.where(np.isnan(values), np.nanmedian(values, axis=0, keepdims=True), values)
+
+    def by_axis(self, names: Collection[str], *, filled: bool = False) -> Array:
+        """Columns of numbers side by side, (units, n, columns)."""
+        return np.stack([self.filled(name) if filled else self.grid(name) for name in names], axis=-1)
+
+    def optional(self, name: str, *, filled: bool = False) -> Array | None:
+        """A column of numbers, (units, n), where the table has it without gaps."""
+        if not self.has(name):
+            return None
+        return self.filled(name) if filled else self.grid(name)
+
+    def texts(self, name: str) -> list[str]:
+        """A column of texts, one for each row."""
+        values = self.frame[name].to_numpy(dtype=object)
+        return [str(one) for one in (values if self._order is None else values[self._order])]
+
+    def per_dwell(self, name: str) -> tuple[str, ...]:
+        """A text of every dwell, (n,): that of the first unit that has it; empty where the table has no such column."""
+        if name not in self.frame.columns:
+            return ("",) * self.shape[1]
+        first = np.unique(self._rows[1], return_index=True)[1]
+        texts = self.texts(name)
+        return tuple(texts[row] for row in first.tolist())
+
+
+def state_of_table(table: DwellTable, history: pd.DataFrame | None = None) -> tuple[str, State]:
+    """What effects may look at, for every reader of dwells alike; before it what is known of the force.
+
+    ``force``: it is there; ``angles``: it follows from the table's; ``norm``: its size alone is known, and it is zero here. A
+    quantity that lacks a value anywhere is not there at all; of a dwell that a unit lacks, it has the other units' middle value.
+    """
+    known: dict[str, Any] = {}
+    for row in RECORDED:
+        if row.attribute and (values := table.optional(row.column, filled=True)) is not None:
+            values = values if row.factor == 1.0 else row.factor * values
+            known[row.attribute] = values[:, 0] if row.once else values
+    if not table.has(*ANGLE_COLUMNS):
+        known |= {"outer": None, "inner": None}
+    if known.get("temperature") is None:
+        known["temperature"] = known.get("chamber")
+    known["power_off"] = _power_off(table)
+    reference, force = _force(table, known)
+    columns = {
+        name: values for name in covariates(table.frame) if (values := table.optional(name, filled=True)) is not None
+    }
+    past = None if history is None or known["temperature"] is None else history_of(history, table.units, known["time"])
+    return reference, State(force=force, **known, covariates=columns, history=past)
+
+
+def _force(table: DwellTable, known: dict[str, Any]) -> tuple[str, Array]:
+    if table.has(*FORCE_COLUMNS):
+        return "force", frames.without_rounding(table.by_axis(FORCE_COLUMNS, filled=True))
+    if known["outer"] is not None:
+        return "angles", frames.force_from_angles(known["outer"], known["inner"])
+    return "norm", np.zeros((*table.shape, 3))
+
+
+def _power_off(table: DwellTable) -> Array | None:
+    """Seconds without power before each dwell; None where no run switched its devices, or since when they have it is not known.
+
+    Runs that did not switch have no such column: beside one that did, their devices stayed on.
+    """
+    off, since = BY_ATTRIBUTE["power_off"].column, BY_ATTRIBUTE["since_power"].column
+    if off not in table.frame.columns or not table.has(since):
+        return None
+    known = np.nan_to_num(table.grid(off), nan=0.0)
+    return np.broadcast_to(known.max(axis=0), known.shape).copy()  # one relay for all
+
+
+def history_of(history: pd.DataFrame, units: tuple[str, ...], time: Array) -> History | None:
+    """Temperatures of every unit on one time grid; None where a unit has none, or the history lies beside the dwells.
+
+    Parameters
+    ----------
+    history : ``time_s`` and ``unit_C``, or ``chamber_C`` where there is none; one without units serves all of them
+    time : (units, n), s, of the dwells
+    """
+    column = "unit_C" if "unit_C" in history.columns else "chamber_C"
+    times, values = (np.array(history[name], dtype=np.float64) for name in ("time_s", column))
+    known = np.flatnonzero(~np.isnan(values))
+    if "unit" not in history.columns:
+        parts = [known[np.argsort(times[known], kind="stable")]] * len(units)
+    else:
+        codes, names = history["unit"].factorize()
+        rank = {unit: place for place, unit in enumerate(units)}
+        place = np.array([rank.get(str(name), -1) for name in names], dtype=np.int64)[codes]
+        known = known[place[known] >= 0]
+        counts = np.bincount(place[known], minlength=len(units))
+        parts = np.split(known[np.lexsort((times[known], place[known]))], np.cumsum(counts)[:-1])
+    if any(len(own) < FEWEST_POINTS for own in parts):
+        return None
+    every = times[known]
+    if every.min() > np.max(time) or every.max() < np.min(time):
+        return None
+    grid = np.linspace(every.min(), every.max(), max(FEWEST_POINTS, min(HISTORY_POINTS, np.unique(every).size)))
+    return History(grid, np.stack([_at(grid, times[own], values[own]) for own in parts]))
+
+
+def _at(grid: Array, time: Array, values: Array) -> Array:
+    """Values on a grid; of several at one time, their mean."""
+    if np.any(time[1:] == time[:-1]):
+        time, which, count = np.unique(time, return_inverse=True, return_counts=True)
+        values = np.bincount(which, weights=values) / count
+    return np.interp(grid, time, values)

@@ -1,0 +1,126 @@
+"""One pass over the samples of a run: a row for every unit and record, on which validation and reduction are arithmetic."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pandas as pd
+
+from pipelines.tables.samples import by_record
+from schemas.units import AXES
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Iterator, Sequence
+
+    from numpy.typing import NDArray
+
+    Array = NDArray[np.float64]
+
+MEANS, SPREADS, LOWS, HIGHS = (tuple(f"{name}_{axis}" for axis in AXES) for name in ("out", "sd", "low", "high"))
+NUMBERS = (*MEANS, *SPREADS, *LOWS, *HIGHS, "wild_value")
+WHOLE = ("record", "n", "wild_count", "wild_axis", "wild_row", "clipped", "clipped_axis")
+
+
+def summarised(samples: Iterable[pd.DataFrame], readings: pd.DataFrame, zero_output: float = 0.0) -> pd.DataFrame:
+    """One row per record and unit that has samples, in the order in which they come.
+
+    Columns: ``unit``, ``record``, ``kind``, ``n``; mean ``out_x`` …, standard deviation ``sd_x`` … (n − 1 in its divisor),
+    smallest ``low_x`` … and largest ``high_x`` … sample, in the output's unit; ``wild_count`` values that are not finite, the
+    first of them ``wild_value`` on axis ``wild_axis`` (0 to 2) in row ``wild_row``; ``clipped`` values at full scale, the
+    first on ``clipped_axis``.
+
+    Parameters
+    ----------
+    samples : one table per record, or several of a long one; each is looked at once
+    readings : full scale of every unit in every record, where it answered
+    zero_output : nominal output at 0 g, from which the full scale extends both ways; output unit
+    """
+    full = readings[readings["status"] == "ok"].set_index(["record", "unit"])["full_scale"]
+    rows = [row for record, tables in by_record(samples) for row in _of_record(record, tables, full, zero_output)]
+    if not rows:
+        texts = {name: pd.Series([], dtype="str") for name in ("unit", "kind")}
+        numbers = {name: pd.Series([], dtype=np.float64) for name in NUMBERS}
+        return pd.DataFrame(texts | {name: pd.Series([], dtype=np.int64) for name in WHOLE} | numbers)
+    return pd.DataFrame(rows)
+
+
+def _of_record(
+    record: int, tables: Iterator[pd.DataFrame], full: pd.Series, zero_output: float
+) -> Iterator[dict[str, Any]]:
+    """The rows of one record, from all of its tables."""
+    known: dict[str, dict[str, Any]] = {}
+    for table in tables:
+        kind = str(table["kind"].iloc[0])
+        for unit, part in _parts(table, record, full, zero_output):
+            known[unit] = (
+                _joined(known[unit], part) if unit in known else {"unit": unit, "record": record, "kind": kind} | part
+            )
+    for row in known.values():
+        flat = {name: value for name, value in row.items() if not isinstance(value, np.ndarray)}
+        columns = zip((MEANS, SPREADS, LOWS, HIGHS), ("mean", "sd", "low", "high"), strict=True)
+        yield flat | {name: float(value) for names, key in columns for name, value in zip(names, row[key], strict=True)}
+
+
+def _parts(
+    table: pd.DataFrame, record: int, full: pd.Series, zero_output: float
+) -> Iterator[tuple[str, dict[str, Any]]]:
+    """What one table says of each of its units, in order of unit."""
+    groups = table.groupby("unit", sort=True)
+    values = groups[list(AXES)]
+    mean, sd, low, high = (
+        found.to_numpy() for found in (values.mean(), values.std(ddof=1), values.min(), values.max())
+    )
+    output = table[list(AXES)].to_numpy(dtype=float)
+    for k, (unit, places) in enumerate(groups.indices.items()):
+        own = output[places]
+        limit = float(full.get((record, unit), 0.0))
+        bad = np.argwhere(~np.isfinite(own))
+        ends = np.argwhere(np.abs(own - zero_output) >= limit) if limit > 0.0 else bad[:0]
+        row, axis = bad[0].tolist() if len(bad) else (0, 0)
+        yield (
+            str(unit),
+            {
+                "n": len(own),
+                "mean": mean[k],
+                "sd": sd[k],
+                "low": low[k],
+                "high": high[k],
+                "wild_count": len(bad),
+                "wild_row": row,
+                "wild_axis": axis,
+                "wild_value": float(own[row, axis]) if len(bad) else 0.0,
+                "clipped": len(ends),
+                "clipped_axis": int(ends[0][1]) if len(ends) else 0,
+            },
+        )
+
+
+def _joined(one: dict[str, Any], more: dict[str, Any]) -> dict[str, Any]:
+    """Two parts of a record as one: Chan, Golub & LeVeque, Amer. Statist. 37 (1983) 242, for mean and variance."""
+    n = one["n"] + more["n"]
+    with np.errstate(all="ignore"):  # what is not finite stays so, and its unit is refused
+        apart = more["mean"] - one["mean"]
+        squares = apart**2 * (one["n"] * more["n"] / n)
+        for part in (one, more):
+            squares = squares + (part["sd"] ** 2 * (part["n"] - 1) if part["n"] > 1 else 0.0)
+        mean, sd = one["mean"] + apart * (more["n"] / n), np.sqrt(squares / (n - 1))
+    first_wild = one if one["wild_count"] else {**more, "wild_row": more["wild_row"] + one["n"]}
+    first_clipped = one if one["clipped"] else more
+    return one | {
+        "n": n,
+        "mean": mean,
+        "sd": sd,
+        "low": np.minimum(one["low"], more["low"]),
+        "high": np.maximum(one["high"], more["high"]),
+        "wild_count": one["wild_count"] + more["wild_count"],
+        **{name: first_wild[name] for name in ("wild_value", "wild_row", "wild_axis")},
+        "clipped": one["clipped"] + more["clipped"],
+        "clipped_axis": first_clipped["clipped_axis"],
+    }
+
+
+def means(summaries: pd.DataFrame, kinds_but: Sequence[str] = ()) -> pd.DataFrame:
+    """Unit, record and mean samples x, y, z, of all kinds but some."""
+    kept = summaries[~summaries["kind"].isin(list(kinds_but))]
+    return kept[["unit", "record", *MEANS]].rename(columns=dict(zip(MEANS, AXES, strict=True)))

@@ -1,0 +1,97 @@
+"""A recorded quantity is one row: everything that names quantities follows from it, and nothing has a row that is half there."""
+
+import re
+from dataclasses import fields
+from itertools import pairwise
+from pathlib import Path
+
+import pytest
+from capture_double import small_job
+
+from inertial.criticism.drivers import quantities
+from inertial.expressions import QUANTITIES
+from inertial.quantities import BOOKKEEPING, BY_COLUMN, DERIVED, KNOWN_COLUMNS, RECORDED, column_of
+from inertial.state import State
+from pipelines.capture.record import INSTRUMENTS
+from pipelines.importers import exchange, mapping
+from pipelines.report.residuals import LABELS
+from pipelines.schedule.planned_state import planned_state
+from pipelines.stages.reduce import KEPT, WHERE_THERE
+from schemas import tables
+from stations.profile_files import load_profile, profile_names
+
+ROOT = Path(__file__).resolve().parents[2]
+NEVER_NAMED = {
+    "unit_C",
+    "chamber_C",
+    "time_s",
+    "outer_deg",
+    "inner_deg",
+    "slot",
+}  # also columns of other tables than dwells
+HERE = {
+    "inertial/quantities.py",
+    "schemas/tables.py",  # the contract of readings, old ones too
+    "pipelines/capture/record.py",  # what each instrument is called
+    "stations/overview.py",  # a live display
+    "pipelines/report/residuals.py",  # pictures that are always shown
+}
+"""Where columns may be written out."""
+
+
+@pytest.mark.parametrize("row", RECORDED, ids=lambda row: row.column)
+def test_a_row_is_whole(row, tmp_path):
+    assert row.label
+    assert (row.column in KNOWN_COLUMNS) == bool(row.attribute)
+    assert not row.attribute or row.attribute in {item.name for item in fields(State)}
+    assert row.axis_label == LABELS[row.column]
+    assert (row.column in exchange.KNOWN) == bool(row.attribute)
+    assert not row.mapped or mapping.MEANINGS[row.mapped] == row.column
+    assert not row.formula or (QUANTITIES[row.formula][0] == QUANTITIES[row.column][0] == row.attribute)
+    assert not row.attribute or column_of(row.attribute) == row.column
+    assert row.column not in BOOKKEEPING
+
+
+def test_every_station_reads_what_the_rows_say_and_dwells_keep_it():
+    required = {name for name in tables.TABLES["readings"].columns if name in BY_COLUMN} - {
+        "outer_deg",
+        "inner_deg",
+        "slot",
+    }
+    assert required == {row.column for row in RECORDED if row.reading}
+    assert required <= set(KEPT)
+    assert set(INSTRUMENTS) <= required
+    assert set(WHERE_THERE) == {row.column for row in RECORDED if row.joined == "max"}
+
+
+def test_a_plan_has_every_quantity_and_every_driver(tmp_path):
+    recipe = small_job(tmp_path).recipe
+    columns = [row.column for row in RECORDED if not row.attribute]
+    state = planned_state(recipe, recorded=columns)
+    for row in RECORDED:
+        if row.attribute and row.column != "power_off_s":
+            assert getattr(state, row.attribute) is not None
+    assert list(state.covariates) == columns
+    drivers = {row.column for row in RECORDED if row.driver} | {row.name for row in DERIVED if row.driver}
+    assert {name for name, _, _ in quantities(state)} == drivers
+
+
+def test_what_a_reader_records_besides_has_a_row():
+    recorded = {r.column for name in profile_names() for r in load_profile(name).registers if r.column}
+    assert recorded
+    assert recorded <= {row.column for row in RECORDED if not row.attribute}
+
+
+def test_no_other_module_lists_the_columns():
+    """Two columns of quantities on neighbouring lines as texts are a list by hand."""
+    names = [row.column for row in RECORDED if row.attribute and row.column not in NEVER_NAMED]
+    text = re.compile("|".join(f'"{name}"' for name in names))
+    found = set()
+    for folder in ("inertial", "pipelines", "schemas", "stations"):
+        for path in (ROOT / folder).rglob("*.py"):
+            lines = [
+                k for k, line in enumerate(path.read_text(encoding="utf-8").splitlines()) for _ in text.findall(line)
+            ]
+            if any(b - a <= 1 for a, b in pairwise(lines)):
+                found.add(path.relative_to(ROOT).as_posix())
+    assert found <= HERE

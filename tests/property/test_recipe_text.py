@@ -1,0 +1,108 @@
+"""A recipe that is written as a file and read again is the same recipe, whatever stands in it."""
+
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from inertial.poses import plan
+from pipelines.jobs.recipe_text import recipe_text
+from pipelines.jobs.recipes import resolved
+from schemas.fault import FaultOrder
+from schemas.recipe import Recipe, RecipeFile, SoakPart, parse_recipe
+
+EFFECTS = ("bias", "scale", "misalignment", "bias_temperature", "warm_up", "covariate:humidity_pct")
+MADE_OTHERWISE = {"model"}  # a recipe with a model file is written with that model's effects
+SEVEN = [[33.0 + 0.5 * k, 71.5] for k in range(7)]  # directions in none of the plans
+
+
+def numbers(low, high):
+    return st.floats(low, high, allow_nan=False) | st.integers(int(low), int(high)).map(float)
+
+
+def maybe(strategy):
+    return st.none() | strategy
+
+
+TEXTS = st.text(st.characters(exclude_categories=["Cs"]), max_size=30)
+SERIALS = st.from_regex(r"[A-Za-z0-9][A-Za-z0-9._+-]{0,8}", fullmatch=True)
+FAULTS = st.builds(
+    FaultOrder,
+    kind=st.from_regex(r"[a-z][a-z0-9_]{0,8}", fullmatch=True),
+    at_s=numbers(0.0, 1e5),
+    for_s=maybe(numbers(1.0, 1e4)),
+    serial=st.just("") | SERIALS,
+    figures=st.dictionaries(st.from_regex(r"[a-z_]{1,6}", fullmatch=True), numbers(-10.0, 10.0), max_size=2),
+)
+
+
+@st.composite
+def soaks(draw, poses, verification):
+    """What is measured at one soak, with waits and pauses for its poses."""
+    own = draw(maybe(st.lists(st.integers(1, poses), min_size=1, max_size=4)))
+    count = poses if own is None else len(own)
+    each = st.lists(numbers(0.0, 900.0), min_size=count, max_size=count)
+    return SoakPart(
+        temperature_C=0.0,
+        poses=own,
+        verification=draw(maybe(st.lists(st.integers(1, verification), max_size=3))) if verification else None,
+        waits_s=draw(maybe(each)),
+        off_s=draw(maybe(each)),
+        settled=draw(st.booleans()),
+    )
+
+
+@st.composite
+def recipe_files(draw):
+    name = draw(st.sampled_from(["nine", "twelve"]))
+    angles = plan(name).tolist()
+    poses = draw(st.sampled_from([name, angles]))
+    verification = draw(st.lists(st.sampled_from(SEVEN), max_size=3))
+    repeats = draw(st.integers(1, 20))
+    temperatures = draw(st.lists(numbers(-40.0, 85.0), min_size=1, max_size=4, unique=True))
+    checks = repeats * len(verification)
+    parts = [draw(soaks(len(angles), checks)) for _ in temperatures] if draw(st.booleans()) else []
+    short = draw(st.booleans())
+    return RecipeFile(
+        name=draw(st.from_regex(r"[a-z0-9][a-z0-9._-]{0,12}", fullmatch=True)),
+        description=draw(TEXTS),
+        device=draw(TEXTS),
+        local_gravity_m_s2=draw(st.floats(9.71, 9.89)),
+        temperatures_C=temperatures,
+        soaks=[part.model_copy(update={"temperature_C": t}) for part, t in zip(parts, temperatures, strict=False)],
+        soak_min_s=draw(numbers(1.0, 899.0) if short else numbers(900.0, 9000.0)),
+        allow_short_soak=short or draw(st.booleans()),
+        settle_s=draw(numbers(0.0, 100.0)),
+        dwell_s=draw(numbers(10.0, 100.0)),
+        rate_hz=draw(numbers(100.0, 4000.0)),
+        static_record_s=draw(numbers(0.0, 5000.0)),
+        static_temperature_C=draw(numbers(-40.0, 85.0)),
+        zero_output=draw(numbers(-5.0, 5.0)),
+        span_min_g=draw(numbers(1.0, 1.4)),
+        effects=draw(st.lists(st.sampled_from(EFFECTS), min_size=1, unique=True)),
+        limits=draw(TEXTS),
+        units=draw(st.lists(SERIALS, max_size=3, unique=True)),
+        seed=draw(st.integers(-(2**60), 2**60)),
+        faults=draw(st.lists(FAULTS, max_size=2)),
+        poses=poses,
+        verification=verification,
+        verification_repeats=repeats,
+        static_pose=[draw(numbers(-180.0, 180.0)), draw(numbers(-180.0, 180.0))],
+    )
+
+
+def read_again(recipe: Recipe) -> Recipe:
+    return resolved(parse_recipe(recipe_text(recipe, ["a remark"]), "again"), "again")
+
+
+@settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.too_slow, HealthCheck.data_too_large])
+@given(recipe_files())
+def test_a_recipe_written_as_a_file_reads_as_itself(file):
+    recipe = resolved(file, "generated")
+    assert read_again(recipe) == recipe
+
+
+@settings(max_examples=1, deadline=None, suppress_health_check=[HealthCheck.too_slow, HealthCheck.data_too_large])
+@given(recipe_files())
+def test_every_key_of_a_recipe_file_is_generated(file):
+    assert set(file.model_dump(exclude_unset=True)) >= set(RecipeFile.model_fields) - MADE_OTHERWISE
+    for part in file.soaks:
+        assert part.model_fields_set == set(SoakPart.model_fields)

@@ -1,0 +1,71 @@
+"""The one kernel of 1/f wander: its spectrum, and the two estimators that use it, held to each other and to the truth."""
+
+import numpy as np
+import pandas as pd
+import pytest
+from scipy.integrate import quad
+
+from inertial import poses
+from inertial.frames import force_from_angles
+from inertial.noise import generate
+from inertial.noise.flicker import flicker_kernel, flicker_of_means, summed, time_constants
+from pipelines.diagnosis.diagnose import diagnose
+from pipelines.stages.fit import fit
+
+MODEL = ["bias", "scale", "misalignment"]
+
+
+def test_means_differ_as_an_integral_over_the_spectrum_says():
+    """Mean squared difference of two means over T that are d apart: ∫ B²/(πf)·4·sin²(πfd)·sinc²(fT) df, slow parts cancel."""
+    duration, slowest = 10.0, 1e5
+    for apart in (20.0, 200.0, 2000.0):
+        found = 2.0 * (
+            flicker_of_means(np.array(0.0), duration, slowest) - flicker_of_means(np.array(apart), duration, slowest)
+        )
+
+        def density(log_f, d=apart):
+            f = np.exp(log_f)
+            return 4.0 / np.pi * np.sin(np.pi * f * d) ** 2 * np.sinc(f * duration) ** 2
+
+        expected = quad(density, np.log(1e-7), np.log(1.0), limit=20000)[0]
+        assert found == pytest.approx(expected, rel=0.02)
+
+
+def test_the_correlation_is_one_at_no_gap_and_that_of_the_same_processes():
+    time = np.array([0.0, 30.0, 60.0, 120.0])
+    kernel = flicker_kernel(time)
+    np.testing.assert_allclose(np.diagonal(kernel), 1.0)
+    taus = time_constants(480.0, int(np.ceil(np.log2(480.0 / 10.0))))
+    np.testing.assert_allclose(kernel, summed(np.abs(time[:, None] - time), taus) / taus.size)
+
+
+def lot(seed: int, wander: float, white: float = 1e-5) -> pd.DataFrame:
+    """Dwells of six units: 24 poses four times, Kasdin's flicker beside white noise of 10 µg."""
+    rng = np.random.default_rng(seed)
+    angles = np.tile(poses.plan("fibonacci24"), (4, 1))
+    force = force_from_angles(*np.radians(angles).T)
+    n, rows = len(force), []
+    for unit in range(6):
+        slow = generate.flicker(rng, (3, 20 * n), wander)[:, -n:].T if wander else 0.0
+        gain = np.eye(3) + 0.01 * rng.normal(size=(3, 3))
+        out = force @ gain.T + 0.01 * rng.normal(size=3) + slow + white * rng.normal(size=(n, 3))
+        rows.append(pd.DataFrame(
+            {"unit": f"U{unit}", "dwell": range(n), "time_s": 20.0 * np.arange(n), "pose": [f"p{k % 24}" for k in range(n)],
+             "kind": "dwell", "out_unit": "g", "unit_C": 25.0, "n": 100, **{f"sd_{a}": 10.0 * white for a in "xyz"},
+             **{f"force_{a}": force[:, i] for i, a in enumerate("xyz")}, **{f"out_{a}": out[:, i] for i, a in enumerate("xyz")}}
+        ))  # fmt: skip
+    return pd.concat(rows, ignore_index=True)
+
+
+@pytest.mark.parametrize("wander", [0.0, 2e-5])
+def test_fit_and_diagnosis_find_the_same_noise(wander: float) -> None:
+    """What each expects a right model to leave, µg: within a tenth of one another and of what is left indeed."""
+    for seed in (11, 12):
+        dwells = lot(seed, wander)
+        residuals = fit(dwells, dwells.iloc[:0], MODEL)["residuals"]
+        fitted, left = (float(np.sqrt(np.mean(residuals[name] ** 2))) for name in ("expected_ug", "residual_ug"))
+        found = diagnose(dwells, None, MODEL)
+        assert found["adequate"]
+        assert found["error"]["floor_ug"] == pytest.approx(fitted, rel=0.1)
+        assert left == pytest.approx(fitted, rel=0.1)
+        assert (found["error"]["wander_share"] > 0.3) == (wander > 0.0)
