@@ -56,14 +56,14 @@ def reason(problem: BaseException) -> str:
     return shown(lines[0]).strip("'") if lines else type(problem).__name__
 
 
-def shown(value: object) -> str:
-    """A foreign value for a message: printable, and never longer than a line."""
+def shown(value: object, longest: int = LONGEST_QUOTE) -> str:
+    """A foreign value for a message: printable, and never longer than a line, or than so many characters."""
     try:
         text = str(value)
     except (ValueError, RecursionError):  # integers of thousands of digits, endless nesting
         return f"a {type(value).__name__} too large to show"
     text = "".join(letter if letter.isprintable() else "\N{REPLACEMENT CHARACTER}" for letter in text)
-    return text if len(text) <= LONGEST_QUOTE else f"{text[:LONGEST_QUOTE]}… ({len(text)} characters)"
+    return text if len(text) <= longest else f"{text[:longest]}… ({len(text)} characters)"
 
 
 def is_file(path: str | Path) -> bool:

@@ -53,6 +53,7 @@ LEAST_SPAN_G = 1.4  # of the poses on every axis; twelve edges reach 1.41, and a
 
 MOST_SAMPLES = 10**9  # of one record, on one axis
 LONGEST_FILE = 4 * 2**20  # bytes of a file that somebody writes by hand
+LONGEST_REASON = 400  # characters of what a check says
 DEEPEST = 16  # tables and lists inside one another; the deepest of our files has five
 
 Angles = Annotated[list[Degrees], Field(min_length=2, max_length=2)]
@@ -399,7 +400,7 @@ def _is_branch(part: object) -> bool:
 def _sentence(detail: ErrorDetails, key: str) -> str:
     if detail["type"] == "missing":
         return f"key '{key}' is missing; add it"
-    reason = detail["msg"].removeprefix("Value error, ")
+    reason = shown(detail["msg"].removeprefix("Value error, "), LONGEST_REASON)
     if not key:
         return reason
     if isinstance(detail["input"], dict | list):

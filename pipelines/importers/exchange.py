@@ -187,6 +187,7 @@ def _all_or_none(frame: pd.DataFrame, names: tuple[str, ...], where: str) -> Non
 
 
 def _plausible(frame: pd.DataFrame, where: str) -> None:
+    _inside(frame.drop(columns="n", errors="ignore"), where)  # which has words of its own
     if FORCE[0] in frame.columns:
         size = float(np.median(np.linalg.norm(frame[list(FORCE)].to_numpy(dtype=np.float64), axis=1)))
         if not 0.0 < size < _LARGEST_FORCE or _METRES[0] < size < _METRES[1]:
@@ -195,10 +196,14 @@ def _plausible(frame: pd.DataFrame, where: str) -> None:
                 "force_y, force_z in g, not m/s² or counts"
             )
             raise DataRejected(message)
-    for column in frame.columns:
-        if pd.api.types.is_numeric_dtype(frame[column]) and column != "n":
-            values.refuse_outside(np.asarray(frame[column], dtype=np.float64), str(column), where, first_row=0)
     _countable(frame, where)
+
+
+def _inside(frame: pd.DataFrame, where: str) -> None:
+    """Refuse numbers where none can lie, in any column."""
+    for column in frame.columns:
+        if pd.api.types.is_numeric_dtype(frame[column]):
+            values.refuse_outside(np.asarray(frame[column], dtype=np.float64), str(column), where, first_row=0)
 
 
 def _countable(frame: pd.DataFrame, where: str) -> None:
@@ -239,7 +244,7 @@ def _checked_history(frame: pd.DataFrame, where: str, *, foreign: bool) -> pd.Da
     named = frame if "unit" in frame.columns else frame.assign(unit="history")
     for column in ("time_s", *heats):
         frame[column] = _numbers(named, column, where)
-        values.refuse_outside(frame[column].to_numpy(), column, where, first_row=0)
+    _inside(frame, where)
     order = ["unit", "time_s"] if "unit" in frame.columns else ["time_s"]
     frame = frame.sort_values(order, kind="stable").reset_index(drop=True)
     twice = frame.duplicated(order)

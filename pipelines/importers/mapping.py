@@ -159,8 +159,8 @@ def build(content: dict[str, Any], where: str) -> Mapping:
     except ValidationError as problem:
         first = problem.errors()[0]
         key = ".".join(str(part) for part in first["loc"])
-        words = first["msg"].removeprefix("Value error, ")
-        if words == first["msg"] and not isinstance(first["input"], dict | list):
+        words = shown(first["msg"].removeprefix("Value error, "), 400)
+        if not first["msg"].startswith("Value error, ") and not isinstance(first["input"], dict | list):
             words = f"found {shown(first['input'])}: {words[:1].lower()}{words[1:]}; correct it"
         close: tuple[str, ...] = ()
         if first["type"] == "extra_forbidden":

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 LARGEST = 1e30
 """Of any number: its square, and sums of such squares, are still numbers."""
 _FORCE_G = 1e4
-_DEGREES = 3600.0
+_DEGREES = 1e6  # angles may be counted on over many turns
 _HOTTEST_C = 2000.0
 
 NOT_NEGATIVE: tuple[float, float] = (0.0, LARGEST_TIME_S)
