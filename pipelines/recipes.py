@@ -101,12 +101,10 @@ def lot_of(
         message = f"lot: serial {', '.join(twice)} is there twice, each may be there once; correct the list of units"
         raise WrongUse(message)
     units = [Unit(serial=serial, slot=slot) for serial, slot in zip(named, slots or range(len(named)), strict=True)]
-    return Lot(
-        units=units,
-        device=recipe.device,
-        seed=recipe.seed if seed is None else seed,
-        repeat=repeat,
-    )
+    try:
+        return Lot(units=units, device=recipe.device, seed=recipe.seed if seed is None else seed, repeat=repeat)
+    except ValidationError as problem:
+        raise explain(problem, "lot", Lot) from None
 
 
 def sample_names(prefix: str = "") -> list[str]:

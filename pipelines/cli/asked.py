@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, get_args
 
+from schemas.bounds import COLDEST_C, HOTTEST_C
 from schemas.errors import WrongUse, did_you_mean
 from schemas.units import MICRO
 
@@ -47,6 +48,11 @@ def levels_of(base: Recipe, temperatures: str) -> tuple[float, ...]:
     except ValueError:
         message = f"plan: --temperatures '{temperatures}' is no list of numbers; write -10,25,60"
         raise WrongUse(message) from None
+    outside = [level for level in given if not COLDEST_C <= level <= HOTTEST_C]
+    if outside:
+        found, needed = f"found {outside[0]:g} °C", f"{COLDEST_C:g} to {HOTTEST_C:g} °C is needed"
+        message = f"plan: --temperatures '{temperatures}': {found}, {needed}; correct it"
+        raise WrongUse(message)
     return tuple(sorted(set(given)))
 
 

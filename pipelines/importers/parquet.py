@@ -83,8 +83,8 @@ def _unpacked(piece: pa.RecordBatch) -> int:
 def _text_bytes(column: pa.Array) -> int:
     if not isinstance(column, pa.DictionaryArray) or not _is_text(column.type.value_type):
         return 0
-    lengths = pc.binary_length(column.dictionary)
-    return pc.sum(pc.take(lengths, column.indices)).as_py() or 0
+    lengths = pc.binary_length(column.dictionary)  # pyright: ignore[reportAttributeAccessIssue]  # made at import
+    return pc.sum(pc.take(lengths, column.indices)).as_py() or 0  # pyright: ignore[reportAttributeAccessIssue]
 
 
 def _plain(column: pa.ChunkedArray) -> pd.Series:
