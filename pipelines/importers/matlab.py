@@ -14,6 +14,7 @@ import numpy as np
 import pandas as pd
 from scipy.io import loadmat
 
+from pipelines.importers.matlab_form import COMPRESSED, Form
 from pipelines.importers.unpacking import inflated, refuse_larger
 from schemas.errors import DataRejected
 from schemas.foreign import foreign
@@ -24,11 +25,6 @@ if TYPE_CHECKING:
 REMEDY = "save it again with save(…, '-v7')"
 _HEADER = 128
 _TAG = 8
-_COMPRESSED = 15
-_MATRIX = 14
-_CELL, _STRUCT, _OBJECT = 1, 2, 3
-DEEPEST = 16
-"""Structures inside one another; the library goes down by recursion and does not come back from thousands."""
 
 
 def table_of(name: str, data: bytes) -> pd.DataFrame:
@@ -54,7 +50,7 @@ def table_of(name: str, data: bytes) -> pd.DataFrame:
 
 
 def _plain(name: str, data: bytes) -> bytes:
-    """The same file with nothing compressed in it, every variable held against the depth that is read."""
+    """The same file with nothing compressed in it, every variable held against its form; those of other classes left out."""
     order = "<" if data[_HEADER - 2 : _HEADER] == b"IM" else ">"
     at, parts, size = _HEADER, [data[:_HEADER]], 0
     while at + _TAG <= len(data):
@@ -65,43 +61,13 @@ def _plain(name: str, data: bytes) -> bytes:
                 f"{name}: a MATLAB file that ends inside a variable ({len(body)} of {count} bytes are there); {REMEDY}"
             )
             raise DataRejected(message)
-        whole = inflated(body, size, len(data), name) if kind == _COMPRESSED else data[at : at + _TAG + count]
+        whole = inflated(body, size, len(data), name) if kind == COMPRESSED else data[at : at + _TAG + count]
         size += len(whole)
         refuse_larger(size, len(data), name)
-        _refuse_deep(name, whole, order)
-        parts.append(whole)
+        if Form(whole, order, name, REMEDY).check():
+            parts.append(whole)
         at += _TAG + count
     return b"".join(parts)
-
-
-def _refuse_deep(name: str, element: bytes, order: str) -> None:
-    """Refuse matrices more than so many deep in one another.
-
-    Elements are looked through without regard to what they mean: each that begins like a matrix within one counts. Numbers that
-    look like it can only be mistaken inside cells, structures and objects, and not sixteen times in one another.
-    """
-    level = [(0, len(element))]
-    for _ in range(DEEPEST + 1):
-        level = [span for start, end in level for span in _matrices(element, start, end, order)]
-        if not level:
-            return
-    message = f"{name}: a variable with more than {DEEPEST} structures in one another, none needs so many; {REMEDY}"
-    raise DataRejected(message)
-
-
-def _matrices(data: bytes, start: int, end: int, order: str) -> Iterator[tuple[int, int]]:
-    """Where the contents of the matrices of a span lie that hold others: cells, structures, objects."""
-    at = start
-    while at + _TAG <= end:
-        kind, count = struct.unpack_from(f"{order}II", data, at)
-        if kind >> 16:  # a small element: its bytes are in the tag
-            at += _TAG
-            continue
-        if kind == _MATRIX and at + 3 * _TAG <= end:
-            flags = struct.unpack_from(f"{order}I", data, at + 2 * _TAG)[0]
-            if flags & 0xFF in {_CELL, _STRUCT, _OBJECT}:
-                yield at + _TAG, min(at + _TAG + count, end)
-        at += _TAG + count + (-count % _TAG if kind != _MATRIX else 0)
 
 
 def _flat(name: str, value: Any) -> Iterator[tuple[str, np.ndarray]]:
