@@ -16,6 +16,8 @@ DONE = 0
 PART_FAILED = 1
 UNUSABLE = 2
 STATION = 3
+UNEXPECTED = 70
+"""A defect of the program (EX_SOFTWARE of sysexits.h); never 1, which scripts read as a verdict."""
 
 
 class TumblelineError(Exception):

@@ -9,14 +9,15 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Annotated, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, ValidationError, model_validator
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
+from schemas.bounds import LARGEST_TIME_S, Number, Text
 from schemas.errors import WrongUse
+from schemas.foreign import shown
 
 if TYPE_CHECKING:
     from pydantic_core import ErrorDetails
 
-NotNegative = Annotated[FiniteFloat, Field(ge=0.0)]
 Part = Literal["", "outer", "inner", "chamber", "reader"]
 SEPARATOR = ":"
 
@@ -30,11 +31,11 @@ class FaultOrder(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True)
 
     kind: Annotated[str, Field(pattern=r"^[a-z][a-z0-9_]*$")]
-    at_s: NotNegative = 0.0
-    for_s: Annotated[FiniteFloat, Field(gt=0.0)] | None = None
-    serial: str = ""
+    at_s: Annotated[Number, Field(ge=0.0, le=LARGEST_TIME_S)] = 0.0
+    for_s: Annotated[Number, Field(gt=0.0, le=LARGEST_TIME_S)] | None = None
+    serial: Text = ""
     device: Part = ""
-    figures: dict[str, FiniteFloat] = Field(default_factory=dict[str, float])
+    figures: dict[str, Number] = Field(default_factory=dict[str, float])
 
     @model_validator(mode="after")
     def _means_one(self) -> FaultOrder:
@@ -63,13 +64,15 @@ def parse_fault(text: str) -> FaultOrder:
     for pair in pairs:
         key, equals, value = pair.partition("=")
         if not equals or not key or not value:
-            raise WrongUse(f"fault '{text}': found '{pair}', key=value is needed; write kind:key=value:key=value")
+            raise WrongUse(
+                f"fault '{shown(text)}': found '{shown(pair)}', key=value is needed; write kind:key=value:key=value"
+            )
         (given if key in FaultOrder.model_fields and key != "figures" else figures)[key] = value
     try:
         return FaultOrder.model_validate({**given, "figures": figures})
     except ValidationError as problem:
         raise WrongUse(
-            f"fault '{text}': {_sentence(problem.errors(include_url=False)[0])}; write kind:key=value:key=value"
+            f"fault '{shown(text)}': {_sentence(problem.errors(include_url=False)[0])}; write kind:key=value:key=value"
         ) from None
 
 

@@ -12,12 +12,12 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 from pydantic import (
     Field,
-    FiniteFloat,
     ValidationError,
     field_validator,
     model_validator,
 )
 
+from schemas.bounds import Name, Number, Positive
 from schemas.errors import RecipeInvalid, close_matches, did_you_mean
 from schemas.recipe import Strict, explain, parse_toml
 
@@ -54,16 +54,16 @@ GRADE_FIGURE = "bias_error_ug"
 class Limit(Strict):
     """The largest magnitude of a figure that a unit may have, in the figure's unit, which the file states again."""
 
-    max: Annotated[FiniteFloat, Field(gt=0.0)]
+    max: Positive
     unit: str
 
 
 class Limits(Strict):
     """The limits file: name, rule, coverage factor and a limit per figure."""
 
-    name: Annotated[str, Field(min_length=1)]
+    name: Name
     rule: Rule = "guarded_acceptance"
-    coverage_factor: Annotated[FiniteFloat, Field(ge=1.0, le=4.0)] = 2.0
+    coverage_factor: Annotated[Number, Field(ge=1.0, le=4.0)] = 2.0
     grade: Literal["navigation", "industrial", "consumer"] = "consumer"
     figures: Annotated[dict[str, Limit], Field(min_length=1)]
 

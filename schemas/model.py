@@ -8,7 +8,10 @@ from typing import Annotated
 
 from pydantic import Field, ValidationError, model_validator
 
+from schemas.bounds import Name, Text
 from schemas.recipe import FormulaSpec, Strict, explain, parse_toml, read_text
+
+MOST_VERSIONS = 1_000_000
 
 
 class ModelChange(Strict):
@@ -17,20 +20,20 @@ class ModelChange(Strict):
     ``run`` is the run or file of dwells that the change was decided on.
     """
 
-    version: Annotated[int, Field(ge=1)]
+    version: Annotated[int, Field(ge=1, le=MOST_VERSIONS)]
     effect: str = ""
-    by: Annotated[str, Field(min_length=1)]
+    by: Annotated[Text, Field(min_length=1)]
     at: datetime | date
-    why: Annotated[str, Field(min_length=1)]
-    run: str = ""
+    why: Annotated[Text, Field(min_length=1)]
+    run: Text = ""
 
 
 class ModelHead(Strict):
     """Name, version and effects of a model."""
 
-    name: Annotated[str, Field(min_length=1, pattern=r"^[a-z0-9][a-z0-9._-]*$")]
-    version: Annotated[int, Field(ge=1)]
-    effects: Annotated[list[str], Field(min_length=1)]
+    name: Annotated[Name, Field(pattern=r"^[a-z0-9][a-z0-9._-]*$")]
+    version: Annotated[int, Field(ge=1, le=MOST_VERSIONS)]
+    effects: Annotated[list[str], Field(min_length=1, max_length=1000)]
 
 
 class ModelFile(Strict):

@@ -6,14 +6,14 @@ only. ``verified`` says whether anybody has held it against the device.
 
 from __future__ import annotations
 
-import tomllib
 from itertools import pairwise
 from typing import Annotated, Literal
 
-from pydantic import Field, FiniteFloat, ValidationError, model_validator
+from pydantic import Field, ValidationError, model_validator
 
+from schemas.bounds import Number
 from schemas.errors import RecipeInvalid, did_you_mean
-from schemas.recipe import Strict, explain
+from schemas.recipe import Strict, explain, parse_toml
 
 WordOrder = Literal["high_first", "low_first", "high_first_swapped", "low_first_swapped"]
 RegisterType = Literal["uint16", "int16", "uint32", "int32", "float32", "string", "bit"]
@@ -47,13 +47,13 @@ class Register(Strict):
     space: Space = "holding"
     manual: str = ""
     type: RegisterType
-    count: Annotated[int, Field(ge=1)] = 1
+    count: Annotated[int, Field(ge=1, le=ADDRESSES)] = 1
     word_order: WordOrder | None = None
-    scale: Annotated[FiniteFloat, Field(gt=0.0)] = 1.0
+    scale: Annotated[Number, Field(gt=0.0)] = 1.0
     scaled_by: str = ""
     unit: str = ""
-    minimum: FiniteFloat | None = None
-    maximum: FiniteFloat | None = None
+    minimum: Number | None = None
+    maximum: Number | None = None
     access: Literal["read", "write", "read_write"] = "read"
     enumeration: dict[str, int] = Field(default_factory=dict[str, int])
     bits: dict[str, int] = Field(default_factory=dict[str, int])
@@ -112,13 +112,13 @@ class Command(Strict):
 
     name: Annotated[str, Field(pattern=r"^[a-z][a-z0-9_]*$")]
     ask: str
-    field: Annotated[int, Field(ge=0)] = 0
+    field: Annotated[int, Field(ge=0, le=1000)] = 0
     tell: str = ""
     manual: str = ""
     type: Literal["number", "text"] = "number"
     unit: str = ""
-    minimum: FiniteFloat | None = None
-    maximum: FiniteFloat | None = None
+    minimum: Number | None = None
+    maximum: Number | None = None
     values: list[str] = Field(default_factory=list[str])
     source: str = ""
     disputed: str = ""
@@ -244,8 +244,6 @@ def _refuse_gaps(group: str, registers: list[Register]) -> None:
 def parse_profile(text: str, source: str) -> Profile:
     """The profile in a TOML text, or :class:`RecipeInvalid` naming the key and what is needed."""
     try:
-        return Profile.model_validate(tomllib.loads(text))
-    except tomllib.TOMLDecodeError as problem:
-        raise RecipeInvalid(f"{source}: not valid TOML: {problem}; correct the file") from None
+        return Profile.model_validate(parse_toml(text, source))
     except ValidationError as problem:
         raise explain(problem, source, Profile) from None

@@ -20,8 +20,27 @@ from pydantic import (
     model_validator,
 )
 
+from schemas.bounds import (
+    LONGEST_RUN_S,
+    MOST_POSES,
+    MOST_SOAKS,
+    MOST_UNITS,
+    Celsius,
+    Degrees,
+    Name,
+    NotNegative,
+    Number,
+    Positive,
+    Rate,
+    Seconds,
+    Seed,
+    Text,
+    Wait,
+)
 from schemas.errors import RecipeInvalid, close_matches, did_you_mean
 from schemas.fault import FaultOrder
+from schemas.foreign import foreign, shown
+from schemas.serials import LONGEST_SERIAL, SERIAL_PATTERN
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -32,9 +51,12 @@ SHORTEST_SOAK_S = 900.0  # at least 15 min of soak per temperature: the field's 
 FEWEST_SAMPLES = 100  # per pose
 LEAST_SPAN_G = 1.4  # of the poses on every axis; twelve edges reach 1.41, and a scale from less is an extrapolation
 
-Positive = Annotated[FiniteFloat, Field(gt=0.0)]
-NotNegative = Annotated[FiniteFloat, Field(ge=0.0)]
-Angles = Annotated[list[FiniteFloat], Field(min_length=2, max_length=2)]
+MOST_SAMPLES = 10**9  # of one record, on one axis
+LONGEST_FILE = 4 * 2**20  # bytes of a file that somebody writes by hand
+LONGEST_REASON = 400  # characters of what a check says
+DEEPEST = 16  # tables and lists inside one another; the deepest of our files has five
+
+Angles = Annotated[list[Degrees], Field(min_length=2, max_length=2)]
 Gravity = Annotated[FiniteFloat, Field(gt=9.7, lt=9.9)]  # every place on earth lies between 9.76 and 9.84 m/s²
 
 
@@ -48,8 +70,8 @@ class Pose(Strict):
     """One attitude of the table: outer angle about the laboratory's x, inner angle about the fixture's z, degrees."""
 
     name: str
-    outer_deg: FiniteFloat
-    inner_deg: FiniteFloat
+    outer_deg: Degrees
+    inner_deg: Degrees
 
 
 class Unit(Strict):
@@ -57,9 +79,9 @@ class Unit(Strict):
 
     serial: Annotated[
         str,
-        Field(min_length=1, max_length=64, pattern=r"^[A-Za-z0-9][A-Za-z0-9._+-]*$"),
+        Field(min_length=1, max_length=LONGEST_SERIAL, pattern=SERIAL_PATTERN),
     ]
-    slot: Annotated[int, Field(ge=0)]
+    slot: Annotated[int, Field(ge=0, le=MOST_UNITS)]
 
 
 class SoakPart(Strict):
@@ -71,11 +93,11 @@ class SoakPart(Strict):
     seconds for which the devices are switched off before the move to each of ``poses``; 0 leaves them on.
     """
 
-    temperature_C: FiniteFloat
-    poses: list[Annotated[int, Field(ge=1)]] | None = None
-    verification: list[Annotated[int, Field(ge=1)]] | None = None
-    waits_s: list[NotNegative] | None = None
-    off_s: list[NotNegative] | None = None
+    temperature_C: Celsius
+    poses: Annotated[list[Annotated[int, Field(ge=1)]], Field(max_length=MOST_POSES)] | None = None
+    verification: Annotated[list[Annotated[int, Field(ge=1)]], Field(max_length=MOST_POSES)] | None = None
+    waits_s: list[Wait] | None = None
+    off_s: list[Wait] | None = None
     settled: bool = True
 
 
@@ -87,8 +109,8 @@ class Lot(Strict):
 
     units: Annotated[list[Unit], Field(min_length=1)]
     device: str
-    seed: int = 0
-    repeat: Annotated[int, Field(ge=0)] = 0
+    seed: Seed = 0
+    repeat: Annotated[int, Field(ge=0, le=10**6)] = 0
 
     @model_validator(mode="after")
     def _each_once(self) -> Lot:
@@ -114,25 +136,25 @@ class _Measurement(Strict):
     simulated station, to try what a recipe does then.
     """
 
-    name: Annotated[str, Field(min_length=1, pattern=r"^[a-z0-9][a-z0-9._-]*$")]
-    description: str = ""
-    device: str
+    name: Annotated[Name, Field(pattern=r"^[a-z0-9][a-z0-9._-]*$")]
+    description: Text = ""
+    device: Name
     local_gravity_m_s2: Gravity
-    temperatures_C: Annotated[list[FiniteFloat], Field(min_length=1)]
-    soaks: list[SoakPart] = []
-    soak_min_s: Positive = SHORTEST_SOAK_S
+    temperatures_C: Annotated[list[Celsius], Field(min_length=1, max_length=MOST_SOAKS)]
+    soaks: Annotated[list[SoakPart], Field(max_length=MOST_SOAKS)] = []
+    soak_min_s: Seconds = SHORTEST_SOAK_S
     allow_short_soak: bool = False
-    settle_s: NotNegative = 2.0
-    dwell_s: Positive = 10.0
-    rate_hz: Positive = 100.0
-    static_record_s: NotNegative = 0.0
-    static_temperature_C: FiniteFloat = 25.0
-    zero_output: FiniteFloat = 0.0
+    settle_s: Wait = 2.0
+    dwell_s: Seconds = 10.0
+    rate_hz: Rate = 100.0
+    static_record_s: Wait = 0.0
+    static_temperature_C: Celsius = 25.0
+    zero_output: Number = 0.0
     span_min_g: Positive = LEAST_SPAN_G
-    effects: list[str] = []
+    effects: Annotated[list[str], Field(max_length=1000)] = []
     limits: str = "consumer"
-    units: list[str] = []
-    seed: int = 0
+    units: Annotated[list[str], Field(max_length=MOST_UNITS)] = []
+    seed: Seed = 0
     faults: list[FaultOrder] = []
 
     @model_validator(mode="before")
@@ -140,7 +162,10 @@ class _Measurement(Strict):
     def _temperatures_of_the_soaks(cls, given: Any) -> Any:
         if not isinstance(given, dict) or not given.get("soaks") or "temperatures_C" in given:
             return given
-        own = [s.get("temperature_C") if isinstance(s, dict) else s.temperature_C for s in given["soaks"]]
+        parts = given["soaks"]
+        if not isinstance(parts, list) or not all(isinstance(s, dict | SoakPart) for s in parts):
+            return given  # the field itself says what is wrong
+        own = [s.get("temperature_C") if isinstance(s, dict) else s.temperature_C for s in parts]
         return {**given, "temperatures_C": own}
 
     @model_validator(mode="after")
@@ -159,6 +184,12 @@ class _Measurement(Strict):
             raise ValueError(
                 f"dwell_s: {samples} samples per pose, a mean needs {FEWEST_SAMPLES}; raise dwell_s or rate_hz"
             )
+        for key in ("dwell_s", "static_record_s"):
+            if getattr(self, key) * self.rate_hz > MOST_SAMPLES:
+                raise ValueError(
+                    f"{key}: {getattr(self, key) * self.rate_hz:.3g} samples in one record, at most {MOST_SAMPLES:.0e} are "
+                    f"possible; lower {key} or rate_hz"
+                )
         return self
 
     @field_validator("temperatures_C")
@@ -183,10 +214,10 @@ class _Measurement(Strict):
 class FormulaSpec(Strict):
     """An effect written as formulas, one per column; :mod:`inertial.expressions` says what may stand in them."""
 
-    id: Annotated[str, Field(pattern=r"^[a-z][a-z0-9_]*$")]
-    columns: Annotated[list[Annotated[str, Field(min_length=1)]], Field(min_length=1, max_length=12)]
-    why: str = ""
-    symbol: str = "c"
+    id: Annotated[Name, Field(pattern=r"^[a-z][a-z0-9_]*$")]
+    columns: Annotated[list[Annotated[str, Field(min_length=1, max_length=1000)]], Field(min_length=1, max_length=12)]
+    why: Text = ""
+    symbol: Name = "c"
     typical_ug: tuple[NotNegative, NotNegative] = (1.0, 10000.0)
 
 
@@ -197,8 +228,8 @@ class RecipeFile(_Measurement):
     dwells tells what the calibration leaves, one dwell alone what the device has wandered besides.
     """
 
-    poses: str | Annotated[list[Angles], Field(min_length=1)]
-    verification: str | list[Angles] = []
+    poses: str | Annotated[list[Angles], Field(min_length=1, max_length=MOST_POSES)]
+    verification: str | Annotated[list[Angles], Field(max_length=MOST_POSES)] = []
     verification_repeats: Annotated[int, Field(ge=1, le=20)] = 1
     static_pose: Angles = [0.0, 0.0]
     model: str = ""
@@ -236,6 +267,21 @@ class Recipe(_Measurement):
                         f"soaks: soak {number} has {len(given)} {what} for {count} poses, each pose needs one; "
                         f"correct {key}"
                     )
+        return self
+
+    @model_validator(mode="after")
+    def _comes_to_an_end(self) -> Recipe:
+        soaks = range(len(self.temperatures_C))
+        dwells = sum(len(self.poses_at(k)) + len(self.verification_at(k)) for k in soaks)
+        waits = sum(
+            sum(self.waits_at(k)) + sum(self.off_at(k)) + self.settle_s * len(self.verification_at(k)) for k in soaks
+        )
+        total = len(soaks) * self.soak_min_s + dwells * self.dwell_s + waits + self.static_record_s
+        if total > LONGEST_RUN_S:
+            raise ValueError(
+                f"soak_min_s, settle_s, dwell_s: {len(soaks)} soaks and {dwells} dwells take {total / 86400.0:.4g} days, at most "
+                f"{LONGEST_RUN_S / 86400.0:g} are possible; shorten them"
+            )
         return self
 
     def waits_at(self, soak: int) -> list[float]:
@@ -282,22 +328,46 @@ def parse_recipe(text: str, source: str) -> RecipeFile:
 
 
 def read_text(path: Path, what: str, form: str = "TOML") -> str:
-    """The content of a text file; the message names the file and what it should have been."""
+    """The content of a text file, with or without the mark that some editors begin UTF-8 with.
+
+    The message names the file and what it should have been.
+    """
     try:
-        return path.read_text(encoding="utf-8")
-    except (OSError, UnicodeDecodeError) as problem:
-        reason = problem.strerror if isinstance(problem, OSError) else "not UTF-8 text"
+        with path.open("rb") as file:
+            data = file.read(LONGEST_FILE + 1)
+        text = data.decode("utf-8-sig")
+    except (OSError, ValueError) as problem:  # a name with a zero byte is a ValueError, too
+        strerror = problem.strerror if isinstance(problem, OSError) else None
+        reason = strerror or ("not UTF-8 text" if isinstance(problem, UnicodeDecodeError) else str(problem))
         raise RecipeInvalid(
-            f"{what}: {path} cannot be read ({reason}); give the path of a {what} file in {form}"
+            f"{what}: {shown(str(path))} cannot be read ({reason}); give the path of a {what} file in {form}"
         ) from None
+    if len(data) > LONGEST_FILE:
+        raise RecipeInvalid(
+            f"{what}: {shown(str(path))} has more than {LONGEST_FILE // 2**20} MiB, which no {what} file has; give the path of "
+            f"a {what} file in {form}"
+        )
+    return text
 
 
 def parse_toml(text: str, source: str) -> dict[str, Any]:
     """The tables of a TOML text, or :class:`RecipeInvalid` with line and column."""
-    try:
-        return tomllib.loads(text)
-    except tomllib.TOMLDecodeError as problem:
-        raise RecipeInvalid(f"{source}: not valid TOML: {problem}; correct the file") from None
+    with foreign(f"{source}: not valid TOML", "correct the file", RecipeInvalid):
+        content = tomllib.loads(text)
+    if _depth(content) > DEEPEST:
+        raise RecipeInvalid(
+            f"{source}: tables and lists more than {DEEPEST} deep in one another, none needs so many; correct the file"
+        )
+    return content
+
+
+def _depth(content: Any) -> int:
+    """How deep lists and tables lie in one another, found without going down into them one by one."""
+    level, depth = [content], 0
+    while level and depth <= DEEPEST:
+        inner = [v for one in level for v in (one.values() if isinstance(one, dict) else one)]
+        level, depth = [v for v in inner if isinstance(v, dict | list)], depth + 1
+    return depth
 
 
 def explain(problem: ValidationError, source: str, model: type[BaseModel]) -> RecipeInvalid:
@@ -307,7 +377,7 @@ def explain(problem: ValidationError, source: str, model: type[BaseModel]) -> Re
     """
     details = sorted(problem.errors(include_url=False), key=lambda d: d["type"] != "extra_forbidden")
     first = details[0]
-    key = ".".join(str(part) for part in first["loc"] if not _is_branch(part))
+    key = shown(".".join(str(part) for part in first["loc"] if not _is_branch(part)))
     if first["type"] == "extra_forbidden":
         known = _fields_at(model, first["loc"][:-1])
         wrong = str(first["loc"][-1])
@@ -324,12 +394,14 @@ def _is_branch(part: object) -> bool:
 def _sentence(detail: ErrorDetails, key: str) -> str:
     if detail["type"] == "missing":
         return f"key '{key}' is missing; add it"
-    reason = detail["msg"].removeprefix("Value error, ")
+    reason = shown(detail["msg"].removeprefix("Value error, "), LONGEST_REASON)
     if not key:
         return reason
     if isinstance(detail["input"], dict | list):
         return f"key '{key}': {reason}"
-    return f"key '{key}': found {detail['input']!r}: {reason[:1].lower()}{reason[1:]}"
+    found = detail["input"]
+    text = f"'{shown(found)}'" if isinstance(found, str) else shown(found)
+    return f"key '{key}': found {text}: {reason[:1].lower()}{reason[1:]}"
 
 
 def _fields_at(model: type[BaseModel], location: tuple[int | str, ...]) -> list[str]:

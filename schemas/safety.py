@@ -4,13 +4,12 @@ from __future__ import annotations
 
 from typing import Annotated, Literal
 
-from pydantic import Field, FiniteFloat, model_validator
+from pydantic import Field, model_validator
 
+from schemas.bounds import Celsius, Degrees, Number, Positive, Rate, Seconds, Wait
 from schemas.recipe import Strict
 
-Positive = Annotated[FiniteFloat, Field(gt=0.0)]
-NotNegative = Annotated[FiniteFloat, Field(ge=0.0)]
-Bounds = tuple[FiniteFloat, FiniteFloat]
+Bounds = tuple[Number, Number]
 SAFE_WITHIN_S = 60.0  # by then a station that nobody drives is in its safe state, and its lease is free
 
 
@@ -28,9 +27,9 @@ class Suspenders(Strict):
     vibration_g: Positive = 1e-3
     supply_change: Positive = 0.02
     supply_V: Bounds | None = None
-    poll_s: Positive = 10.0
-    clear_s: NotNegative = 30.0
-    limit_s: Positive = 3600.0
+    poll_s: Seconds = 10.0
+    clear_s: Wait = 30.0
+    limit_s: Seconds = 3600.0
     attempts: Annotated[int, Field(ge=1, le=20)] = 5
 
 
@@ -42,10 +41,10 @@ class Safety(Strict):
     """
 
     chamber: Literal["set_point", "off", "hold"] = "set_point"
-    temperature_C: FiniteFloat = 25.0
+    temperature_C: Celsius = 25.0
     axes: Literal["stop", "hold"] = "stop"
-    heartbeat_s: Annotated[FiniteFloat, Field(gt=0.0, le=10.0)] = 2.0
-    lapse_s: Annotated[FiniteFloat, Field(gt=0.0, le=45.0)] = 20.0
+    heartbeat_s: Annotated[Number, Field(gt=0.0, le=10.0)] = 2.0
+    lapse_s: Annotated[Number, Field(gt=0.0, le=45.0)] = 20.0
 
     @model_validator(mode="after")
     def _notices_in_time(self) -> Safety:
@@ -66,11 +65,11 @@ class SelfTest(Strict):
     left out within three sigma of its own history, once that has ``history_min`` entries.
     """
 
-    outer_deg: FiniteFloat = 10.0
-    inner_deg: FiniteFloat = 10.0
-    settle_s: NotNegative = 2.0
-    sample_s: Positive = 5.0
-    rate_hz: Positive = 100.0
+    outer_deg: Degrees = 10.0
+    inner_deg: Degrees = 10.0
+    settle_s: Wait = 2.0
+    sample_s: Seconds = 5.0
+    rate_hz: Rate = 100.0
     noise_max: Positive | None = None
     standard: str = ""
     offset: Bounds | None = None

@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-import tomllib
 from importlib.resources import files
 from typing import TYPE_CHECKING, Annotated, Literal
 
-from pydantic import Field, FiniteFloat, ValidationError, model_validator
+from pydantic import Field, ValidationError, model_validator
 
+from schemas.bounds import Celsius, Degrees, Name, NotNegative, Number, Positive, Rate, Seconds, Seed, Text, Wait
 from schemas.carrier import Carried
-from schemas.errors import RecipeInvalid, WrongUse
+from schemas.errors import WrongUse
 from schemas.fault import FaultOrder
-from schemas.recipe import Strict, explain, read_text
+from schemas.recipe import Strict, explain, parse_toml, read_text
 from schemas.reference import Reference
 from schemas.safety import Safety, SelfTest, Suspenders
 
@@ -19,9 +19,8 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
     from pathlib import Path
 
-Positive = Annotated[FiniteFloat, Field(gt=0.0)]
-NotNegative = Annotated[FiniteFloat, Field(ge=0.0)]
-Bounds = tuple[FiniteFloat, FiniteFloat]
+Bounds = tuple[Number, Number]
+Angles = tuple[Degrees, Degrees]
 SIMULATED = "simulated.toml"
 MOST_SLOTS = 32  # the reader's registers name that many
 LAST_DEVICE_ID = 247  # Modbus over serial line 1.02, 2.2
@@ -63,12 +62,12 @@ class Devices(Strict):
 class Limits(Strict):
     """What the station may be asked to do; checked before anything moves."""
 
-    outer_deg: Bounds = (-200.0, 200.0)
-    inner_deg: Bounds = (-380.0, 380.0)
+    outer_deg: Angles = (-200.0, 200.0)
+    inner_deg: Angles = (-380.0, 380.0)
     speed_deg_s: Positive = 30.0
     acceleration_deg_s2: Positive = 30.0
-    temperature_C: Bounds = (-40.0, 85.0)
-    rate_hz: Positive = 4000.0
+    temperature_C: tuple[Celsius, Celsius] = (-40.0, 85.0)
+    rate_hz: Rate = 4000.0
     position_deg: Positive = 0.01
 
     @model_validator(mode="after")
@@ -91,9 +90,9 @@ class Soak(Strict):
 
     band_K: Positive = 1.0
     rate_K_per_min: Positive = 0.1
-    window_s: Positive = 120.0
-    limit_s: Positive = 14400.0
-    poll_s: Positive = 10.0
+    window_s: Seconds = 120.0
+    limit_s: Seconds = 14400.0
+    poll_s: Seconds = 10.0
 
 
 class Pace(Strict):
@@ -104,16 +103,16 @@ class Pace(Strict):
     """
 
     ramp_K_per_min: Positive = 3.0
-    lag_s: Positive = 200.0
-    in_position_s: NotNegative = 1.5
-    record_s: NotNegative = 0.0
-    room_C: FiniteFloat = 23.0
+    lag_s: Seconds = 200.0
+    in_position_s: Wait = 1.5
+    record_s: Wait = 0.0
+    room_C: Celsius = 23.0
 
 
 class Link(Strict):
     """Patience of the links."""
 
-    timeout_s: Positive = 3.0
+    timeout_s: Seconds = 3.0
     read_attempts: Annotated[int, Field(ge=1, le=5)] = 2
 
 
@@ -121,20 +120,20 @@ class Hidden(Strict):
     """A hidden effect of the simulated station, with figures other than its usual ones."""
 
     kind: str
-    figures: dict[str, FiniteFloat] = Field(default_factory=dict[str, float])
+    figures: dict[str, Number] = Field(default_factory=dict[str, float])
 
 
 class Simulation(Strict):
     """How the simulated station is made."""
 
-    seed: Annotated[int, Field(ge=0)] = 1
-    room_C: FiniteFloat = 23.0
-    local_gravity_m_s2: Annotated[FiniteFloat, Field(gt=9.7, lt=9.9)] = 9.80665
+    seed: Seed = 1
+    room_C: Celsius = 23.0
+    local_gravity_m_s2: Annotated[Number, Field(gt=9.7, lt=9.9)] = 9.80665
     slot_rotation_mrad: NotNegative = 1.0
     slot_lag_s: Bounds = (90.0, 200.0)
     slot_gradient_K: NotNegative = 0.1
     supply_spread: NotNegative = 1e-3
-    preset_overrides: dict[str, FiniteFloat] = Field(default_factory=dict[str, float])
+    preset_overrides: dict[str, Number] = Field(default_factory=dict[str, float])
     hidden: list[Hidden] = Field(default_factory=list[Hidden])
     faults: list[FaultOrder] = Field(default_factory=list[FaultOrder])
 
@@ -142,9 +141,9 @@ class Simulation(Strict):
 class StationConfig(Strict):
     """A station."""
 
-    name: Annotated[str, Field(pattern=r"^[a-z0-9][a-z0-9._-]*$")]
+    name: Annotated[Name, Field(pattern=r"^[a-z0-9][a-z0-9._-]*$")]
     kind: Literal["simulated", "modbus"]
-    description: str = ""
+    description: Text = ""
     devices: Devices
     limits: Limits = Limits()
     soak: Soak = Soak()
@@ -196,8 +195,6 @@ def load_station(path: Path | None = None) -> StationConfig:
     else:
         source, text = str(path), read_text(path, "station")
     try:
-        return StationConfig.model_validate(tomllib.loads(text))
-    except tomllib.TOMLDecodeError as problem:
-        raise RecipeInvalid(f"{source}: not valid TOML: {problem}; correct the file") from None
+        return StationConfig.model_validate(parse_toml(text, source))
     except ValidationError as problem:
         raise explain(problem, source, StationConfig) from None

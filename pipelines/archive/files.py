@@ -74,7 +74,7 @@ def parsed(data: bytes, path: Place) -> dict[str, Any]:
     """The content of a manifest whose bytes were read."""
     try:
         content = json.loads(data)
-    except ValueError:
+    except (ValueError, RecursionError):
         raise ArchiveUnusable(_no_manifest(path)) from None
     if not isinstance(content, dict):
         raise ArchiveUnusable(_no_manifest(path))

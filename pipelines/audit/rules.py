@@ -47,9 +47,9 @@ class Rules(Strict):
     interval_months: Months
     shortest_months: Months
     longest_months: Months
-    notice_days: Annotated[int, Field(ge=0)]
+    notice_days: Annotated[int, Field(ge=0, le=3660)]
     check_standards: list[str]
-    baseline_points: Annotated[int, Field(ge=8)]
+    baseline_points: Annotated[int, Field(ge=8, le=1_000_000)]
     gauge_days: Positive
     ppk_least: Positive
     gauge_most_percent: Positive

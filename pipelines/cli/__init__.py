@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import sys
 from importlib import import_module
 from typing import TYPE_CHECKING, Annotated, Any
@@ -10,12 +11,14 @@ import typer
 from typer.core import TyperCommand, TyperGroup
 
 from inertial.errors import InertialError
-from schemas.errors import UNUSABLE, TumblelineError, WrongUse, did_you_mean
+from schemas.errors import UNEXPECTED, UNUSABLE, TumblelineError, WrongUse, did_you_mean
+from schemas.foreign import shown
 
 if TYPE_CHECKING:
     from typer._click import Command, Context
 
 INTERRUPTED = 130  # as shells tell of Ctrl-C
+NOBODY_READS = 141  # as shells tell of a pipe that was closed
 
 MEASURE = "Measure"
 FIND = "Is the model good enough, and what is missing?"
@@ -90,7 +93,7 @@ class _Commands(TyperGroup):
     def resolve_command(self, ctx: Context, args: list[str]) -> tuple[str | None, Command | None, list[str]]:
         """The command that the arguments begin with; one that is not there is told with close matches."""
         if args and args[0] not in COMMANDS and not args[0].startswith("-"):
-            raise WrongUse(f"no command is called '{args[0]}'; {did_you_mean(args[0], COMMANDS)}")
+            raise WrongUse(f"no command is called '{shown(args[0])}'; {did_you_mean(args[0], COMMANDS)}")
         return super().resolve_command(ctx, args)
 
     def get_command(self, ctx: Context, cmd_name: str) -> Command | None:
@@ -137,7 +140,15 @@ def main() -> None:
     except SystemExit as left:
         if left.code == INTERRUPTED:
             _leave("stopped; a run goes on where it was when its command is given again", INTERRUPTED)
+        if left.code == 1 and isinstance(left.__context__, OSError) and left.__context__.errno == errno.EPIPE:
+            sys.exit(NOBODY_READS)  # 1 would be a verdict
         raise
+    except Exception as problem:  # noqa: BLE001 - a defect: told in one line, kept in a file, never a verdict
+        if isinstance(problem, OSError) and problem.errno == errno.ENAMETOOLONG:
+            _leave(f"'{shown(str(problem.filename))}': no file can have so long a name; give a shorter one", UNUSABLE)
+        from pipelines.cli.unexpected import told
+
+        _leave(told(problem), UNEXPECTED)
 
 
 def _leave(message: str, status: int) -> None:

@@ -9,11 +9,17 @@ import typer
 
 from pipelines.cli.options import ArchiveOption, JsonOption, console, error_console, print_json
 from schemas.errors import DONE, PART_FAILED, WrongUse, did_you_mean
+from schemas.foreign import shown
 
 if TYPE_CHECKING:
     from pipelines.importers.mapping import Mapping
 
 METHODS = ("norm", "faces", "temperature")
+VERDICTS = {
+    True: ("adequate", "bold green"),
+    False: ("NOT ADEQUATE: this fit does not describe these data", "bold red"),
+    None: ("CANNOT BE JUDGED: see above", "bold yellow"),
+}
 
 
 def command(
@@ -50,7 +56,7 @@ def command(
     """Bring recordings of others into the archive: a raw record and its dwells in the exchange format.
 
     Columns are named (or numbered from 1 where a text file has no header). Nothing is guessed: what is not understood is
-    refused. Exit status 1: the fit asked for is not adequate for these data.
+    refused. Exit status 1: the fit asked for is not adequate for these data, or they cannot tell.
     """
     from pipelines.importers import mapping as mapped
 
@@ -68,18 +74,19 @@ def command(
         "signs": [part.strip() for part in signs.split(",")] if signs else None,
         "local_gravity_m_s2": local_g,
     }
-    wanted = given | {key: value for key, value in options.items() if value}
+    wanted = given | {key: value for key, value in options.items() if value not in ("", None, {}, [])}  # 0 is a value
     _refuse_unmapped(files[0], wanted)
     how = mapped.build(wanted, str(mapping or "import"))
     _refuse_unknown_fit(fit)
     imports = [_import_one(path, how, fit, archive) for path in files]
-    adequate = all(one["adequate"] is not False for one in imports)
+    verdicts = [one["adequate"] for one in imports if one["fit"]]
+    adequate = False if False in verdicts else None if None in verdicts else True
     if as_json:
         print_json(imports[0] if len(imports) == 1 else {"imports": imports, "adequate": adequate})
     else:
         for one in imports:
             _print(one)
-    raise typer.Exit(DONE if adequate else PART_FAILED)
+    raise typer.Exit(DONE if adequate is True else PART_FAILED)
 
 
 def _refuse_unmapped(path: Path, wanted: dict[str, Any]) -> None:
@@ -102,7 +109,9 @@ def _refuse_unmapped(path: Path, wanted: dict[str, Any]) -> None:
 
 def _refuse_unknown_fit(fit: str) -> None:
     if fit and fit not in METHODS:
-        raise WrongUse(f"--fit: found '{fit}', one of {', '.join(METHODS)} is needed; {did_you_mean(fit, METHODS)}")
+        raise WrongUse(
+            f"--fit: found '{shown(fit)}', one of {', '.join(METHODS)} is needed; {did_you_mean(fit, METHODS)}"
+        )
 
 
 def _import_one(path: Path, how: Mapping, fit: str, archive: str | None) -> dict[str, Any]:
@@ -136,6 +145,6 @@ def _print(one: dict[str, Any]) -> None:
     out.print(f"{', '.join(one['units'])}: {rows} in {one['out_unit']}, kept as run {one['run']}", markup=False)
     for remark in [*one["remarks"], *one["lines"]]:
         out.print(f"  {remark}", markup=False, soft_wrap=True)
-    if one["adequate"] is not None:
-        verdict = "adequate" if one["adequate"] else "NOT ADEQUATE: this fit does not describe these data"
-        out.print(f"  {verdict}", style="bold green" if one["adequate"] else "bold red")
+    if one["fit"]:
+        verdict, style = VERDICTS[one["adequate"]]
+        out.print(f"  {verdict}", style=style)

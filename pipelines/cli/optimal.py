@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, get_args
 
 from pipelines.cli.options import console, error_console, print_table, short
+from schemas.bounds import COLDEST_C, HOTTEST_C
 from schemas.errors import WrongUse, did_you_mean
 from schemas.units import MICRO
 
@@ -189,6 +190,10 @@ def levels_of(base: Recipe, temperatures: str) -> tuple[float, ...]:
         given = [float(part) for part in temperatures.split(",")] if temperatures else base.temperatures_C
     except ValueError:
         raise WrongUse(f"plan: --temperatures '{temperatures}' is no list of numbers; write -10,25,60") from None
+    outside = [level for level in given if not COLDEST_C <= level <= HOTTEST_C]
+    if outside:
+        found, needed = f"found {outside[0]:g} °C", f"{COLDEST_C:g} to {HOTTEST_C:g} °C is needed"
+        raise WrongUse(f"plan: --temperatures '{temperatures}': {found}, {needed}; correct it")
     return tuple(sorted(set(given)))
 
 

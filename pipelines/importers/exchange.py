@@ -9,11 +9,13 @@ import numpy as np
 import pandas as pd
 
 from pipelines.archive import Archive
-from pipelines.importers import files
+from pipelines.importers import files, values
 from pipelines.tables.dwell_columns import ANGLES, DEVIATIONS, FORCE, KNOWN, REQUIRED
 from schemas import tables
 from schemas.errors import DataRejected, WrongUse, did_you_mean
-from schemas.serials import refuse_unprintable
+from schemas.foreign import is_file as is_there
+from schemas.foreign import shown
+from schemas.serials import refuse_unusable_serials
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -22,6 +24,7 @@ if TYPE_CHECKING:
 
 
 _TEXTS = ("kind", "pose", "out_unit", "status")
+_CORRECT = "correct it in the file"
 _LARGEST_FORCE = 1e3
 _METRES = (9.7, 9.9)
 """A reference of this size is gravity in m/s², not 9.8 g in a centrifuge."""
@@ -44,7 +47,7 @@ def read_dwells(source: str | Path, *, archive: str | Path | None = None) -> pd.
     """
     if is_file(source):
         frame, _ = files.read(Path(source))
-        return checked(frame, where=Path(source).name)
+        return checked(frame, where=Path(source).name, foreign=True)
     return checked(_from_run(source, archive, "dwells"), where=f"run {source}")
 
 
@@ -58,17 +61,20 @@ def read_history(source: str | Path, *, archive: str | Path | None = None) -> pd
     """
     if is_file(source):
         frame, _ = files.read(Path(source))
-        where = Path(source).name
-    else:
-        frame, where = _from_run(source, archive, "history"), f"run {source}"
-    return _checked_history(frame, where)
+        return _checked_history(frame, Path(source).name, foreign=True)
+    return _checked_history(_from_run(source, archive, "history"), f"run {source}", foreign=False)
 
 
-def checked(frame: pd.DataFrame, *, where: str) -> pd.DataFrame:
-    """The dwells with their types made right, or `DataRejected` with row, value and what is needed."""
+def checked(frame: pd.DataFrame, *, where: str, foreign: bool = False) -> pd.DataFrame:
+    """The dwells with their types made right, or `DataRejected` with row, value and what is needed.
+
+    Parameters
+    ----------
+    foreign : whether they come from elsewhere; an archive keeps the serial numbers that older versions let in.
+    """
     _require(frame, REQUIRED, where)
     frame = frame.copy()
-    frame["unit"] = _texts(frame, "unit", where)
+    frame["unit"] = _units(frame, where, foreign=foreign)
     for column in frame.columns:
         if column == "unit" or column in _TEXTS:
             continue
@@ -87,7 +93,7 @@ def is_file(source: str | Path) -> bool:
     """Whether dwells or a history are meant as a file, not as a run of the archive."""
     path = Path(source)
     looks_like_one = isinstance(source, Path) or "/" in str(source) or path.suffix != ""
-    return path.is_file() or (looks_like_one and not _is_run_like(source))
+    return is_there(path) or (looks_like_one and not _is_run_like(source))
 
 
 def _is_run_like(source: str | Path) -> bool:
@@ -98,8 +104,8 @@ def _from_run(source: str | Path, archive: str | Path | None, table: str) -> pd.
     store = Archive(archive)
     if not store.runs():
         raise WrongUse(
-            f"'{source}': neither a file nor a run (the archive {store.root} is empty); name a file of dwells, or give "
-            "the archive with --archive"
+            f"'{shown(str(source))}': neither a file nor a run (the archive {store.root} is empty); name a file of dwells, "
+            "or give the archive with --archive"
         )
     return store.table(str(source), table)
 
@@ -113,41 +119,40 @@ def _require(frame: pd.DataFrame, names: Iterable[str], where: str) -> None:
         )
 
 
-def _texts(frame: pd.DataFrame, column: str, where: str) -> list[str]:
-    names = ["" if pd.isna(value) else _name(value) for value in frame[column].tolist()]
+def _units(frame: pd.DataFrame, where: str, *, foreign: bool) -> list[str]:
+    names = ["" if pd.isna(value) else values.text(value) for value in frame["unit"].tolist()]
     if "" in names:
-        raise DataRejected(f"{where}: row {names.index('')}, column {column}: empty, a name is needed; fill it in")
-    refuse_unprintable(dict.fromkeys(names), where)
+        raise DataRejected(f"{where}: row {names.index('')}, column unit: empty, a name is needed; fill it in")
+    if foreign:
+        refuse_unusable_serials(dict.fromkeys(names), f"{where}: column unit", _CORRECT)
     return names
 
 
-def _name(value: object) -> str:
-    """A serial number as text; a column of whole numbers with a gap somewhere comes as floats."""
-    return str(int(value)) if isinstance(value, float) and value.is_integer() else str(value).strip()
-
-
 def _numbers(frame: pd.DataFrame, column: str, where: str) -> NDArray[np.float64]:
-    values = np.asarray(pd.to_numeric(frame[column], errors="coerce"), dtype=np.float64)
-    bad = np.flatnonzero(~np.isfinite(values))
+    if column == "time_s" and values.is_moment(frame[column]):
+        return values.seconds(frame[column], where)
+    numbers = values.as_numbers(frame[column], where, flags=column not in KNOWN)
+    bad = np.flatnonzero(~np.isfinite(numbers))
     needed = (*REQUIRED, *FORCE, *ANGLES)
     if bad.size and not (column not in needed and bool(np.all(pd.isna(frame[column])))):
         row = int(bad[0])
+        place = f"row {row} (unit {frame['unit'].iloc[row]}), column {shown(column)}"
         raise DataRejected(
-            f"{where}: row {row} (unit {frame['unit'].iloc[row]}), column {column}: found {frame[column].iloc[row]}, a "
-            f"finite number is needed ({bad.size} such rows); measure again, or leave the row or the column out"
+            f"{where}: {place}: found {shown(frame[column].iloc[row])}, a finite number is needed ({bad.size} such rows); "
+            "measure again, or leave the row or the column out"
         )
-    return values
+    return numbers
 
 
 def _whole(frame: pd.DataFrame, column: str, where: str) -> NDArray[np.int64]:
-    values = np.asarray(frame[column], dtype=np.float64)
-    bad = np.flatnonzero((values != np.rint(values)) | (values < 0))
+    numbers = np.asarray(frame[column], dtype=np.float64)
+    bad = np.flatnonzero((numbers != np.rint(numbers)) | (numbers < 0) | (numbers > values.BOUNDS[column][1]))
     if bad.size:
         row = int(bad[0])
         raise DataRejected(
-            f"{where}: row {row}, column {column}: found {values[row]}, a whole number from 0 on is needed; correct it"
+            f"{where}: row {row}, column {column}: found {numbers[row]}, a whole number from 0 on is needed; correct it"
         )
-    return values.astype(np.int64)
+    return numbers.astype(np.int64)
 
 
 def _all_or_none(frame: pd.DataFrame, names: tuple[str, ...], where: str) -> None:
@@ -160,6 +165,7 @@ def _all_or_none(frame: pd.DataFrame, names: tuple[str, ...], where: str) -> Non
 
 
 def _plausible(frame: pd.DataFrame, where: str) -> None:
+    _inside(frame.drop(columns="n", errors="ignore"), where)  # which has words of its own
     if FORCE[0] in frame.columns:
         size = float(np.median(np.linalg.norm(frame[list(FORCE)].to_numpy(dtype=np.float64), axis=1)))
         if not 0.0 < size < _LARGEST_FORCE or _METRES[0] < size < _METRES[1]:
@@ -167,30 +173,32 @@ def _plausible(frame: pd.DataFrame, where: str) -> None:
                 f"{where}: the reference force has a norm of {size:.4g}, about 1 is needed; give force_x, "
                 "force_y, force_z in g, not m/s² or counts"
             )
-    for column in DEVIATIONS:
-        values = np.asarray(frame[column], dtype=np.float64) if column in frame.columns else np.zeros(1)
-        row = int(values.argmin())
-        if values[row] < 0.0:
-            raise DataRejected(
-                f"{where}: row {row}, column {column}: found {values[row]}, 0 or more is needed; correct it"
-            )
     _countable(frame, where)
+
+
+def _inside(frame: pd.DataFrame, where: str) -> None:
+    """Refuse numbers where none can lie, in any column."""
+    for column in frame.columns:
+        if pd.api.types.is_numeric_dtype(frame[column]):
+            values.refuse_outside(np.asarray(frame[column], dtype=np.float64), str(column), where, first_row=0)
 
 
 def _countable(frame: pd.DataFrame, where: str) -> None:
     """Refuse means of no samples, outputs in a unit that nobody knows, and dwells that were all measured at one instant."""
     if "n" in frame.columns:
-        values = np.asarray(frame["n"], dtype=np.float64)
-        row = int(np.argmax(values < 1.0))
-        if values[row] < 1.0:
+        count = np.asarray(frame["n"], dtype=np.float64)
+        row = int(np.argmax((count < 1.0) | (count > values.BOUNDS["n"][1])))
+        if count[row] < 1.0 or count[row] > values.BOUNDS["n"][1]:
             raise DataRejected(
-                f"{where}: row {row}, column n: found {values[row]:g}, a mean of 1 or more samples is needed; correct it"
+                f"{where}: row {row}, column n: found {count[row]:g}, a mean of 1 or more samples is needed; correct it"
             )
     if "out_unit" in frame.columns:
         for name in sorted({str(value) for value in frame["out_unit"].dropna()}):
             if name not in tables.OUTPUT_UNITS:
                 known = ", ".join(tables.OUTPUT_UNITS)
-                raise DataRejected(f"{where}: column out_unit: found '{name}', one of {known} is needed; correct it")
+                raise DataRejected(
+                    f"{where}: column out_unit: found '{shown(name)}', one of {known} is needed; correct it"
+                )
     for unit, rows in frame.groupby("unit", sort=False):
         if len(rows) > 1 and float(np.ptp(rows["time_s"])) == 0.0:
             raise DataRejected(
@@ -199,7 +207,7 @@ def _countable(frame: pd.DataFrame, where: str) -> None:
             )
 
 
-def _checked_history(frame: pd.DataFrame, where: str) -> pd.DataFrame:
+def _checked_history(frame: pd.DataFrame, where: str, *, foreign: bool) -> pd.DataFrame:
     _require(frame, ("time_s",), where)
     heats = [name for name in ("unit_C", "chamber_C") if name in frame.columns]
     if not heats:
@@ -207,10 +215,11 @@ def _checked_history(frame: pd.DataFrame, where: str) -> pd.DataFrame:
         raise DataRejected(f"{where}: neither unit_C nor chamber_C, a temperature is needed; {hint}")
     frame = frame.copy()
     if "unit" in frame.columns:
-        frame["unit"] = _texts(frame, "unit", where)
+        frame["unit"] = _units(frame, where, foreign=foreign)
     named = frame if "unit" in frame.columns else frame.assign(unit="history")
     for column in ("time_s", *heats):
         frame[column] = _numbers(named, column, where)
+    _inside(frame, where)
     order = ["unit", "time_s"] if "unit" in frame.columns else ["time_s"]
     frame = frame.sort_values(order, kind="stable").reset_index(drop=True)
     twice = frame.duplicated(order)

@@ -19,6 +19,8 @@ if TYPE_CHECKING:
     from pipelines.importers.mapping import Mapping
     from pipelines.importers.record import Imported
 
+GROSS = 0.05
+"""Part of gravity that no tilt of a face by hand leaves: cos 18° is 0.95."""
 UNLIKELY = 0.01
 """Probability of a lack of fit below which six faces are not adequate."""
 
@@ -29,10 +31,11 @@ def six_faces(data: Imported, mapping: Mapping) -> FitAnswer:
     gravity = gravity_of(mapping)
     up, down, error = _by_face(dwells, mapping)
     published, found = ferraris(up, down, gravity), faces(up, down, gravity, error)
-    adequate = not bool(np.any(found.p_value < UNLIKELY))
     per_g = np.linalg.norm(found.response, axis=1)
+    adequate, why = _verdict(found, per_g * gravity)
     document = {
         "adequate": adequate,
+        "reason": why or None,
         "error": {
             "rms_ug": (MICRO * found.rms / per_g).tolist(),
             "floor_ug": (MICRO * found.pure_error / per_g).tolist(),
@@ -52,7 +55,32 @@ def six_faces(data: Imported, mapping: Mapping) -> FitAnswer:
         },
     }
     lines = tuple(_face_line(k, found, float(published.bias[k]), data.out_unit) for k in range(3))
+    lines = (*lines, why) if why else lines
     return FitAnswer("faces", adequate, document, lines, _face_coefficients(str(dwells["unit"].iloc[0]), found, data))
+
+
+def _verdict(found: Faces, size: NDArray[np.float64]) -> tuple[bool | None, str]:
+    """Whether six faces are described, and why that cannot be told or needs no probability; nan is no probability.
+
+    Parameters
+    ----------
+    size : (3,), response of each output to gravity, output unit.
+    """
+    share = found.rms / size
+    if not bool(np.all(share <= GROSS)):
+        worst = float(np.max(share)) if np.isfinite(share).all() else float("nan")
+        return (
+            False,
+            f"the faces disagree by {100.0 * worst:.3g} % of gravity, whatever the noise; check the labels of the faces",
+        )
+    if bool(np.all(found.p_value >= UNLIKELY)):
+        return True, ""
+    if bool(np.any(found.p_value < UNLIKELY)):
+        return False, ""
+    return (
+        None,
+        "cannot be judged: the noise of the means is unknown; map n, sd_x, sd_y and sd_z, or import the samples",
+    )
 
 
 def _by_face(

@@ -2,29 +2,29 @@
 
 from __future__ import annotations
 
-import gzip
 import hashlib
 import io
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import pandas as pd
-import pyarrow as pa
-import pyarrow.parquet as pq
-from scipy.io import loadmat
 
+from pipelines.importers import matlab, parquet
+from pipelines.importers.unpacking import gunzipped
 from schemas.errors import DataRejected, WrongUse
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
+from schemas.foreign import foreign, shown
 
 _PARQUET = b"PAR1"
 _HDF5 = b"\x89HDF"
 _GZIP = b"\x1f\x8b"
 _COMMENTS = ("#", "%")
 _MORE = "\0more"
+_ZIP = b"PK\x03\x04"
+LONGEST_NAME = 200
+"""Characters of the name of a column."""
+MOST_COLUMNS = 10_000
 
 
 @dataclass(frozen=True)
@@ -48,11 +48,15 @@ def read(path: Path) -> tuple[pd.DataFrame, SourceFile]:
     else must be text with one row per line, divided by tabs, commas, semicolons or blanks.
     """
     packed = _bytes(path)
-    data = _unpacked(path, packed)
+    data = gunzipped(packed, path.name) if packed.startswith(_GZIP) else packed
     if data.startswith(_PARQUET):
-        form, table = "parquet", _parquet(path, data)
+        form, table = "parquet", parquet.table_of(path.name, data)
     elif data.startswith(b"MATLAB 5.0"):
-        form, table = "matlab", _matlab(path, data)
+        form, table = "matlab", matlab.table_of(path.name, data)
+    elif data.startswith(_ZIP):
+        raise DataRejected(
+            f"{path.name}: a zip archive (also .xlsx, .npz), which is not read; unpack it, or export the table as CSV"
+        )
     elif data.startswith(_HDF5) or b"MATLAB 7.3" in data[:128]:
         raise DataRejected(
             f"{path.name}: a MATLAB 7.3 (HDF5) file, which is not read; save it again with save(…, '-v7')"
@@ -61,69 +65,31 @@ def read(path: Path) -> tuple[pd.DataFrame, SourceFile]:
         form, table = "text", _text(path, data)
     if table.empty:
         raise DataRejected(f"{path.name}: no rows of data were found, at least one is needed; check the file")
+    _refuse_odd_names(table, path.name)
     return table, SourceFile(str(path), hashlib.sha256(packed).hexdigest(), len(packed), form)
 
 
 def _bytes(path: Path) -> bytes:
-    if path.is_dir():
-        raise WrongUse(f"{path}: a folder, a file is needed; name the file")
     try:
         return path.read_bytes()
-    except OSError as problem:
-        raise WrongUse(f"{path}: cannot be read ({problem.strerror}); check the name") from None
+    except IsADirectoryError:
+        message = f"{path}: a folder, a file is needed; name the file"
+    except (OSError, ValueError) as problem:  # a name with a zero byte is a ValueError
+        reason = problem.strerror if isinstance(problem, OSError) else str(problem)
+        message = f"{shown(str(path))}: cannot be read ({reason}); check the name"
+    raise WrongUse(message)
 
 
-def _unpacked(path: Path, data: bytes) -> bytes:
-    if not data.startswith(_GZIP):
-        return data
-    try:
-        return gzip.decompress(data)
-    except (OSError, EOFError) as problem:
+def _refuse_odd_names(table: pd.DataFrame, where: str) -> None:
+    """Refuse names of columns that no list, page or message can show."""
+    if len(table.columns) > MOST_COLUMNS:
         raise DataRejected(
-            f"{path.name}: a gzip file of {len(data)} bytes that does not unpack ({problem}); copy it again"
-        ) from None
-
-
-def _parquet(path: Path, data: bytes) -> pd.DataFrame:
-    try:
-        return pq.read_table(pa.BufferReader(data)).to_pandas()
-    except (pa.ArrowInvalid, OSError) as problem:
-        reason = str(problem).splitlines()[0]
-        raise DataRejected(
-            f"{path.name}: {len(data)} bytes that begin as Parquet but are not a whole file ({reason}); copy it again"
-        ) from None
-
-
-def _matlab(path: Path, data: bytes) -> pd.DataFrame:
-    """Numeric variables as columns: a vector under its name, a matrix under name_1, name_2, …, structures with dots."""
-    try:
-        content = loadmat(io.BytesIO(data), squeeze_me=True, struct_as_record=False)
-    except (ValueError, TypeError, NotImplementedError, OSError) as problem:
-        raise DataRejected(
-            f"{path.name}: a MATLAB file that cannot be read ({problem}); save it again with save(…, '-v7')"
-        ) from None
-    columns = {
-        name: column for key, value in content.items() if not key.startswith("__") for name, column in _flat(key, value)
-    }
-    lengths = {len(column) for column in columns.values()}
-    if len(lengths) > 1:
-        longest = max(lengths)
-        columns = {name: column for name, column in columns.items() if len(column) == longest}
-    return pd.DataFrame(columns)
-
-
-def _flat(name: str, value: Any) -> Iterator[tuple[str, np.ndarray]]:
-    if hasattr(value, "_fieldnames"):
-        for field in value._fieldnames:  # noqa: SLF001 - the only way this library names the fields of a structure
-            yield from _flat(f"{name}.{field}", getattr(value, field))
-        return
-    array = np.asarray(value)
-    if array.ndim == 1 and array.dtype.kind in "fiubU":
-        yield name, array
-    elif array.ndim == 2 and array.dtype.kind in "fiub":
-        tall = array if array.shape[0] >= array.shape[1] else array.T
-        for k in range(tall.shape[1]):
-            yield f"{name}_{k + 1}", tall[:, k]
+            f"{where}: {len(table.columns)} columns, at most {MOST_COLUMNS} are read; one row per sample is needed"
+        )
+    for name in table.columns.astype(str):
+        if len(name) > LONGEST_NAME or not name.isprintable():
+            needed = f"at most {LONGEST_NAME} printable characters are needed"
+            raise DataRejected(f"{where}: a column is called {shown(name)!r}, {needed}; rename it")
 
 
 def _text(path: Path, data: bytes) -> pd.DataFrame:
@@ -141,10 +107,13 @@ def _text(path: Path, data: bytes) -> pd.DataFrame:
     names = [
         name.strip().strip('"') for name in (lines[first].split() if divider == r"\s+" else lines[first].split(divider))
     ]
+    if len(names) > MOST_COLUMNS:
+        found = f"{len(names)} columns in line {first + 1}"
+        raise DataRejected(f"{path.name}: {found}, at most {MOST_COLUMNS} are read; one row per sample is needed")
     header = not all(_is_number(name) for name in names)
     if header and len(set(names)) < len(names):
         twice = next(name for name in names if names.count(name) > 1)
-        raise DataRejected(f"{path.name}: column '{twice}' is there twice, names must differ; rename one")
+        raise DataRejected(f"{path.name}: column '{shown(twice)}' is there twice, names must differ; rename one")
     labels = names if header else [str(k + 1) for k in range(len(names))]
     body = "\n".join(line for line in lines[first + int(header) :] if not line.lstrip().startswith(_COMMENTS))
     return _parse(path, body, divider, labels, first + 1 + int(header))
@@ -153,13 +122,17 @@ def _text(path: Path, data: bytes) -> pd.DataFrame:
 def _parse(path: Path, body: str, divider: str, labels: list[str], first_line: int) -> pd.DataFrame:
     if not body.strip():
         return pd.DataFrame(columns=labels)
-    try:
+    where = f"{path.name}: rows from line {first_line} on do not have the {len(labels)} columns of the first"
+    with foreign(where, "repair or remove the broken rows"):
         table = pd.read_csv(
-            io.StringIO(body), sep=divider, header=None, names=[*labels, _MORE], index_col=False, skipinitialspace=True
+            io.StringIO(body),
+            sep=divider,
+            header=None,
+            names=[*labels, _MORE],
+            index_col=False,
+            skipinitialspace=True,
+            low_memory=False,
         )
-    except (pd.errors.ParserError, ValueError) as problem:
-        reason = str(problem).splitlines()[0]
-        raise DataRejected(_ragged(path, labels, first_line, reason)) from None
     more = np.flatnonzero(table.pop(_MORE).notna())
     if more.size:
         raise DataRejected(_ragged(path, labels, first_line, f"row {int(more[0])} has more"))

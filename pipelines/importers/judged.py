@@ -20,7 +20,8 @@ class FitAnswer:
     """A fit's answer: a document for JSON, lines for people, and coefficients for the archive."""
 
     method: str
-    adequate: bool
+    adequate: bool | None
+    """None where these data cannot tell; the lines say why."""
     document: dict[str, Any]
     lines: tuple[str, ...]
     coefficients: list[dict[str, Any]] = field(default_factory=list[dict[str, Any]])

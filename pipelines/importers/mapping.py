@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
-import tomllib
-from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator
 
 from inertial.quantities import RECORDED
+from schemas.bounds import FASTEST_HZ, LONGEST_WAIT_S
 from schemas.errors import RecipeInvalid, WrongUse, close_matches, did_you_mean
+from schemas.foreign import shown
+from schemas.recipe import parse_toml, read_text
 from schemas.units import STANDARD_GRAVITY_M_S2
+
+if TYPE_CHECKING:
+    from pathlib import Path
 
 NEEDED = ("x", "y", "z")
 MEANINGS: dict[str, str] = {
@@ -26,6 +30,14 @@ MEANINGS: dict[str, str] = {
 }
 """Further names of a mapping and the columns that they become."""
 KNOWN = ("time", *NEEDED, "unit", "dwell", *MEANINGS)
+RESERVED = frozenset({
+    *("slot", "record", "kind", "pose", "soak", "time_s", "out_unit", "status", "rate_hz"),
+    *("out_x", "out_y", "out_z", "since_move_s", "since_power_s", "power_off_s"),
+    *("outer_command_deg", "inner_command_deg", *MEANINGS.values()),
+})  # fmt: skip
+"""Columns that the tables of an import have with a meaning of their own: no covariate may be called so."""
+SHORTEST_BLOCK_S = 1e-3
+LONGEST_NAME = 200
 
 OUTPUT_UNITS: dict[str, tuple[str, float]] = {
     "g": ("g", 1.0),
@@ -77,7 +89,7 @@ class Mapping(BaseModel):
     unit: str = ""
     """Serial number, where the file has no column for it."""
     rows: Literal["samples", "dwells"] = "samples"
-    rate_hz: Annotated[float, Field(gt=0.0)] | None = None
+    rate_hz: Annotated[float, Field(gt=0.0, le=FASTEST_HZ)] | None = None
     axes: tuple[Literal["x", "y", "z"], Literal["x", "y", "z"], Literal["x", "y", "z"]] = ("x", "y", "z")
     """Mapped axes in the order in which they become x, y, z."""
     signs: tuple[Literal["+", "-"], Literal["+", "-"], Literal["+", "-"]] = ("+", "+", "+")
@@ -86,7 +98,7 @@ class Mapping(BaseModel):
     """Label of a dwell → face up, as +x … -z; with any given, dwells with other labels are left out."""
     face: Literal["", "+x", "+y", "+z", "-x", "-y", "-z"] = ""
     """The face that is up all the time, for a record in one pose."""
-    block_s: Annotated[float, Field(gt=0.0)] | None = None
+    block_s: Annotated[float, Field(ge=SHORTEST_BLOCK_S, le=LONGEST_WAIT_S)] | None = None
     """Dwells of this length instead of found ones, for a record in one pose."""
 
     @field_validator("columns")
@@ -96,6 +108,14 @@ class Mapping(BaseModel):
         if missing:
             raise ValueError(f"{', '.join(missing)} not mapped; x, y and z are needed")
         for name in value:
+            if name in RESERVED and name not in KNOWN:
+                said = next((said for said, column in MEANINGS.items() if column == name), "")
+                hint = f"map it as '{said}'" if said else "choose another name for the covariate"
+                raise ValueError(f"'{shown(name)}' is the name of a column that an import writes itself; {hint}")
+            if not (name.isprintable() and 0 < len(name) <= LONGEST_NAME):
+                raise ValueError(
+                    f"'{shown(name)}': a name of 1 to {LONGEST_NAME} printable characters is needed; choose another"
+                )
             close = close_matches(name, KNOWN) if name not in KNOWN else ()
             if close and len(name) > 1:
                 raise ValueError(f"'{name}' is not known, but close to one that is; did you mean {' or '.join(close)}?")
@@ -113,7 +133,7 @@ class Mapping(BaseModel):
     def _faces(cls, value: dict[str, str]) -> dict[str, str]:
         for label, face in value.items():
             if face not in FACES:
-                raise ValueError(f"'{label}': found '{face}', one of {', '.join(FACES)} is needed")
+                raise ValueError(f"'{label}': found '{shown(face)}', one of {', '.join(FACES)} is needed")
         return value
 
     @property
@@ -129,7 +149,9 @@ def build(content: dict[str, Any], where: str) -> Mapping:
     except ValidationError as problem:
         first = problem.errors()[0]
         key = ".".join(str(part) for part in first["loc"])
-        words = first["msg"].removeprefix("Value error, ")
+        words = shown(first["msg"].removeprefix("Value error, "), 400)
+        if not first["msg"].startswith("Value error, ") and not isinstance(first["input"], dict | list):
+            words = f"found {shown(first['input'])}: {words[:1].lower()}{words[1:]}; correct it"
         close: tuple[str, ...] = ()
         if first["type"] == "extra_forbidden":
             known = Units.model_fields if first["loc"][0] == "units" else Mapping.model_fields
@@ -137,17 +159,12 @@ def build(content: dict[str, Any], where: str) -> Mapping:
             words = f"this key is not known; {did_you_mean(str(first['loc'][-1]), known)}"
         elif first["type"] == "missing":
             words = "it is needed; add it"
-        raise RecipeInvalid(f"{where}: {key}: {words}", key=key, close=close) from None
+        raise RecipeInvalid(f"{where}: {shown(key)}: {words}", key=key, close=close) from None
 
 
 def from_file(path: Path) -> dict[str, Any]:
     """The content of a mapping file."""
-    try:
-        return tomllib.loads(path.read_text(encoding="utf-8"))
-    except OSError as problem:
-        raise WrongUse(f"{path}: cannot be read ({problem.strerror}); check the name of the mapping file") from None
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as problem:
-        raise RecipeInvalid(f"{path}: not TOML: {problem}; correct that place") from None
+    return parse_toml(read_text(path, "mapping"), f"mapping {path.name}")
 
 
 def pairs(text: str, option: str) -> dict[str, str]:
@@ -156,7 +173,7 @@ def pairs(text: str, option: str) -> dict[str, str]:
     for part in filter(None, (piece.strip() for piece in text.split(","))):
         name, equals, value = (piece.strip() for piece in part.partition("="))
         if not (name and equals and value):
-            raise WrongUse(f"{option}: found '{part}', name=value is needed, divided by commas; correct it")
+            raise WrongUse(f"{option}: found '{shown(part)}', name=value is needed, divided by commas; correct it")
         if name in found:
             raise WrongUse(f"{option}: '{name}' is there twice, once is needed; remove one")
         found[name] = value
@@ -165,5 +182,5 @@ def pairs(text: str, option: str) -> dict[str, str]:
 
 def _one_of(value: str, known: Any, what: str) -> str:
     if value not in known:
-        raise ValueError(f"found '{value}', a known {what} is needed: {', '.join(known)}")
+        raise ValueError(f"found '{shown(value)}', a known {what} is needed: {', '.join(known)}")
     return value

@@ -3,19 +3,22 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pandas as pd
 
 from inertial import static_intervals
-from pipelines.importers import exchange
+from pipelines.importers import exchange, values
 from pipelines.importers.mapping import FACES, MEANINGS, OUTPUT_UNITS, TIME_UNITS, Mapping
 from schemas.errors import DataRejected, WrongUse, did_you_mean
-from schemas.serials import refuse_unprintable
+from schemas.foreign import shown
+from schemas.serials import refuse_unusable_serials
 from schemas.units import AXES, STANDARD_GRAVITY_M_S2
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from numpy.typing import NDArray
 
 _LIKELY = (0.5, 2.0)
@@ -50,11 +53,11 @@ def imported(table: pd.DataFrame, mapping: Mapping, where: str) -> Imported:
         A column is not there, a value is no finite number, time runs back, the norm contradicts the unit.
     """
     columns = _columns(table, mapping, where)
-    output = _output(columns, mapping)
+    output = _output(columns, mapping, where)
     out_unit = OUTPUT_UNITS[mapping.units.output][0]
     _refuse_other_unit(output, out_unit, where)
     serials = _serials(columns, mapping, where)
-    extras = _extras(columns, mapping)
+    extras = _extras(columns, mapping, where)
     if mapping.rows == "dwells":
         return _as_dwells(columns, output, serials, extras, mapping, where)
     time, remarks = _time(columns, mapping, where)
@@ -81,29 +84,30 @@ def _columns(table: pd.DataFrame, mapping: Mapping, where: str) -> dict[str, pd.
     for meaning, column in mapping.columns.items():
         if column not in names:
             raise DataRejected(
-                f"{where}: column '{column}' (for {meaning}) is not there; {did_you_mean(column, names)}"
+                f"{where}: column '{shown(column)}' (for {meaning}) is not there; {did_you_mean(column, names)}"
             )
     return {meaning: pd.Series(named[column], name=column) for meaning, column in mapping.columns.items()}
 
 
-def _finite(values: pd.Series, where: str, *, first_row: int = 1) -> NDArray[np.float64]:
-    numbers = np.asarray(pd.to_numeric(values, errors="coerce"), dtype=np.float64)
+def _finite(column: pd.Series, where: str, *, flags: bool = False) -> NDArray[np.float64]:
+    numbers = values.as_numbers(column, where, flags=flags)
     bad = np.flatnonzero(~np.isfinite(numbers))
     if bad.size:
         row = int(bad[0])
         raise DataRejected(
-            f"{where}: row {row + first_row}, column '{values.name}': found {values.iloc[row]}, a finite number is needed "
-            f"({bad.size} such rows); repair the file or leave those rows out"
+            f"{where}: row {row + 1}, column '{shown(str(column.name))}': found {shown(str(column.iloc[row]))}, a finite number "
+            f"is needed ({bad.size} such rows); repair the file or leave those rows out"
         )
+    values.refuse_outside(numbers, "", where, label=str(column.name))
     return numbers
 
 
-def _output(columns: dict[str, pd.Series], mapping: Mapping) -> NDArray[np.float64]:
+def _output(columns: dict[str, pd.Series], mapping: Mapping, where: str) -> NDArray[np.float64]:
     """Output (n, 3) after axes, signs and unit."""
     factor = OUTPUT_UNITS[mapping.units.output][1]
     signs = [factor if sign == "+" else -factor for sign in mapping.signs]
     return np.column_stack(
-        [_finite(columns[axis], "import") * sign for axis, sign in zip(mapping.axes, signs, strict=True)]
+        [_finite(columns[axis], where) * sign for axis, sign in zip(mapping.axes, signs, strict=True)]
     )
 
 
@@ -131,17 +135,21 @@ def _refuse_other_unit(output: NDArray[np.float64], out_unit: str, where: str) -
 
 def _serials(columns: dict[str, pd.Series], mapping: Mapping, where: str) -> list[str]:
     if "unit" in columns:
-        serials = [str(value) for value in columns["unit"].tolist()]
-        refuse_unprintable(dict.fromkeys(serials), where)
+        serials = ["" if pd.isna(value) else values.text(value) for value in columns["unit"].tolist()]
+        refuse_unusable_serials(
+            dict.fromkeys(serials), f"{where}: column '{columns['unit'].name}'", "correct it in the file"
+        )
         return serials
     if not mapping.unit:
         raise WrongUse(f"{where}: whose record is it? no unit is mapped, a serial number is needed; give --unit SN")
-    refuse_unprintable([mapping.unit], where)
+    refuse_unusable_serials([mapping.unit], where)
     return [mapping.unit] * len(columns["x"])
 
 
-def _time(columns: dict[str, pd.Series], mapping: Mapping, where: str) -> tuple[NDArray[np.float64], tuple[str, ...]]:
-    """Seconds since the first sample."""
+def _clock(columns: dict[str, pd.Series], mapping: Mapping, where: str) -> NDArray[np.float64]:
+    """Seconds from any beginning."""
+    if "time" in columns and values.is_moment(columns["time"]):
+        return values.seconds(columns["time"], where)
     if "time" not in columns or mapping.units.time == "samples":
         if mapping.rate_hz is None:
             raise WrongUse(
@@ -151,30 +159,60 @@ def _time(columns: dict[str, pd.Series], mapping: Mapping, where: str) -> tuple[
         time = count / mapping.rate_hz
     else:
         time = _finite(columns["time"], where) * TIME_UNITS[mapping.units.time]
-    back = np.flatnonzero(np.diff(time) < 0.0)
-    if back.size and "dwell" not in columns:
-        row = int(back[0]) + 1
+    values.refuse_outside(time, "time_s", where)
+    return time
+
+
+def _refuse_backwards(time: NDArray[np.float64], group: Sequence[Any], where: str, *, together: bool) -> None:
+    """Refuse times that run back within a group.
+
+    Parameters
+    ----------
+    group : a label for each row.
+    together : whether rows of a group that others lie between belong together, as those of one unit do.
+    """
+    codes = pd.factorize(np.asarray(group, dtype=object))[0]
+    order = np.argsort(codes, kind="stable") if together else np.arange(len(time))
+    back = np.flatnonzero((np.diff(time[order]) < 0.0) & (np.diff(codes[order]) == 0))
+    if back.size:
+        row, before = int(order[back[0] + 1]), int(order[back[0]])
+        label = f" within {shown(str(group[row]))}" if len(set(codes.tolist())) > 1 else ""
         raise DataRejected(
-            f"{where}: row {row + 1}: time runs back by {time[row - 1] - time[row]:.4g} s, it must not; sort the rows"
+            f"{where}: row {row + 1}: time runs back by {time[before] - time[row]:.4g} s{label}, it must not; sort the rows"
+        )
+
+
+def _time(columns: dict[str, pd.Series], mapping: Mapping, where: str) -> tuple[NDArray[np.float64], tuple[str, ...]]:
+    """Seconds since the first sample of a record."""
+    time = _clock(columns, mapping, where)
+    if "dwell" in columns:  # dwells may have been recorded one by one, each with a clock of its own
+        _refuse_backwards(time, columns["dwell"].astype(str).tolist(), where, together=False)
+        return time - time[0], ()
+    _refuse_backwards(time, [""] * len(time), where, together=False)
+    if len(time) < 2 or time[-1] <= time[0]:
+        found = "1 sample" if len(time) < 2 else f"{len(time)} samples, all at {time[0]:g} s"
+        raise DataRejected(
+            f"{where}: {found}, a record of two at least that takes some time is needed; map another column as time, give "
+            "--rate HZ without one, or say --rows dwells"
         )
     gaps = np.diff(time)
     typical = float(np.median(gaps))
     wide = int(np.sum(gaps > 5.0 * typical)) if typical > 0.0 else 0
-    return time - time[0], (
-        f"{wide} gaps in time, longer than five samples",
-    ) if wide and "dwell" not in columns else ()
+    return time - time[0], (f"{wide} gaps in time, longer than five samples",) if wide else ()
 
 
-def _extras(columns: dict[str, pd.Series], mapping: Mapping) -> dict[str, NDArray[np.float64]]:
+def _extras(columns: dict[str, pd.Series], mapping: Mapping, where: str) -> dict[str, NDArray[np.float64]]:
     """Temperature, other known columns and covariates by the names of the tables."""
     extras: dict[str, NDArray[np.float64]] = {}
-    for meaning, values in columns.items():
+    for meaning, column in columns.items():
         if meaning in ("time", *AXES, "unit", "dwell"):
             continue
-        numbers = _finite(values, "import")
+        name = MEANINGS.get(meaning, meaning)
+        numbers = _finite(column, where, flags=meaning not in MEANINGS)
         if meaning in ("temperature", "chamber"):
             numbers = _celsius(numbers, mapping.units.temperature)
-        extras[MEANINGS.get(meaning, meaning)] = numbers
+        values.refuse_outside(numbers, name, where)
+        extras[name] = numbers
     return extras
 
 
@@ -194,7 +232,7 @@ def _stretches(
         last = np.concatenate([first[1:], [labels.size]])
         return first.tolist(), last.tolist(), [str(labels[k]) for k in first]
     if mapping.block_s is not None:
-        number = np.floor(time / mapping.block_s).astype(np.int64)
+        number = np.floor((time - time[0]) / mapping.block_s).astype(np.int64)
         first = np.concatenate([[0], np.flatnonzero(np.diff(number)) + 1])
         last = np.concatenate([first[1:], [time.size]])
         return first.tolist(), last.tolist(), [f"block {k}" for k in range(first.size)]
@@ -261,12 +299,16 @@ def _as_dwells(
 ) -> Imported:
     """A file whose rows are dwells already."""
     count = pd.Series(serials).groupby(serials).cumcount().to_numpy()
-    time = _time(columns, mapping, where)[0] if "time" in columns else count.astype(np.float64)
+    time = count.astype(np.float64)
+    if "time" in columns:
+        time = _clock(columns, mapping, where)
+        _refuse_backwards(time, serials, where, together=True)  # units may follow one another, or alternate
+        time = time - float(time.min())
     frame = pd.DataFrame({"unit": serials, "dwell": count, "time_s": time})
     frame[["out_x", "out_y", "out_z"]] = output
     labels = columns["dwell"].astype(str).tolist() if "dwell" in columns else [f"dwell {k}" for k in count]
     frame = _finished(frame.assign(record=count, pose=labels, **extras), mapping)
-    return Imported(None, exchange.checked(frame, where=where), OUTPUT_UNITS[mapping.units.output][0], ())
+    return Imported(None, exchange.checked(frame, where=where, foreign=True), OUTPUT_UNITS[mapping.units.output][0], ())
 
 
 def _finished(frame: pd.DataFrame, mapping: Mapping) -> pd.DataFrame:

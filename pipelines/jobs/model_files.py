@@ -13,6 +13,7 @@ from inertial.effects.formula import Formula
 from inertial.errors import InertialError, UnknownEffect
 from pipelines.archive import files
 from schemas.errors import RecipeInvalid, WrongUse, did_you_mean
+from schemas.foreign import foreign, shown
 from schemas.model import load_model, parse_model
 from schemas.recipe import FormulaSpec, read_text
 
@@ -93,7 +94,7 @@ def refuse_unknown_effects(names: Sequence[str], where: str) -> None:
             effects.get(name)
         except UnknownEffect as problem:
             raise RecipeInvalid(
-                f"{where}: unknown effect '{name}'; {did_you_mean(name, effects.catalogue())}",
+                f"{where}: unknown effect '{shown(name)}'; {did_you_mean(name, effects.catalogue())}",
                 key="effects",
                 close=problem.close,
             ) from None
@@ -167,7 +168,8 @@ def extended(text: str, step: ModelStep, source: str) -> tuple[str, ModelFile]:
             key="model.effects",
         )
     refuse_unknown_effects([step.effect], source)
-    document = tomlkit.parse(text)
+    with foreign(f"{source}: not valid TOML", "correct the file", RecipeInvalid):
+        document = tomlkit.parse(text)
     head = document["model"]
     version = model.model.version + 1
     head["version"] = version  # pyright: ignore[reportIndexIssue]

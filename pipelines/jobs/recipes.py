@@ -17,8 +17,10 @@ from inertial import poses
 from inertial.frames import force_from_angles
 from pipelines.jobs.model_files import read_model, refuse_unknown_effects
 from schemas.errors import RecipeInvalid, WrongUse, close_matches, did_you_mean
+from schemas.foreign import is_file, shown
 from schemas.limits import Limits, parse_limits, unknown_limits
 from schemas.recipe import Lot, Pose, Recipe, RecipeFile, Unit, explain, parse_recipe, read_text
+from schemas.serials import refuse_unusable_serials
 from schemas.units import AXES
 
 if TYPE_CHECKING:
@@ -93,10 +95,10 @@ def load_limits(recipe: Recipe, folder: Path | None = None) -> Limits:
 def read_limits(name: str, folder: Path | None = None) -> Limits:
     """The limits of a file in a folder or anywhere, or the built-in ones of this name."""
     for path in ((folder or Path()) / name, Path(name)):
-        if path.is_file():
+        if is_file(path):
             return parse_limits(read_text(path, "limits"), f"limits {path.name}")
     built_in = files("schemas") / "samples" / f"limits-{name}.toml"
-    if not built_in.is_file():
+    if name not in sample_names("limits-"):
         raise unknown_limits(name, sample_names("limits-"))
     return parse_limits(built_in.read_text(encoding="utf-8"), f"limits {name}")
 
@@ -110,26 +112,17 @@ def lot_of(
         raise WrongUse(
             "lot: no unit is named, at least one is needed; give serial numbers with --units, or in the recipe"
         )
-    bad = [s for s in named if not 0 < len(s) <= LONGEST_SERIAL or not set(s) <= _SERIAL or not s[0].isalnum()]
-    if bad:
-        needed = f"1 to {LONGEST_SERIAL} letters, digits and . _ + - are needed"
-        raise WrongUse(f"lot: serial {bad[0]!r} is not usable, {needed}; correct it")
+    refuse_unusable_serials(named, "lot", "correct it", WrongUse)
     twice = sorted({serial for serial in named if named.count(serial) > 1})
     if twice:
         raise WrongUse(
             f"lot: serial {', '.join(twice)} is there twice, each may be there once; correct the list of units"
         )
     units = [Unit(serial=serial, slot=slot) for serial, slot in zip(named, slots or range(len(named)), strict=True)]
-    return Lot(
-        units=units,
-        device=recipe.device,
-        seed=recipe.seed if seed is None else seed,
-        repeat=repeat,
-    )
-
-
-LONGEST_SERIAL = 64
-_SERIAL = frozenset("ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789._+-")
+    try:
+        return Lot(units=units, device=recipe.device, seed=recipe.seed if seed is None else seed, repeat=repeat)
+    except ValidationError as problem:
+        raise explain(problem, "lot", Lot) from None
 
 
 def sample_names(prefix: str = "") -> list[str]:
@@ -143,13 +136,13 @@ def sample_names(prefix: str = "") -> list[str]:
 def _recipe_text(name: str) -> tuple[str, str, Path]:
     """Content, what to call it in messages, and the folder that names inside it are relative to."""
     path = Path(name)
-    if path.is_file():
+    if is_file(path):
         return read_text(path, "recipe"), f"recipe {path.name}", path.parent
     built_in = files("schemas") / "samples" / f"{name}.toml"
     if name in sample_names() and built_in.is_file():
         return built_in.read_text(encoding="utf-8"), f"recipe {name}", Path()
     raise RecipeInvalid(
-        f"recipe: no file and no built-in recipe is called '{name}'; {did_you_mean(name, sample_names())}",
+        f"recipe: no file and no built-in recipe is called '{shown(name)}'; {did_you_mean(name, sample_names())}",
         close=close_matches(name, sample_names()),
     )
 

@@ -9,7 +9,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from schemas.errors import WrongUse
+from schemas.foreign import foreign, shown
 from schemas.recipe import parse_toml, read_text
+from schemas.serials import refuse_unusable_serials, serial_fault
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -19,6 +21,9 @@ if TYPE_CHECKING:
 
 SCAN = "scan"
 COLUMNS = ["slot", "serial"]
+DIVIDERS = (",", ";", "\t")
+"""Of the cells of a slot map: Excel writes the second where the comma is the decimal sign."""
+LONGEST_SLOT = 4
 
 
 @dataclass(frozen=True)
@@ -51,6 +56,9 @@ def scan(slots: int, read: Callable[[int], str], refuse: Callable[[str], None]) 
     found: list[tuple[int, str]] = []
     for slot in range(slots):
         while serial := read(slot).strip():
+            if fault := serial_fault(serial):
+                refuse(f"slot {slot}: {fault}; scan it again, or clean the label")
+                continue
             twice = [where for where, other in found if other == serial]
             if not twice:
                 found.append((slot, serial))
@@ -80,33 +88,52 @@ def disagreements(station: Station, lot: Lot) -> list[str]:
 
 
 def _csv_rows(content: str, path: Path) -> list[tuple[str, str]]:
-    rows = list(csv.reader(io.StringIO(content)))
+    """Slot and serial number of every line but blank ones; cells are divided as in the first line."""
+    where = f"slot map {path.name}"
+    lines = content.splitlines()
+    first = lines[0] if lines else ""
+    divider = next((one for one in DIVIDERS if one in first), DIVIDERS[0])
+    with foreign(f"{where}: not a table of text", "save it as CSV again", WrongUse):
+        rows = list(csv.reader(io.StringIO(content), delimiter=divider))
     head = [cell.strip().lower() for cell in rows[0]] if rows else []
     if head[:2] != COLUMNS:
-        raise WrongUse(
-            f"slot map {path.name}: begins with '{','.join(head)}', a first line 'slot,serial' is needed; add it"
-        )
-    return [(row[0], row[1]) for row in rows[1:] if len(row) >= 2 and any(cell.strip() for cell in row)]
+        raise WrongUse(f"{where}: begins with '{shown(','.join(head))}', a first line 'slot,serial' is needed; add it")
+    found: list[tuple[str, str]] = []
+    for number, row in enumerate(rows[1:], start=1):
+        if not any(cell.strip() for cell in row):
+            continue
+        if not len(COLUMNS) <= len(row) <= len(head):
+            raise WrongUse(
+                f"{where}: row {number}: {len(row)} cells ({shown(divider.join(row))}), the {len(head)} of the first line are "
+                "needed; correct the row"
+            )
+        found.append((row[0], row[1]))
+    return found
 
 
 def _toml_rows(content: str, path: Path) -> list[tuple[str, str]]:
-    table = parse_toml(content, f"slot map {path.name}").get("slots")
+    where = f"slot map {path.name}"
+    table = parse_toml(content, where).get("slots")
     if not isinstance(table, dict):
-        raise WrongUse(f'slot map {path.name}: no table [slots], one with lines like 0 = "SN1" is needed; add it')
-    return [(str(slot), str(serial)) for slot, serial in table.items()]
+        raise WrongUse(f'{where}: no table [slots], one with lines like 0 = "SN1" is needed; add it')
+    for slot, serial in table.items():
+        if not isinstance(serial, str):
+            found, written = f"slot {shown(slot)}: found {shown(serial)}", f'"{shown(serial)}"'
+            raise WrongUse(f"{where}: {found}, a serial number in quotes is needed; write {written}")
+    return list(table.items())
 
 
 def _checked(rows: Sequence[tuple[str, str]], source: str) -> Seating:
     slots: list[int] = []
     for number, (slot, serial) in enumerate(rows, start=1):
-        if not slot.strip().isdecimal():
+        text = slot.strip()
+        if not (text.isascii() and text.isdecimal() and len(text) <= LONGEST_SLOT):
             raise WrongUse(
-                f"{source}: row {number}: slot '{slot.strip()}', a whole number from 0 on is needed; correct the row"
+                f"{source}: row {number}: slot '{shown(text)}', a whole number from 0 on is needed; correct the row"
             )
         if not serial.strip():
-            raise WrongUse(
-                f"{source}: row {number}: slot {slot.strip()} has no serial number; write it, or leave the row out"
-            )
+            raise WrongUse(f"{source}: row {number}: slot {text} has no serial number; write it, or leave the row out")
+        refuse_unusable_serials([serial.strip()], f"{source}: row {number}: slot {text}", "correct the row", WrongUse)
         if int(slot) in slots:
             raise WrongUse(
                 f"{source}: row {number}: slot {int(slot)} is there twice, it can hold one unit; correct the map"
@@ -114,4 +141,8 @@ def _checked(rows: Sequence[tuple[str, str]], source: str) -> Seating:
         slots.append(int(slot))
     if not slots:
         raise WrongUse(f"{source}: no slot has a unit, at least one is needed; fill it in")
-    return Seating(tuple(serial.strip() for _, serial in rows), tuple(slots))
+    serials = tuple(serial.strip() for _, serial in rows)
+    twice = next((serial for serial in serials if serials.count(serial) > 1), "")
+    if twice:
+        raise WrongUse(f"{source}: serial {twice} is there twice, it can sit in one slot; correct the map")
+    return Seating(serials, tuple(slots))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import warnings
 from typing import TYPE_CHECKING, Any
 
 import matplotlib as mpl
@@ -29,6 +30,7 @@ STYLE: dict[Any, Any] = {
     "svg.fonttype": "none",
     "svg.hashsalt": "tumbleline",
     "font.family": "sans-serif",
+    "text.parse_math": False,  # names of columns and units are shown as they are, dollar signs too
     "axes.titley": 1.0,  # a fixed place: looking for a free one costs as much as drawing the points
 }
 MOST_TICKS = (
@@ -193,6 +195,8 @@ def _slope_guides(place: Axes, allan: pd.DataFrame) -> None:
 def svg(figure: Figure) -> str:
     """A figure as SVG text that stands inside a page."""
     sink = io.StringIO()
-    figure.savefig(sink, format="svg", metadata={"Date": None, "Creator": None})
+    with warnings.catch_warnings():
+        warnings.filterwarnings("ignore", message="Glyph .* missing")  # the browser has fonts of its own
+        figure.savefig(sink, format="svg", metadata={"Date": None, "Creator": None})
     text = sink.getvalue()
     return text[text.index("<svg") :]

@@ -138,7 +138,7 @@ def test_refuses_an_empty_lot(tmp_path: Path) -> None:
 
 
 def test_refuses_an_empty_serial(tmp_path: Path) -> None:
-    with pytest.raises(WrongUse, match="serial '' is not usable"):
+    with pytest.raises(WrongUse, match="serial '' is blank"):
         small_job(tmp_path, units=("A1", ""))
 
 

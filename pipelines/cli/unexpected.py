@@ -1,0 +1,88 @@
+"""An exception that nobody foresaw: one line for whoever sits there, the whole of it in a file for whoever mends it."""
+
+from __future__ import annotations
+
+import os
+import platform
+import re
+import sys
+import tempfile
+import traceback
+from datetime import UTC, datetime
+from pathlib import Path
+
+from schemas.foreign import reason
+
+VARIABLE = "TUMBLELINE_DEBUG"
+PREFIX = "unexpected-"
+KEPT = 20
+_SECRET = re.compile(r"//[^/@\s]+@")
+
+
+def told(problem: Exception) -> str:
+    """One line that says what happened and where its report lies; the report is written."""
+    place = _place(problem)
+    what = f"unexpected {type(problem).__name__} in {place} ({reason(problem)})"
+    report = _written(_report(problem))
+    if os.environ.get(VARIABLE):
+        sys.stderr.write("".join(traceback.format_exception(problem)))
+    if report is None:
+        where = f"no report could be written; {VARIABLE}=1 shows it on the screen"
+    else:
+        where = f"send the report {report}; {VARIABLE}=1 shows it on the screen"
+    return f"{what}: a defect of the program, not of what it was given; {where}"
+
+
+def _place(problem: Exception) -> str:
+    """File and line of our own code that the exception came through last."""
+    root = Path(__file__).resolve().parents[2]
+    frames = traceback.extract_tb(problem.__traceback__)
+    own = [f for f in frames if Path(f.filename).is_relative_to(root) and "site-packages" not in f.filename]
+    last = (own or frames or [None])[-1]
+    if last is None:
+        return "the command line"
+    path = Path(last.filename)
+    return f"{path.relative_to(root) if path.is_relative_to(root) else path.name} line {last.lineno}"
+
+
+def _report(problem: Exception) -> str:
+    """Command, versions and traceback; no values of variables, and no secrets of addresses."""
+    from importlib.metadata import version
+
+    command = " ".join(_SECRET.sub("//…@", word) for word in sys.argv)
+    head = [
+        f"tumbleline {version('tumbleline')}, Python {platform.python_version()}, {platform.platform()}",
+        f"{datetime.now(UTC).isoformat(timespec='seconds')}  in {Path.cwd()}",
+        command,
+        "",
+    ]
+    return "\n".join(head) + "".join(traceback.format_exception(problem))
+
+
+def _written(text: str) -> Path | None:
+    """The report's file: in the folder of states, or else the one of temporary files; None where neither takes it."""
+    from schemas.errors import TumblelineError
+    from stations.safety.folder import state_folder
+
+    now = datetime.now(UTC).strftime("%Y%m%dT%H%M%S")
+    name = f"{PREFIX}{now}-{os.getpid()}.txt"
+    for folder in (state_folder, lambda: Path(tempfile.gettempdir())):
+        try:
+            path = folder() / name
+            handle = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600)
+            with os.fdopen(handle, "w", encoding="utf-8", errors="backslashreplace") as file:
+                file.write(text)
+        except (OSError, RuntimeError, TumblelineError):  # RuntimeError: no home folder
+            continue
+        _forget_old(path.parent)
+        return path
+    return None
+
+
+def _forget_old(folder: Path) -> None:
+    """Keep the newest reports only; their names sort by time."""
+    for old in sorted(folder.glob(f"{PREFIX}*.txt"))[:-KEPT]:
+        try:
+            old.unlink(missing_ok=True)
+        except OSError:
+            return

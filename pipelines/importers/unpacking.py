@@ -1,0 +1,86 @@
+"""How much a packed file may become: 3 MB can unpack to 10 GB, and nobody who brings them knows.
+
+The limit is on what is unpacked, in all and as a multiple of what was brought, and holds for gzip, for the compressed variables
+of MATLAB, and for Parquet, whose dictionaries and runs of equal values unpack as well.
+"""
+
+from __future__ import annotations
+
+import gzip
+import io
+import zlib
+from typing import TYPE_CHECKING
+
+from schemas.errors import DataRejected
+from schemas.foreign import foreign
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+MOST_BYTES = 2**30
+"""Of a file, unpacked."""
+MOST_TIMES = 100
+"""What is unpacked over what is brought; measured records reach 10, with columns that never change 30."""
+FREE_BYTES = 2**26
+"""Up to here no multiple is too large: tables of constants are small."""
+PIECE = 2**20
+
+
+def refuse_larger(size: int, packed: int, where: str) -> None:
+    """Refuse what unpacks to too much.
+
+    Parameters
+    ----------
+    size : bytes unpacked, so far or as the file itself says.
+    packed : bytes of the file.
+    """
+    if size <= min(MOST_BYTES, max(FREE_BYTES, MOST_TIMES * packed)):
+        return
+    raise DataRejected(
+        f"{where}: {packed} bytes unpack to {size} or more, at most {MOST_BYTES} and {MOST_TIMES} times the file are read; "
+        "divide the recording into several files, or unpack and look at it"
+    )
+
+
+def gunzipped(data: bytes, where: str) -> bytes:
+    """What a gzip file holds.
+
+    Raises
+    ------
+    DataRejected
+        It does not unpack, or to too much.
+    """
+    pieces: list[bytes] = []
+    size = 0
+    stream = gzip.GzipFile(fileobj=io.BytesIO(data))
+    while piece := _next(lambda: stream.read(PIECE), f"{where}: a gzip file of {len(data)} bytes that does not unpack"):
+        size += len(piece)
+        refuse_larger(size, len(data), where)
+        pieces.append(piece)
+    return b"".join(pieces)
+
+
+def inflated(data: bytes, room: int, packed: int, where: str) -> bytes:
+    """What a zlib stream holds.
+
+    Parameters
+    ----------
+    room : bytes of the same file that were unpacked before.
+    packed : bytes of the file.
+    """
+    found = f"{where}: a compressed variable that does not unpack"
+    stream, pieces, size = zlib.decompressobj(), list[bytes](), 0
+    while data and not stream.eof:
+        piece = _next(lambda rest=data: stream.decompress(rest, PIECE), found)
+        data = stream.unconsumed_tail
+        size += len(piece)
+        refuse_larger(room + size, packed, where)
+        pieces.append(piece)
+        if not piece and not data:
+            break
+    return b"".join(pieces)
+
+
+def _next(read: Callable[[], bytes], found: str) -> bytes:
+    with foreign(found, "copy it again"):
+        return read()

@@ -1,0 +1,120 @@
+"""Columns of foreign tables as numbers: what is none, is a flag or a date, or lies where nothing measured can lie is refused."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pandas as pd
+
+from schemas.bounds import ABSOLUTE_ZERO_C, LARGEST_TIME_S
+from schemas.errors import DataRejected
+from schemas.foreign import foreign, shown
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+LARGEST = 1e30
+"""Of any number: its square, and sums of such squares, are still numbers."""
+_FORCE_G = 1e4
+_DEGREES = 1e6  # angles may be counted on over many turns
+_HOTTEST_C = 2000.0
+
+NOT_NEGATIVE: tuple[float, float] = (0.0, LARGEST_TIME_S)
+BOUNDS: dict[str, tuple[float, float]] = {
+    "time_s": (-LARGEST_TIME_S, LARGEST_TIME_S),
+    **dict.fromkeys(("duration_s", "since_move_s", "since_power_s", "power_off_s"), NOT_NEGATIVE),
+    **dict.fromkeys(("unit_C", "chamber_C"), (ABSOLUTE_ZERO_C, _HOTTEST_C)),
+    **dict.fromkeys(("force_x", "force_y", "force_z"), (-_FORCE_G, _FORCE_G)),
+    **dict.fromkeys(("outer_deg", "inner_deg", "outer_command_deg", "inner_command_deg"), (-_DEGREES, _DEGREES)),
+    **dict.fromkeys(("sd_x", "sd_y", "sd_z", "vibration_g", "full_scale"), (0.0, LARGEST)),
+    "rate_hz": (1e-9, 1e9),
+    "n": (1.0, 2.0**53),
+    **dict.fromkeys(("dwell", "slot", "soak", "record"), (0.0, 2.0**53)),
+}
+"""Where values of a column with a meaning can lie, in its unit; other columns lie within ± ``LARGEST``."""
+
+_UNITS = {"s": "s", "C": "°C", "g": "g", "deg": "°", "hz": "Hz", "V": "V"}
+
+
+def is_moment(values: pd.Series) -> bool:
+    """Whether a column holds points in time, or spans of it, in a type of its own."""
+    return values.dtype.kind in "mM" or isinstance(values.dtype, pd.DatetimeTZDtype)
+
+
+def seconds(values: pd.Series, where: str) -> NDArray[np.float64]:
+    """Seconds since the first of points in time, or of spans of it, whatever unit the column has them in."""
+    missing = np.flatnonzero(values.isna())
+    if missing.size:
+        raise DataRejected(
+            f"{where}: row {int(missing[0]) + 1}, column '{shown(str(values.name))}': no time, one is needed in every row "
+            f"({missing.size} such rows); repair the file or leave those rows out"
+        )
+    with foreign(
+        f"{where}: column '{shown(str(values.name))}': times that cannot be subtracted", "give the time in seconds"
+    ):
+        steps = (values - values.iloc[0]) / pd.Timedelta(seconds=1)
+    return np.asarray(steps, dtype=np.float64)
+
+
+def as_numbers(values: pd.Series, where: str, *, flags: bool = False) -> NDArray[np.float64]:
+    """The values of a column, nan where one is no number.
+
+    Parameters
+    ----------
+    flags : whether true and false count as 1 and 0.
+    """
+    name = shown(str(values.name))
+    if is_moment(values):
+        raise DataRejected(
+            f"{where}: column '{name}' holds dates or times, numbers are needed; map it as time, or leave it out"
+        )
+    if not flags and _has_flags(values):
+        raise DataRejected(
+            f"{where}: column '{name}' holds true and false, numbers are needed; map another column, or leave it out"
+        )
+    with foreign(f"{where}: column '{name}' does not turn into numbers", "repair the column"):
+        return np.asarray(pd.to_numeric(values, errors="coerce"), dtype=np.float64)
+
+
+def _has_flags(values: pd.Series) -> bool:
+    if pd.api.types.is_bool_dtype(values):
+        return True
+    return values.dtype == object and any(isinstance(value, bool | np.bool_) for value in values)
+
+
+def outside(values: NDArray[np.float64], column: str) -> tuple[int, str]:
+    """The first row whose value lies where none can, and what is needed there; −1 where all are inside. Gaps count as inside."""
+    low, high = BOUNDS.get(column, (-LARGEST, LARGEST))
+    bad = np.flatnonzero((values < low) | (values > high))
+    if not bad.size:
+        return -1, ""
+    unit = _UNITS.get(column.rsplit("_", 1)[-1], "") if column in BOUNDS else ""
+    return int(bad[0]), _range(low, high, f" {unit}" if unit else "")
+
+
+def _range(low: float, high: float, unit: str) -> str:
+    if low == 0.0 and high >= LARGEST_TIME_S:
+        return f"0{unit} or more is"
+    return f"{low:g} to {high:g}{unit} is"
+
+
+def refuse_outside(
+    values: NDArray[np.float64], column: str, where: str, *, label: str = "", first_row: int = 1
+) -> None:
+    """Refuse values where none can lie, with row, value and bounds.
+
+    Parameters
+    ----------
+    column : whose bounds hold; those of any number for one without a meaning.
+    label : what the message calls it; the same by default.
+    """
+    row, needed = outside(values, column)
+    if row >= 0:
+        place = f"row {row + first_row}, column {shown(label or column)}"
+        raise DataRejected(f"{where}: {place}: found {values[row]:g}, {needed} needed; correct it, or its unit")
+
+
+def text(value: Any) -> str:
+    """A name as text; a column of whole numbers with a gap somewhere comes as floats."""
+    return str(int(value)) if isinstance(value, float) and value.is_integer() else str(value).strip()

@@ -1,0 +1,291 @@
+"""Readers of files that people bring, samples of what they read, and mutations of these; a process of its own works through them.
+
+    python foreign_files.py SEED FIRST COUNT
+
+tells a JSON line per mutation that it begins and one for what came of it, so that whoever waits knows what killed or held it up.
+"""
+
+import datetime as dt
+import decimal
+import gzip
+import io
+import json
+import re
+import resource
+import sys
+import tempfile
+import time
+import traceback
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+from foreign_samples import READERS, mat, packed, parquet, raw, samples
+
+from inertial.errors import InertialError
+from schemas.errors import TumblelineError
+
+MOST_BYTES = 2**30
+
+# -- mutations ------------------------------------------------------------------------------------------------------------
+
+WORDS = [
+    b"nan",
+    b"inf",
+    b"-inf",
+    b"1e300",
+    b"-1e300",
+    b"9e302",
+    b"1e-320",
+    b"9" * 5000,
+    b"0x" + b"f" * 6000,
+    b"-1",
+    b"0",
+    b"1e18",
+    b"-400.0",
+    b"true",
+    b"True",
+    b"null",
+    b"..",
+    b" ",
+    b"",
+    b"=cmd|x",
+    "\u0410\u0412\u0421".encode(),
+    b"\x00",
+    b"\xff\xfe",
+    b"\xef\xbb\xbf",
+    b'"',
+    b"'",
+    b"[" * 3000,
+    b"{" * 3000,
+    b"[[" * 2000,
+    b"a." * 3000 + b"b = 1",
+    b"x" * 70000,
+    b"$\\frac{x$",
+    b"\n",
+    b"\r",
+    b",",
+    b";",
+    b"\t",
+    b"\\",
+    b"\xe2\x80\xae",
+    b"2026-01-01T00:00:00",
+    b"99999999999999999999",
+    b"4294967295",
+    b"1,2,3",
+    b"n/a",
+    b"1_000",
+    b"\xd9\xa3",
+]
+NUMBER = re.compile(rb"-?\d+\.?\d*(?:e-?\d+)?")
+
+
+def _word(rng):
+    return WORDS[int(rng.integers(len(WORDS)))]
+
+
+def _place(rng, data):
+    """Anywhere; often near the end, where Parquet has its footer, or the beginning."""
+    n = max(len(data), 1)
+    return (
+        int(rng.integers(n))
+        if rng.random() < 0.6
+        else int(min(rng.geometric(1 / 200), n) - 1 if rng.random() < 0.4 else n - min(rng.geometric(1 / 300), n))
+    )
+
+
+def flip(rng, data):
+    out = bytearray(data)
+    for _ in range(int(rng.integers(1, 9))):
+        if out:
+            out[_place(rng, out)] ^= 1 << int(rng.integers(8))
+    return bytes(out)
+
+
+def other_bytes(rng, data):
+    at, n = _place(rng, data), int(rng.choice([1, 2, 4, 8, 16]))
+    return (
+        data[:at]
+        + (rng.bytes(n) if rng.random() < 0.6 else bytes([int(rng.choice([0, 255, 127, 128]))]) * n)
+        + data[at + n :]
+    )
+
+
+def cut(rng, data):
+    return data[: _place(rng, data)]
+
+
+def without(rng, data):
+    at = _place(rng, data)
+    return data[:at] + data[at + int(rng.integers(1, 200)) :]
+
+
+def twice(rng, data):
+    at, n = _place(rng, data), int(rng.integers(1, 300))
+    return data[: at + n] + data[at : at + n] * int(rng.integers(1, 4)) + data[at + n :]
+
+
+def word_in(rng, data):
+    at = _place(rng, data)
+    return data[:at] + _word(rng) + data[at:]
+
+
+def number_out(rng, data):
+    found = list(NUMBER.finditer(data)) if len(data) < 200_000 else []
+    if not found:
+        return word_in(rng, data)
+    for hit in sorted({int(k) for k in rng.integers(len(found), size=int(rng.choice([1, 1, 1, 3])))}, reverse=True):
+        data = data[: found[hit].start()] + _word(rng) + data[found[hit].end() :]
+    return data
+
+
+def cells_out(rng, data):
+    """A cell, or a whole column of a table; the value behind a key."""
+    lines = data.split(b"\n")
+    if b" = " in data:
+        keys = [k for k, line in enumerate(lines) if b" = " in line]
+        k = int(rng.choice(keys))
+        value = _word(rng) if rng.random() < 0.5 else b'"' + _word(rng) + b'"'
+        lines[k] = lines[k].split(b" = ", 1)[0] + b" = " + (b"[" + value + b"]" if rng.random() < 0.2 else value)
+        return b"\n".join(lines)
+    mark = next((one for one in (b"\t", b";", b",") if one in lines[0]), b",")
+    column, word = int(rng.integers(lines[0].count(mark) + 1)), _word(rng)
+    rows = range(len(lines)) if rng.random() < 0.3 else [int(rng.integers(len(lines)))]
+    for k in rows:
+        cells = lines[k].split(mark)
+        if column < len(cells):
+            cells[column] = word
+            lines[k] = mark.join(cells)
+    return b"\n".join(lines)
+
+
+def lines_moved(rng, data):
+    lines = data.split(b"\n")
+    rng.shuffle(lines)
+    return b"\n".join(lines[: int(rng.integers(1, len(lines) + 1))])
+
+
+def digit(rng, data):
+    """One digit another."""
+    found = [k for k, letter in enumerate(data[:100_000]) if 48 <= letter <= 57]
+    if not found:
+        return data
+    at = found[int(rng.integers(len(found)))]
+    return data[:at] + str(int(rng.integers(10))).encode() + data[at + 1 :]
+
+
+def retyped(rng, ending, data):
+    """A table written whole by its library, with a column of values, a type or a name that it should not have."""
+    frame = pd.read_parquet(io.BytesIO(data)) if ending == ".parquet" else raw()
+    n = len(frame)
+    numbers = np.arange(n)
+    new = [
+        numbers % 2 == 0,
+        numbers + 0.5j if ending == ".mat" else numbers,
+        pd.Timestamp("2026-01-01") + pd.to_timedelta(numbers, unit="ms"),
+        pd.to_timedelta(numbers, unit="us"),
+        [decimal.Decimal(int(k)) for k in numbers],
+        [str(k) for k in numbers],
+        ["=cmd|x"] * n,
+        [None] * n,
+        [[1.0, 2.0]] * n,
+        [{"a": 1}] * n,
+        [b"\xff"] * n,
+        numbers.astype(np.int8),
+        numbers.astype(np.uint64) + 2**63,
+        numbers * 1e300,
+        np.full(n, np.nan),
+        np.full(n, np.inf),
+        -1.0 * numbers,
+        pd.Categorical([str(k % 3) for k in numbers]),
+        numbers[::-1],
+        [f"A{k}" * 300 for k in numbers],
+        [dt.date(2026, 1, 1)] * n,
+        [dt.time(1, 2, 3)] * n,
+        np.full(n, -400.0),
+        np.zeros(n),
+        ["x" * 70000] * n,
+        pd.array([1, None] * n, dtype="Int64")[:n],
+        pd.array([True, None] * n, dtype="boolean")[:n],
+        np.full(n, 1.8e18),
+    ]
+    column = str(rng.choice(list(frame.columns)))
+    frame = frame.assign(**{column: new[int(rng.integers(len(new)))]}) if rng.random() < 0.85 else frame
+    if rng.random() < 0.2:
+        frame = frame.rename(
+            columns={column: str(rng.choice(["", "x" * 300, "a\nb", "__index_level_0__", "record", "unit", "n"]))}
+        )
+    if rng.random() < 0.2:
+        frame = frame.head(int(rng.integers(0, 3)))
+    try:
+        return parquet(frame) if ending == ".parquet" else mat(frame, packed=rng.random() < 0.5)
+    except Exception:  # noqa: BLE001 - there is no such file then
+        return data
+
+
+BINARY = (flip, other_bytes, cut, without, twice, word_in)
+TEXT = (*BINARY, digit, digit, number_out, number_out, cells_out, cells_out, cells_out, lines_moved)
+
+
+def mutated(rng, ending, data):
+    """A few mutations one after another; of what is packed, mostly of the content."""
+    if ending.endswith(".gz") and rng.random() < 0.7:
+        return packed(mutated(rng, ending.removesuffix(".gz"), gzip.decompress(data)))
+    if ending in {".parquet", ".mat"} and rng.random() < 0.5:
+        return retyped(rng, ending, data)
+    kinds = BINARY if ending.endswith((".parquet", ".mat", ".gz")) else TEXT
+    for _ in range(int(rng.choice([1, 1, 1, 2, 4]))):
+        data = kinds[int(rng.integers(len(kinds)))](rng, data)
+    return data
+
+
+def case(seed, number, every):
+    """Reader, ending and bytes of the mutation of this number, the same whenever it is asked for."""
+    rng = np.random.default_rng([seed, number])
+    names = list(every)
+    # tables have more formats than the rest: two of three
+    name = names[int(rng.integers(3))] if rng.random() < 0.6 else names[int(rng.integers(3, len(names)))]
+    ending, data = every[name][int(rng.integers(len(every[name])))]
+    return name, ending, mutated(rng, ending, data)
+
+
+def work(seed, first, count):
+    """Work through mutations, telling of each on standard output."""
+    every = samples()
+    with tempfile.TemporaryDirectory() as folder:
+        for name, some in every.items():  # as they are they are read; whatever is imported late is imported now
+            for ending, data in some:
+                path = Path(folder) / f"sample{ending}"
+                path.write_bytes(data)
+                READERS[name](path)
+        used = int(Path("/proc/self/statm").read_text().split()[0]) * resource.getpagesize()
+        resource.setrlimit(resource.RLIMIT_AS, (used + MOST_BYTES, used + MOST_BYTES))
+        for number in range(first, first + count):
+            name, ending, data = case(seed, number, every)
+            path = Path(folder) / f"mutated{ending}"
+            path.write_bytes(data)
+            tell(number=number, reader=name + ending)
+            tell(number=number, **outcome(READERS[name], path))
+
+
+def tell(**line):
+    """One line on standard output, at once."""
+    sys.stdout.write(json.dumps(line) + "\n")
+    sys.stdout.flush()
+
+
+def outcome(reader, path):
+    """Accepted, refused with its message, or broken with its traceback; and the seconds of this processor that it took."""
+    begun = time.process_time()
+    try:
+        reader(path)
+        result = {"came": "accepted"}
+    except (TumblelineError, InertialError) as problem:
+        result = {"came": "refused", "words": str(problem)}
+    except Exception:  # noqa: BLE001 - that is what is looked for
+        result = {"came": "broken", "words": traceback.format_exc()}
+    return {**result, "seconds": time.process_time() - begun}
+
+
+if __name__ == "__main__":
+    work(*map(int, sys.argv[1:4]))

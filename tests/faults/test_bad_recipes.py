@@ -1,0 +1,110 @@
+"""Recipes, models, manifests and slot maps beyond all bounds: refused with key or row."""
+
+from pathlib import Path
+
+import pytest
+
+from pipelines.archive import files as archive_files
+from pipelines.jobs.recipes import load_recipe
+from pipelines.jobs.seating import Seating, read_seating, scan
+from schemas.errors import ArchiveUnusable, RecipeInvalid, WrongUse
+from schemas.model import parse_model
+from schemas.recipe import parse_toml
+
+ROOT = Path(__file__).resolve().parents[2]
+RECIPE = ROOT / "schemas" / "samples" / "production.toml"
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        ("soak_min_s = 900.0", "soak_min_s = 9e302", "'soak_min_s': found 9e\\+302"),
+        ("dwell_s = 10.0", "dwell_s = 1e200", "'dwell_s': found 1e\\+200"),
+        ("dwell_s = 10.0", "dwell_s = true", "true and false are no numbers"),
+        ("dwell_s = 10.0", "dwell_s = -10.0", "'dwell_s': found -10"),
+        ("settle_s = 2.0", "settle_s = 1e300", "'settle_s': found 1e\\+300"),
+        ("settle_s = 2.0", "settle_s = 1e6", "days, at most 366 are possible"),
+        ("rate_hz = 100.0", "rate_hz = 1e200", "'rate_hz': found 1e\\+200"),
+        ("rate_hz = 100.0", "rate_hz = 1e6", "static_record_s: 1.2e\\+09 samples in one record"),
+        ("static_record_s = 1200.0", "static_record_s = 1e18", "'static_record_s': found"),
+        ("[-10.0, 25.0, 60.0]", "[-400.0, 25.0]", "'temperatures_C.0': found -400"),
+        ("seed = 1", "seed = -1", "'seed': found -1"),
+        ("seed = 1", f"seed = {'9' * 5000}", "not valid TOML"),
+        ("seed = 1", f"seed = 0x{'f' * 6000}", "'seed': found a int too large to show"),
+        ("verification_repeats = 3", "verification_repeats = 9999999999", "'verification_repeats'"),
+        ('name = "production"', f'name = "{"x" * 5000}"', "'name'"),
+        ("seed = 1", f"seed = {'[' * 5000}", "nested too deeply"),
+        ("seed = 1", f"seed.{'a.' * 3000}b = 1", "deep in one another"),
+        ("[[35.0, 15.0]", "[[1e200, 15.0]", "verification"),
+    ],
+)  # fmt: skip
+def test_recipes_beyond_all_bounds_are_refused_with_their_key(tmp_path: Path, old: str, new: str, words: str) -> None:
+    text = RECIPE.read_text()
+    assert old in text
+    (tmp_path / "r.toml").write_text(text.replace(old, new, 1))
+    with pytest.raises(RecipeInvalid, match=words) as refused:
+        load_recipe(str(tmp_path / "r.toml"))
+    assert len(str(refused.value)) < 700
+
+
+def test_nesting_and_long_integers_end_in_one_message_everywhere(tmp_path: Path) -> None:
+    for text in ("a = " + "[" * 9999, "a = " + "{b=" * 9999, f"a = {'1' * 9999}"):
+        with pytest.raises(RecipeInvalid, match="not valid TOML"):
+            parse_toml(text, "f")
+        with pytest.raises(RecipeInvalid):
+            parse_model(text, "f")
+    for text in ("[" * 100_000, '{"a": ' * 100_000, f'{{"a": {"1" * 9999}}}'):
+        with pytest.raises(ArchiveUnusable, match="not a manifest"):
+            archive_files.parsed(text.encode(), tmp_path / "m.json")
+
+
+def test_a_mark_at_the_beginning_of_a_file_is_read_over(tmp_path: Path) -> None:
+    (tmp_path / "r.toml").write_bytes(b"\xef\xbb\xbf" + RECIPE.read_bytes())
+    assert load_recipe(str(tmp_path / "r.toml")).name == "production"
+
+
+@pytest.mark.parametrize(
+    "content",
+    [
+        b"\xef\xbb\xbfslot;serial\r\n0;A1\r\n\r\n2;B2\r\n;\r\n",
+        b"\xef\xbb\xbfslot,serial\n0,A1\n2,B2\n",
+        b"slot\tserial\n0\tA1\n2\tB2",
+    ],
+)  # fmt: skip
+def test_slot_maps_of_excel_are_read(tmp_path: Path, content: bytes) -> None:
+    (tmp_path / "m.csv").write_bytes(content)
+    assert read_seating(str(tmp_path / "m.csv")) == Seating(("A1", "B2"), (0, 2))
+
+
+@pytest.mark.parametrize(
+    ("content", "words"),
+    [
+        ("slot,serial\n0,A1\n1\n", "row 2: 1 cells"),
+        ("slot,serial\n0,A1\n1;B2\n", "row 2: 1 cells"),
+        ("slot,serial\n0,A1\n1,B2,C3\n", "row 2: 3 cells"),
+        ("slot,serial\n0,A1\n1,A1\n", "serial A1 is there twice"),
+        ("slot,serial\n0,..\n", "serial '..' is not usable"),
+        ("slot,serial\n0,=cmd|x\n", "serial '=cmd|x' is not usable"),
+        ("slot,serial\n0,АВ\n", r"U\+0410"),
+        ("slot,serial\n٣,A1\n", "slot '٣', a whole number"),
+        (f"slot,serial\n{'9' * 5000},A1\n", "a whole number from 0 on"),
+        (f"slot,serial\n0,{'x' * 200000}\n", "not a table of text|too long"),
+    ],
+)
+def test_slot_maps_lose_no_row_and_take_no_nonsense(tmp_path: Path, content: str, words: str) -> None:
+    (tmp_path / "m.csv").write_text(content, encoding="utf-8")
+    with pytest.raises(WrongUse, match=words.replace("|x'", r"\|x'")) as refused:
+        read_seating(str(tmp_path / "m.csv"))
+    assert len(str(refused.value)) < 400
+
+
+def test_a_slot_map_in_toml_has_texts(tmp_path: Path) -> None:
+    (tmp_path / "m.toml").write_text("[slots]\n0 = true\n")
+    with pytest.raises(WrongUse, match="slot 0: found True, a serial number in quotes is needed"):
+        read_seating(str(tmp_path / "m.toml"))
+
+
+def test_each_scan_is_checked_when_it_is_scanned() -> None:
+    lines, words = iter(["=cmd|x", "A1", "АВ", "..", "B2"]), []
+    assert scan(2, lambda _slot: next(lines), words.append) == Seating(("A1", "B2"), (0, 1))
+    assert [text.split(":")[0] for text in words] == ["slot 0", "slot 1", "slot 1"]

@@ -1,0 +1,151 @@
+"""Files that are broken, or unpack to more than anybody can have meant."""
+
+import gzip
+import io
+import struct
+import subprocess
+import sys
+import zlib
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pyarrow as pa
+import pyarrow.parquet as pq
+import pytest
+from scipy.io import savemat
+
+from pipelines.importers import exchange, files
+from schemas.errors import DataRejected
+
+ROOT = Path(__file__).resolve().parents[2]
+RECIPE = ROOT / "schemas" / "samples" / "production.toml"
+
+
+def record(n: int = 400) -> pd.DataFrame:
+    frame = pd.DataFrame(np.tile([0.0, 0.6, 0.8], (n, 1)), columns=["ax", "ay", "az"])
+    frame.insert(0, "t", np.arange(n) / 100.0)
+    return frame
+
+
+def dwells(n: int = 4) -> pd.DataFrame:
+    frame = pd.DataFrame({"unit": "A1", "dwell": range(n), "time_s": np.arange(n) * 10.0})
+    return frame.assign(out_x=0.1, out_y=0.2, out_z=0.97)
+
+
+def test_broken_notes_of_pandas_in_a_parquet_file_do_not_matter(tmp_path: Path) -> None:
+    table = pa.Table.from_pandas(dwells()).replace_schema_metadata({b"pandas": b'{"index_columns": [{"kind": 7'})
+    pq.write_table(table, tmp_path / "d.parquet")
+    assert len(exchange.read_dwells(tmp_path / "d.parquet")) == 4
+
+
+def test_an_index_without_a_name_is_no_column(tmp_path: Path) -> None:
+    dwells().set_index(pd.Index([5, 6, 7, 9])).to_parquet(tmp_path / "d.parquet")
+    assert exchange.covariates(exchange.read_dwells(tmp_path / "d.parquet")) == []
+
+
+@pytest.mark.parametrize("packed", [False, True])
+def test_a_corrupted_matlab_file_is_refused(tmp_path: Path, *, packed: bool) -> None:
+    sink = io.BytesIO()
+    savemat(sink, {"t": np.arange(1000.0), "s": {"a": np.arange(5.0)}}, do_compression=packed)
+    rng, path, refused = np.random.default_rng(1), tmp_path / "a.mat", 0
+    for _ in range(50):
+        data = bytearray(sink.getvalue())
+        data[int(rng.integers(128, min(len(data), 220)))] ^= 1 << int(rng.integers(8))
+        path.write_bytes(bytes(data))
+        try:
+            files.read(path)
+        except DataRejected:
+            refused += 1
+    assert refused > 10
+
+
+def test_a_type_of_element_that_there_is_not_is_refused(tmp_path: Path) -> None:
+    """It ended the process: the library takes it as a place in a list without looking."""
+    sink = io.BytesIO()
+    savemat(sink, {"heat": np.arange(9.0)})
+    data = bytearray(sink.getvalue())
+    at = data.index(struct.pack("<II", 9, 72))
+    data[at : at + 4] = struct.pack("<I", 153)
+    (tmp_path / "a.mat").write_bytes(data)
+    with pytest.raises(DataRejected, match="an element of type 153"):
+        files.read(tmp_path / "a.mat")
+
+
+def test_a_variable_of_a_class_that_is_not_read_is_left_out(tmp_path: Path) -> None:
+    sink = io.BytesIO()
+    savemat(sink, {"a": np.arange(9.0), "b": np.arange(9.0)})
+    data = bytearray(sink.getvalue())
+    assert data[144] == 6  # class of the first: double
+    data[144] = 17
+    (tmp_path / "a.mat").write_bytes(data)
+    assert list(files.read(tmp_path / "a.mat")[0].columns) == ["b"]
+
+
+def nested(depth: int) -> dict:
+    content: dict = {"x": np.arange(3.0)}
+    for _ in range(depth):
+        content = {"s": content}
+    return content
+
+
+def test_structures_of_matlab_are_read_to_a_depth(tmp_path: Path) -> None:
+    savemat(tmp_path / "a.mat", nested(5))
+    assert list(files.read(tmp_path / "a.mat")[0].columns) == ["s.s.s.s.s.x"]
+    savemat(tmp_path / "b.mat", nested(40))
+    with pytest.raises(DataRejected, match="more than 16 structures in one another"):
+        files.read(tmp_path / "b.mat")
+
+
+def bomb_gzip() -> bytes:
+    """256 MiB of zeros in a quarter of one."""
+    packer, piece = zlib.compressobj(6, zlib.DEFLATED, 31), bytes(2**24)
+    return b"".join([*(packer.compress(piece) for _ in range(16)), packer.flush()])
+
+
+def bomb_matlab() -> bytes:
+    packer, piece = zlib.compressobj(6), bytes(2**24)
+    body = b"".join([*(packer.compress(piece) for _ in range(16)), packer.flush()])
+    return b"MATLAB 5.0 MAT-file".ljust(124) + b"\x00\x01IM" + struct.pack("<II", 15, len(body)) + body
+
+
+def bomb_parquet() -> bytes:
+    sink = io.BytesIO()
+    columns = {name: pa.repeat(0.5, 2**24) for name in ("t", "ax", "ay", "az")}
+    pq.write_table(pa.table(columns), sink)
+    return sink.getvalue()
+
+
+def bomb_texts() -> bytes:
+    """A text of a megabyte, once in the dictionary, in 2000 rows."""
+    sink = io.BytesIO()
+    texts = pa.DictionaryArray.from_arrays(pa.array(np.zeros(2000, dtype=np.int32)), pa.array(["x" * 2**20]))
+    pq.write_table(pa.table({"unit": texts}), sink)
+    return sink.getvalue()
+
+
+@pytest.mark.parametrize("bomb", [bomb_gzip, bomb_matlab, bomb_parquet, bomb_texts])
+def test_a_file_that_unpacks_to_too_much_is_refused_in_little_memory(tmp_path: Path, bomb) -> None:
+    path = tmp_path / "a.csv"
+    path.write_bytes(bomb())
+    program = (
+        "import resource, sys; from pathlib import Path; from pipelines.importers import files; from schemas.errors import *\n"
+        "before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss\n"
+        "try: files.read(Path(sys.argv[1]))\n"
+        "except DataRejected as problem: print(problem)\n"
+        "print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before)"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", program, str(path)], capture_output=True, text=True, check=True, cwd=RECIPE.parents[2]
+    )
+    message, grown = done.stdout.splitlines()
+    assert "unpack to" in message
+    assert int(grown) < 500_000  # kB
+
+
+def test_a_gzip_file_cut_or_changed_is_refused(tmp_path: Path) -> None:
+    whole = gzip.compress(record().to_csv(index=False).encode(), mtime=0)
+    for data in (whole[:-20], whole[:5], whole[:40] + b"\x00" * 9 + whole[49:], whole + b"\x1f\x8brest"):
+        (tmp_path / "a.csv.gz").write_bytes(data)
+        with pytest.raises(DataRejected, match=r"gzip file of .* that does not unpack"):
+            files.read(tmp_path / "a.csv.gz")
