@@ -10,7 +10,7 @@ from pipelines.stages.guard import LINK_ATTEMPTS, LOST_FOR, WARMING, Guard, Stil
 from pipelines.stages.remaining import Remaining
 from pipelines.stages.steps import Step, steps
 from pipelines.stages.taking import Taking
-from schemas.errors import LinkLost, NotReached, StationError, StationTimeout
+from schemas.errors import LeaseLost, LinkLost, NotReached, StationError, StationTimeout
 from schemas.event import MemoryLog
 from stations.safety.suspenders import Suspended
 from stations.station import Unsettled
@@ -114,7 +114,7 @@ class _Work(Taking):
                     self.at = number
                     self.record(step, settled=step.soak <= soak)
                     soak = max(soak, step.soak)
-        except StationError as problem:
+        except (StationError, LeaseLost) as problem:
             self.guard.stopped(self.at, problem)
             raise
         self.progress(len(plan), len(plan), "captured")
