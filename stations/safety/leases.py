@@ -38,7 +38,7 @@ __all__ = ["PARTS", "Holder", "Leases", "Part", "addresses", "holders", "new_hol
 Part = Literal["outer", "inner", "chamber", "reader"]
 PARTS: tuple[Part, ...] = ("outer", "inner", "chamber", "reader")
 POLL_S = 0.2
-GLANCES, GLANCE_S = 5, 0.05  # a look at a lock holds it for a moment: a taker tries again so often, after so long
+PASSING_S = 5.0  # a lock without a living name is about to be taken or left, or is being looked at
 BOTH = "two runs must not command one device"
 
 
@@ -72,12 +72,12 @@ class Leases:
 
     def take(self) -> None:
         """Takes every lease, or refuses with the name of who has one; waits for a watchdog that is still at work."""
-        end = steady() + SAFE_WITHIN_S
+        begun = steady()
         try:
             for part in sorted(self.wanted, key=lambda p: self.wanted[p]):
-                while not self._tried(part):
+                while not self.try_one(part):
                     other = read_holder(self._file(part))
-                    if other is None or other.role != "watchdog" or steady() > end:
+                    if steady() - begun > self._patience(part, other):
                         self.release()
                         self._refuse(part, other)
                     time.sleep(POLL_S)
@@ -91,12 +91,11 @@ class Leases:
             raise StationRefused(message) from None
         self._beaten = steady()
 
-    def _tried(self, part: Part) -> bool:
-        for _ in range(GLANCES):
-            if self.try_one(part):
-                return True
-            time.sleep(GLANCE_S)
-        return False
+    def _patience(self, part: Part, other: Holder | None) -> float:
+        """Seconds to wait for a lease that another has: for a watchdog, and for a lock that nobody's name is on."""
+        if other is not None and other.role == "watchdog":
+            return SAFE_WITHIN_S
+        return PASSING_S if other is None or not other.lives(self._file(part)) else 0.0
 
     def try_one(self, part: Part) -> bool:
         """Takes the lock of one part where nobody has it; whether it is held now. A note that cannot be read bars nobody."""

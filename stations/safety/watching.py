@@ -40,6 +40,7 @@ class Watchdog:
     _unanswered: int = 0  # heartbeats since it was heard of
     _begun: float = 0.0
     _starts: int = 0  # since it last watched
+    _anew: bool = False
 
     def start(self) -> None:
         """Starts the process; it watches when it says so."""
@@ -92,8 +93,8 @@ class Watchdog:
             )
             self._watches.set()
             return
+        self._anew = True
         self.start()
-        told(self.leases.folder, self.config.name, "watchdog_anew", run=self.leases.holder.run, pid=self.pid)
 
     def dismiss(self) -> None:
         """Sends it away: the station is safe."""
@@ -123,6 +124,8 @@ class Watchdog:
         if READY in found:
             self._starts = 0
             self._watches.set()
+            if self._anew:
+                told(self.leases.folder, self.config.name, "watchdog_anew", run=self.leases.holder.run, pid=self.pid)
 
     def _gone(self) -> str:
         """Why it does not watch any more; empty where it does, or is about to."""
@@ -147,6 +150,7 @@ class Watchdog:
             self._process.kill()
             self._close()
             self._process.wait()
+            self._process = None
 
     def _close(self) -> None:
         for pipe in (self._process.stdin, self._process.stdout) if self._process is not None else ():
