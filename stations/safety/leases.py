@@ -38,7 +38,8 @@ __all__ = ["PARTS", "Holder", "Leases", "Part", "addresses", "holders", "new_hol
 Part = Literal["outer", "inner", "chamber", "reader"]
 PARTS: tuple[Part, ...] = ("outer", "inner", "chamber", "reader")
 POLL_S = 0.2
-PASSING_S = 5.0  # a lock without a living name is about to be taken or left, or is being looked at
+PASSING_S = 5.0  # a lock without a living name is about to be taken or left, or looked at
+HANDED_OVER = "the run has ended and left it to its watchdog"
 BOTH = "two runs must not command one device"
 
 
@@ -95,7 +96,8 @@ class Leases:
         """Seconds to wait for a lease that another has: for a watchdog, and for a lock that nobody's name is on."""
         if other is not None and other.role == "watchdog":
             return SAFE_WITHIN_S
-        return PASSING_S if other is None or not other.lives(self._file(part)) else 0.0
+        passing = other is None or other.tripped or bool(other.trouble) or not other.lives(self._file(part))
+        return PASSING_S if passing else 0.0
 
     def try_one(self, part: Part) -> bool:
         """Takes the lock of one part where nobody has it; whether it is held now. A note that cannot be read bars nobody."""
@@ -119,8 +121,9 @@ class Leases:
                 self._note(part)
 
     def hand_over(self) -> None:
-        """Lets go of the locks, and leaves the notes for the watchdog."""
+        """Lets go of the locks, and leaves the notes for the watchdog, which takes them over."""
         with self._alone:
+            self._mark(list(self._locks), trouble=HANDED_OVER)
             self._let_go()
 
     def held(self) -> list[Part]:
@@ -163,11 +166,7 @@ class Leases:
 
     def trip(self) -> None:
         """Notes on the leases of a holder that stands still that its station was put into its safe state."""
-        for part in self.wanted:
-            other = read_holder(self._file(part))
-            if other is not None and other.token == self.holder.token:
-                with suppress(OSError):
-                    write_holder(self._file(part), replace(other, tripped=True))
+        self._mark(list(self.wanted), tripped=True)
 
     def release(self) -> None:
         """Gives every lease back."""
@@ -188,6 +187,14 @@ class Leases:
 
     def _note(self, part: Part) -> None:
         write_holder(self._file(part), replace(self.holder, what=part))
+
+    def _mark(self, parts: list[Part], **changes: Any) -> None:
+        """Changes the notes of these parts that are in this run's name, as far as they can be written."""
+        for part in parts:
+            other = read_holder(self._file(part))
+            if other is not None and other.token == self.holder.token:
+                with suppress(OSError):
+                    write_holder(self._file(part), replace(other, **changes))
 
     def _let_go(self) -> None:
         for lock in self._locks.values():

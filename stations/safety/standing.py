@@ -33,19 +33,27 @@ def _judged(holder: Holder | None, path: Path, address: str, *, taken: bool) -> 
         state = "is held by a process that cannot be named" if taken else "cannot be read and nobody holds it"
         return f"the lease on {address} {state} ({path}); look at the station before anything is started"
     who = f"{holder.run} (process {holder.pid} on {holder.host} since {holder.since})"
-    if holder.role == "watchdog" and holder.lives(path):
-        return (
-            f"the watchdog of {who} is making it safe and has not done so yet ({holder.trouble or 'it has just begun'}); "
-            "it goes on until it is safe; look at what it names"
-        )
-    if holder.tripped and holder.lives(path):
-        return f"{who} stands still; its watchdog has put the station into its safe state; end that process"
-    if holder.lives(path) or taken:
+    if holder.lives(path):
+        return _of_a_living(holder, who)
+    if taken:
         return ""
     return (
         f"{who} has ended and neither it nor its watchdog has told that the station is safe; look at axes and chamber; the next "
         "run or 'station check' takes the lease over and leaves it safe"
     )
+
+
+def _of_a_living(holder: Holder, who: str) -> str:
+    if holder.role == "watchdog":
+        return (
+            f"the watchdog of {who} is making it safe and has not done so yet ({holder.trouble or 'it has just begun'}); "
+            "it goes on until it is safe; look at what it names"
+        )
+    if holder.tripped:
+        return f"{who} stands still; its watchdog has put the station into its safe state; end that process"
+    if holder.trouble:
+        return f"{who}: {holder.trouble}, which has not told yet that the station is safe; wait a moment and look again"
+    return ""
 
 
 def _is_locked(path: Path) -> bool:
