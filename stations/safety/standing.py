@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import fcntl
+import time
 from typing import TYPE_CHECKING
 
 from stations.safety.lease_files import lease_file, read_holder
@@ -15,8 +16,20 @@ if TYPE_CHECKING:
     from stations.safety.lease_files import Holder
 
 
+AGAIN_S = 0.5
+
+
 def not_safe(folder: Path, config: StationConfig) -> str:
-    """Why the station does not count as safe, in a sentence; empty where it does, or a run that lives drives it."""
+    """Why the station does not count as safe, in a sentence; empty where it does, or a run that lives drives it.
+
+    What is found is looked at twice: a lease that is being taken or given back has a lock and no note for a moment.
+    """
+    if _found(folder, config):
+        time.sleep(AGAIN_S)
+    return _found(folder, config)
+
+
+def _found(folder: Path, config: StationConfig) -> str:
     for address in addresses(config).values():
         path = lease_file(folder, address)
         holder, taken = read_holder(path), _is_locked(path.with_suffix(".lock"))

@@ -138,7 +138,8 @@ def away_and_back(seconds):
             away.clear()
             assert safe_within(config, SOON_S + watchdog.SLOWEST_S) < SAFE_WITHIN_S
             told("watchdog_safe")
-    assert not not_safe(folder.state_folder(), config)
+            while not_safe(folder.state_folder(), config):
+                time.sleep(0.1)
 
 
 def refused_soon(config):
