@@ -157,12 +157,10 @@ class Leases:
 
     def standing(self) -> list[Part]:
         """Parts whose lock another process has, and nobody else's name is on: those of a run that lives and stands still."""
-        found: list[Part] = []
-        for part in self.wanted:
-            other = read_holder(self._file(part)) if part not in self._locks else None
-            if part not in self._locks and (other is None or other.token == self.holder.token):
-                found.append(part)
-        return found
+        apart: list[Part] = [part for part in self.wanted if part not in self._locks]
+        names = [read_holder(self._file(part)) for part in apart]
+        mine = self.holder.token
+        return [part for part, name in zip(apart, names, strict=True) if name is None or name.token == mine]
 
     def trip(self) -> None:
         """Notes on the leases of a holder that stands still that its station was put into its safe state."""
@@ -266,15 +264,13 @@ class Leases:
         )
 
     def _refuse(self, part: Part, other: Holder | None) -> None:
-        where = self.wanted[part]
+        which = f"station {self.holder.station}: the {_name(part)} at {self.wanted[part]}"
         if other is None:
-            message = (
-                f"station {self.holder.station}: the {_name(part)} at {where} is being taken by another run; try again"
-            )
+            message = f"{which} is being taken by another run; try again"
             raise OperatorNeeded(message)
         if other.role == "watchdog":
             message = (
-                f"station {self.holder.station}: the {_name(part)} at {where} is held by the watchdog of {other.run} (process "
+                f"{which} is held by the watchdog of {other.run} (process "
                 f"{other.pid} on {other.host} since {other.since}), which could not make the station safe so far "
                 f"({other.trouble or 'no reason is noted'}); look at the station and put that right: "
                 "it is free as soon as it is safe"
@@ -282,7 +278,7 @@ class Leases:
             raise OperatorNeeded(message)
         age = seconds_since_beat(self._file(part))
         message = (
-            f"station {self.holder.station}: the {_name(part)} at {where} is driven by {other.run} (process {other.pid} on "
+            f"{which} is driven by {other.run} (process {other.pid} on "
             f"{other.host} since {other.since}, heard of {age:.0f} s ago), one run at a time can drive it, whatever started "
             f"them; wait for it or stop it: its lease is free at the latest {SAFE_WITHIN_S:g} s after its end"
         )
