@@ -252,3 +252,15 @@ def test_the_first_process_of_a_container_ends_after_the_watchdogs_of_its_worker
         first.send_signal(signal.SIGTERM)
         assert first.wait(SOON_S) == 128 + signal.SIGTERM
         assert (tmp_path / "safe").exists()
+
+
+@pytest.mark.parametrize(("link", "ended"), [("rtu", True), ("tcp", False)])
+def test_a_run_that_stands_still_on_a_serial_line_is_ended_because_one_process_can_open_it(monkeypatch, link, ended):
+    config = modbus_station(4000)
+    outer = config.devices.outer.model_copy(update={"link": link, "serial": "/dev/ttyS9" if link == "rtu" else ""})
+    config = config.model_copy(update={"devices": config.devices.model_copy(update={"outer": outer})})
+    mine = Leases(folder.state_folder(), new_holder("served", "a", "watchdog"), addresses(config), 10.0)
+    sent = []
+    monkeypatch.setattr(watchdog.os, "kill", lambda pid, number: sent.append((pid, number)))
+    watchdog.Watch(config, mine, os.getppid(), [])._free_lines()
+    assert sent == ([(os.getppid(), signal.SIGKILL)] if ended else [])
