@@ -76,6 +76,15 @@ class OperatorNeeded(StationError):
     """Something that only a person at the station can put right (door, interlock, power, a missing unit)."""
 
 
+class LeaseLost(TumblelineError):
+    """A run that may drive its station no longer: it stood still, or another drives. It sends nothing more and ends.
+
+    Not one of the station's errors, so that nothing that tries again after those, or works round them, goes on after it.
+    """
+
+    exit_status: ClassVar[int] = STATION
+
+
 class StationRefused(StationError):
     """A command outside what a device is able or allowed to do; nothing was moved."""
 

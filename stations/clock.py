@@ -7,6 +7,12 @@ import time
 from typing import Protocol
 
 
+def steady() -> float:
+    """Seconds that never go back and go on while the machine is suspended; for ages and deadlines, not for dates."""
+    boot = getattr(time, "CLOCK_BOOTTIME", None)
+    return time.monotonic() if boot is None else time.clock_gettime(boot)
+
+
 class Clock(Protocol):
     """Seconds that only go forward."""
 

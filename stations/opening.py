@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Generator
+from collections.abc import Generator
 from contextlib import ExitStack, contextmanager
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from schemas.errors import RecipeInvalid
+from schemas.errors import RecipeInvalid, StationError
 from stations.clock import Clock, WallClock
 from stations.devices.adapters import axis_adapter, chamber_adapter
 from stations.devices.commands import Commands
@@ -15,9 +15,10 @@ from stations.devices.reader import Reader
 from stations.devices.registers import Registers
 from stations.devices.slot import Slot
 from stations.devices.table import TiltTable
+from stations.links.gate import Permit
 from stations.links.making import Links
 from stations.profile_files import profile_of
-from stations.safety.guarded import PARTING_S, guarded
+from stations.safety.guarded import Protection, guarded
 from stations.safety.safe_state import safe_steps
 from stations.station import Station, nobody_else
 
@@ -60,11 +61,14 @@ def open_station(
             yield station
         return
     slots = [unit.slot for unit in lot.units]
-    with guarded(config, run) as protection, open_devices(config, slots, resume, protection.require) as station:
+    with guarded(config, run) as protection, open_devices(config, slots, resume, protection) as station:
         try:
             yield station
+        except StationError:
+            protection.held()  # what a run finds at a station that it has lost is not why it ends
+            raise
         finally:
-            protection.left(station.make_safe(PARTING_S))
+            protection.leave(station.make_safe)
 
 
 @contextmanager
@@ -72,10 +76,12 @@ def open_devices(
     config: StationConfig,
     slots: Sequence[int],
     resume: bytes | None = None,
-    require: Callable[[], None] = nobody_else,
+    protection: Protection | None = None,
 ) -> Generator[Station]:
-    """The devices of a station of hardware, not leased and not watched: to look at them, or to make them safe."""
-    links, clock = Links(config), WallClock(resume)
+    """The devices of a station of hardware; without ``protection`` to look at them, or to make them safe."""
+    permit = None if protection is None else Permit(protection, config.link.timeout_s)
+    require = nobody_else if protection is None else protection.require
+    links, clock = Links(config, permit=permit), WallClock(resume)
     try:
         yield replace(_assemble(config, slots, links, clock), state=clock.state, exact=False, require=require)
     finally:

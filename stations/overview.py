@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 from schemas.errors import StationError
 from stations.safety.folder import state_folder
 from stations.safety.leases import holders
+from stations.safety.standing import not_safe
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Generator
@@ -82,7 +83,7 @@ def look_at(config: StationConfig, station: Station) -> Overview:
     _ask(now, "chamber", lambda: _chamber(now, station))
     _ask(now, "reader", lambda: _reader(now, station))
     if config.kind != "simulated":
-        now.lease = _lease(config)
+        _ask(now, "lease", lambda: _leased(now, config))
     return now
 
 
@@ -130,6 +131,13 @@ def _occupied(station: Station) -> list[int]:
         return station.reader.occupied()
     except StationError:
         return []
+
+
+def _leased(now: Overview, config: StationConfig) -> None:
+    """Who drives the station; and where a run has left it without making it safe, that it is not safe."""
+    now.lease = _lease(config)
+    if problem := not_safe(state_folder(), config):
+        now.faults["safe state"] = problem
 
 
 def _lease(config: StationConfig) -> dict[str, Any] | None:

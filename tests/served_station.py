@@ -5,11 +5,15 @@ from collections.abc import Generator
 from contextlib import contextmanager
 from pathlib import Path
 
+import pytest
 import tomlkit
 from small_station import lot_of, station_of
 
 from schemas.recipe import Lot
 from schemas.station import StationConfig
+from stations import opening
+from stations.plant.journal import Write
+from stations.plant.plant import Plant
 from stations.serving import serve
 
 QUICK = {
@@ -49,6 +53,29 @@ def served(lot: Lot | None = None, silence_s: float = 0.0, **simulation: object)
     finally:
         stop.set()
         thread.join(20.0)
+
+
+@contextmanager
+def served_plant(**simulation: object) -> Generator[tuple[int, Plant], None, None]:
+    """The station served, and the plant behind it with its own journal of all that was ever written to it."""
+    made: list[Plant] = []
+    make = opening.make_plant
+
+    def noted(*args, **more) -> Plant:
+        made.append(make(*args, **more))
+        return made[-1]
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(opening, "make_plant", noted)
+        with served(**simulation) as port:
+            yield port, made[0]
+
+
+def moves_ordered(plant: Plant) -> int:
+    """How many moves the drives of a plant have been ordered so far: writes of direct data, which end with the trigger."""
+    with plant.lock:
+        events = list(plant.journal.events())
+    return sum(isinstance(e, Write) and e.device_id in {1, 2} and len(e.words) >= 16 for e in events)
 
 
 def station_file(folder: Path, config: StationConfig, name: str = "served.toml") -> Path:

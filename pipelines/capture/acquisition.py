@@ -117,7 +117,8 @@ class Acquisition:
                 self.lose(unit.serial, f"slot {unit.slot}: {text}")
 
     def noted(self) -> Instruments:
-        """The instruments, noted in the history when it is due."""
+        """The instruments, noted in the history when it is due; a run that may not go on is told so here too."""
+        self.station.require()
         instruments = self.station.reader.instruments()
         self.note(instruments)
         return instruments

@@ -11,7 +11,7 @@ from pipelines.capture.soak_response import Approach
 from pipelines.capture.supervision import LINK_ATTEMPTS, LOST_FOR, WARMING, StillSuspended, Supervisor
 from pipelines.capture.time_left import Remaining
 from pipelines.schedule.steps import Step, steps
-from schemas.errors import LinkLost, NotReached, StationError, StationTimeout
+from schemas.errors import LeaseLost, LinkLost, NotReached, StationError, StationTimeout
 from schemas.event import MemoryLog
 from stations.safety.suspenders import Suspended
 from stations.station import Unsettled
@@ -85,7 +85,7 @@ class CaptureRun(Acquisition):
                     self.at = number
                     self.record(step, settled=step.soak <= soak)
                     soak = max(soak, step.soak)
-        except StationError as problem:
+        except (StationError, LeaseLost) as problem:
             self.guard.stopped(self.at, problem)
             raise
         self.progress(len(plan), len(plan), "captured")

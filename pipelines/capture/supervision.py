@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
-from schemas.errors import OperatorNeeded, StationError
+from schemas.errors import LeaseLost, OperatorNeeded, StationError
 from schemas.event import NO_RECORD, Event, EventLog
 from stations.safety.suspenders import EmergencyStop, Reason, Suspended, Watched, require_released
 
@@ -186,10 +186,15 @@ class Supervisor:
             text = f"the chamber's door is open, closed is needed ({problem})"
             raise Suspended([Reason("door", text)], spoilt=True)
 
-    def stopped(self, record: int, problem: StationError) -> None:
-        """Leaves the station in its safe state and notes why the run ended."""
+    def stopped(self, record: int, problem: StationError | LeaseLost) -> None:
+        """Leaves the station in its safe state and notes why the run ended; :class:`LeaseLost` where it may command no more."""
         kind = "emergency_stop" if isinstance(problem, EmergencyStop) else "stopped"
-        reached = self.station.make_safe()
+        try:
+            reached = self.station.make_safe()
+        except LeaseLost as lost:  # whatever it found at a station that is not its own any more is not why it ended
+            action = "nothing more was sent: its watchdog, or the run that has the station now, sees to it"
+            self.note("stopped", record, str(lost), action)
+            raise lost from problem
         self.note(kind, record, str(problem), reached.sentence())
 
     def note(self, kind: Kind, record: int, reason: str, action: str, figures: dict[str, float] | None = None) -> None:

@@ -99,7 +99,7 @@ def command(
 
 def _measured(request: Request, job: Job, store: Archive, *, direct: bool, asks: bool) -> Run:
     """The run of one filling of the fixture."""
-    from pipelines.chain.attendance import Attendance
+    from pipelines.chain.attendance import JUDGED, Attendance
     from pipelines.chain.runner import Runner
     from pipelines.cli.terminal import Terminal
 
@@ -110,10 +110,13 @@ def _measured(request: Request, job: Job, store: Archive, *, direct: bool, asks:
 
             return run_locally(request, job, store, progress, told, operator)
         runner = Runner(job, store, progress)
-        if operator is not None:
-            told(Attendance(operator, job, runner.run.id).capture(runner, lambda: runner.stage("capture")))
+        beside = None if operator is None else Attendance(operator, job, runner.run.id)
+        if beside is not None:
+            told(beside.capture(runner, lambda: runner.stage("capture")))
         for done in runner.all():
             told(done)
+            if beside is not None and done.stage == JUDGED:
+                beside.unload(runner.run)
         return runner.run
 
 

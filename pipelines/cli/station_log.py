@@ -22,6 +22,8 @@ STYLES = {
     "not_safe": "bold red",
     "watchdog_acts": "yellow",
     "watchdog_failed": "bold red",
+    "watchdog_lost": "yellow",
+    "lease_lost": "bold red",
 }
 QUIET = {"reference", "soak"}  # told with --all only: they happen in every run
 

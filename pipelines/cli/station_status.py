@@ -27,7 +27,9 @@ def status(
     watch: Annotated[bool, typer.Option("--watch", help="Look again and again, until Ctrl-C.")] = False,
     as_json: JsonOption = False,
 ) -> None:
-    """Show angles, temperatures, states, slots and who drives the station; exit 3 when a part does not answer.
+    """Show angles, temperatures, states, slots and who drives the station.
+
+    Exit 3: a part does not answer, or a run has left the station without making it safe.
 
     Nothing is moved and no lease is needed: a run that is under way is not disturbed.
     """

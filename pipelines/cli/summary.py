@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from pipelines.cli.options import STYLES, console, print_table, short
+from pipelines.interruptions import interruptions
 from pipelines.tables.frames import rows_of
 from pipelines.tables.json_values import json_value
 from schemas.errors import DONE, PART_FAILED
@@ -14,6 +15,7 @@ if TYPE_CHECKING:
     from rich.text import Text
 
     from pipelines.archive import Run
+    from pipelines.interruptions import Interruptions
 
 SHOWN = (
     ("residual_rms_ug", "fit\nµg"),
@@ -45,6 +47,7 @@ def summary(run: Run) -> dict[str, Any]:
         "failed": sum(unit["outcome"] == "fail" for unit in units),
         "refused": sum(unit["outcome"] == "refused" for unit in units),
         "yield": passed / len(units),
+        "interruptions": interruptions(run),
         "report": str(run.report),
         "archive": str(run.archive.root),
     }
@@ -84,7 +87,22 @@ def print_summary(document: dict[str, Any]) -> None:
         if unit["reasons"]:
             out.print(f"  {unit['unit']}: {unit['reasons']}", markup=False)
     out.print(f"  decided by {document['rule']}", markup=False, style="dim")
+    for line in _interrupted(document["interruptions"]):
+        out.print(line, markup=False, soft_wrap=True)
     total = len(document["units"])
     out.print(f"{document['passed']} of {total} passed, {document['failed']} failed, {document['refused']} refused")
     out.print(f"run     {document['run']}", markup=False)
     out.print(f"report  {document['report']}", markup=False, soft_wrap=True)
+
+
+def _interrupted(found: Interruptions | None) -> list[str]:
+    """What interrupted a run, in lines; none where nothing did."""
+    if not found or not found["events"]:
+        return []
+    door = f", the door was opened {found['door_opened']} times" if found["door_opened"] else ""
+    head = f"  station: {found['pauses']} pauses ({found['paused_s'] / 60.0:.1f} min waited){door}"
+    dwells = [
+        f"  dwell {one['record']} (pose {one['pose']}) measured again {one['times']} times: {'; '.join(one['reasons'])}"
+        for one in found["repeated_dwells"]
+    ]
+    return [head, *dwells]

@@ -17,7 +17,7 @@ from prefect.runtime import flow_run
 from prefect.states import Crashed
 
 from pipelines.archive import Archive
-from pipelines.chain.attendance import Attendance
+from pipelines.chain.attendance import JUDGED, Attendance
 from pipelines.chain.chain import ORDER
 from pipelines.chain.runner import Done, Runner
 from pipelines.flows.operator import Paused
@@ -100,9 +100,13 @@ def calibrate_lot(  # noqa: PLR0913 - a flow's parameters are its form on the se
     progress, told, operator = _listeners[-1] if _listeners else (silent, lambda _done: None, None)
     job = requested(recipe, station, units, slots, seed, repeat, faults).job(Archive(archive))
     runner = Runner(job, Archive(archive), progress)
-    told(_capture(runner, operator or (Paused() if prompts else None)))
+    person = operator or (Paused() if prompts else None)
+    beside = None if person is None else Attendance(person, job, runner.run.id)
+    told(_capture(runner, beside))
     for name in ORDER[1:]:
         told(stage(name, runner))
+        if beside is not None and name == JUDGED:
+            beside.unload(runner.run)
     return runner.run.id
 
 
@@ -121,11 +125,11 @@ def requested(
     return Request(recipe, where, tuple(units or ()), tuple(slots or ()), seed, anew, tuple(faults or ()))
 
 
-def _capture(runner: Runner, operator: Operator | None) -> Done:
+def _capture(runner: Runner, beside: Attendance | None) -> Done:
     """The capture, with somebody beside it or not."""
-    if operator is None:
+    if beside is None:
         return stage("capture", runner)
-    return Attendance(operator, runner.job, runner.run.id).capture(runner, lambda: stage("capture", runner))
+    return beside.capture(runner, lambda: stage("capture", runner))
 
 
 def settle_history(name: str, stages: int) -> None:

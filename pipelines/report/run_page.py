@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from pipelines.interruptions import interruptions
 from pipelines.report.numbers import plain, with_uncertainty
 from pipelines.report.plots import check_plots, lot_plot, model_plots
 from pipelines.report.templates import template
@@ -61,6 +62,7 @@ def render(run: Run, certificates: Mapping[str, Stated] | None = None) -> str:
         passed=sum(unit["outcome"] == "pass" for unit in units),
         lot_svg=_lot_svg(tables, calibrated, limit),
         verification_poses=len({pose["name"] for pose in run.about["recipe"]["verification"]}),
+        interruptions=interruptions(run),
         provenance=_provenance(run),
     )
 

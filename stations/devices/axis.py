@@ -72,16 +72,18 @@ class TableAxis(ABC):
         """Starts a move to ``target`` degrees and gives the seconds it should take.
 
         Where the answer to the order is lost, the drive is asked whether it has taken it; it is never sent a second time. A drive
-        that has not taken it raises what was lost. A later start to the same target finds out whether it has in the meantime.
+        that has not taken it raises what was lost. A later start to the same target finds out whether it has in the
+        meantime. An order that could not be sent soon after the reading that it rests on is not sent at all.
         """
         self.check(target)
         limits = self._limits
-        distance = abs(target - self.position())
-        pending, self._pending = self._pending, target
-        self._target, self._looks = target, 0
-        if pending != target or not self._took(target):
-            self._require_ready()
-            self._order_once(target)
+        with self._registers.deciding():
+            distance = abs(target - self.position())
+            pending, self._pending = self._pending, target
+            self._target, self._looks = target, 0
+            if pending != target or not self._took(target):
+                self._require_ready()
+                self._order_once(target)
         return distance / limits.speed_deg_s + 2.0 * math.sqrt(distance / limits.acceleration_deg_s2)
 
     def _order_once(self, target: float) -> None:

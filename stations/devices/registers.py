@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
 from schemas.errors import LinkLost, StationRefused, StationTimeout
+from stations.clock import steady
 from stations.codec import NotEncodable, Value, decode, encode, named
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Generator, Mapping
 
-    from schemas.profile import Profile, Register
+    from schemas.profile import Profile, Register, Space
     from stations.links.link import Link
 
 
@@ -23,6 +25,17 @@ class Registers:
         self._link = link
         self._device_id = device_id
         self._decimals: dict[str, int] = {}
+        self._answered: float | None = None
+        self._deciding = False
+
+    @contextmanager
+    def deciding(self) -> Generator[None]:
+        """A block whose orders rest on what is read in it: one that could not be sent soon after is refused by the gate."""
+        self._answered, self._deciding = None, True
+        try:
+            yield
+        finally:
+            self._deciding = False
 
     def has(self, name: str) -> bool:
         """Whether the device has a register or group of that name."""
@@ -31,9 +44,7 @@ class Registers:
     def read(self, name: str) -> Value:
         """The value of a register: a number, a list where it has a count, a text."""
         register = self._scaled(name)
-        words = self._link.read(
-            self._device_id, register.address, register.words, f"{self.name} {name}", register.space
-        )
+        words = self._asked(register.address, register.words, name, register.space)
         return decode(register, self.profile.order(register), words)
 
     def number(self, name: str) -> float:
@@ -91,24 +102,20 @@ class Registers:
         """Values of a group of registers, read in one request and so of one instant."""
         registers = [self._scaled(name) for name in self.profile.groups[group]]
         first = registers[0].address
-        words = self._link.read(
-            self._device_id, first, registers[-1].end - first, f"{self.name} {group}", registers[0].space
-        )
+        words = self._asked(first, registers[-1].end - first, group, registers[0].space)
         return {r.name: decode(r, self.profile.order(r), words[r.address - first : r.end - first]) for r in registers}
 
     def write(self, name: str, value: Value) -> None:
         """Writes one register, once."""
         register = self._scaled(name)
         words = self._encoded(register, value)
-        what = f"{self.name} {name} = {value}"
-        self._link.write(self._device_id, register.address, words, what, register.space)
+        self._order(register.address, words, f"{name} = {value}", register.space)
 
     def write_group(self, group: str, values: Mapping[str, Value]) -> None:
         """Writes a group of registers in one request, once."""
         registers = [self._scaled(name) for name in self.profile.groups[group]]
         words = [word for register in registers for word in self._encoded(register, values[register.name])]
-        what = f"{self.name} {group} {dict(values)}"
-        self._link.write(self._device_id, registers[0].address, words, what, registers[0].space)
+        self._order(registers[0].address, words, f"{group} {dict(values)}", registers[0].space)
 
     def set_group(self, group: str, values: Mapping[str, Value]) -> None:
         """Writes registers that start nothing in one request, once; reading them back decides, also of a lost answer."""
@@ -143,7 +150,16 @@ class Registers:
 
     def words(self, address: int, count: int, what: str) -> list[int]:
         """Raw words, for windows that have no names."""
-        return self._link.read(self._device_id, address, count, f"{self.name} {what}")
+        return self._asked(address, count, what)
+
+    def _asked(self, address: int, count: int, what: str, space: Space = "holding") -> list[int]:
+        words = self._link.read(self._device_id, address, count, f"{self.name} {what}", space)
+        self._answered = steady()
+        return words
+
+    def _order(self, address: int, words: list[int], what: str, space: Space) -> None:
+        since = self._answered if self._deciding else None
+        self._link.write(self._device_id, address, words, f"{self.name} {what}", space, since=since)
 
     def _holds(self, name: str, value: Value) -> bool:
         """Whether a register holds what a value becomes on the wire."""

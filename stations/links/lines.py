@@ -4,8 +4,13 @@ from __future__ import annotations
 
 import socket
 import time
+from typing import TYPE_CHECKING
 
 from schemas.errors import LinkLost, StationRefused, StationTimeout
+from stations.links.wires import drop_what_is_late
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
 
 END = b"\r\n"
 REFUSED = "NA:"
@@ -35,21 +40,21 @@ class LineLink:
             f"{self._where}: no attempt to ask '{question}' was allowed; set read_attempts to 1 or more"
         )
 
-    def tell(self, order: str, what: str) -> str:
+    def tell(self, order: str, what: str, *, before: Callable[[], None] | None = None) -> str:
         """The answer to an order, sent once: after a failure nobody knows whether it acted."""
-        return self._exchange(order, what)
+        return self._exchange(order, what, before)
 
     def close(self) -> None:
         """Ends the connection."""
         if self._socket is not None:
-            self._socket.close()
+            self._socket.close()  # what could not be sent is dropped with it
         self._socket = None
 
-    def _exchange(self, line: str, what: str) -> str:
+    def _exchange(self, line: str, what: str, before: Callable[[], None] | None = None) -> str:
         """The line that comes back. A line has no number, so a connection whose answer is late or strange is not used again."""
         asked = f"{what} '{line}'"
         try:
-            answer = self._spoken(line)
+            answer = self._spoken(line, before)
         except TimeoutError:
             self.close()
             raise StationTimeout(
@@ -66,10 +71,13 @@ class LineLink:
             )
         return answer
 
-    def _spoken(self, line: str) -> str:
+    def _spoken(self, line: str, before: Callable[[], None] | None) -> str:
         deadline = time.monotonic() + self._timeout
         if self._socket is None:
             self._socket = socket.create_connection(self._address, self._timeout)
+            drop_what_is_late(self._socket, self._timeout)
+        if before is not None:
+            before()
         self._socket.sendall(line.encode("ascii") + END)
         data = b""
         while not data.endswith(END):

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from schemas.errors import RecipeInvalid
 from schemas.station import Devices
-from stations.links.gate import GatedLines, GatedLink
+from stations.links.gate import GatedLines, GatedLink, Permit
 from stations.links.lines import LineLink
 from stations.links.modbus import WireLink
 from stations.links.serial_wire import SerialWire
@@ -29,10 +29,14 @@ Key = tuple[str, str, int]
 
 @dataclass
 class Links:
-    """Links by address, each made once; a simulated station's are ``simulated_at``, by what carries them."""
+    """Links by address, each made once; a simulated station's are ``simulated_at``, by what carries them.
+
+    ``permit`` is what the gates ask before anything is sent; None where nothing is driven, or nobody else can drive.
+    """
 
     config: StationConfig
     simulated_at: Mapping[Carrier, Address] = field(default_factory=dict["Carrier", "Address"])
+    permit: Permit | None = None
     made: dict[Key, GatedLink | GatedLines] = field(default_factory=dict["Key", "GatedLink | GatedLines"])
 
     def registers(self, place: str) -> GatedLink:
@@ -47,7 +51,7 @@ class Links:
         if key not in self.made:
             wire = self._wire(device, key)
             link = WireLink(wire, read_attempts=self.config.link.read_attempts)
-            self.made[key] = GatedLink(link, wire.where, self._profiles(key))
+            self.made[key] = GatedLink(link, wire.where, self._profiles(key), self.permit)
         made = self.made[key]
         if isinstance(made, GatedLines):
             raise self._shared(place, profile)
@@ -61,7 +65,7 @@ class Links:
             _, host, port = key
             patience = self.config.link
             line = LineLink(host, port, timeout_s=patience.timeout_s, read_attempts=patience.read_attempts)
-            self.made[key] = GatedLines(line, f"{host}:{port}", profile)
+            self.made[key] = GatedLines(line, f"{host}:{port}", profile, self.permit)
         made = self.made[key]
         if isinstance(made, GatedLink):
             raise self._shared(place, profile)

@@ -12,7 +12,7 @@ from stations.links.frames import Malformed, Refused, read_request, values_in, w
 from stations.links.wires import Broken, Silence, TcpWire
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Callable, Sequence
 
     from schemas.profile import Space
     from stations.links.wires import Wire
@@ -56,19 +56,28 @@ class WireLink:
             f"{self._wire.where} device {device_id}: no attempt to {asked} was allowed; set read_attempts to 1 or more"
         )
 
-    def write(self, device_id: int, address: int, words: Sequence[int], what: str, space: Space = "holding") -> None:
-        """Writes registers or bits in one request, sent once."""
+    def write(
+        self,
+        device_id: int,
+        address: int,
+        words: Sequence[int],
+        what: str,
+        space: Space = "holding",
+        *,
+        before: Callable[[], None] | None = None,
+    ) -> None:
+        """Writes registers or bits in one request, sent once, unless ``before`` raises when it is about to be sent."""
         asked = f"write {what} ({len(words)} {NAMES[space]} from {address})"
-        self._ask(device_id, write_request(space, address, words), asked)
+        self._ask(device_id, write_request(space, address, words), asked, before)
 
     def close(self) -> None:
         """Ends the connection."""
         self._wire.close()
 
-    def _ask(self, device_id: int, request: bytes, asked: str) -> list[int]:
+    def _ask(self, device_id: int, request: bytes, asked: str, before: Callable[[], None] | None = None) -> list[int]:
         where = f"{self._wire.where} device {device_id}"
         try:
-            return values_in(request, self._wire.exchange(device_id, request))
+            return values_in(request, self._wire.exchange(device_id, request, before))
         except Silence:
             raise StationTimeout(
                 f"{where}: no answer to '{asked}' in {self._wire.timeout_s:g} s; check device and cable"

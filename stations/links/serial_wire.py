@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import termios
 import time
+from typing import TYPE_CHECKING
 
 import serial
 from serial import PARITY_EVEN, PARITY_NONE, PARITY_ODD, Serial
@@ -19,6 +20,9 @@ from stations.links.frames import (
     reply_size,
 )
 from stations.links.wires import CHUNK, Broken, Silence, reason_of
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
 
 PARITIES = {"none": PARITY_NONE, "even": PARITY_EVEN, "odd": PARITY_ODD}
 EXCEPTION_FRAME = 5  # device, function, code, check
@@ -45,7 +49,7 @@ class SerialWire:
         self._quiet = max(QUIET_S, QUIET_CHARACTERS * character)
         self._heard = 0.0
 
-    def exchange(self, device_id: int, request: bytes) -> bytes:
+    def exchange(self, device_id: int, request: bytes, before: Callable[[], None] | None = None) -> bytes:
         """The answer to a request; its check must be right."""
         frame = bytes([device_id]) + request
         try:
@@ -53,6 +57,8 @@ class SerialWire:
             self._hear_out(port)
             if device_id in self._unsure:
                 self._await_sign(port, device_id, request)
+            if before is not None:
+                before()
             port.write(frame + crc16(frame))
             return self._answer(port, device_id, request)
         except (Silence, Malformed):

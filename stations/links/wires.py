@@ -14,11 +14,13 @@ import socket
 import ssl
 import struct
 import time
+from contextlib import suppress
 from typing import TYPE_CHECKING, Protocol
 
 from stations.links.frames import WRITES, Malformed
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
     from pathlib import Path
 
 HEADER = 7  # transaction, protocol, length, unit (Modbus Messaging on TCP/IP 1.0b, 3.1.3)
@@ -40,8 +42,13 @@ class Wire(Protocol):
     where: str
     timeout_s: float
 
-    def exchange(self, device_id: int, request: bytes) -> bytes:
-        """The answer to a request, without its envelope; :class:`Silence`, :class:`Broken` or :class:`Malformed`."""
+    def exchange(self, device_id: int, request: bytes, before: Callable[[], None] | None = None) -> bytes:
+        """The answer to a request, without its envelope; :class:`Silence`, :class:`Broken` or :class:`Malformed`.
+
+        Parameters
+        ----------
+        before : called when the connection stands and nothing but the sending is left; what it raises leaves the request unsent
+        """
         ...
 
     def close(self) -> None:
@@ -65,7 +72,7 @@ class TcpWire:
         self._unsure = False  # the last request was a write, and nothing came back
         self._number = int.from_bytes(os.urandom(2), "big")  # a gateway may still hold what an earlier process asked
 
-    def exchange(self, device_id: int, request: bytes) -> bytes:
+    def exchange(self, device_id: int, request: bytes, before: Callable[[], None] | None = None) -> bytes:
         """The answer under this request's number; answers under other numbers are dropped."""
         deadline = time.monotonic() + self.timeout_s
         self._number = self._number % 0xFFFF + 1
@@ -74,22 +81,31 @@ class TcpWire:
         try:
             connection = self._connected()
             connection.settimeout(self.timeout_s)
+            if before is not None:
+                before()
             connection.sendall(frame)
             return self._answer(connection, device_id, deadline)
         except TimeoutError:
             self._unsure = first and request[0] in WRITES and self._socket is not None
             if not self._unsure:
-                self.close()
+                self._abort()
             raise Silence from None
         except OSError as problem:
-            self.close()
+            self._abort()
             raise Broken(reason_of(problem)) from None
         except Malformed:
-            self.close()
+            self._abort()
             raise
 
     def close(self) -> None:
-        """Ends the connection."""
+        """Ends the connection; in peace where every request had its answer."""
+        if self._socket is not None and not self._unsure:
+            with suppress(OSError):
+                self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, struct.pack("ii", 0, 0))
+        self._abort()
+
+    def _abort(self) -> None:
+        """Ends the connection; what could not be delivered is dropped."""
         if self._socket is not None:
             self._socket.close()
         self._socket, self._buffer, self._unsure = None, b"", False
@@ -98,6 +114,7 @@ class TcpWire:
         if self._socket is None:
             plain = socket.create_connection(self._address, self.timeout_s)
             plain.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+            drop_what_is_late(plain, self.timeout_s)
             self._socket = plain
             if self._tls is not None:
                 self._socket = self._tls.wrap_socket(plain, server_hostname=self._server_name)
@@ -132,6 +149,17 @@ class TcpWire:
             return None
         frame, self._buffer = self._buffer[:end], self._buffer[end:]
         return frame
+
+
+def drop_what_is_late(connection: socket.socket, patience_s: float) -> None:
+    """Has the system drop what it could not deliver: at the end of the connection, also of the process, and after a while.
+
+    Without this the system goes on delivering for minutes what was sent while the network was away: an order would reach the
+    device after the run had given it up, or after a watchdog had made the station safe.
+    """
+    connection.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, struct.pack("ii", 1, 0))
+    if hasattr(socket, "TCP_USER_TIMEOUT"):
+        connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_USER_TIMEOUT, max(1, round(1000.0 * patience_s)))
 
 
 def tls_context(ca: Path, certificate: Path | None = None, key: Path | None = None) -> ssl.SSLContext:

@@ -29,15 +29,21 @@ def state_folder() -> Path:
     return folder
 
 
-def told(folder: Path, station: str, event: str, **about: Any) -> None:
-    """Keeps a line in the machine's log, whole even when several write: one write to a file opened for appending."""
+def told(folder: Path, station: str, event: str, **about: Any) -> bool:
+    """Keeps a line in the machine's log, whole even when several write: one write to a file opened for appending.
+
+    Whether it could be kept: what is done for a station's safety never depends on a note of it.
+    """
     line = {"when": datetime.now(UTC).isoformat(timespec="milliseconds"), "station": station, "event": event, **about}
     data = (json.dumps(line, ensure_ascii=False) + "\n").encode()
-    handle = os.open(folder / LOG, os.O_WRONLY | os.O_CREAT | os.O_APPEND, 0o644)
     try:
-        os.write(handle, data)
-    finally:
-        os.close(handle)
+        handle = os.open(folder / LOG, os.O_WRONLY | os.O_CREAT | os.O_APPEND, 0o644)
+        try:
+            return os.write(handle, data) == len(data)
+        finally:
+            os.close(handle)
+    except OSError:
+        return False
 
 
 def log(folder: Path) -> list[dict[str, Any]]:

@@ -201,9 +201,9 @@ class Recorder:
     def read(self, device_id, address, count, what, space="holding"):
         return self.inner.read(device_id, address, count, what, space)
 
-    def write(self, device_id, address, words, what, space="holding"):
+    def write(self, device_id, address, words, what, space="holding", *, since=None):
         self.written.append((space, address, len(words)))
-        self.inner.write(device_id, address, words, what, space)
+        self.inner.write(device_id, address, words, what, space, since=since)
 
     def close(self):
         self.inner.close()
@@ -264,8 +264,8 @@ def test_an_order_whose_answer_is_lost_is_read_back_and_not_given_again(name, lo
         before, link = plant.outer._moves, axis._registers._link
 
         class Lossy(Recorder):
-            def write(self, device_id, address, words, what, space="holding"):
-                super().write(device_id, address, words, what, space)
+            def write(self, device_id, address, words, what, space="holding", *, since=None):
+                super().write(device_id, address, words, what, space, since=since)
                 if address == start[name]:
                     raise lost("answer lost")
 

@@ -13,11 +13,12 @@ from typer.testing import CliRunner
 
 from pipelines.archive import Archive
 from pipelines.chain.attendance import Answer, Attendance, Prompt
+from pipelines.chain.chain import ORDER
 from pipelines.chain.runner import Runner
 from pipelines.cli import app
 from pipelines.cli.terminal import scanned
 from pipelines.flows.local import local_server
-from schemas.errors import OperatorNeeded
+from schemas.errors import LeaseLost, OperatorNeeded
 from schemas.fault import FaultOrder
 from schemas.station import with_faults
 
@@ -40,7 +41,11 @@ def attended(folder: Path, operator: Told, measure: object = None, fault: FaultO
     if fault is not None:
         job = type(job)(job.recipe, job.limits, job.lot, with_faults(job.station, [fault]))
     runner = Runner(job, Archive(folder / "archive"), measure=measure or CaptureDouble())
-    Attendance(operator, job, runner.run.id).capture(runner, lambda: runner.stage("capture"))
+    beside = Attendance(operator, job, runner.run.id)
+    beside.capture(runner, lambda: runner.stage("capture"))
+    for name in ORDER[1:-1]:
+        runner.stage(name)
+    beside.unload(runner.run)
 
 
 def test_units_are_asked_for_before_and_after_and_not_again_when_a_run_goes_on(tmp_path: Path) -> None:
@@ -48,8 +53,32 @@ def test_units_are_asked_for_before_and_after_and_not_again_when_a_run_goes_on(t
     attended(tmp_path, first)
     assert [prompt.kind for prompt in first.asked] == ["load", "unload"]
     assert first.asked[0].slots == ((0, "A1"), (1, "A2"), (2, "A3"))
+    assert [slot for slot, _ in first.asked[1].slots] == [0, 1, 2]
     attended(tmp_path, again)
     assert not again.asked
+
+
+def test_results_are_shown_slot_by_slot_before_the_units_are_taken_out(tmp_path: Path) -> None:
+    operator = Told()
+    attended(tmp_path, operator, CaptureDouble({"A2": "stuck"}))
+    unload = operator.asked[-1]
+    assert unload.kind == "unload"
+    results = dict(unload.slots)
+    assert results[0].split("  ")[0] == "A1"
+    assert results[1].startswith("A2  refused: ")
+    assert all(results[slot].split("  ")[1].split(",")[0].split(":")[0] in {"pass", "fail"} for slot in (0, 2))
+    passed = sum("  pass" in text for text in results.values())
+    assert unload.text.startswith(f"{passed} of 3 passed")
+
+
+def test_a_run_that_lost_its_lease_ends_though_somebody_is_beside_it(tmp_path: Path) -> None:
+    def lost(_job, _records, _progress):
+        raise LeaseLost("station served: this run stood still")
+
+    operator = Told()
+    with pytest.raises(LeaseLost):
+        attended(tmp_path, operator, lost)
+    assert [prompt.kind for prompt in operator.asked] == ["load"]
 
 
 def test_seats_that_are_not_as_the_slot_map_says_are_asked_for_until_somebody_stops(tmp_path: Path) -> None:
@@ -89,6 +118,9 @@ def test_a_terminal_is_asked_and_a_scanner_types_the_serials(tmp_path: Path) -> 
     assert [unit["unit"] for unit in json.loads(result.stdout)["units"]] == ["S1", "S2"]
     for words in ("slot  0:", "Load", "Unload", "slot  1  S2"):
         assert words in result.stderr
+    unloaded = result.stderr[result.stderr.index("Unload") :]
+    for unit in json.loads(result.stdout)["units"]:
+        assert f"slot {unit['slot']:>2}  {unit['unit']}  {unit['outcome']}" in unloaded
 
 
 def test_an_operator_who_stops_gets_status_3_and_nothing_is_measured(tmp_path: Path) -> None:
@@ -130,6 +162,7 @@ def test_a_paused_flow_run_is_answered_from_another_terminal(tmp_path: Path) -> 
     assert questions[0].startswith("load: seat the units as listed")
     assert "slot 1: A2" in questions[0]
     assert questions[1].startswith("unload")
+    assert "passed; take the units out" in questions[1]
     [info] = Archive(archive).runs()
     assert info.finished
 

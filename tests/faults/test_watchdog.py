@@ -8,100 +8,23 @@ import subprocess
 import sys
 import threading
 import time
-from contextlib import contextmanager
-from pathlib import Path
 
 import pytest
+from driven_station import FAR, HOT, SLOW, SOON_S, driver, look, safe_within, told
 from served_station import modbus_station, served
 from small_station import lot_of
 
-from schemas.errors import OperatorNeeded
+from schemas.errors import LeaseLost, OperatorNeeded
 from schemas.safety import SAFE_WITHIN_S
 from stations.opening import open_devices, open_station
 from stations.safety import folder
 from stations.safety.leases import Leases, addresses, holders, new_holder
-
-ROOT = Path(__file__).resolve().parents[2]
-HOT, FAR = 60.0, 170.0
-SOON_S = 15.0
-
-DRIVER = """
-import sys, time
-from schemas.recipe import Lot
-from schemas.station import StationConfig
-from stations.opening import open_station
-config = StationConfig.model_validate_json(sys.argv[1])
-with open_station(config, Lot.model_validate_json(sys.argv[2]), run="the driver") as station:
-    station.chamber.set_temperature(60.0)
-    station.reader.start(100.0)
-    station.table.axes["outer"].start(170.0)
-    print("driving", flush=True)
-    time.sleep(float(sys.argv[3]))
-"""
 
 
 @pytest.fixture(autouse=True)
 def state(tmp_path, monkeypatch):
     monkeypatch.setenv("TUMBLELINE_STATE", str(tmp_path / "state"))
     return tmp_path / "state"
-
-
-@contextmanager
-def driver(config, seconds=60.0):
-    """A process that drives the station: hot chamber, a slow move, sampling."""
-    arguments = [sys.executable, "-c", DRIVER, config.model_dump_json(), lot_of().model_dump_json(), str(seconds)]
-    environment = {**os.environ, "PYTHONPATH": str(ROOT)}
-    with subprocess.Popen(arguments, cwd=ROOT, env=environment, stdout=subprocess.PIPE, text=True) as process:
-        try:
-            assert process.stdout.readline() == "driving\n"
-            yield process
-        finally:
-            with_last_breath(process)
-
-
-def with_last_breath(process):
-    if process.poll() is None:
-        process.send_signal(signal.SIGCONT)
-        process.kill()
-    process.wait(10.0)
-
-
-def look(config):
-    """Angle of the outer axis, whether it moves, the chamber's set point, whether samples are taken."""
-    with open_devices(config, ()) as station:
-        registers = station.chamber._values
-        axis = station.table.axes["outer"]
-        return (
-            axis.position(),
-            axis._registers.flags("status")["move"],
-            registers.number("set_point"),
-            station.reader._registers.text("sampling"),
-        )
-
-
-def safe_within(config, seconds):
-    """Seconds until the station is in its safe state."""
-    begun = time.monotonic()
-    while time.monotonic() - begun < seconds:
-        _, moving, set_point, sampling = look(config)
-        if (moving, set_point, sampling) == (False, 25.0, "stopped"):
-            return time.monotonic() - begun
-        time.sleep(0.1)
-    pytest.fail(f"not safe after {seconds} s: {look(config)}; {folder.log(folder.state_folder())}")
-
-
-def told(event):
-    """The machine's log of one kind of event, once there is one."""
-    end = time.monotonic() + SOON_S
-    while time.monotonic() < end:
-        found = [line for line in folder.log(folder.state_folder()) if line["event"] == event]
-        if found:
-            return found[-1]
-        time.sleep(0.05)
-    return pytest.fail(f"no {event}: {folder.log(folder.state_folder())}")
-
-
-SLOW = {"speed_deg_s": 5.0}
 
 
 def test_a_killed_run_leaves_its_station_safe_and_free():
@@ -157,7 +80,7 @@ def test_a_holder_that_stood_still_is_refused_when_it_wakes(state):
     leases.require()
     time.sleep(0.1)
     leases.beat()  # too late
-    with pytest.raises(OperatorNeeded, match=r"stood still for more than 0\.05 s .* goes on where it was"):
+    with pytest.raises(LeaseLost, match=r"stood still for more than 0\.05 s .* goes on where it was"):
         leases.require()
     leases.release()
 

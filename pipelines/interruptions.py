@@ -1,0 +1,103 @@
+"""What interrupted a run at its station: an opened door, pauses, dwells that were measured again, units that were given up."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, TypedDict
+
+from pipelines.tables.frames import rows_of
+
+if TYPE_CHECKING:
+    from pipelines.archive import Run
+
+TOLD = ("suspended", "spoilt", "resumed", "unit_lost", "power", "emergency_stop", "stopped")
+PAUSES = ("suspended", "spoilt")
+DOOR = "door is open"
+
+
+class Interruption(TypedDict):
+    """One event, at ``time_s`` on the station's clock; ``record`` and ``pose`` of its dwell, −1 and empty where it has none."""
+
+    time_s: float
+    kind: str
+    record: int
+    pose: str
+    reason: str
+    action: str
+
+
+class RepeatedDwell(TypedDict):
+    """A dwell that was thrown away and measured again, so many times, and why."""
+
+    record: int
+    pose: str
+    times: int
+    reasons: list[str]
+
+
+class Interruptions(TypedDict):
+    """All of a run. ``paused_s`` is the time from each pause to where the run went on, of those that had to be waited for."""
+
+    door_opened: int
+    pauses: int
+    paused_s: float
+    repeated_dwells: list[RepeatedDwell]
+    events: list[Interruption]
+
+
+def interruptions(run: Run) -> Interruptions | None:
+    """What interrupted a run; None where its archive does not say (imported data, or a version that did not note it)."""
+    if "events" not in run.tables():
+        return None
+    poses = _poses(run)
+    events = [_event(row, poses) for row in rows_of(run.table("events")) if row["kind"] in TOLD]
+    pauses = [event for event in events if event["kind"] in PAUSES]
+    return {
+        "door_opened": sum(DOOR in event["reason"] for event in pauses),
+        "pauses": len(pauses),
+        "paused_s": round(_paused(events), 3),
+        "repeated_dwells": _repeated(events),
+        "events": events,
+    }
+
+
+def _event(row: dict[str, Any], poses: dict[int, str]) -> Interruption:
+    record = int(row["record"])
+    return {
+        "time_s": float(row["time_s"]),
+        "kind": str(row["kind"]),
+        "record": record,
+        "pose": poses.get(record, ""),
+        "reason": str(row["reason"]),
+        "action": str(row["action"]),
+    }
+
+
+def _poses(run: Run) -> dict[int, str]:
+    if "readings" not in run.tables():
+        return {}
+    readings = run.table("readings").drop_duplicates("record")
+    return {int(record): str(pose) for record, pose in zip(readings["record"], readings["pose"], strict=True)}
+
+
+def _paused(events: list[Interruption]) -> float:
+    """Seconds from the first pause of each row of them to the event that tells of its end."""
+    total, since = 0.0, None
+    for event in events:
+        if event["kind"] in PAUSES and since is None:
+            since = event["time_s"]
+        elif event["kind"] == "resumed" and since is not None:
+            total, since = total + event["time_s"] - since, None
+        elif event["kind"] in {"stopped", "emergency_stop"}:
+            since = None
+    return total
+
+
+def _repeated(events: list[Interruption]) -> list[RepeatedDwell]:
+    found: dict[int, RepeatedDwell] = {}
+    for event in events:
+        if event["kind"] == "spoilt":
+            new: RepeatedDwell = {"record": event["record"], "pose": event["pose"], "times": 0, "reasons": []}
+            dwell = found.setdefault(event["record"], new)
+            dwell["times"] += 1
+            dwell["reasons"].append(event["reason"])
+    return list(found.values())

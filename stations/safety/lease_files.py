@@ -1,0 +1,105 @@
+"""The notes beside the locks of leases: who holds which part of a station, written whole or not at all."""
+
+from __future__ import annotations
+
+import json
+import os
+import platform
+import re
+import time
+import uuid
+from dataclasses import asdict, dataclass, fields
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Literal
+
+from schemas.safety import SAFE_WITHIN_S
+
+Role = Literal["run", "watchdog"]
+
+
+@dataclass(frozen=True)
+class Holder:
+    """Who holds a lease, since when, and where; ``token`` is the same for all leases of one run.
+
+    ``tripped``: the run stood still and its watchdog has made the station safe. ``trouble``: what a watchdog could not do so far.
+    """
+
+    token: str
+    pid: int
+    host: str
+    run: str
+    station: str
+    role: Role
+    since: str
+    what: str = ""
+    tripped: bool = False
+    trouble: str = ""
+
+    def lives(self, path: Path) -> bool:
+        """Whether the holder that ``path`` names still counts: heard of in time and, on this machine, with a process."""
+        if seconds_since_beat(path) > SAFE_WITHIN_S:
+            return False
+        return self.host != platform.node() or _is_process(self.pid)
+
+
+def new_holder(station: str, run: str, role: Role = "run", token: str = "") -> Holder:
+    """The holder of leases that this process is."""
+    since = datetime.now(UTC).isoformat(timespec="seconds")
+    return Holder(token or uuid.uuid4().hex, os.getpid(), platform.node(), run, station, role, since)
+
+
+def lease_file(folder: Path, address: str) -> Path:
+    """Where the note of the lease on a place lies; its lock lies beside it."""
+    return folder / "leases" / f"{re.sub(r'[^A-Za-z0-9.-]', '_', address)}.json"
+
+
+def read_holder(path: Path) -> Holder | None:
+    """Who a lease's note names; None where there is none, or none that can be read: the lock decides then."""
+    known = {one.name for one in fields(Holder)}
+    try:
+        content = json.loads(path.read_text("utf-8"))
+        return Holder(**{name: value for name, value in content.items() if name in known})
+    except (OSError, ValueError, TypeError, AttributeError):
+        return None
+
+
+def write_holder(path: Path, holder: Holder) -> None:
+    """Puts a lease's note in its place, whole and on the disk; :class:`OSError` where it cannot be."""
+    aside = path.with_suffix(f".{uuid.uuid4().hex[:8]}")
+    try:
+        with aside.open("w", encoding="utf-8") as file:
+            file.write(json.dumps(asdict(holder)))
+            file.flush()
+            os.fsync(file.fileno())
+        aside.replace(path)
+    except OSError:
+        aside.unlink(missing_ok=True)
+        raise
+    handle = os.open(path.parent, os.O_RDONLY | os.O_DIRECTORY)
+    try:
+        os.fsync(handle)
+    finally:
+        os.close(handle)
+
+
+def seconds_since_beat(path: Path) -> float:
+    """Seconds since a lease's holder was heard of; infinite where there is no note of it."""
+    try:
+        return max(0.0, time.time() - path.stat().st_mtime)
+    except OSError:
+        return float("inf")
+
+
+def _is_process(pid: int) -> bool:
+    try:
+        os.kill(pid, 0)
+    except ProcessLookupError:
+        return False
+    except PermissionError:
+        return True
+    try:
+        state = Path(f"/proc/{pid}/stat").read_text("utf-8", errors="replace").rpartition(")")[2].split()[0]
+    except (OSError, IndexError):
+        return True
+    return state != "Z"  # killed, and its parent has not asked for its status yet

@@ -1,0 +1,210 @@
+"""A run that stood still sends nothing when it wakes: no order comes after the safe state, and it says why it ends."""
+
+import json
+import os
+import random
+import signal
+import subprocess
+import sys
+import time
+from contextlib import contextmanager
+
+import pytest
+from driven_station import ROOT, told, with_last_breath
+from served_station import modbus_station, moves_ordered, served_plant
+from small_station import lot_of
+
+from schemas.errors import LeaseLost, OperatorNeeded, StationTimeout
+from stations.opening import open_station
+from stations.safety import folder
+
+QUICK_MOVES = {"speed_deg_s": 90.0, "acceleration_deg_s2": 200.0}
+
+MOVER = """
+import json, random, sys
+import stations.devices.table
+from schemas.errors import TumblelineError
+from schemas.recipe import Lot
+from schemas.station import StationConfig
+from stations.opening import open_station
+stations.devices.table.POLL_S = 0.005  # nearly all of its time between readings and orders
+config, lot = StationConfig.model_validate_json(sys.argv[1]), Lot.model_validate_json(sys.argv[2])
+for _ in range(int(sys.argv[3])):
+    try:
+        with open_station(config, lot, run="the mover") as station:
+            print("driving", flush=True)
+            while True:
+                station.table.move(random.uniform(-40, 40), random.uniform(-40, 40))
+    except TumblelineError as problem:
+        print(json.dumps([type(problem).__name__, str(problem)]), flush=True)
+"""
+
+
+@pytest.fixture(autouse=True)
+def state(tmp_path, monkeypatch):
+    monkeypatch.setenv("TUMBLELINE_STATE", str(tmp_path / "state"))
+    return tmp_path / "state"
+
+
+@contextmanager
+def mover(config, times):
+    """A process that moves the table without a pause, and begins again so often after it was stopped."""
+    command = [sys.executable, "-c", MOVER, config.model_dump_json(), lot_of().model_dump_json(), str(times)]
+    environment = {**os.environ, "PYTHONPATH": str(ROOT)}
+    with subprocess.Popen(command, cwd=ROOT, env=environment, stdout=subprocess.PIPE, text=True) as process:
+        try:
+            yield process
+        finally:
+            with_last_breath(process)
+
+
+def counted(event):
+    return sum(line["event"] == event for line in folder.log(folder.state_folder()))
+
+
+def stop_and_wake(process, plant, rng):
+    """Moves ordered after the safe state, and what the run said: one stop at a random moment of its moves."""
+    assert process.stdout.readline() == "driving\n"
+    begun = moves_ordered(plant)
+    while moves_ordered(plant) == begun:
+        time.sleep(0.01)
+    time.sleep(rng.uniform(0.0, 0.7))
+    safe = counted("watchdog_safe")
+    process.send_signal(signal.SIGSTOP)
+    told("watchdog_safe", after=safe)
+    before = moves_ordered(plant)
+    process.send_signal(signal.SIGCONT)
+    kind, message = json.loads(process.stdout.readline())
+    told("watchdog_safe", after=safe + 1)  # once more, when the run had ended
+    return moves_ordered(plant) - before, kind, message
+
+
+def stopped_many_times(times, seed):
+    with served_plant() as (port, plant):
+        config = modbus_station(port, limits=QUICK_MOVES, safety={"heartbeat_s": 0.2, "lapse_s": 2.0})
+        rng, found = random.Random(seed), []
+        with mover(config, times) as process:
+            found = [stop_and_wake(process, plant, rng) for _ in range(times)]
+    assert [orders for orders, _, _ in found] == [0] * times
+    for _, kind, message in found:
+        assert kind == "LeaseLost"
+        assert "stood still" in message
+        assert "lost its lease" in message
+        assert "brake" not in message
+    kinds = [line["event"] for line in folder.log(folder.state_folder())]
+    assert kinds.count("lease_lost") == times
+    assert not {"left_safe", "not_safe"} & set(kinds)
+
+
+def test_no_order_comes_after_the_safe_state_when_a_run_that_stood_still_wakes():
+    stopped_many_times(2, 11)
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(3600)
+def test_no_order_comes_after_the_safe_state_in_a_hundred_stops_at_random_moments():
+    stopped_many_times(100, 12)
+
+
+@contextmanager
+def driven():
+    with served_plant() as (port, plant):
+        config = modbus_station(port, limits=QUICK_MOVES, safety={"heartbeat_s": 1.0, "lapse_s": 10.0})
+        with open_station(config, lot_of(), run="mine") as station:
+            yield station, plant, station.require.__self__
+
+
+@contextmanager
+def lost(why):
+    """A block that ends because the run has lost its lease."""
+    with pytest.raises(LeaseLost, match=why):
+        yield
+
+
+def between_reading_and_order(axis, monkeypatch, happens):
+    """Has something happen after the last reading before an axis' order."""
+    ready = axis._require_ready
+
+    def read_and_then():
+        ready()
+        happens()
+
+    monkeypatch.setattr(axis, "_require_ready", read_and_then)
+
+
+def test_a_lease_that_lapses_between_a_reading_and_the_order_leaves_it_unsent(monkeypatch):
+    with lost("stood still"), driven() as (station, plant, protection):
+        before, axis = moves_ordered(plant), station.table.axes["inner"]
+
+        def stands_still():
+            protection.leases._beaten -= 60.0
+
+        between_reading_and_order(axis, monkeypatch, stands_still)
+        try:
+            axis.start(115.0)
+        finally:
+            assert moves_ordered(plant) == before
+    assert [line["event"] for line in folder.log(folder.state_folder())][:2] == ["driven", "lease_lost"]
+
+
+def test_an_order_that_comes_long_after_its_reading_is_not_sent_and_may_be_tried_again(monkeypatch):
+    with driven() as (station, plant, _):
+        before, axis = moves_ordered(plant), station.table.axes["inner"]
+        with monkeypatch.context() as patch:
+
+            def is_late():
+                axis._registers._answered -= 6.0
+
+            between_reading_and_order(axis, patch, is_late)
+            with pytest.raises(StationTimeout, match=r"6\.\d s after the reading that it rests on, at most 1 s"):
+                axis.start(30.0)
+        assert moves_ordered(plant) == before
+        station.table.move(0.0, 30.0)
+        assert moves_ordered(plant) > before
+
+
+def test_what_a_run_finds_at_a_station_that_it_has_lost_is_not_why_it_ends():
+    with lost("stood still"), driven() as (_, _, protection):
+        protection.leases._beaten -= 60.0
+        raise OperatorNeeded("inner axis: stands at 3 deg, 115 is needed; check load and brake of the table")
+
+
+def test_a_run_whose_leases_were_cleared_away_and_taken_sends_nothing_more(state):
+    from stations.safety.leases import Leases, addresses, new_holder
+
+    with lost("has gone to the other"), driven() as (station, plant, _):
+        for path in (state / "leases").iterdir():
+            path.unlink()
+        other = Leases(state, new_holder("served", "the other"), addresses(station.config), 10.0)
+        other.take()
+        try:
+            with pytest.raises(LeaseLost):
+                station.table.move(10.0, 10.0)
+            assert moves_ordered(plant) == 0
+            station.chamber.set_temperature(40.0)
+        finally:
+            other.release()
+
+
+def test_leases_that_were_cleared_away_and_not_taken_are_held_on_to(state):
+    from stations.safety.leases import Leases, addresses, new_holder
+
+    with driven() as (station, _, _):
+        for path in (state / "leases").iterdir():
+            path.unlink()
+        station.table.move(1.0, 1.0)
+        other = Leases(state, new_holder("served", "the other"), addresses(station.config), 10.0)
+        with pytest.raises(OperatorNeeded, match="driven by mine"):
+            other.take()
+
+
+def test_what_the_network_could_not_deliver_is_dropped_with_its_connection():
+    import socket
+    import struct
+
+    with driven() as (station, _, _):
+        station.table.angles()
+        connection = station.table.axes["outer"]._registers._link._link._wire._socket
+        linger = connection.getsockopt(socket.SOL_SOCKET, socket.SO_LINGER, 8)
+        assert struct.unpack("ii", linger) == (1, 0)
+        assert connection.getsockopt(socket.IPPROTO_TCP, socket.TCP_USER_TIMEOUT) == 1000
