@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+from pipelines.capture.interruptions import interruptions
 from pipelines.cli.options import STYLES, console, print_table, short
-from pipelines.interruptions import interruptions
 from pipelines.tables.frames import rows_of
 from pipelines.tables.json_values import json_value
 from schemas.errors import DONE, PART_FAILED
@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from rich.text import Text
 
     from pipelines.archive import Run
-    from pipelines.interruptions import Interruptions
+    from pipelines.capture.interruptions import Interruptions
 
 SHOWN = (
     ("residual_rms_ug", "fit\nµg"),

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from pipelines.interruptions import interruptions
+from pipelines.capture.interruptions import interruptions
 from pipelines.report.numbers import plain, with_uncertainty
 from pipelines.report.plots import check_plots, lot_plot, model_plots
 from pipelines.report.templates import template

@@ -7,11 +7,11 @@ from capture_double import CaptureDouble, small_job
 from typer.testing import CliRunner
 
 from pipelines.archive import Archive, Run
+from pipelines.capture.interruptions import interruptions
 from pipelines.chain.chain import ORDER
 from pipelines.chain.runner import Runner
 from pipelines.cli import app
 from pipelines.cli.summary import summary
-from pipelines.interruptions import interruptions
 from pipelines.report import render
 from schemas.event import Event
 
