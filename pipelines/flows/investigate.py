@@ -12,9 +12,9 @@ from typing import TYPE_CHECKING, Any
 
 from prefect import flow
 
-from pipelines.archive import Archive
 from pipelines.flows.calibrate import requested, stage
 from pipelines.flows.operator import Paused
+from pipelines.flows.places import archive_of
 from pipelines.inquiry.play import Consent, Table, Terms, always, play
 from pipelines.operator import Prompt
 
@@ -77,8 +77,9 @@ def investigate(  # noqa: PLR0913 - a flow's parameters are its form on the serv
     Without ``repeat`` every flow run measures the lot anew, and a retry of the same flow run goes on where it was. With ``ask``
     the flow run pauses before every follow-up until somebody approves its minutes.
     """
-    job = requested(recipe, station, units, slots, seed, repeat, faults).job(Archive(archive))
+    store = archive_of(archive)
+    job = requested(recipe, station, units, slots, seed, repeat, faults).job(store)
     table = _tables[-1] if _tables else Table()
     approve = Asked(Paused()) if ask else (table.approve if _tables else always)
     at = Table(_stage, approve, table.progress, table.told, table.looked)
-    return play(job, Archive(archive), Terms(tuple(effects or ()), budget_min, unseen), at)
+    return play(job, store, Terms(tuple(effects or ()), budget_min, unseen), at)

@@ -19,15 +19,17 @@ def investigate_locally(request: Request, archive: Archive, terms: Terms, table:
     job = request.job(archive)
     name = f"investigate {job.recipe.name} {job.capture_id}"
     with reached(archive):
-        from pipelines.flows.calibrate import close_dead_runs, settle_history
+        from pipelines.flows.calibrate import settle_history
+        from pipelines.flows.dead_runs import close_dead_runs
         from pipelines.flows.investigate import investigate, seated
+        from pipelines.flows.places import named
 
         close_dead_runs(name)
-        with seated(table):
-            named = investigate.with_options(flow_run_name=name)
-            found: Any = named(
+        with seated(table), named(archive) as address:
+            flow = investigate.with_options(flow_run_name=name)
+            found: Any = flow(
                 **request.parameters(),
-                archive=archive.address,
+                archive=address,
                 effects=list(terms.effects),
                 budget_min=terms.budget,
                 unseen=terms.unseen,
