@@ -10,6 +10,7 @@ null for two numbers, and since then FastAPI takes null for a value and no longe
 from __future__ import annotations
 
 import sys
+from importlib import import_module
 from pathlib import Path
 from typing import Any
 
@@ -73,14 +74,12 @@ def _have_queue(pool: str, name: str) -> None:
 
 
 def _register(item: dict[str, Any]) -> str:
-    from prefect import Flow, flow
     from prefect.client.schemas.schedules import CronSchedule
     from prefect.deployments.runner import RunnerDeployment
+    from prefect.types.entrypoint import EntrypointType
 
-    source = flow.from_source(source=str(ROOT), entrypoint=item["entrypoint"])
-    if not isinstance(source, Flow):
-        raise TypeError(NOT_HERE)
-    deployment = source.to_deployment(
+    module, _, name = item["entrypoint"].rpartition(".")
+    deployment = getattr(import_module(module), name).to_deployment(
         name=item["name"],
         description=item["description"],
         tags=item["tags"],
@@ -89,6 +88,10 @@ def _register(item: dict[str, Any]) -> str:
         schedules=[CronSchedule(cron=s["cron"], timezone=s["timezone"]) for s in item["schedules"]],
         work_pool_name=item["work_pool"]["name"],
         work_queue_name=item["work_pool"]["work_queue_name"],
+        # by its module: by its file Prefect would put the file's folder first on sys.path, where our operator.py hides
+        # Python's own, and no process that a flow starts (a station's watchdog) would come up
+        entrypoint_type=EntrypointType.MODULE_PATH,
+        job_variables={"working_dir": str(ROOT)},  # where recipes and stations of deploy/ are found
     )
     if not isinstance(deployment, RunnerDeployment):
         raise TypeError(NOT_HERE)

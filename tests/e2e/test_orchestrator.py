@@ -22,7 +22,8 @@ DEPLOYMENTS = ["calibrate_lot/production-line", "calibrate_lot/on-demand", "audi
 @pytest.fixture(scope="module")
 def line(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Orchestrator]:
     """One server for the tests of this file, with the deployments of the product."""
-    with served(tmp_path_factory.mktemp("orchestrator")) as found:
+    home = tmp_path_factory.mktemp("orchestrator")
+    with served(home, PREFECT_UI_STATIC_DIRECTORY=str(home / "ui")) as found:
         names = python(found.environment, "-m", "pipelines.flows.deploy", "deploy/prefect.yaml").split()
         assert names == DEPLOYMENTS
         yield found
@@ -99,6 +100,13 @@ async def greet(line: Orchestrator, path: str, key: str, called: str = "127.0.0.
         return json.loads(await socket.recv())
 
 
+def test_the_page_is_served_where_the_code_may_not_be_written_to(line: Orchestrator) -> None:
+    status, page = line.ask("/", key="")
+    assert status == 200
+    assert "<html" in page
+    assert list((line.home / "ui").glob("v*/index.html"))
+
+
 def test_the_files_of_the_server_are_its_own(line: Orchestrator) -> None:
     assert stat.S_IMODE(line.home.stat().st_mode) == 0o700
     modes = {path.name: stat.S_IMODE(path.stat().st_mode) for path in line.home.glob("prefect.db*")}
@@ -115,6 +123,57 @@ def test_the_queue_of_the_station_takes_one_run_at_a_time(line: Orchestrator) ->
         "on-demand": "line-1",
         "weekly-audit": "audits",
     }
+
+
+def test_flows_are_found_by_their_module_so_that_their_folder_hides_no_module_of_python(line: Orchestrator) -> None:
+    _, found = line.ask("/api/deployments/filter", {})
+    assert {one["entrypoint"] for one in found} == {
+        "pipelines.flows.calibrate.calibrate_lot",
+        "pipelines.flows.audit.audit_archive",
+    }
+    assert {one["job_variables"]["working_dir"] for one in found} == {str(ROOT)}
+
+
+CLOSING = """
+import json
+from pipelines.flows.dead_runs import cancel_missed_runs, close_dead_runs_of_queue
+print(json.dumps([close_dead_runs_of_queue("line", "line-1"), cancel_missed_runs("line", "line-1")]))
+"""
+
+
+def test_runs_whose_process_is_gone_are_closed_and_others_left_alone(line: Orchestrator) -> None:
+    _, deployment = line.ask("/api/deployments/name/calibrate_lot/on-demand")
+    _, elsewhere = line.ask("/api/deployments/name/audit_archive/weekly-audit")
+
+    def began(name: str, kind: str, where: dict = deployment, **about: object) -> str:
+        _, run = line.ask(f"/api/deployments/{where['id']}/create_flow_run", {"name": name})
+        state = {"type": kind, "name": about.pop("state", kind.title())}
+        assert line.ask(f"/api/flow_runs/{run['id']}/set_state", {"state": state, "force": True})[0] in {200, 201}
+        assert line.ask(f"/api/flow_runs/{run['id']}", about, "PATCH")[0] == 204
+        return run["id"]
+
+    gone = 2**22 + 1  # above the largest number of a process
+    runs = {
+        "power-cut": began("power-cut", "RUNNING", infrastructure_pid=str(gone)),
+        "another-process": began("another-process", "RUNNING", infrastructure_pid=str(os.getpid())),
+        "never-began": began("never-began", "PENDING"),
+        "waits-without-process": began("waits-without-process", "PAUSED", infrastructure_pid=str(gone)),
+        "suspended": began("suspended", "PAUSED", state="Suspended"),
+        "of-another-queue": began("of-another-queue", "RUNNING", elsewhere, infrastructure_pid=str(gone)),
+        "ordered": began("ordered", "SCHEDULED"),
+    }
+    alive = began("alive", "RUNNING")
+    environment = {**os.environ, "PREFECT__FLOW_RUN_ID": alive}
+    with subprocess.Popen(["sleep", "600"], env=environment) as process:
+        line.ask(f"/api/flow_runs/{alive}", {"infrastructure_pid": str(process.pid)}, "PATCH")
+        closed, missed = json.loads(python(line.environment, "-c", CLOSING))
+        process.kill()
+    assert sorted(closed) == ["another-process", "never-began", "power-cut", "waits-without-process"]
+    assert missed == []
+    states = {name: line.ask(f"/api/flow_runs/{found}")[1]["state_type"] for name, found in runs.items()}
+    assert {name for name, state in states.items() if state == "CRASHED"} == set(closed)
+    for found in (*runs.values(), alive):
+        line.ask(f"/api/flow_runs/{found}", method="DELETE")
 
 
 def test_credentials_are_refused_as_a_parameter_of_a_flow_and_not_stored(line: Orchestrator) -> None:

@@ -9,7 +9,9 @@ STARTED = "02:26:50.483 | WARNING | prefect.server - slow\n"
 FAILED = "02:26:49.950 | ERROR   | prefect.server.services.scheduler - Unexpected error\nTraceback (most recent call last):\n"
 
 
-@pytest.mark.parametrize("text", [FAILED, "CRITICAL: x\n", "ERROR:    Exception in ASGI application\n", "Traceback (most\n"])
+@pytest.mark.parametrize(
+    "text", [FAILED, "CRITICAL: x\n", "ERROR:    Exception in ASGI application\n", "Traceback (most\n"]
+)
 def test_an_error_is_found_with_what_follows_it(tmp_path: Path, text: str) -> None:
     log = tmp_path / "log"
     log.write_text(STARTED + text)
