@@ -115,8 +115,7 @@ def any_client(home: Path) -> bool:
     return alive
 
 
-def main(arguments: Sequence[str] | None = None) -> None:
-    """Serve as the command line says."""
+def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(prog="python -m pipelines.flows.server", description="The orchestrator's server.")
     parser.add_argument("--host", default=LOOPBACK[0], help="Address to listen on.")
     parser.add_argument("--port", type=int, default=4200, help="Port to listen on.")
@@ -126,7 +125,12 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser.add_argument(
         "--until-unused", type=Path, metavar="FOLDER", help="Leave when no client holds a lock in this folder."
     )
-    given = parser.parse_args(arguments)
+    return parser
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    """Serve as the command line says."""
+    given = _parser().parse_args(arguments)
     try:
         serve(given.host, given.port, given.name, given.until_unused)
     except TumblelineError as problem:

@@ -73,7 +73,15 @@ def test_a_deployment_started_by_hand_appears_in_the_archive(tmp_path: Path) -> 
 def test_the_server_goes_when_its_last_user_has_gone(tmp_path: Path) -> None:
     home = tmp_path / "orchestrator"
     with local_server(home) as first:
-        pid = json.loads((home / "server.json").read_text(encoding="utf-8"))["pid"]
+        content = json.loads((home / "server.json").read_text(encoding="utf-8"))
+        pid, key = content["pid"], content["key"]
+        assert first["PREFECT_API_AUTH_STRING"] == key
+        assert key.encode() not in Path(f"/proc/{pid}/cmdline").read_bytes()
+        modes = {
+            path.name: path.stat().st_mode & 0o077 for path in (home, *home.iterdir()) if path.is_file() or path == home
+        }
+        assert {"orchestrator", "server.json", "server.log", "prefect.db"} <= set(modes)
+        assert {name for name, mode in modes.items() if mode} <= {"start.lock"}
         with local_server(home) as second:
             assert second["PREFECT_API_URL"] == first["PREFECT_API_URL"]
         assert Path(f"/proc/{pid}").exists()

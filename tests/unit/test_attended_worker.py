@@ -59,15 +59,3 @@ def test_it_has_the_status_of_its_worker(tmp_path: Path) -> None:
     done = subprocess.run(command, cwd=ROOT, env={**os.environ, "PYTHONPATH": str(ROOT)}, timeout=60, check=False)
     assert done.returncode == 7
     assert (tmp_path / "safe").exists()
-
-
-def test_a_worker_with_a_key_that_others_may_read_does_not_start(tmp_path: Path) -> None:
-    key = tmp_path / "prefect-auth"
-    key.write_text("tumbleline:" + "x" * 32)
-    key.chmod(0o644)
-    environment = {name: value for name, value in os.environ.items() if not name.endswith("AUTH_STRING")}
-    environment |= {"TUMBLELINE_ORCHESTRATOR_KEY": str(key), "PREFECT_API_URL": "http://127.0.0.1:9/api"}
-    command = [sys.executable, "-m", "pipelines.flows.worker", "start", "--station", "line-1"]
-    done = subprocess.run(command, cwd=ROOT, env=environment, capture_output=True, text=True, timeout=60, check=False)
-    assert done.returncode == 2
-    assert "has mode 0644, 0600 or less is needed" in done.stderr

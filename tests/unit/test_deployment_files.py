@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 import yaml
 
+from pipelines.flows import server, worker
 from schemas.safety import SAFE_WITHIN_S
 from schemas.station import load_station
 
@@ -161,3 +162,20 @@ def test_every_deployment_of_a_lot_is_in_the_queue_of_its_station() -> None:
     assert queues["weekly-audit"] != station
     assert f"--station {station}" in unit("tumbleline-worker")["Service"]["ExecStart"][0]
     assert f"--station={station}" in SERVICES["worker"]["entrypoint"]
+
+
+def commands() -> list[tuple[str, list[str]]]:
+    """Every start of a server or worker that the files name: the module and its arguments."""
+    texts = [
+        line for name in UNITS for line in (DEPLOY / "systemd" / f"{name}.service").read_text("utf-8").splitlines()
+    ]
+    texts += [line for line in (DEPLOY / "README.md").read_text("utf-8").splitlines() if line.startswith("$")]
+    texts += [" ".join(service["entrypoint"]) for service in SERVICES.values()]
+    found = [re.search(r"-m pipelines\.flows\.(server|worker) ([^&]*)", text) for text in texts]
+    return [(match[1], match[2].split()) for match in found if match]
+
+
+def test_every_command_of_the_files_is_one_that_is_there() -> None:
+    assert [module for module, _ in commands()].count("worker") >= 5
+    for module, arguments in commands():
+        {"server": server, "worker": worker}[module]._parser().parse_args(arguments)
