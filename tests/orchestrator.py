@@ -22,14 +22,17 @@ from pipelines.flows.settings import CLIENT_KEY, SERVER_KEY, new_key
 
 PATIENCE_S = 120.0
 LOG = "server.log"
-WRONG = re.compile(r"\|\s*(?:ERROR|CRITICAL)\s*\||^(?:ERROR|CRITICAL)\b|^Traceback ", re.MULTILINE)
+RECORD = re.compile(r"^(?=\d\d:\d\d:\d\d\.\d+ \| )", re.MULTILINE)
+WRONG = re.compile(r"\A\S+ \|\s*(?:ERROR|CRITICAL)\s*\||^(?:ERROR|CRITICAL)\b|^Traceback ", re.MULTILINE)
+BUSY = "sqlite3.OperationalError: database is locked"
+"""Two services of the server wrote at once: SQLite refuses the second, which comes again within seconds."""
 
 
 def errors_in(log: Path) -> str:
     """The first error of a server's log with what follows it; empty where there is none."""
     text = log.read_text(encoding="utf-8", errors="replace") if log.is_file() else ""
-    found = WRONG.search(text)
-    return text[text.rfind("\n", 0, found.start()) + 1 :][:4000] if found else ""
+    wrong = [record for record in RECORD.split(text) if WRONG.search(record) and BUSY not in record]
+    return wrong[0][:4000] if wrong else ""
 
 
 @dataclass(frozen=True)
