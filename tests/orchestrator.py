@@ -58,7 +58,8 @@ class Orchestrator:
             with urllib.request.urlopen(request, timeout=30) as answer:
                 return answer.status, _document(answer.read())
         except urllib.error.HTTPError as problem:
-            return problem.code, _document(problem.read())
+            with problem:
+                return problem.code, _document(problem.read())
 
     def runs(self, deployment: str, *states: str) -> list[dict]:
         """Flow runs of a deployment in one of the states."""

@@ -17,6 +17,7 @@ from typing import Any
 import yaml
 
 from pipelines.flows.credentials import refuse_credentials
+from pipelines.flows.knock import knock
 from pipelines.flows.settings import CLIENT_KEY, use_key
 from schemas.errors import TumblelineError
 
@@ -31,9 +32,10 @@ def register(path: Path) -> list[str]:
     Raises
     ------
     WrongUse
-        There is no key, or a parameter holds credentials.
+        There is no key or a wrong one, or a parameter holds credentials.
     """
     use_key(CLIENT_KEY)
+    knock()
     content = yaml.safe_load(path.read_text(encoding="utf-8"))
     for item in content["deployments"]:
         refuse_credentials(item["parameters"].get("archive"))

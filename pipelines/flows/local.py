@@ -19,8 +19,9 @@ from typing import TYPE_CHECKING
 
 from pipelines.chain import ORDER
 from pipelines.flows.credentials import without_credentials
+from pipelines.flows.knock import knock
 from pipelines.flows.server import ADDRESS, CLIENTS, START_LOCK, private_folder
-from pipelines.flows.settings import STARTUP_S, new_key, settings
+from pipelines.flows.settings import CLIENT_KEY, KEY_FILE, STARTUP_S, new_key, settings, use_key
 from schemas.errors import ArchiveUnusable, StationTimeout
 
 if TYPE_CHECKING:
@@ -57,11 +58,20 @@ def run_locally(
 def reached(archive: Archive) -> Generator[None]:
     """A block in which an orchestrator answers: the one named by PREFECT_API_URL, or one of our own beside the archive."""
     if os.environ.get("PREFECT_API_URL"):
+        reach_named()
         yield
         return
     with local_server(_home(archive)) as environment:
         os.environ.update(environment)
         yield
+
+
+def reach_named() -> None:
+    """Make sure that the orchestrator named by PREFECT_API_URL answers to our key; Prefect's cloud has keys of its own kind."""
+    if os.environ.get(KEY_FILE) and not os.environ.get(CLIENT_KEY):
+        use_key(CLIENT_KEY)
+    if not os.environ.get("PREFECT_API_KEY"):
+        knock()
 
 
 def _home(archive: Archive) -> Path:

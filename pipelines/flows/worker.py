@@ -13,25 +13,22 @@ from __future__ import annotations
 
 import argparse
 import fcntl
-import os
 import re
 import sys
 import time
-import urllib.error
-import urllib.request
 from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
 from pipelines.flows.attended import attend
+from pipelines.flows.knock import POLL_S, knock
 from pipelines.flows.settings import CLIENT_KEY, STARTUP_S, use_key
-from schemas.errors import LinkLost, OperatorNeeded, TumblelineError, WrongUse
+from schemas.errors import OperatorNeeded, TumblelineError, WrongUse
 from stations.safety.folder import state_folder
 
 if TYPE_CHECKING:
     from collections.abc import Generator, Sequence
     from pathlib import Path
 
-POLL_S = 1.0
 NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]*")
 
 
@@ -42,13 +39,13 @@ def start(pool: str, station: str, queues: Sequence[str], *, once: bool = False,
     ------
     OperatorNeeded
         Another worker of this machine works for the station.
-    LinkLost
-        The orchestrator does not answer.
+    WrongUse, LinkLost
+        The orchestrator does not take the key, or does not answer.
     """
     from pipelines.flows.dead_runs import cancel_missed_runs, close_dead_runs_of_queue
 
     with _alone(station):
-        _await_server()
+        knock(STARTUP_S)
         for queue in (station, *queues):
             for name in close_dead_runs_of_queue(pool, queue):
                 _tell(f"{queue}: run {name} is closed as crashed: its process is gone")
@@ -83,7 +80,7 @@ def stop(pool: str, station: str, wait_s: float) -> list[str]:
 
     from pipelines.flows.dead_runs import WORKING, runs_of_queue
 
-    _await_server(patience_s=0.0)
+    knock()
     if _pause(pool, station, paused=True):
         _marker(station).touch()
     end = time.monotonic() + wait_s
@@ -132,25 +129,6 @@ def _alone(station: str) -> Generator[None]:
 def _marker(station: str) -> Path:
     """File that says that the station's queue was paused by ``stop``, and not by somebody who has a reason."""
     return state_folder() / f"worker-{station}.paused"
-
-
-def _await_server(patience_s: float = STARTUP_S) -> None:
-    """Wait until the orchestrator answers: a service is started before it does."""
-    address = os.environ.get("PREFECT_API_URL", "")
-    if not address.startswith(("http://", "https://")):
-        message = f"worker: PREFECT_API_URL is '{address}', the orchestrator's address is needed, such as http://127.0.0.1:4200/api"
-        raise WrongUse(message)
-    end = time.monotonic() + patience_s
-    while True:
-        try:
-            with urllib.request.urlopen(f"{address.rstrip('/')}/health", timeout=5.0):  # noqa: S310 - looked at above
-                return
-        except (urllib.error.URLError, TimeoutError, ConnectionError) as problem:
-            if time.monotonic() >= end:
-                found = f"the orchestrator at {address} does not answer ({problem})"
-                message = f"worker: {found}; start its server, or correct the address"
-                raise LinkLost(message) from None
-            time.sleep(POLL_S)
 
 
 def _tell(text: str) -> None:

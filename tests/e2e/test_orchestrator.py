@@ -12,8 +12,12 @@ import pytest
 import websockets
 from orchestrator import Orchestrator, served
 from root_process import ROOT, python
+from typer.testing import CliRunner
 
+from pipelines.cli import app
 from pipelines.flows.credentials import REFUSED
+from pipelines.flows.knock import knock
+from schemas.errors import LinkLost, WrongUse
 
 EVIL = "http://evil.example"
 DEPLOYMENTS = ["calibrate_lot/production-line", "calibrate_lot/on-demand", "audit_archive/weekly-audit"]
@@ -185,6 +189,25 @@ def test_credentials_are_refused_as_a_parameter_of_a_flow_and_not_stored(line: O
     status, _ = line.ask(f"/api/deployments/{found['id']}", {"parameters": parameters}, "PATCH")
     assert status == 422
     assert [path.name for path in line.home.iterdir() if path.is_file() and secret.encode() in path.read_bytes()] == []
+
+
+@pytest.mark.parametrize(("key", "told"), [("", "wants a key"), ("tumbleline:" + "x" * 32, "refuses the key")])
+def test_a_client_with_no_key_or_a_wrong_one_is_told(
+    line: Orchestrator, key: str, told: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("PREFECT_API_URL", line.environment["PREFECT_API_URL"])
+    monkeypatch.setenv("PREFECT_API_AUTH_STRING", key)
+    result = CliRunner().invoke(app, ["operator"])
+    assert isinstance(result.exception, WrongUse)
+    assert told in str(result.exception)
+    monkeypatch.setenv("PREFECT_API_AUTH_STRING", line.key)
+    knock()
+
+
+def test_an_orchestrator_that_does_not_answer_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("PREFECT_API_URL", "http://127.0.0.1:9/api")
+    with pytest.raises(LinkLost, match="does not answer"):
+        knock()
 
 
 def test_a_server_without_a_key_does_not_start() -> None:
