@@ -15,13 +15,13 @@ import uuid
 from contextlib import contextmanager
 from hashlib import sha256
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from pipelines.chain import ORDER
 from pipelines.flows.credentials import without_credentials
 from pipelines.flows.knock import knock
 from pipelines.flows.server import ADDRESS, CLIENTS, START_LOCK, private_folder
-from pipelines.flows.settings import CLIENT_KEY, KEY_FILE, STARTUP_S, new_key, settings, use_key
+from pipelines.flows.settings import CLIENT_KEY, KEY_FILE, STARTUP_S, environment, new_key, settings, use_key
 from schemas.errors import ArchiveUnusable, StationTimeout
 
 if TYPE_CHECKING:
@@ -61,9 +61,20 @@ def reached(archive: Archive) -> Generator[None]:
         reach_named()
         yield
         return
-    with local_server(_home(archive)) as environment:
-        os.environ.update(environment)
+    with own_server(_home(archive)):
         yield
+
+
+@contextmanager
+def own_server(home: Path) -> Generator[None]:
+    """A block in which this process is a client of a server of our own; nothing of it is left afterwards."""
+    with local_server(home) as found, environment(found):
+        from prefect.settings import temporary_settings
+
+        # Prefect reads the environment when it is imported, which an earlier block may have done for another server
+        own: dict[Any, str] = {name: found[name] for name in ("PREFECT_API_URL", "PREFECT_HOME", CLIENT_KEY)}
+        with temporary_settings(updates=own):
+            yield
 
 
 def reach_named() -> None:

@@ -5,13 +5,14 @@ from __future__ import annotations
 import os
 import secrets
 import stat
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from schemas.errors import WrongUse
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Generator, Mapping, Sequence
 
 STARTUP_S = 120
 SERVER_KEY, CLIENT_KEY = "PREFECT_SERVER_API_AUTH_STRING", "PREFECT_API_AUTH_STRING"
@@ -58,6 +59,19 @@ def origins(names: Sequence[str], port: int) -> list[str]:
 def new_key() -> str:
     """A key that nobody guesses, in the form ``user:password`` that Prefect asks for."""
     return f"tumbleline:{secrets.token_urlsafe(32)}"
+
+
+@contextmanager
+def environment(values: Mapping[str, str]) -> Generator[None, None, None]:
+    """A block with these variables in the environment, which is as it was after it."""
+    before = {key: os.environ.get(key) for key in values}
+    os.environ.update(values)
+    try:
+        yield
+    finally:
+        for key, value in before.items():
+            os.environ.pop(key, None)
+            os.environ.update({} if value is None else {key: value})
 
 
 def use_key(variable: str) -> str:

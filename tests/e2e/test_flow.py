@@ -87,3 +87,24 @@ def test_the_server_goes_when_its_last_user_has_gone(tmp_path: Path) -> None:
         assert Path(f"/proc/{pid}").exists()
     os.waitpid(pid, 0)
     assert not (home / "server.json").exists()
+
+
+TWICE = """
+import sys, time
+from pathlib import Path
+from pipelines.archive import Archive
+from pipelines.flows.local import reached
+for _ in range(2):
+    with reached(Archive(sys.argv[1])):
+        from pipelines.flows.operator import waiting
+        assert waiting() == []
+    end = time.monotonic() + 60.0
+    while (Path(sys.argv[1]) / "orchestrator" / "server.json").exists() and time.monotonic() < end:
+        time.sleep(0.1)
+"""
+
+
+@pytest.mark.slow
+def test_a_command_with_a_second_filling_reaches_a_server_again(tmp_path: Path) -> None:
+    environment = {name: value for name, value in os.environ.items() if not name.startswith("PREFECT_")}
+    python({**environment, "PYTHONPATH": str(ROOT)}, "-c", TWICE, str(tmp_path / "archive"))
