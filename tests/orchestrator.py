@@ -13,6 +13,7 @@ import urllib.request
 from collections.abc import Iterator
 from contextlib import closing, contextmanager
 from dataclasses import dataclass
+from http import HTTPStatus
 from pathlib import Path
 from typing import Any
 
@@ -21,6 +22,7 @@ from root_process import ROOT
 from pipelines.flows.settings import CLIENT_KEY, SERVER_KEY, new_key
 
 PATIENCE_S = 120.0
+BUSY_TIMES = 20
 LOG = "server.log"
 RECORD = re.compile(r"^(?=\d\d:\d\d:\d\d\.\d+ \| )", re.MULTILINE)
 WRONG = re.compile(r"\A\S+ \|\s*(?:ERROR|CRITICAL)\s*\||^(?:ERROR|CRITICAL)\b|^Traceback ", re.MULTILINE)
@@ -47,7 +49,18 @@ class Orchestrator:
     def ask(
         self, path: str, content: Any = None, method: str = "", key: str | None = None, **headers: str
     ) -> tuple[int, Any]:
-        """Status and document of a request; ``key`` is the server's where None is given, and none where it is empty."""
+        """Status and document of a request; ``key`` is the server's where None is given, and none where it is empty.
+
+        A server that is busy (503) is asked again, as Prefect's clients do.
+        """
+        for _ in range(BUSY_TIMES):
+            answer = self._ask(path, content, method, key, headers)
+            if answer[0] != HTTPStatus.SERVICE_UNAVAILABLE:
+                break
+            time.sleep(0.5)
+        return answer
+
+    def _ask(self, path: str, content: Any, method: str, key: str | None, headers: dict[str, str]) -> tuple[int, Any]:
         used = self.key if key is None else key
         sent = {"Content-Type": "application/json"} | {name.replace("_", "-"): value for name, value in headers.items()}
         if used:
