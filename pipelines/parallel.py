@@ -13,14 +13,15 @@ from contextlib import contextmanager
 from multiprocessing import get_context
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, TypeVar
 
 from threadpoolctl import threadpool_limits
 
+from pipelines.flows.settings import environment
 from schemas.errors import ArchiveUnusable, WrongUse
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Generator, Mapping, Sequence
+    from collections.abc import Callable, Generator, Sequence
 
 Part = TypeVar("Part")
 Result = TypeVar("Result")
@@ -89,21 +90,8 @@ def processors() -> int:
 @contextmanager
 def one_thread_each() -> Generator[None, None, None]:
     """A block whose child processes begin with one BLAS thread."""
-    with _environment(ONE_THREAD):
+    with environment(ONE_THREAD):
         yield
-
-
-@contextmanager
-def _environment(values: Mapping[str, str]) -> Generator[None, None, None]:
-    """A block with these variables in the environment, which is as it was after it."""
-    before = {key: os.environ.get(key) for key in values}
-    os.environ.update(values)
-    try:
-        yield
-    finally:
-        for key, value in before.items():
-            os.environ.pop(key, None)
-            os.environ.update({} if value is None else {key: value})
 
 
 def _in_processes(function: Callable[[Part], Result], partitions: Sequence[Part], workers: int) -> list[Result]:
@@ -131,18 +119,11 @@ def _refuse_address(dask: str) -> None:
 @contextmanager
 def _orchestrator(home: Path | None) -> Generator[None, None, None]:
     """A block with an orchestrator: the one that PREFECT_API_URL names, or one of our own for as long as it lasts."""
+    from pipelines.flows.local import own_server, reach_named
+
     if os.environ.get("PREFECT_API_URL"):
+        reach_named()
         yield
         return
-    from pipelines.flows.local import local_server
-
-    with (
-        TemporaryDirectory(prefix="tumbleline-", ignore_cleanup_errors=True) as spare,
-        local_server(home or Path(spare)) as settings,
-        _environment(settings),
-    ):
-        from prefect.settings import temporary_settings
-
-        own: dict[Any, str] = {name: settings[name] for name in ("PREFECT_API_URL", "PREFECT_HOME")}
-        with temporary_settings(updates=own):  # in case that Prefect was imported before, with others
-            yield
+    with TemporaryDirectory(prefix="tumbleline-", ignore_cleanup_errors=True) as spare, own_server(home or Path(spare)):
+        yield
