@@ -82,12 +82,12 @@ def processors() -> int:
 @contextmanager
 def one_thread_each() -> Generator[None, None, None]:
     """A block whose child processes begin with one BLAS thread."""
-    with environment_of(ONE_THREAD):
+    with with_environment(ONE_THREAD):
         yield
 
 
 @contextmanager
-def environment_of(values: Mapping[str, str]) -> Generator[None, None, None]:
+def with_environment(values: Mapping[str, str]) -> Generator[None, None, None]:
     """A block with these variables in the environment, which is as it was after it."""
     before = {key: os.environ.get(key) for key in values}
     os.environ.update(values)

@@ -1,10 +1,12 @@
 """Markers by folder, and the folder of real measurements."""
 
 import os
+from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
 import pytest
+from orchestrator import LOG, errors_in
 
 ROOT = Path(__file__).resolve().parent.parent
 FOLDERS = ("unit", "property", "contract", "reference", "faults", "e2e", "blind")
@@ -30,3 +32,12 @@ def shared_data() -> Path:
 def rng() -> np.random.Generator:
     """A seeded generator."""
     return np.random.default_rng(20260101)
+
+
+@pytest.fixture(autouse=True)
+def no_error_of_a_server(request: pytest.FixtureRequest) -> Iterator[None]:
+    """Fails a test in whose folder an orchestrator's server has logged an error, whoever started it."""
+    folder = request.getfixturevalue("tmp_path") if "tmp_path" in request.fixturenames else None
+    yield
+    for log in folder.rglob(LOG) if folder is not None else ():
+        assert not errors_in(log), f"{log} has an error:\n{errors_in(log)}"

@@ -57,10 +57,11 @@ def _reach(archive: str | None) -> None:
     import os
 
     from pipelines.archive import Archive
-    from pipelines.flows.local import environment_of
+    from pipelines.flows.local import environment_of, reach_named
     from schemas.errors import WrongUse
 
     if os.environ.get("PREFECT_API_URL"):
+        reach_named()
         return
     found = environment_of(Archive(archive))
     if not found:

@@ -10,7 +10,6 @@ from prefect import flow, task
 from prefect.artifacts import create_markdown_artifact, create_table_artifact
 from prefect.cache_policies import NO_CACHE
 
-from pipelines.archive import Archive
 from pipelines.archive.files import ELSEWHERE, json_bytes, publish
 from pipelines.audit.audit import Scope, audit
 from pipelines.audit.calibrations import date_of, day_of
@@ -20,10 +19,12 @@ from pipelines.audit.findings import findings
 from pipelines.audit.page import render
 from pipelines.audit.rules import load_rules
 from pipelines.certificates.days import today
+from pipelines.flows.places import archive_of
 from pipelines.flows.spread import on_dask
 from pipelines.tables.json_values import json_value
 
 if TYPE_CHECKING:
+    from pipelines.archive import Archive
     from pipelines.audit.audit import Audit
     from pipelines.audit.finding import AuditFinding
 
@@ -64,11 +65,12 @@ def audit_archive(
 
     Parameters
     ----------
+    archive : without credentials, see :func:`pipelines.flows.places.archive_of`
     pages : folder for the page and the document of every audit
     since, until : dates; everything up to today where empty
     dask, workers : where runs are read, see :func:`pipelines.flows.spread.on_dask`
     """
-    store = Archive(archive)
+    store = archive_of(archive)
     found = look(store, Path(rules) if rules else None, since, until or today(), dask, workers)
     told = findings(found)
     tell(found, told, str(store.root), Path(pages))

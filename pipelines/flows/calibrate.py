@@ -14,13 +14,12 @@ from prefect.client.schemas.filters import FlowRunFilter, FlowRunFilterId, FlowR
 from prefect.client.schemas.objects import FlowRun, StateType
 from prefect.client.schemas.sorting import FlowRunSort, TaskRunSort
 from prefect.runtime import flow_run
-from prefect.states import Crashed
 
-from pipelines.archive import Archive
 from pipelines.chain.attendance import JUDGED, Attendance
 from pipelines.chain.chain import ORDER
 from pipelines.chain.runner import Done, Runner
 from pipelines.flows.operator import Paused
+from pipelines.flows.places import archive_of
 from pipelines.jobs.job import Request
 from schemas.errors import LinkLost, NotReached, StationTimeout
 from schemas.progress import silent
@@ -95,11 +94,13 @@ def calibrate_lot(  # noqa: PLR0913 - a flow's parameters are its form on the se
     """Measure and calibrate a lot; the id of its run in the archive.
 
     Without ``repeat`` every flow run measures the lot anew, and a retry of the same flow run goes on where it was. With
-    ``prompts`` the flow run pauses for the operator: to load, to put right what is wrong, to unload.
+    ``prompts`` the flow run pauses for the operator: to load, to put right what is wrong, to unload. ``archive`` holds no
+    credentials, see :func:`pipelines.flows.places.archive_of`.
     """
     progress, told, operator = _listeners[-1] if _listeners else (silent, lambda _done: None, None)
-    job = requested(recipe, station, units, slots, seed, repeat, faults).job(Archive(archive))
-    runner = Runner(job, Archive(archive), progress)
+    store = archive_of(archive)
+    job = requested(recipe, station, units, slots, seed, repeat, faults).job(store)
+    runner = Runner(job, store, progress)
     person = operator or (Paused() if prompts else None)
     beside = None if person is None else Attendance(person, job, runner.run.id)
     told(_capture(runner, beside))
@@ -143,19 +144,6 @@ def settle_history(name: str, stages: int) -> None:
             if len(tasks) >= stages and all(one.state_type in FINAL for one in tasks):
                 return
             time.sleep(0.1)
-
-
-def close_dead_runs(name: str) -> None:
-    """Mark flow runs whose process was killed, which the orchestrator still believes to be running, as crashed."""
-    with get_client(sync_client=True) as client:
-        _close(client, name)
-
-
-def _close(client: SyncPrefectClient, name: str) -> None:
-    for run in _flow_runs(client, name):
-        if run.state_type == StateType.RUNNING:
-            message = "its process was killed; another flow run of this name goes on in its stead"
-            client.set_flow_run_state(run.id, Crashed(message=message), force=True)
 
 
 def _flow_runs(client: SyncPrefectClient, name: str) -> list[FlowRun]:

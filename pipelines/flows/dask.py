@@ -18,6 +18,9 @@ if TYPE_CHECKING:
 
 CONNECT_S = 10
 
+_work: list[tuple[Callable[[Any], Any], Sequence[Any]]] = []
+"""The function and the partitions of the flow of this process: no parameters, which are stored, as they name archives."""
+
 
 @task(task_run_name="{label}", cache_policy=NO_CACHE, persist_result=False)
 def partition(label: str, function: Callable[[Any], Any], part: Any) -> Any:
@@ -26,9 +29,10 @@ def partition(label: str, function: Callable[[Any], Any], part: Any) -> Any:
     return in_one_thread(function, part)
 
 
-@flow(name="map_partitions", persist_result=False, log_prints=False, validate_parameters=False)
-def mapped(function: Callable[[Any], Any], partitions: Sequence[Any]) -> list[Any]:
-    """What the function makes of every partition, in order."""
+@flow(name="map_partitions", persist_result=False, log_prints=False)
+def mapped() -> list[Any]:
+    """What the function at work makes of every partition, in order."""
+    function, partitions = _work[-1]
     width = len(str(len(partitions)))
     futures = [
         partition.submit(f"{number:0{width}d} of {len(partitions)}", function, part)
@@ -43,7 +47,7 @@ def run_on_dask(
     """Results of all partitions, in order, from a cluster at an address, or from one of processes on this machine."""
     if address != LOCAL:
         _refuse_silent(address)
-        return _flow(DaskTaskRunner(address=address), name)(function, partitions)
+        return _run(DaskTaskRunner(address=address), function, partitions, name)
     with one_thread_each(), TemporaryDirectory(prefix="tumbleline-dask-", ignore_cleanup_errors=True) as scratch:
         cluster = {
             "n_workers": min(workers, len(partitions)),
@@ -52,11 +56,15 @@ def run_on_dask(
             "dashboard_address": None,
             "local_directory": scratch,
         }
-        return _flow(DaskTaskRunner(cluster_kwargs=cluster), name)(function, partitions)
+        return _run(DaskTaskRunner(cluster_kwargs=cluster), function, partitions, name)
 
 
-def _flow(runner: Any, name: str) -> Callable[[Callable[[Any], Any], Sequence[Any]], list[Any]]:
-    return mapped.with_options(flow_run_name=name, task_runner=runner)
+def _run(runner: Any, function: Callable[[Any], Any], partitions: Sequence[Any], name: str) -> list[Any]:
+    _work.append((function, partitions))
+    try:
+        return mapped.with_options(flow_run_name=name, task_runner=runner)()
+    finally:
+        _work.pop()
 
 
 def _refuse_silent(address: str) -> None:

@@ -12,17 +12,18 @@ from typing import TYPE_CHECKING, Any
 
 from prefect import flow
 
-from pipelines.archive import Archive
 from pipelines.chain.attendance import Prompt
 from pipelines.chain.chain import ORDER
 from pipelines.flows.calibrate import requested, stage
 from pipelines.flows.local import reached
 from pipelines.flows.operator import Paused
+from pipelines.flows.places import archive_of
 from pipelines.inquiry.loop import Consent, Participants, Settings, always, play
 
 if TYPE_CHECKING:
     from collections.abc import Generator
 
+    from pipelines.archive import Archive
     from pipelines.chain.runner import Done, Runner
     from pipelines.inquiry.inquiry import FollowUp, Inquiry, JointDiagnosis
     from pipelines.jobs.job import Request
@@ -80,11 +81,12 @@ def investigate(  # noqa: PLR0913 - a flow's parameters are its form on the serv
     Without ``repeat`` every flow run measures the lot anew, and a retry of the same flow run goes on where it was. With ``ask``
     the flow run pauses before every follow-up until somebody approves its minutes.
     """
-    job = requested(recipe, station, units, slots, seed, repeat, faults).job(Archive(archive))
+    store = archive_of(archive)
+    job = requested(recipe, station, units, slots, seed, repeat, faults).job(store)
     table = _tables[-1] if _tables else Participants()
     approve = PausedApproval(Paused()) if ask else (table.approve if _tables else always)
     at = Participants(_stage, approve, table.progress, table.told, table.looked)
-    return play(job, Archive(archive), Settings(tuple(effects or ()), budget_min, unseen), at)
+    return play(job, store, Settings(tuple(effects or ()), budget_min, unseen), at)
 
 
 def investigate_locally(
@@ -95,14 +97,16 @@ def investigate_locally(
     job = request.job(archive)
     name = f"investigate {job.recipe.name} {job.capture_id}"
     with reached(archive):
-        from pipelines.flows.calibrate import close_dead_runs, settle_history
+        from pipelines.flows.calibrate import settle_history
+        from pipelines.flows.dead_runs import close_dead_runs
+        from pipelines.flows.places import named
 
         close_dead_runs(name)
-        with seated(table):
-            named = investigate.with_options(flow_run_name=name)
-            found: Any = named(
+        with seated(table), named(archive) as address:
+            flow = investigate.with_options(flow_run_name=name)
+            found: Any = flow(
                 **request.parameters(),
-                archive=archive.address,
+                archive=address,
                 effects=list(terms.effects),
                 budget_min=terms.budget,
                 unseen=terms.unseen,

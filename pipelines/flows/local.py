@@ -15,11 +15,15 @@ import uuid
 from contextlib import contextmanager
 from hashlib import sha256
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from pipelines.chain.chain import ORDER
-from pipelines.flows.settings import STARTUP_S, settings
-from schemas.errors import StationTimeout
+from pipelines.flows.credentials import without_credentials
+from pipelines.flows.knock import knock
+from pipelines.flows.server import ADDRESS, CLIENTS, START_LOCK, private_folder
+from pipelines.flows.settings import CLIENT_KEY, KEY_FILE, STARTUP_S, new_key, settings, use_key
+from pipelines.parallel import with_environment
+from schemas.errors import ArchiveUnusable, StationTimeout
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Generator
@@ -31,7 +35,7 @@ if TYPE_CHECKING:
     from schemas.progress import Progress
 
 POLL_S = 0.1
-CLIENTS, START_LOCK, ADDRESS = "clients", "start.lock", "server.json"
+PRIVATE = 0o600
 
 _started: list[subprocess.Popen[bytes]] = []  # they end by themselves; kept so that the interpreter does not complain
 
@@ -55,11 +59,31 @@ def run_locally(
 def reached(archive: Archive) -> Generator[None]:
     """A block in which an orchestrator answers: the one named by PREFECT_API_URL, or one of our own beside the archive."""
     if os.environ.get("PREFECT_API_URL"):
+        reach_named()
         yield
         return
-    with local_server(_home(archive)) as environment:
-        os.environ.update(environment)
+    with own_server(_home(archive)):
         yield
+
+
+@contextmanager
+def own_server(home: Path) -> Generator[None]:
+    """A block in which this process is a client of a server of our own; nothing of it is left afterwards."""
+    with local_server(home) as found, with_environment(found):
+        from prefect.settings import temporary_settings
+
+        # Prefect reads the environment when it is imported, which an earlier block may have done for another server
+        own: dict[Any, str] = {name: found[name] for name in ("PREFECT_API_URL", "PREFECT_HOME", CLIENT_KEY)}
+        with temporary_settings(updates=own):
+            yield
+
+
+def reach_named() -> None:
+    """Make sure that the orchestrator named by PREFECT_API_URL answers to our key; Prefect's cloud has keys of its own kind."""
+    if os.environ.get(KEY_FILE) and not os.environ.get(CLIENT_KEY):
+        use_key(CLIENT_KEY)
+    if not os.environ.get("PREFECT_API_KEY"):
+        knock()
 
 
 def _home(archive: Archive) -> Path:
@@ -67,7 +91,9 @@ def _home(archive: Archive) -> Path:
     if isinstance(archive.root, Path):
         return archive.root.resolve() / "orchestrator"
     cache = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
-    return cache / "tumbleline" / f"orchestrator-{sha256(archive.address.encode()).hexdigest()[:16]}"
+    return (
+        cache / "tumbleline" / f"orchestrator-{sha256(without_credentials(archive.address).encode()).hexdigest()[:16]}"
+    )
 
 
 def _run(
@@ -78,13 +104,15 @@ def _run(
     told: Callable[[Done], None],
     operator: Operator | None,
 ) -> Run:
-    from pipelines.flows.calibrate import calibrate_lot, close_dead_runs, listening, settle_history
+    from pipelines.flows.calibrate import calibrate_lot, listening, settle_history
+    from pipelines.flows.dead_runs import close_dead_runs
+    from pipelines.flows.places import named
 
     name = f"{job.recipe.name} {job.capture_id}"
     close_dead_runs(name)
-    with listening(progress, told, operator):
-        named = calibrate_lot.with_options(flow_run_name=name)
-        run_id = str(named(**request.parameters(), archive=archive.address))
+    with listening(progress, told, operator), named(archive) as address:
+        flow = calibrate_lot.with_options(flow_run_name=name)
+        run_id = str(flow(**request.parameters(), archive=address))
     settle_history(name, len(ORDER))
     return archive.run(run_id)
 
@@ -92,15 +120,17 @@ def _run(
 @contextmanager
 def local_server(home: Path) -> Generator[dict[str, str], None, None]:
     """The environment of a server that runs for as long as this block, shared with others who want it."""
-    (home / CLIENTS).mkdir(parents=True, exist_ok=True)
+    _refuse_foreign(home)
+    private_folder(home)
+    private_folder(home / CLIENTS)
     client = home / CLIENTS / f"{os.getpid()}-{uuid.uuid4().hex[:8]}"
     with client.open("w") as held:
         fcntl.flock(held, fcntl.LOCK_SH)
         with (home / START_LOCK).open("w") as lock:
             fcntl.flock(lock, fcntl.LOCK_EX)
-            port = _running(home) or _start(home)
+            port, key = _running(home) or _start(home)
         try:
-            yield settings(home, port)
+            yield settings(home, port, key)
         finally:
             client.unlink(missing_ok=True)
 
@@ -108,25 +138,40 @@ def local_server(home: Path) -> Generator[dict[str, str], None, None]:
 def environment_of(archive: Archive) -> dict[str, str]:
     """The environment of the server that runs beside an archive; nothing where none does."""
     home = _home(archive)
-    port = _running(home)
-    return settings(home, port) if port else {}
+    found = _running(home)
+    return settings(home, *found) if found else {}
 
 
-def _running(home: Path) -> int:
-    """Port of a server that answers; 0 where there is none."""
+def _refuse_foreign(home: Path) -> None:
+    """Refuse the folder of another user's server: its key is that user's alone."""
+    if home.exists() and os.getuid() not in {home.stat().st_uid, 0}:
+        raise ArchiveUnusable(
+            f"orchestrator: {home} belongs to another user (id {home.stat().st_uid}), whose server nobody else may use; name an "
+            "orchestrator of the line in PREFECT_API_URL, or run with --direct"
+        )
+
+
+def _running(home: Path) -> tuple[int, str] | None:
+    """Port and key of a server that answers; None where there is none."""
     try:
-        port = int(json.loads((home / ADDRESS).read_text(encoding="utf-8"))["port"])
-    except (OSError, ValueError, KeyError):
-        return 0
-    return port if _answers(port) else 0
+        content = json.loads((home / ADDRESS).read_text(encoding="utf-8"))
+        port, key = int(content["port"]), str(content["key"])
+    except (OSError, ValueError, KeyError, TypeError):
+        return None
+    return (port, key) if _answers(port) else None
 
 
-def _start(home: Path) -> int:
-    port = _free_port()
-    with (home / "server.log").open("ab") as log:
+def _start(home: Path) -> tuple[int, str]:
+    port, key = _free_port(), new_key()
+    with os.fdopen(_private_file(home / "server.log", os.O_APPEND), "ab") as log:
         process = subprocess.Popen(  # noqa: S603 - our own module, by our own interpreter
-            [sys.executable, "-m", "pipelines.flows.server", str(home), str(port)],
-            env={**os.environ, **settings(home, port), "PYTHONPATH": os.pathsep.join(filter(None, sys.path))},
+            [sys.executable, "-m", "pipelines.flows.server", "--port", str(port), "--until-unused", str(home)],
+            # the key in the environment: the arguments of a process are there for everybody to read
+            env={
+                **os.environ,
+                **settings(home, port, key),
+                "PYTHONPATH": os.pathsep.join(filter(None, sys.path)),
+            },
             stdin=subprocess.DEVNULL,
             stdout=log,
             stderr=log,
@@ -141,8 +186,16 @@ def _start(home: Path) -> int:
                 f"{home / 'server.log'}, or run with --direct"
             )
         time.sleep(POLL_S)
-    (home / ADDRESS).write_text(json.dumps({"port": port, "pid": process.pid}), encoding="utf-8")
-    return port
+    with os.fdopen(_private_file(home / ADDRESS, os.O_TRUNC), "w", encoding="utf-8") as file:
+        json.dump({"port": port, "pid": process.pid, "key": key}, file)
+    return port, key
+
+
+def _private_file(path: Path, how: int) -> int:
+    """A file opened for writing that nobody else may read."""
+    handle = os.open(path, os.O_WRONLY | os.O_CREAT | how, PRIVATE)
+    os.fchmod(handle, PRIVATE)  # one of an older version is there with another mode
+    return handle
 
 
 def _free_port() -> int:

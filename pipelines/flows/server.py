@@ -1,34 +1,78 @@
-"""The local orchestrator's server process: lives as long as somebody uses it, and keeps its history on disk.
+"""The orchestrator's server process: Prefect's server with a key, for its own host names and the pages of its own origin only.
 
-A client holds a locked file in ``clients/``; the system frees the lock when the client dies, however it dies. The
-server looks every second and leaves when no lock is held.
+    python -m pipelines.flows.server --host 127.0.0.1 --port 4200
+
+With ``--until-unused FOLDER`` it is the server of a command: it lives as long as somebody uses it. A client holds a locked file
+in ``clients/``; the system frees the lock when the client dies, however it dies. The server looks every second and leaves when no
+lock is held.
 """
 
 from __future__ import annotations
 
+import argparse
 import fcntl
+import os
 import sys
 import threading
 import time
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-import uvicorn
-from prefect.server.api.server import create_app
+from pipelines.flows.settings import LOOPBACK, SERVER_KEY, closed, origins, use_key
+from schemas.errors import TumblelineError
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    import uvicorn
 
 LOOK_S = 1.0
 CLIENTS = "clients"
 START_LOCK = "start.lock"
 ADDRESS = "server.json"
+PRIVATE = (
+    0o077  # taken from the modes of all files that the server makes: its database has parameters and logs in clear
+)
 
 
-def serve(home: Path, port: int) -> None:
-    """Serve on loopback until no client is left."""
+def serve(host: str, port: int, names: Sequence[str], home: Path | None = None) -> None:
+    """Serve until the process is told to end, or, with a ``home``, until no client is left there.
+
+    Parameters
+    ----------
+    host, port : where to listen
+    names : further names by which this host is called; a request by any other is refused
+    home : folder of the clients' locks
+    """
+    known = [*LOOPBACK, *names]
+    os.umask(PRIVATE)
+    os.environ.update(closed(use_key(SERVER_KEY), origins(known, port)))
+    os.environ.setdefault("PREFECT_SERVER_UI_API_URL", f"http://{LOOPBACK[0]}:{port}/api")
+    folder = os.environ.get("PREFECT_HOME")
+    if folder:
+        private_folder(Path(folder))
+    import uvicorn
+
+    from pipelines.flows.application import application  # Prefect reads its settings when it is imported
+
     config = uvicorn.Config(
-        create_app(), host="127.0.0.1", port=port, log_level="critical", timeout_graceful_shutdown=5
+        application(known, origins(known, port)),
+        host=host,
+        port=port,
+        log_config=None,  # as Prefect has set up logging, in its form
+        log_level="warning",
+        timeout_graceful_shutdown=5,
     )
     server = uvicorn.Server(config)
-    threading.Thread(target=_leave_when_alone, args=(home, server), daemon=True).start()
+    if home is not None:
+        threading.Thread(target=_leave_when_alone, args=(home, server), daemon=True).start()
     server.run()
+
+
+def private_folder(path: Path) -> None:
+    """Makes a folder that nobody else may look into."""
+    path.mkdir(mode=0o700, parents=True, exist_ok=True)
+    path.chmod(0o700)
 
 
 def _leave_when_alone(home: Path, server: uvicorn.Server) -> None:
@@ -71,5 +115,28 @@ def any_client(home: Path) -> bool:
     return alive
 
 
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(prog="python -m pipelines.flows.server", description="The orchestrator's server.")
+    parser.add_argument("--host", default=LOOPBACK[0], help="Address to listen on.")
+    parser.add_argument("--port", type=int, default=4200, help="Port to listen on.")
+    parser.add_argument(
+        "--name", action="append", default=[], help="A further name by which clients call this host; may be repeated."
+    )
+    parser.add_argument(
+        "--until-unused", type=Path, metavar="FOLDER", help="Leave when no client holds a lock in this folder."
+    )
+    return parser
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    """Serve as the command line says."""
+    given = _parser().parse_args(arguments)
+    try:
+        serve(given.host, given.port, given.name, given.until_unused)
+    except TumblelineError as problem:
+        sys.stderr.write(f"tumbleline: {problem}\n")
+        sys.exit(problem.exit_status)
+
+
 if __name__ == "__main__":
-    serve(Path(sys.argv[1]), int(sys.argv[2]))
+    main()

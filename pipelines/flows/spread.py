@@ -8,9 +8,8 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
 
-from pipelines.flows.local import local_server
+from pipelines.flows.local import own_server, reach_named
 from pipelines.flows.settings import LOCAL
-from pipelines.parallel import environment_of
 from schemas.errors import WrongUse
 
 if TYPE_CHECKING:
@@ -60,15 +59,8 @@ def _refuse_address(dask: str) -> None:
 def _orchestrator(home: Path | None) -> Generator[None, None, None]:
     """A block with an orchestrator: the one that PREFECT_API_URL names, or one of our own for as long as it lasts."""
     if os.environ.get("PREFECT_API_URL"):
+        reach_named()
         yield
         return
-    with (
-        TemporaryDirectory(prefix="tumbleline-", ignore_cleanup_errors=True) as spare,
-        local_server(home or Path(spare)) as settings,
-        environment_of(settings),
-    ):
-        from prefect.settings import temporary_settings
-
-        own: dict[Any, str] = {name: settings[name] for name in ("PREFECT_API_URL", "PREFECT_HOME")}
-        with temporary_settings(updates=own):  # in case that Prefect was imported before, with others
-            yield
+    with TemporaryDirectory(prefix="tumbleline-", ignore_cleanup_errors=True) as spare, own_server(home or Path(spare)):
+        yield

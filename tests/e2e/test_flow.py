@@ -73,9 +73,38 @@ def test_a_deployment_started_by_hand_appears_in_the_archive(tmp_path: Path) -> 
 def test_the_server_goes_when_its_last_user_has_gone(tmp_path: Path) -> None:
     home = tmp_path / "orchestrator"
     with local_server(home) as first:
-        pid = json.loads((home / "server.json").read_text(encoding="utf-8"))["pid"]
+        content = json.loads((home / "server.json").read_text(encoding="utf-8"))
+        pid, key = content["pid"], content["key"]
+        assert first["PREFECT_API_AUTH_STRING"] == key
+        assert key.encode() not in Path(f"/proc/{pid}/cmdline").read_bytes()
+        modes = {
+            path.name: path.stat().st_mode & 0o077 for path in (home, *home.iterdir()) if path.is_file() or path == home
+        }
+        assert {"orchestrator", "server.json", "server.log", "prefect.db"} <= set(modes)
+        assert {name for name, mode in modes.items() if mode} <= {"start.lock"}
         with local_server(home) as second:
             assert second["PREFECT_API_URL"] == first["PREFECT_API_URL"]
         assert Path(f"/proc/{pid}").exists()
     os.waitpid(pid, 0)
     assert not (home / "server.json").exists()
+
+
+TWICE = """
+import sys, time
+from pathlib import Path
+from pipelines.archive import Archive
+from pipelines.flows.local import reached
+for _ in range(2):
+    with reached(Archive(sys.argv[1])):
+        from pipelines.flows.operator import waiting
+        assert waiting() == []
+    end = time.monotonic() + 60.0
+    while (Path(sys.argv[1]) / "orchestrator" / "server.json").exists() and time.monotonic() < end:
+        time.sleep(0.1)
+"""
+
+
+@pytest.mark.slow
+def test_a_command_with_a_second_filling_reaches_a_server_again(tmp_path: Path) -> None:
+    environment = {name: value for name, value in os.environ.items() if not name.startswith("PREFECT_")}
+    python({**environment, "PYTHONPATH": str(ROOT)}, "-c", TWICE, str(tmp_path / "archive"))

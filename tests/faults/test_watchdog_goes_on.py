@@ -6,12 +6,10 @@ import os
 import resource
 import shutil
 import signal
-import subprocess
-import sys
 import time
 
 import pytest
-from driven_station import ROOT, SLOW, SOON_S, driver, look, safe_within, told
+from driven_station import SLOW, SOON_S, driver, look, safe_within, told
 from served_station import modbus_station, served, station_file
 from small_station import lot_of
 from typer.testing import CliRunner
@@ -238,20 +236,6 @@ def test_an_unreadable_lease_whose_lock_is_free_is_free(state, monkeypatch):
     assert {holder.run for holder, _ in holders(state, config).values()} == {"mine"}
     second.release()
     assert not not_safe(state, config)
-
-
-def test_the_first_process_of_a_container_ends_after_the_watchdogs_of_its_worker(tmp_path):
-    left = f"import time; time.sleep(1.5); open({str(tmp_path / 'safe')!r}, 'w').close()"
-    worker = (
-        "import subprocess, sys, time; "
-        f"subprocess.Popen([sys.executable, '-c', {left!r}], start_new_session=True); print('up', flush=True); time.sleep(60)"
-    )
-    command = [sys.executable, "-m", "stations.safety.outlive", sys.executable, "-c", worker]
-    with subprocess.Popen(command, cwd=ROOT, stdout=subprocess.PIPE, text=True) as first:
-        assert first.stdout.readline() == "up\n"
-        first.send_signal(signal.SIGTERM)
-        assert first.wait(SOON_S) == 128 + signal.SIGTERM
-        assert (tmp_path / "safe").exists()
 
 
 @pytest.mark.parametrize(("link", "ended"), [("rtu", True), ("tcp", False)])

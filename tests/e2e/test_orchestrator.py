@@ -1,0 +1,219 @@
+"""The orchestrator that the product starts: who it answers, what it stores, and that scheduled runs appear in it."""
+
+import asyncio
+import json
+import os
+import stat
+import subprocess
+import sys
+from collections.abc import Iterator
+
+import pytest
+import websockets
+from orchestrator import Orchestrator, served
+from root_process import ROOT, python
+from typer.testing import CliRunner
+
+from pipelines.cli import app
+from pipelines.flows.credentials import REFUSED
+from pipelines.flows.knock import knock
+from schemas.errors import LinkLost, WrongUse
+
+EVIL = "http://evil.example"
+DEPLOYMENTS = ["calibrate_lot/production-line", "calibrate_lot/on-demand", "audit_archive/weekly-audit"]
+
+
+@pytest.fixture(scope="module")
+def line(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Orchestrator]:
+    """One server for the tests of this file, with the deployments of the product."""
+    home = tmp_path_factory.mktemp("orchestrator")
+    with served(home, PREFECT_UI_STATIC_DIRECTORY=str(home / "ui")) as found:
+        names = python(found.environment, "-m", "pipelines.flows.deploy", "deploy/prefect.yaml").split()
+        assert names == DEPLOYMENTS
+        yield found
+
+
+def variable(line: Orchestrator, name: str, **how: str) -> int:
+    """Status of a request that would change the server's state; whether it did is checked."""
+    status, _ = line.ask("/api/variables/", {"name": name, "value": "1"}, **how)
+    there, _ = line.ask(f"/api/variables/name/{name}")
+    assert (there == 200) == (status == 201), "the answer does not say what was done"
+    return status
+
+
+def test_scheduled_runs_of_the_line_appear(line: Orchestrator) -> None:
+    found = line.until(lambda: line.runs("production-line", "SCHEDULED"), "a scheduled run of the line", 60.0)
+    assert found[0]["auto_scheduled"]
+    assert found[0]["expected_start_time"][11:19] == "06:00:00"
+
+
+def test_a_request_with_the_key_from_the_own_page_changes_state(line: Orchestrator) -> None:
+    assert variable(line, "plain") == 201
+    assert variable(line, "own_page", Origin=f"http://127.0.0.1:{line.port}") == 201
+
+
+@pytest.mark.parametrize("key", ["", "tumbleline:wrong"])
+@pytest.mark.parametrize("headers", [{}, {"Origin": EVIL}, {"Host": "evil.example"}], ids=["bare", "origin", "host"])
+def test_no_request_without_the_key_changes_state(line: Orchestrator, key: str, headers: dict[str, str]) -> None:
+    assert variable(line, "without_key", key=key, **headers) in {400, 401, 403}
+
+
+@pytest.mark.parametrize("path", ["/api/flow_runs/filter", "/api/deployments/filter", "/api/work_pools/filter"])
+def test_nothing_is_told_without_the_key(line: Orchestrator, path: str) -> None:
+    assert line.ask(path, {}, key="")[0] == 401
+
+
+def test_a_page_of_another_origin_changes_nothing_even_with_the_key(line: Orchestrator) -> None:
+    assert variable(line, "foreign_origin", Origin=EVIL) == 403
+    assert variable(line, "null_origin", Origin="null") == 403
+    preflight = line.ask("/api/variables/", method="OPTIONS", Origin=EVIL, Access_Control_Request_Method="POST")
+    assert preflight[0] == 403
+
+
+@pytest.mark.parametrize("host", ["evil.example", "evil.example:4200", "127.0.0.1.evil.example", ""])
+def test_a_request_by_another_name_of_the_host_changes_nothing_even_with_the_key(line: Orchestrator, host: str) -> None:
+    assert variable(line, "foreign_host", Host=host) == 400
+    assert line.ask("/", key="", Host=host)[0] == 400
+
+
+@pytest.mark.parametrize(
+    "how",
+    [{"origin": EVIL}, {"called": "evil.example"}, {"called": "evil.example", "origin": EVIL}, {"subprotocols": None}],
+    ids=["origin", "host", "both", "no-subprotocol"],
+)
+@pytest.mark.parametrize("path", ["events/in", "events/out", "logs/out"])
+def test_a_websocket_of_a_stranger_is_not_opened(line: Orchestrator, path: str, how: dict) -> None:
+    with pytest.raises(websockets.InvalidStatus, match="403"):
+        asyncio.run(greet(line, path, line.key, **{"subprotocols": ["prefect"], **how}))
+
+
+@pytest.mark.parametrize("key", ["", "tumbleline:wrong"])
+def test_a_websocket_without_the_key_is_closed_at_once(line: Orchestrator, key: str) -> None:
+    with pytest.raises(websockets.ConnectionClosed, match="1008"):
+        asyncio.run(greet(line, "events/in", key, subprotocols=["prefect"]))
+
+
+def test_a_websocket_with_the_key_is_opened(line: Orchestrator) -> None:
+    assert asyncio.run(greet(line, "events/in", line.key, subprotocols=["prefect"]))["type"] == "auth_success"
+
+
+async def greet(line: Orchestrator, path: str, key: str, called: str = "127.0.0.1", **how: object) -> dict:
+    where = {"host": "127.0.0.1", "port": line.port, "open_timeout": 30}
+    async with websockets.connect(f"ws://{called}:{line.port}/api/{path}", **where, **how) as socket:
+        await socket.send(json.dumps({"type": "auth", "token": key}))
+        return json.loads(await socket.recv())
+
+
+def test_the_page_is_served_where_the_code_may_not_be_written_to(line: Orchestrator) -> None:
+    status, page = line.ask("/", key="")
+    assert status == 200
+    assert "<html" in page
+    assert list((line.home / "ui").glob("v*/index.html"))
+
+
+def test_the_files_of_the_server_are_its_own(line: Orchestrator) -> None:
+    assert stat.S_IMODE(line.home.stat().st_mode) == 0o700
+    modes = {path.name: stat.S_IMODE(path.stat().st_mode) for path in line.home.glob("prefect.db*")}
+    assert "prefect.db" in modes
+    assert {name: oct(mode) for name, mode in modes.items() if mode & 0o077} == {}
+
+
+def test_the_queue_of_the_station_takes_one_run_at_a_time(line: Orchestrator) -> None:
+    status, queue = line.ask("/api/work_pools/line/queues/line-1")
+    assert (status, queue["concurrency_limit"]) == (200, 1)
+    _, found = line.ask("/api/deployments/filter", {})
+    assert {one["name"]: one["work_queue_name"] for one in found} == {
+        "production-line": "line-1",
+        "on-demand": "line-1",
+        "weekly-audit": "audits",
+    }
+
+
+def test_flows_are_found_by_their_module_so_that_their_folder_hides_no_module_of_python(line: Orchestrator) -> None:
+    _, found = line.ask("/api/deployments/filter", {})
+    assert {one["entrypoint"] for one in found} == {
+        "pipelines.flows.calibrate.calibrate_lot",
+        "pipelines.flows.audit.audit_archive",
+    }
+    assert {one["job_variables"]["working_dir"] for one in found} == {str(ROOT)}
+
+
+CLOSING = """
+import json
+from pipelines.flows.dead_runs import cancel_missed_runs, close_dead_runs_of_queue
+print(json.dumps([close_dead_runs_of_queue("line", "line-1"), cancel_missed_runs("line", "line-1")]))
+"""
+
+
+def test_runs_whose_process_is_gone_are_closed_and_others_left_alone(line: Orchestrator) -> None:
+    _, deployment = line.ask("/api/deployments/name/calibrate_lot/on-demand")
+    _, elsewhere = line.ask("/api/deployments/name/audit_archive/weekly-audit")
+
+    def began(name: str, kind: str, where: dict = deployment, **about: object) -> str:
+        _, run = line.ask(f"/api/deployments/{where['id']}/create_flow_run", {"name": name})
+        state = {"type": kind, "name": about.pop("state", kind.title())}
+        assert line.ask(f"/api/flow_runs/{run['id']}/set_state", {"state": state, "force": True})[0] in {200, 201}
+        assert line.ask(f"/api/flow_runs/{run['id']}", about, "PATCH")[0] == 204
+        return run["id"]
+
+    gone = 2**22 + 1  # above the largest number of a process
+    runs = {
+        "power-cut": began("power-cut", "RUNNING", infrastructure_pid=str(gone)),
+        "another-process": began("another-process", "RUNNING", infrastructure_pid=str(os.getpid())),
+        "never-began": began("never-began", "PENDING"),
+        "waits-without-process": began("waits-without-process", "PAUSED", infrastructure_pid=str(gone)),
+        "suspended": began("suspended", "PAUSED", state="Suspended"),
+        "of-another-queue": began("of-another-queue", "RUNNING", elsewhere, infrastructure_pid=str(gone)),
+        "ordered": began("ordered", "SCHEDULED"),
+    }
+    alive = began("alive", "RUNNING")
+    environment = {**os.environ, "PREFECT__FLOW_RUN_ID": alive}
+    with subprocess.Popen(["sleep", "600"], env=environment) as process:
+        line.ask(f"/api/flow_runs/{alive}", {"infrastructure_pid": str(process.pid)}, "PATCH")
+        closed, missed = json.loads(python(line.environment, "-c", CLOSING))
+        process.kill()
+    assert sorted(closed) == ["another-process", "never-began", "power-cut", "waits-without-process"]
+    assert missed == []
+    states = {name: line.ask(f"/api/flow_runs/{found}")[1]["state_type"] for name, found in runs.items()}
+    assert {name for name, state in states.items() if state == "CRASHED"} == set(closed)
+    for found in (*runs.values(), alive):
+        line.ask(f"/api/flow_runs/{found}", method="DELETE")
+
+
+def test_credentials_are_refused_as_a_parameter_of_a_flow_and_not_stored(line: Orchestrator) -> None:
+    secret = "wJalrXUtnFEMI"
+    _, found = line.ask("/api/deployments/name/calibrate_lot/on-demand")
+    parameters = {"archive": f"s3://AKIA:{secret}@factory/archive"}
+    status, told = line.ask(f"/api/deployments/{found['id']}/create_flow_run", {"parameters": parameters})
+    assert (status, told["exception_message"]) == (422, REFUSED)
+    status, _ = line.ask(f"/api/deployments/{found['id']}", {"parameters": parameters}, "PATCH")
+    assert status == 422
+    assert [path.name for path in line.home.iterdir() if path.is_file() and secret.encode() in path.read_bytes()] == []
+
+
+@pytest.mark.parametrize(("key", "told"), [("", "wants a key"), ("tumbleline:" + "x" * 32, "refuses the key")])
+def test_a_client_with_no_key_or_a_wrong_one_is_told(
+    line: Orchestrator, key: str, told: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("PREFECT_API_URL", line.environment["PREFECT_API_URL"])
+    monkeypatch.setenv("PREFECT_API_AUTH_STRING", key)
+    result = CliRunner().invoke(app, ["operator"])
+    assert isinstance(result.exception, WrongUse)
+    assert told in str(result.exception)
+    monkeypatch.setenv("PREFECT_API_AUTH_STRING", line.key)
+    knock()
+
+
+def test_an_orchestrator_that_does_not_answer_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("PREFECT_API_URL", "http://127.0.0.1:9/api")
+    with pytest.raises(LinkLost, match="does not answer"):
+        knock()
+
+
+def test_a_server_without_a_key_does_not_start() -> None:
+    environment = {key: value for key, value in os.environ.items() if not key.endswith("AUTH_STRING")}
+    command = [sys.executable, "-m", "pipelines.flows.server", "--port", "1"]
+    done = subprocess.run(command, cwd=ROOT, env=environment, capture_output=True, text=True, timeout=60, check=False)
+    assert done.returncode == 2
+    assert "orchestrator: no key was found" in done.stderr
+    assert "PREFECT_SERVER_API_AUTH_STRING" in done.stderr
