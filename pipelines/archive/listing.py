@@ -40,7 +40,7 @@ def info_of(run: Run) -> RunInfo | None:
         device=lot.get("device", ""),
         units=tuple(unit["serial"] for unit in lot.get("units", [])),
         started=about["when"],
-        finished="report.html" in names,
+        finished="report.html" in names or SEALED in names,  # a re-run is sealed without a report
         stages=tuple(_sealed_stages(run, names) or stages_of(run, names)),
     )
 

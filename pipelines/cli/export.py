@@ -38,6 +38,7 @@ def command(
     from pipelines.archive import Archive
     from pipelines.export import FORMATS, export_text, unit_calibrations
     from pipelines.models import use_formulas_of
+    from pipelines.trace.handed_out import signature_remarks
     from schemas.errors import WrongUse, did_you_mean
 
     form = "json" if as_json else form
@@ -49,7 +50,7 @@ def command(
     serials = tuple(serial.strip() for serial in units.split(",")) if units else ()
     chosen = unit_calibrations(found, serials, failed=failed, revoked=revoked)
     text = export_text(form, chosen, found.id, nominal)
-    _tell_certificates(found, chosen)
+    _tell_certificates(found, chosen, signature_remarks(found, [c.unit for c in chosen]))
     if output is None:
         typer.echo(text, nl=False)
         return
@@ -60,10 +61,11 @@ def command(
         raise WrongUse(message) from None
 
 
-def _tell_certificates(run: Run, chosen: Sequence[UnitCalibration]) -> None:
+def _tell_certificates(run: Run, chosen: Sequence[UnitCalibration], signers: Sequence[str]) -> None:
     """Say on the error stream what whoever loads these coefficients must know of their certificates."""
     from pipelines.export import revoked_units
     from pipelines.trace.days import today
+    from pipelines.trace.handed_out import library_remarks
 
     given, day = {c.unit for c in chosen}, today()
     lines = [f"left out: {unit}, {one.words()}" for unit, one in revoked_units(run).items() if unit not in given]
@@ -73,5 +75,6 @@ def _tell_certificates(run: Run, chosen: Sequence[UnitCalibration]) -> None:
         lines.append(
             f"not certified: {', '.join(bare)}; 'tumbleline certify {run.id}' says from when until when they hold"
         )
+    lines += [*library_remarks(run), *signers]
     for line in lines:
         error_console().print(f"export: {line}", markup=False, soft_wrap=True)

@@ -12,12 +12,14 @@ from pipelines.archive import Archive, Run
 from pipelines.archive.signatures import GOOD, UNKNOWN, UNSIGNED
 from pipelines.archive.store import ObjectPath
 from pipelines.trace.checks.calibrations import check_shard
+from pipelines.trace.checks.caches import check_ledger_index, check_list
 from pipelines.trace.checks.captures import check_capture, check_strangers
+from pipelines.trace.checks.causes import by_cause
 from pipelines.trace.checks.chain import check_chain
 from pipelines.trace.checks.findings import MISSING, SIGNATURE, Checked
 from pipelines.trace.checks.runs import check_run
 from pipelines.trace.checks.seals import check_seals
-from pipelines.trace.checks.surroundings import SHOWN, check_mark, check_surroundings
+from pipelines.trace.checks.surroundings import SHOWN, check_links, check_mark, check_surroundings
 from schemas.errors import ArchiveUnusable
 
 if TYPE_CHECKING:
@@ -80,6 +82,7 @@ def verify(
     keys: Mapping[str, Ed25519PublicKey],
     demanded: bool = False,
     head: str = "",
+    also: Sequence[Callable[[Archive, Checked], None]] = (),
     progress: Callable[[int, int], None] = lambda _done, _total: None,
 ) -> Report:
     """What is wrong with an archive.
@@ -90,6 +93,7 @@ def verify(
     keys : public keys that are trusted, by name.
     demanded : whether a manifest without a signature by one of these is wrong.
     head : hash of an entry of the chain that was noted elsewhere.
+    also : more checks of the whole archive, of what this package does not know.
     """
     from schemas import tables
 
@@ -116,8 +120,14 @@ def verify(
     if not runs:
         _check_owners(chosen, captures, total)
         check_surroundings(archive, total)
+        check_list(archive, total)
+        check_ledger_index(archive, total)
+        for check in also:
+            check(archive, total)
+    else:
+        check_links(archive, [run.path for run in chosen] + captures, total)
     _tell_untrusted(total, demanded=demanded)
-    total.findings = list(dict.fromkeys(total.findings))  # a manifest may be missed by several that name it
+    total.findings = by_cause(total.findings, archive.root)
     return Report(total, told.head, _trust(total), len(chosen), len(captures), time.perf_counter() - start)
 
 

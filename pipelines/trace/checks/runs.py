@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from pipelines.archive import files, parquet, stage_key
+from pipelines.archive.listing import SEALED
 from pipelines.archive.records import COMPLETE
 from pipelines.archive.store import ObjectPath
 from pipelines.trace.checks.findings import EDITED, FOREIGN, MISSING, Checked
@@ -13,7 +14,7 @@ if TYPE_CHECKING:
     from pipelines.archive import Run
     from pipelines.archive.store import Place
 
-OURS = ("run.json", "sealed.json", "lock")
+OURS = ("run.json", SEALED, "lock")
 KEYED = ("stage", "inputs", "parameters", "code", "key")
 
 
@@ -42,8 +43,9 @@ def check_run(run: Run, checked: Checked, schema: int) -> Checked:
     capture = str(about.get("capture") or "")
     _check_capture_link(run, capture, manifests, checked)
     _check_others(run, names, manifests, checked)
-    if not names.keys() & {"report.json"} and capture:
-        checked.remarks.append(f"run {run.id} is not finished: give its command again and it goes on")
+    if not names.keys() & {"report.json", SEALED} and capture:
+        command = "'tumbleline rerun'" if about.get("rerun_of") else "its command"
+        checked.remarks.append(f"run {run.id} is not finished: give {command} again and it goes on")
     return checked
 
 
