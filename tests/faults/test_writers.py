@@ -32,6 +32,7 @@ import sys
 from pathlib import Path
 sys.path[:0] = [{tests!r}, {root!r}]
 from capture_double import CaptureDouble, small_job
+from ledger_events import day
 from pipelines.archive import Archive
 from pipelines.chain import ORDER
 from pipelines.runner import Runner
@@ -45,7 +46,7 @@ for seed in (number, 99):  # a lot of its own, then the one that all of them wor
     for stage in ORDER[:-1]:
         runner.stage(stage)
     runner.run.seal()
-    Ledger(archive).certify(runner.run, start=f"2026-01-{{number:02d}}", until="2099-01-01", supersede=True)
+    Ledger(archive).certify(runner.run, start=day(number), until=day(300), supersede=True)
 """
 
 FLOOD = """

@@ -13,6 +13,7 @@ from pipelines.runner import Runner
 from pipelines.trace import Ledger
 from pipelines.trace.checks import verify
 from pipelines.trace.lineage import lineage
+from pipelines.trace.refusals import measured_on
 from schemas import upgrades, version
 from schemas.errors import ArchiveUnusable
 
@@ -59,7 +60,7 @@ def test_a_changed_byte_and_an_edited_manifest_are_found_there_too(run: Run) -> 
 
 
 def test_its_units_are_certified_and_traced(run: Run) -> None:
-    Ledger(run.archive).certify(run, start="2026-01-01", until="2027-01-01")
+    Ledger(run.archive).certify(run, start=measured_on(run))
     found = lineage(run.archive, "A1")
     kinds = {node.kind for node in found.graph.nodes.values()}
     assert {"certificate", "samples", "table", "station", "recipe"} <= kinds

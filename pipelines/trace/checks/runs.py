@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 from pipelines.archive import files, parquet, stage_key
 from pipelines.archive.listing import SEALED
+from pipelines.archive.run import START
 from pipelines.archive.records import COMPLETE
 from pipelines.archive.store import ObjectPath
 from pipelines.trace.checks.findings import EDITED, FOREIGN, MISSING, Checked
@@ -21,7 +22,8 @@ KEYED = ("stage", "inputs", "parameters", "code", "key")
 def check_run(run: Run, checked: Checked, schema: int) -> Checked:
     """What is wrong with a run."""
     names = {place.name: place for place in run.path.iterdir()}
-    if all(name == "lock" or name.startswith(files.TEMPORARY) for name in names):
+    begun = any(name != "lock" and not name.startswith(files.TEMPORARY) for name in names)
+    if not begun or not names.keys() & {START, "report.json", SEALED}:  # a re-run is begun with all of its files at once
         checked.remarks.append(f"{checked.name(run.path)} holds no run: its writer was killed, or has just begun")
         return checked
     start = checked.manifest(run.path / "run.json", schema)
