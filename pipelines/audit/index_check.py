@@ -35,7 +35,9 @@ def check_index(archive: Archive, checked: Checked) -> None:
         if standing_of(part) == derived.EDITED:
             checked.wrong(CHANGED, part, f"was edited since it was made: {REMEDY}")
         elif runs:
-            _check_rows(archive, part, [(run, stamp) for run, stamp in runs.items() if stamps.get(run) == stamp], checked)
+            _check_rows(
+                archive, part, [(run, stamp) for run, stamp in runs.items() if stamps.get(run) == stamp], checked
+            )
 
 
 def _check_rows(archive: Archive, part: Place, runs: list[tuple[str, str]], checked: Checked) -> None:

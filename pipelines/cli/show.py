@@ -6,7 +6,16 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from pipelines.cli.options import ArchiveOption, JsonOption, console, error_console, print_json, print_table, rows, short
+from pipelines.cli.options import (
+    ArchiveOption,
+    JsonOption,
+    console,
+    error_console,
+    print_json,
+    print_table,
+    rows,
+    short,
+)
 from schemas.errors import DONE, PART_FAILED
 
 if TYPE_CHECKING:

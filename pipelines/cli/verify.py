@@ -23,7 +23,9 @@ def command(
     key: Annotated[
         list[str] | None,
         typer.Option(
-            "--key", metavar="FILE|HEX", help="A public key; every manifest must be signed by one of those given, else by the own."
+            "--key",
+            metavar="FILE|HEX",
+            help="A public key; every manifest must be signed by one of those given, else by the own.",
         ),
     ] = None,
     head: Annotated[

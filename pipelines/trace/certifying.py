@@ -89,9 +89,9 @@ def certify(
         )
         raise WrongUse(message)
     proposals, result = _proposals(run, units, first, last, reason)
-    refuse_period(run, first, last)
     seen = {proposal.serial: len(ledger.events(proposal.serial)) for proposal in proposals}
     refuse_unsound(run, public_keys() if keys is None else keys)
+    refuse_period(run, first, last)
     # one at a time from here on: of two that certify one serial at the same moment the second is told of the first
     with alone(ledger.root / FOLDER, wait=True):
         for proposal in proposals:

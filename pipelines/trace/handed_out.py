@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 from pipelines.archive import files
 from pipelines.archive.signatures import BAD, GOOD, UNSIGNED, check, public_keys
 from pipelines.trace.ledger import Ledger
+from pipelines.trace.libraries import differing_libraries
 from pipelines.trace.places import folder_of
 from schemas.errors import ArchiveUnusable
 
@@ -39,9 +40,7 @@ def signature_remarks(run: Run, serials: Iterable[str] = ()) -> list[str]:
         state = check(files.read_json(place), keys)
         name = str(place)[len(str(run.archive.root)) :].lstrip("/\\")
         if state == BAD:
-            message = (
-                f"archive: {name} was edited after it was signed; restore it from a copy, see 'tumbleline verify {run.id}'"
-            )
+            message = f"archive: {name} was edited after it was signed; restore it from a copy, see 'tumbleline verify {run.id}'"
             raise ArchiveUnusable(message)
         if state != GOOD:
             found.setdefault(state, []).append(name)
@@ -52,27 +51,9 @@ def signature_remarks(run: Run, serials: Iterable[str] = ()) -> list[str]:
 
 
 def library_remarks(run: Run) -> list[str]:
-    """Libraries that can move a number and of which the run's tables were made with more than one version.
-
-    Versions are not in the keys of stages (docs/decisions/re-runs.md), so a stage that is run again after an update stands beside
-    stages of the version before.
-    """
-    versions: dict[str, dict[str, list[str]]] = {}
-    for name in run.tables():
-        if not (run.path / f"{name}.json").is_file():
-            continue
-        libraries = run.manifest(name).get("libraries")
-        for library, number in (libraries if isinstance(libraries, dict) else {}).items():
-            versions.setdefault(str(library), {}).setdefault(str(number), []).append(name)
-    return [
-        f"run {run.id}: tables made with {library} {_told(by)}; 'tumbleline rerun {run.id} --check' tells whether a number moved"
-        for library, by in sorted(versions.items())
-        if len(by) > 1
-    ]
-
-
-def _told(by: dict[str, list[str]]) -> str:
-    return " and ".join(f"{number} ({', '.join(names)})" for number, names in sorted(by.items()))
+    """Libraries of which the run's tables were made with more than one version."""
+    there = [name for name in run.tables() if (run.path / f"{name}.json").is_file()]
+    return differing_libraries(run.id, {name: run.manifest(name) for name in there})
 
 
 def _manifests(run: Run) -> list[Place]:

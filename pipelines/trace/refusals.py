@@ -52,7 +52,9 @@ def refuse_period(run: Run, first: str, last: str) -> None:
             "--from"
         )
         raise WrongUse(message)
-    rule = f"limits '{limits}' allow {months} months; state validity_months in a limits file before the units are graded"
+    rule = (
+        f"limits '{limits}' allow {months} months; state validity_months in a limits file before the units are graded"
+    )
     if last > months_after(first, months):
         message = f"certify: valid from {first} until {last}, no more than until {months_after(first, months)} is allowed; {rule}"
         raise WrongUse(message)
@@ -88,9 +90,7 @@ def refuse_unsound(run: Run, keys: Mapping[str, Ed25519PublicKey]) -> None:
     findings = verify(run.archive, [run.id], keys=keys, demanded=bool(keys)).checked.findings
     if findings:
         more = f" (and {len(findings) - 1} more)" if len(findings) > 1 else ""
-        message = (
-            f"certify: {findings[0].path} {findings[0].message}{more}; nothing was certified: see 'tumbleline verify {run.id}'"
-        )
+        message = f"certify: {findings[0].path} {findings[0].message}{more}; nothing was certified: see 'tumbleline verify {run.id}'"
         raise ArchiveUnusable(message)
 
 

@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, Any
 from pipelines.archive import Archive, Run
 from pipelines.archive.signatures import GOOD, UNKNOWN, UNSIGNED
 from pipelines.archive.store import ObjectPath
-from pipelines.trace.checks.calibrations import check_shard
 from pipelines.trace.checks.caches import check_ledger_index, check_list
+from pipelines.trace.checks.calibrations import check_shard
 from pipelines.trace.checks.captures import check_capture, check_strangers
 from pipelines.trace.checks.causes import by_cause
 from pipelines.trace.checks.chain import check_chain

@@ -6,10 +6,11 @@ from typing import TYPE_CHECKING, Any
 
 from pipelines.archive import files, parquet, stage_key
 from pipelines.archive.listing import SEALED
-from pipelines.archive.run import START
 from pipelines.archive.records import COMPLETE
+from pipelines.archive.run import START
 from pipelines.archive.store import ObjectPath
 from pipelines.trace.checks.findings import EDITED, FOREIGN, MISSING, Checked
+from pipelines.trace.libraries import differing_libraries
 
 if TYPE_CHECKING:
     from pipelines.archive import Run
@@ -23,7 +24,11 @@ def check_run(run: Run, checked: Checked, schema: int) -> Checked:
     """What is wrong with a run."""
     names = {place.name: place for place in run.path.iterdir()}
     begun = any(name != "lock" and not name.startswith(files.TEMPORARY) for name in names)
-    if not begun or not names.keys() & {START, "report.json", SEALED}:  # a re-run is begun with all of its files at once
+    if not begun or not names.keys() & {
+        START,
+        "report.json",
+        SEALED,
+    }:  # a re-run is begun with all of its files at once
         checked.remarks.append(f"{checked.name(run.path)} holds no run: its writer was killed, or has just begun")
         return checked
     start = checked.manifest(run.path / "run.json", schema)
@@ -45,6 +50,7 @@ def check_run(run: Run, checked: Checked, schema: int) -> Checked:
     capture = str(about.get("capture") or "")
     _check_capture_link(run, capture, manifests, checked)
     _check_others(run, names, manifests, checked)
+    checked.remarks += differing_libraries(run.id, manifests)
     if not names.keys() & {"report.json", SEALED} and capture:
         command = "'tumbleline rerun'" if about.get("rerun_of") else "its command"
         checked.remarks.append(f"run {run.id} is not finished: give {command} again and it goes on")
