@@ -76,7 +76,7 @@ class Limits(Strict):
     rule: Rule = "guarded_acceptance"
     coverage_factor: Annotated[FiniteFloat, Field(ge=1.0, le=4.0)] = 2.0
     grade: Literal["navigation", "industrial", "consumer"] = "consumer"
-    validity_months: Annotated[int, Field(ge=1, le=MOST_MONTHS)] | None = None
+    validity_months: Annotated[int, Field(strict=True, ge=1, le=MOST_MONTHS)] | None = None
     figures: Annotated[dict[str, Limit], Field(min_length=1)]
 
     @property

@@ -1,8 +1,8 @@
-"""What an archive keeps only to be quick, and believes only as far as it is sealed: the list, the ledger's events, the audit's index.
+"""What an archive keeps only to be quick, believed only as far as it is sealed: the list, the ledger's events, the audit's index.
 
-A seal holds the hashes of what was derived and is signed where a key is there. What was edited is made again from the files that it
-was derived from, and that is said; where an own key is configured, so is what it did not sign, silently. Who may write an unsigned
-archive can write a seal to match: ``tumbleline verify`` derives everything anew and compares.
+A seal holds the hashes of what was derived and is signed where a key is there. What was edited is made again from the files that
+it was derived from, and that is said; where an own key is configured, so is what it did not sign, silently. Who may write an
+unsigned archive can write a seal to match: ``tumbleline verify`` derives everything anew and compares.
 """
 
 from __future__ import annotations
@@ -69,6 +69,7 @@ def unframed(place: Place) -> tuple[bytes, str]:
 def tell_edited(place: Place) -> None:
     """Say that something derived was edited and is made again."""
     LOGGER.warning(
-        "archive: %s was edited since it was made from the archive's files; it is not used and is made again, see 'tumbleline verify'",
+        "archive: %s was edited since it was made from the archive's files; it is not used and is made again, see 'tumbleline "
+        "verify'",
         place,
     )

@@ -56,7 +56,10 @@ def of_runs(names: Sequence[str]) -> ds.Dataset:
     try:
         columns = pa.unify_schemas(found, promote_options="permissive").remove_metadata()
     except (pa.ArrowInvalid, pa.ArrowTypeError) as problem:
-        message = f"query: tables {Path(names[0]).name} of the runs do not fit together ({first_line(problem)}); see 'tumbleline verify'"
+        message = (
+            f"query: tables {Path(names[0]).name} of the runs do not fit together ({first_line(problem)}); see 'tumbleline "
+            "verify'"
+        )
         raise ArchiveUnusable(message) from None
     form, system = ds.ParquetFileFormat(), LocalFileSystem()
     parts = [

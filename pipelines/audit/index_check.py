@@ -42,11 +42,11 @@ def check_index(archive: Archive, checked: Checked) -> None:
 
 def _check_rows(archive: Archive, part: Place, runs: list[tuple[str, str]], checked: Checked) -> None:
     wanted = rows_of_runs(read_runs(archive.root / "runs", runs))
-    chosen = pa.array([run for run, _ in runs], pa.string())
+    chosen = [run for run, _ in runs]
     for name in TABLES:
         place = part / f"{name}.parquet"
         table = pq.read_table(pa.BufferReader(place.read_bytes()) if isinstance(place, ObjectPath) else str(place))
-        found = table.filter(pc.is_in(table["run"].cast(pa.string()), value_set=chosen))
+        found = table.filter(pc.field("run").isin(chosen))
         if not _same(found, wanted[name], SCHEMAS[name]):
             checked.wrong(CHANGED, place, f"tells other rows than the runs that it was made from: {REMEDY}")
 

@@ -46,8 +46,8 @@ def command(
 ) -> None:
     """Certify the units of a run that passed: from when until when their calibration holds.
 
-    The run is verified first; what is not as it was written is not certified. A calibration that began earlier ends where the new one begins; of one unit no two hold on one day. The run's report is made
-    again and names the certificates. Exit status 1: some
+    The run is verified first; what is not as it was written is not certified. A calibration that began earlier ends where the new
+    one begins; of one unit no two hold on one day. The run's report is made again and names the certificates. Exit status 1: some
     units of the run did not pass and got no certificate.
     """
     from pipelines.archive import Archive

@@ -67,6 +67,7 @@ def command(
     from pipelines.cli.terminal import attended, scanned
     from pipelines.job import Request
     from pipelines.seating import SCAN, read_seating
+    from pipelines.trace.handed_out import library_remarks
     from schemas.station import load_station
 
     config = load_station(station)
@@ -85,10 +86,13 @@ def command(
     requests = wanted.fillings(slots) if asks else [wanted]
     asks = asks and (bool(prompts) or len(requests) > 1 or config.kind == "modbus")
     jobs = [request.job(Archive(archive)) for request in requests]
-    documents = [
-        summary(_measured(request, job, Archive(archive), direct=direct, asks=asks))
+    runs = [
+        _measured(request, job, Archive(archive), direct=direct, asks=asks)
         for request, job in zip(requests, jobs, strict=True)
     ]
+    for line in (line for run in runs for line in library_remarks(run)):
+        error_console().print(f"run: {line}", markup=False, soft_wrap=True)
+    documents = [summary(run) for run in runs]
     if as_json:
         print_json(documents[0] if len(documents) == 1 else {"fillings": documents})
     else:

@@ -25,7 +25,7 @@ def command(
         typer.Option(
             "--key",
             metavar="FILE|HEX",
-            help="A public key; every manifest must be signed by one of those given, else by the own.",
+            help="A public key; each manifest must be signed by one of those given, else by the own.",
         ),
     ] = None,
     head: Annotated[

@@ -52,7 +52,7 @@ class Certified:
         return [*self.written, *self.there]
 
 
-def certify(
+def certify(  # noqa: PLR0913 - each is an option of the command
     ledger: Ledger,
     run: Run,
     units: Sequence[str] = (),

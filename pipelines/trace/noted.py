@@ -1,6 +1,7 @@
 """The events of all units, as they were read before: a hundred thousand small files need not be read again.
 
-``index/ledger/<digit>.noted`` holds the events of the units whose folder's name begins so, behind a line that seals them. It is made from the ledger's files
+``index/ledger/<digit>.noted`` holds the events of the units whose folder's name begins so, behind a line that seals them. It is
+made from the ledger's files
 and from nothing else and can be removed at any time; an event is believed while its file has the size and the time that it had.
 """
 

@@ -1,4 +1,4 @@
-"""What the ledger refuses, and why: a strange serial, an overdue standard, one serial on two units, nothing to revoke, and more."""
+"""What the ledger refuses, and why: a strange serial, an overdue standard, dates that are not allowed, and more."""
 
 from __future__ import annotations
 
@@ -75,7 +75,7 @@ def measured_on(run: Run) -> str:
 def allowed_months(run: Run) -> int:
     """Longest that a certificate of a run may hold, months: by its limits, else by policy."""
     stated = (run.about.get("limits") or {}).get("validity_months")
-    return stated if isinstance(stated, int) and 1 <= stated <= MOST_MONTHS else VALIDITY_MONTHS
+    return stated if type(stated) is int and 1 <= stated <= MOST_MONTHS else VALIDITY_MONTHS
 
 
 def refuse_unsound(run: Run, keys: Mapping[str, Ed25519PublicKey]) -> None:
@@ -90,7 +90,9 @@ def refuse_unsound(run: Run, keys: Mapping[str, Ed25519PublicKey]) -> None:
     findings = verify(run.archive, [run.id], keys=keys, demanded=bool(keys)).checked.findings
     if findings:
         more = f" (and {len(findings) - 1} more)" if len(findings) > 1 else ""
-        message = f"certify: {findings[0].path} {findings[0].message}{more}; nothing was certified: see 'tumbleline verify {run.id}'"
+        message = (
+            f"certify: {findings[0].path} {findings[0].message}{more}; not certified, see 'tumbleline verify {run.id}'"
+        )
         raise ArchiveUnusable(message)
 
 

@@ -223,8 +223,8 @@ def a_run_copied_in_under_another_name(root: Path, made: dict[str, Path]) -> str
 OF_A_RUN = (
     coefficients_alone, coefficients_with_their_manifest, coefficients_with_all_hashes_of_the_run, a_failed_unit_that_passes,
     an_earlier_day_of_measurement, other_limits, exchanged_run_folders, exchanged_captures, tables_of_another_run,
-    a_manifest_that_is_gone, signatures_of_a_foreign_key, a_link_to_a_table_elsewhere, a_link_to_a_run_elsewhere, a_capture_outside,
-    a_record_outside, a_run_copied_in_under_another_name,
+    a_manifest_that_is_gone, signatures_of_a_foreign_key, a_link_to_a_table_elsewhere, a_link_to_a_run_elsewhere,
+    a_capture_outside, a_record_outside, a_run_copied_in_under_another_name,
 )  # fmt: skip
 
 
@@ -348,7 +348,7 @@ def test_one_edited_file_gives_one_finding_with_its_consequences(root: Path) -> 
 
 
 def test_numbers_that_moved_under_a_certificate_leave_by_no_door(root: Path, made: dict[str, Path]) -> None:
-    """A table that was removed is made again under a library that moves a number: the run is whole, the certificate is of another."""
+    """A table that was removed is made again under a library that moves a number; the certificate is of the one before."""
     run = runs(root)[0]
     content = moved(run)
     with pytest.MonkeyPatch.context() as patch:

@@ -162,11 +162,15 @@ def _tell_untrusted(total: Checked, *, demanded: bool) -> None:
     for state, names in total.untrusted.items():
         what = "is not signed" if state == UNSIGNED else "is signed with a key that is not known here"
         if demanded and len(names) == total.manifests:
-            all_of_them = f"{len(names)} of {total.manifests} manifests: each {what}; a signature by --key is demanded"
+            all_of_them = f"{len(names)} of {total.manifests} manifests: each {what}; a signature by the own key, or one given with --key, is needed"
             total.wrong(SIGNATURE, total.root, all_of_them)
         elif demanded:
             for name in names:
-                total.wrong(SIGNATURE, total.root / name, f"{what}; a signature by --key is demanded")
+                total.wrong(
+                    SIGNATURE,
+                    total.root / name,
+                    f"{what}; a signature by the own key, or one given with --key, is needed",
+                )
         elif len(names) < total.manifests:
             shown = f"{', '.join(names[:SHOWN])}{f' and {len(names) - SHOWN} more' if len(names) > SHOWN else ''}"
             total.remarks += [f"{shown} {what.replace('is', 'are', 1) if len(names) > 1 else what}"] if names else []

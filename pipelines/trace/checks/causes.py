@@ -1,7 +1,7 @@
 """One finding per cause: what follows from a file that was edited or is gone stands under it, not beside it.
 
-One edited manifest is told by its signature, by its key, by the chain and by each manifest that was made from it; a folder that is gone
-is told file by file.
+One edited manifest is told by its signature, by its key, by the chain and by each manifest that was made from it; a folder that
+is gone is told file by file.
 """
 
 from __future__ import annotations
