@@ -16,7 +16,7 @@ from pipelines.trace.checks.calibrations import check_shard
 from pipelines.trace.checks.captures import check_capture, check_strangers
 from pipelines.trace.checks.causes import by_cause
 from pipelines.trace.checks.chain import check_chain
-from pipelines.trace.checks.findings import MISSING, SIGNATURE, Checked
+from pipelines.trace.checks.findings import MISSING, SIGNATURE, Checked, Finding
 from pipelines.trace.checks.runs import check_run
 from pipelines.trace.checks.seals import check_seals
 from pipelines.trace.checks.surroundings import SHOWN, check_links, check_mark, check_surroundings
@@ -29,6 +29,7 @@ if TYPE_CHECKING:
 
     from pipelines.archive.store import Place
 
+NEEDED = "a signature by the own key, or by one given with --key, is needed"
 READERS = min(8, 2 * (os.cpu_count() or 1))
 READERS_OF_OBJECTS = 32  # an object store answers late, and many at once
 
@@ -161,16 +162,12 @@ def _tell_untrusted(total: Checked, *, demanded: bool) -> None:
     """Name the manifests that nobody known signed: wrong where a signature is demanded, said where others are signed."""
     for state, names in total.untrusted.items():
         what = "is not signed" if state == UNSIGNED else "is signed with a key that is not known here"
-        if demanded and len(names) == total.manifests:
-            all_of_them = f"{len(names)} of {total.manifests} manifests: each {what}; a signature by the own key, or one given with --key, is needed"
-            total.wrong(SIGNATURE, total.root, all_of_them)
+        if demanded and len(names) > SHOWN:
+            each = f"{len(names)} of {total.manifests} manifests: each {what}; {NEEDED}"
+            total.findings.append(Finding(SIGNATURE, total.name(total.root), each, tuple(names)))
         elif demanded:
             for name in names:
-                total.wrong(
-                    SIGNATURE,
-                    total.root / name,
-                    f"{what}; a signature by the own key, or one given with --key, is needed",
-                )
+                total.wrong(SIGNATURE, total.root / name, f"{what}; {NEEDED}")
         elif len(names) < total.manifests:
             shown = f"{', '.join(names[:SHOWN])}{f' and {len(names) - SHOWN} more' if len(names) > SHOWN else ''}"
             total.remarks += [f"{shown} {what.replace('is', 'are', 1) if len(names) > 1 else what}"] if names else []
