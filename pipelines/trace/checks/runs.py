@@ -23,12 +23,10 @@ KEYED = ("stage", "inputs", "parameters", "code", "key")
 def check_run(run: Run, checked: Checked, schema: int) -> Checked:
     """What is wrong with a run."""
     names = {place.name: place for place in run.path.iterdir()}
+    left = any(name.startswith(files.TEMPORARY) for name in names)
     begun = any(name != "lock" and not name.startswith(files.TEMPORARY) for name in names)
-    if not begun or not names.keys() & {
-        START,
-        "report.json",
-        SEALED,
-    }:  # a re-run is begun with all of its files at once
+    # a re-run publishes all of its files at once, this one last: a killed one left it under a temporary name
+    if not begun or (left and not names.keys() & {START, "report.json", SEALED}):
         checked.remarks.append(f"{checked.name(run.path)} holds no run: its writer was killed, or has just begun")
         return checked
     start = checked.manifest(run.path / "run.json", schema)
