@@ -46,7 +46,7 @@ def _check_rows(archive: Archive, part: Place, runs: list[tuple[str, str]], chec
     for name in TABLES:
         place = part / f"{name}.parquet"
         table = pq.read_table(pa.BufferReader(place.read_bytes()) if isinstance(place, ObjectPath) else str(place))
-        found = table.filter(pc.field("run").isin(chosen))
+        found = table.filter(pc.field("run").isin(pa.array(chosen, pa.string())))
         if not _same(found, wanted[name], SCHEMAS[name]):
             checked.wrong(CHANGED, place, f"tells other rows than the runs that it was made from: {REMEDY}")
 

@@ -321,6 +321,7 @@ def test_a_forgery_is_found(root: Path, made: dict[str, Path], forge: Callable[[
     assert any(wanted in path for path in found), found
 
 
+@pytest.mark.parametrize("root", ["unsigned"], indirect=True)  # where no signature helps
 @pytest.mark.parametrize("forge", OF_A_RUN, ids=lambda one: one.__name__)
 def test_a_forged_run_is_not_certified(
     root: Path, made: dict[str, Path], forge: Callable[[Path, dict[str, Path]], str]
@@ -395,6 +396,7 @@ def test_noted_events_that_were_edited_are_read_again(root: Path, caplog) -> Non
     assert "was edited since it was made" in caplog.text
 
 
+@pytest.mark.parametrize("root", ["unsigned"], indirect=True)
 @pytest.mark.parametrize("name", ["../../../x", "/tmp/x", "a/b", "..", "a\\b"])
 def test_a_crate_of_a_foreign_archive_stays_in_its_folder(root: Path, tmp_path: Path, name: str) -> None:
     run = runs(root)[0]
