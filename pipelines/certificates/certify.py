@@ -6,13 +6,18 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 from pipelines.archive import Run, files
+from pipelines.archive.locks import alone
+from pipelines.archive.signatures import public_keys
 from pipelines.certificates.days import day_of, months_after, today
-from pipelines.certificates.entries import LedgerEntry
+from pipelines.certificates.entries import FOLDER, LedgerEntry
+from pipelines.certificates.refusals import allowed_months, refuse_meanwhile, refuse_period, refuse_unsound
 from pipelines.tables.frames import rows_of
 from schemas.errors import WrongUse, did_you_mean
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Mapping, Sequence
+
+    from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PublicKey
 
     from pipelines.certificates.ledger import Ledger
 
@@ -38,16 +43,17 @@ class Certified:
         return [*self.written, *self.there]
 
 
-def certify(
+def certify(  # noqa: PLR0913 - each is an option of the command
     ledger: Ledger,
     run: Run,
     units: Sequence[str] = (),
     start: str = "",
     until: str = "",
     *,
-    months: int = 12,
+    months: int = 0,
     reason: str = "",
     supersede: bool = False,
+    keys: Mapping[str, Ed25519PublicKey] | None = None,
 ) -> Certified:
     """The events that certify units of a run, written to the ledger.
 
@@ -55,22 +61,37 @@ def certify(
     ----------
     units : serials; every unit of the run that passed where empty.
     start : first day, today where empty.
-    until : day after the last, so many ``months`` after the first where empty.
+    until : day after the last, so many ``months`` after the first where empty, as many as are allowed where that is 0.
     supersede : end calibrations that begin later and overlap, too.
+    keys : public keys that are trusted; the own where None. Where there are any the run must be signed by one.
+
+    Raises
+    ------
+    ArchiveUnusable
+        The run is not as it was written, or not signed by a key that is trusted.
+    WrongUse
+        The dates are not allowed, a unit may not be certified, or another process certified one of the units meanwhile.
     """
     first = day_of(start, "--from") if start else today()
-    last = day_of(until, "--until") if until else months_after(first, months)
+    last = day_of(until, "--until") if until else months_after(first, months or allowed_months(run))
     if first >= last:
         raise WrongUse(
             f"certify: valid from {first} until {last}, a day after the first is needed; correct --from or --until"
         )
     proposals, result = _proposals(run, units, first, last, reason)
-    for proposal in proposals:
-        refuse_two_at_once(ledger, run, proposal.serial)
-    for proposal in proposals:
-        event, was_there = ledger.add(proposal, supersede=supersede)
-        (result.there if was_there else result.written).append(event)
-    ledger.anchor(result.written)
+    seen = {proposal.serial: len(ledger.events(proposal.serial)) for proposal in proposals}
+    refuse_unsound(run, public_keys() if keys is None else keys)
+    refuse_period(run, first, last)
+    # one at a time from here on: of two that certify one serial at the same moment the second is told of the first
+    with alone(ledger.root / FOLDER, wait=True):
+        for proposal in proposals:
+            refuse_two_at_once(ledger, run, proposal.serial)
+            if not supersede:
+                refuse_meanwhile(ledger, proposal, seen[proposal.serial])
+        for proposal in proposals:
+            event, was_there = ledger.add(proposal, supersede=supersede)
+            (result.there if was_there else result.written).append(event)
+        ledger.anchor(result.written)
     return result
 
 

@@ -25,7 +25,9 @@ from pipelines.certificates.validity import Calibration, calibrations_of, overla
 from schemas.errors import ArchiveUnusable, WrongUse
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Iterator, Sequence
+    from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+
+    from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PublicKey
 
     from pipelines.archive import Run
     from pipelines.archive.store import Place
@@ -85,14 +87,15 @@ class Ledger:
         start: str = "",
         until: str = "",
         *,
-        months: int = 12,
+        months: int = 0,
         reason: str = "",
         supersede: bool = False,
+        keys: Mapping[str, Ed25519PublicKey] | None = None,
     ) -> Certified:
         """What became of certifying a run's units; see :func:`pipelines.certificates.certify.certify`."""
         from pipelines.certificates.certify import certify  # reads tables, which looking up does not
 
-        return certify(self, run, units, start, until, months=months, reason=reason, supersede=supersede)
+        return certify(self, run, units, start, until, months=months, reason=reason, supersede=supersede, keys=keys)
 
     def add(self, event: LedgerEntry, *, supersede: bool = False) -> tuple[LedgerEntry, bool]:
         """The event that certifies a calibration, as it was written, and whether it was there already.
