@@ -8,12 +8,14 @@ are four outcomes; with ``simple_acceptance`` (4.2.1) the limit itself decides.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from pydantic import (
     Field,
+    SerializerFunctionWrapHandler,
     ValidationError,
     field_validator,
+    model_serializer,
     model_validator,
 )
 
@@ -23,6 +25,10 @@ from schemas.recipe import Strict, explain, parse_toml
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
+
+VALIDITY_MONTHS = 12
+"""Longest that a certificate may hold where the limits file does not say: a year, the usual first interval (ILAC-G24:2022)."""
+MOST_MONTHS = 120
 
 Rule = Literal["guarded_acceptance", "simple_acceptance"]
 Outcome = Literal["pass", "conditional pass", "conditional fail", "fail"]
@@ -59,13 +65,30 @@ class Limit(Strict):
 
 
 class Limits(Strict):
-    """The limits file: name, rule, coverage factor and a limit per figure."""
+    """The limits file: name, rule, coverage factor and a limit per figure.
+
+    Parameters
+    ----------
+    validity_months : longest that a certificate by these limits may hold; :data:`VALIDITY_MONTHS` where it is not stated.
+    """
 
     name: Name
     rule: Rule = "guarded_acceptance"
     coverage_factor: Annotated[Number, Field(ge=1.0, le=4.0)] = 2.0
     grade: Literal["navigation", "industrial", "consumer"] = "consumer"
+    validity_months: Annotated[int, Field(strict=True, ge=1, le=MOST_MONTHS)] | None = None
     figures: Annotated[dict[str, Limit], Field(min_length=1)]
+
+    @property
+    def longest_validity_months(self) -> int:
+        """Longest that a certificate by these limits may hold, months: as the file says, else the product's policy."""
+        return VALIDITY_MONTHS if self.validity_months is None else self.validity_months
+
+    @model_serializer(mode="wrap")
+    def _as_before(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
+        """Without what is not stated: runs are named for their limits, and those of earlier versions keep their names."""
+        content = handler(self)
+        return {name: value for name, value in content.items() if name != "validity_months" or value is not None}
 
     @field_validator("figures")
     @classmethod

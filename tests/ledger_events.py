@@ -1,8 +1,14 @@
 """Events of calibrations, for tests that need a ledger without a run."""
 
 from dataclasses import replace
+from datetime import UTC, datetime, timedelta
 
 from pipelines.certificates import LedgerEntry
+
+
+def day(number: int = 0) -> str:
+    """The day so many days from today, UTC: what is measured in a test cannot be certified for days before."""
+    return (datetime.now(UTC).date() + timedelta(days=number)).isoformat()
 
 
 def event(serial: str = "A1", start: str = "2026-01-01", until: str = "2027-01-01", **more: object) -> LedgerEntry:

@@ -87,11 +87,16 @@ class Archive:
         about : what is kept for readers in ``run.json``.
         decisive : JSON-able; everything that the result depends on.
         """
-        run = Run(self, f"{name}-{digest(decisive)[:10]}")
+        run = Run(self, self.run_name(name, decisive))
         if not (run.path / START).is_file():
             self.prepare()
             files.publish(run.path / START, files.manifest_bytes({**provenance(), **about}))
         return run
+
+    @staticmethod
+    def run_name(name: str, decisive: object) -> str:
+        """The id of the run that is named for ``name`` and the hash of what decides its result."""
+        return f"{name}-{digest(decisive)[:10]}"
 
     def capture(self, capture_id: str) -> Records:
         """The records of a capture, to be read or gone on with."""

@@ -15,6 +15,7 @@ import uuid
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
+from pipelines.archive.names import refuse_leading_out
 from pipelines.archive.signatures import signed
 from pipelines.archive.store import ObjectPath, first_line
 from schemas.errors import ArchiveUnusable
@@ -71,13 +72,14 @@ def read_json(path: Place) -> dict[str, Any]:
 
 
 def parsed(data: bytes, path: Place) -> dict[str, Any]:
-    """The content of a manifest whose bytes were read."""
+    """The content of a manifest whose bytes were read, refused where it names a place outside of the archive."""
     try:
         content = json.loads(data)
     except (ValueError, RecursionError):
         raise ArchiveUnusable(_no_manifest(path)) from None
     if not isinstance(content, dict):
         raise ArchiveUnusable(_no_manifest(path))
+    refuse_leading_out(content, path)
     return content
 
 

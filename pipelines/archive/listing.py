@@ -7,7 +7,8 @@ from contextlib import suppress
 from dataclasses import astuple, dataclass
 from typing import TYPE_CHECKING, Any
 
-from pipelines.archive import files
+from pipelines.archive import derived, files
+from pipelines.archive.keys import digest
 from pipelines.archive.store import ObjectPath
 from schemas.errors import ArchiveUnusable
 
@@ -46,7 +47,7 @@ def info_of(run: Run) -> RunInfo | None:
         device=lot.get("device", ""),
         units=tuple(unit["serial"] for unit in lot.get("units", [])),
         started=about["when"],
-        finished="report.html" in names,
+        finished="report.html" in names or SEALED in names,  # a re-run is sealed without a report
         stages=tuple(_sealed_stages(run, names) or stages_of(run, names)),
     )
 
@@ -83,12 +84,15 @@ FINISHED = 1  # the stamp of a finished run where folders have no time
 def infos_of(root: Place, runs: Sequence[Run]) -> list[RunInfo]:
     """The lines of runs, read from their folders where they are not noted."""
     place = root / "index" / "list.json"
-    known, noted, found, new = _noted(place), dict[str, Any](), list[RunInfo](), 0
+    known, state = noted_lines(place)
+    if state == derived.EDITED:
+        derived.tell_edited(place)
+    noted, found, new = dict[str, Any](), list[RunInfo](), 0
     for run in runs:
-        before, stamp = known.get(run.id), _stamp(run)
+        before, stamp = known.get(run.id), stamp_of(run)
         if before is not None and before[0] == stamp:
             noted[run.id] = before
-            found.append(_line(before[1]))
+            found.append(line_of(before[1]))
             continue
         info = info_of(run)
         if info is None:
@@ -96,13 +100,13 @@ def infos_of(root: Place, runs: Sequence[Run]) -> list[RunInfo]:
         found.append(info)
         if stamp is not None and (stamp != FINISHED or info.finished) and time.time_ns() - stamp > TICK_NS:
             noted[run.id], new = [stamp, astuple(info)], new + 1
-    if new >= FEWEST_NEW:
+    if new >= FEWEST_NEW or state == derived.EDITED:
         with suppress(ArchiveUnusable):  # who may only read the archive reads it without
-            files.publish(place, files.json_bytes({"runs": noted}))
+            files.publish(place, files.json_bytes({"runs": noted, "seal": derived.seal({"runs": digest(noted)})}))
     return found
 
 
-def _stamp(run: Run) -> int | None:
+def stamp_of(run: Run) -> int | None:
     """When the run's folder was last written to, ns."""
     if isinstance(run.path, ObjectPath):
         return FINISHED
@@ -112,13 +116,22 @@ def _stamp(run: Run) -> int | None:
         return None
 
 
-def _noted(place: Place) -> dict[str, Any]:
+def noted_lines(place: Place) -> tuple[dict[str, Any], str]:
+    """Stamp and line of every run that was noted, and how their seal stands; nothing of what is not sound."""
+    if not place.is_file():
+        return {}, derived.SOUND
     try:
-        return files.read_json(place).get("runs", {}) if place.is_file() else {}
-    except ArchiveUnusable:  # half of something that nobody needs
-        return {}
+        content = files.read_json(place)
+    except ArchiveUnusable:
+        return {}, derived.EDITED
+    lines = content.get("runs")
+    if "seal" not in content or not isinstance(lines, dict):  # an older version sealed nothing
+        return {}, derived.OTHERS
+    state = derived.standing(content["seal"], {"runs": digest(lines)})
+    return (lines if state == derived.SOUND else {}), state
 
 
-def _line(noted: Sequence[Any]) -> RunInfo:
+def line_of(noted: Sequence[Any]) -> RunInfo:
+    """A line as it was noted."""
     run_id, recipe, device, units, started, finished, stages = noted
     return RunInfo(run_id, recipe, device, tuple(units), started, finished, tuple(stages))

@@ -9,10 +9,12 @@ from __future__ import annotations
 
 import fcntl
 import hashlib
+import json
 import os
 import re
 import shutil
 from collections.abc import Mapping
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import nullcontext, suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -23,7 +25,7 @@ from weakref import finalize
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from pipelines.archive import files
+from pipelines.archive import derived, files
 from pipelines.archive.locks import alone
 from pipelines.archive.store import ObjectPath, address_of, first_line, place_of
 from pipelines.audit.run_files import read_runs, stamps_of
@@ -44,6 +46,8 @@ MOST_SMALL = 24  # parts with less than half of that, before they are put togeth
 SOURCES = ("run_files.py", "run_rows.py", "parameters.py", "station_effects.py")
 VERSION = b"tumbleline.index"
 NAME = re.compile("[0-9a-f]{16}")
+SEAL = "seal.json"
+READERS = 4
 
 
 class Portion(NamedTuple):
@@ -137,8 +141,8 @@ def up_to_date(archive: Archive, spread: Spread | None = None, workers: int = 1)
 
 
 def _refreshed(archive: Archive, place: Place, spread: Spread | None, workers: int) -> AuditIndex:
-    stamps, version = stamps_of(archive.root), _version()
-    parts = {part: _runs_of(part, version) for part in _folders(place)}
+    stamps, version = stamps_of(archive.root), version_of_rows()
+    parts = _believed(part_folders(place), version)
     _remove(place, [part for part, runs in parts.items() if not runs])  # one that is made anew may have its name
     good = {part: runs for part, runs in parts.items() if runs and runs.items() <= stamps.items()}
     good = _without_doubles(good)
@@ -163,6 +167,8 @@ def make_part(portion: Portion) -> str:
     found = rows_of_runs(read_runs(runs, portion.runs))
     # ``runs`` last: where it is, all are
     content = {f"{name}.parquet": _encoded(found[name], portion.version) for name in reversed(TABLES)}
+    hashes = {file: files.hash_of(data) for file, data in content.items()}
+    content = {SEAL: files.json_bytes(derived.seal(hashes)), **content}
     text = "\n".join([portion.version, *(f"{run} {stamp}" for run, stamp in portion.runs)])
     name = hashlib.sha256(text.encode()).hexdigest()[:16]
     files.publish_folder(place / name, content)
@@ -176,7 +182,7 @@ def _encoded(table: pa.Table, version: str) -> bytes:
     return sink.getvalue().to_pybytes()
 
 
-def _version() -> str:
+def version_of_rows() -> str:
     """Hash of the code that makes the rows: an index made by other code is made again."""
     total = hashlib.sha256()
     for name in SOURCES:
@@ -184,13 +190,37 @@ def _version() -> str:
     return total.hexdigest()[:16]
 
 
-def _folders(place: Place) -> list[Place]:
+def _believed(folders: Sequence[Place], version: str) -> dict[Place, dict[str, str]]:
+    """Runs of parts with their stamps; of a part that is not as it was made, none, and it is said that it was edited."""
+    with ThreadPoolExecutor(READERS) as pool:
+        states = dict(zip(folders, pool.map(standing_of, folders), strict=True))
+    for part, state in states.items():
+        if state == derived.EDITED:
+            derived.tell_edited(part)
+    return {part: runs_of(part, version) if state == derived.SOUND else {} for part, state in states.items()}
+
+
+def standing_of(part: Place) -> str:
+    """How the seal of a part stands, see :func:`pipelines.archive.derived.standing`; a part of an older version has none."""
+    names = [f"{name}.parquet" for name in TABLES]
+    if not all((part / name).is_file() for name in (*names, SEAL)):
+        return derived.OTHERS
+    try:
+        found = json.loads((part / SEAL).read_bytes())
+        hashes = {name: files.sha256(part / name) for name in names}
+    except (OSError, ValueError, RecursionError):
+        return derived.EDITED
+    return derived.standing(found, hashes)
+
+
+def part_folders(place: Place) -> list[Place]:
+    """Folders of an index that are parts by their name."""
     if not place.is_dir():
         return []
     return sorted((part for part in place.iterdir() if NAME.fullmatch(part.name)), key=str)
 
 
-def _runs_of(part: Place, version: str) -> dict[str, str]:
+def runs_of(part: Place, version: str) -> dict[str, str]:
     """Runs of a part with their stamps; empty where it is not of this version, lacks a table or cannot be read."""
     if not all((part / f"{name}.parquet").is_file() for name in TABLES):
         return {}

@@ -5,24 +5,32 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NoReturn
 
 import duckdb
+import pyarrow as pa
 
+from pipelines.audit import datasets
 from pipelines.audit.index import AuditIndex, up_to_date
 from pipelines.audit.run_rows import SCHEMAS
 from schemas.errors import WrongUse, did_you_mean
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
-
-    import pyarrow as pa
-
     from pipelines.archive import Archive
     from pipelines.certificates.validity import Calibration
 
-READING = {"SELECT", "EXPLAIN"}  # statements that change nothing; DESCRIBE, SHOW and WITH count as SELECT
+SHUT_IN: dict[str, str | bool | int | float | list[str]] = {  # no file, network, extension or variable of ours
+    "enable_external_access": False,
+    "autoinstall_known_extensions": False,
+    "autoload_known_extensions": False,
+    "python_enable_replacements": False,
+}
+BLANK = r"(?:\s|--[^\n]*\n|/\*(?:[^*]|\*(?!/))*\*/)*"
+EXPLAINS = re.compile(  # the beginning of an EXPLAIN with its options, with comments between the words
+    rf"{BLANK}EXPLAIN\b{BLANK}(?:ANALY[SZ]E\b|\((?=\s*(?:ANALY[SZ]E|FORMAT)\b)[\w\s',]*\))?", re.IGNORECASE
+)
 FILES: tuple[str, ...] = (  # tables of the runs that are read where they lie
     "dwells", "residuals", "readings", "history", "verdicts", "covariance", "predictions", "wander", "verification",
     "verification_poses", "allan", "noise", "grades",
@@ -44,33 +52,20 @@ def ask(archive: Archive, sql: str, *, workers: int = 1, compact: bool = True) -
 
     Views: those of the index (``runs``, ``units``, ``parameters``, ``station``, ``coefficients``, ``figures``), every other
     table of the runs by its name, with the column ``run`` in front, and ``calibrations``, the ledger. Only the files of the
-    views that a question names are opened, and no file outside the archive.
+    views that a question names are opened, to be read, and by us: the engine that answers may reach no file at all.
 
     Parameters
     ----------
     compact : whether ``coefficients``, ``figures`` … are read from the index; else from the runs' own files, which is the same
     """
-    statement = _one_reading_statement(sql)
+    statement = one_reading_statement(sql)
     wanted = {word.lower() for word in WORD.findall(sql)} & set(VIEWS)
-    with duckdb.connect(":memory:") as connection:
-        # no extension is looked for in the network, and questions see the archive only
-        connection.execute("SET autoinstall_known_extensions = false; SET autoload_known_extensions = false")
+    with duckdb.connect(":memory:", config=SHUT_IN) as connection:
         index = up_to_date(archive, workers=workers) if wanted & SCHEMAS.keys() else None
         for name in sorted(wanted):
-            _views(archive, index, compact=compact)[name](connection)
-        _keep_inside(connection, archive, index)
+            connection.register(name, _views(archive, index, compact=compact)[name]())
+        connection.execute("SET enable_progress_bar = false; SET lock_configuration = true")
         return _answered(connection, statement)
-
-
-def _keep_inside(connection: duckdb.DuckDBPyConnection, archive: Archive, index: AuditIndex | None) -> None:
-    """Let questions reach files of the archive and its index, and no others."""
-    folders = [archive.root, *([part.parent for part in index.parts[:1]] if index else [])]
-    allowed = [f"{folder.resolve()}/" for folder in folders if isinstance(folder, Path)]
-    allowed += [f"{folder}/" for folder in folders if isinstance(folder, Path)]
-    connection.execute(f"SET allowed_directories = {_list(allowed)}")
-    connection.execute(
-        "SET enable_progress_bar = false; SET enable_external_access = false; SET lock_configuration = true"
-    )
 
 
 def _answered(connection: duckdb.DuckDBPyConnection, statement: str) -> Answer:
@@ -81,18 +76,45 @@ def _answered(connection: duckdb.DuckDBPyConnection, statement: str) -> Answer:
         raise WrongUse(_explained(problem)) from None
 
 
-def _one_reading_statement(sql: str) -> str:
+def one_reading_statement(sql: str) -> str:
+    """The one SELECT that a question is, or the EXPLAIN of one.
+
+    A common table expression may hold a COPY and still be a SELECT for the parser, and other versions of DuckDB may know
+    more such ways; that nothing is written does not rest on this alone, see :data:`SHUT_IN`.
+
+    Raises
+    ------
+    WrongUse
+        It is something else, or more than one.
+    """
+    statement = _one_statement(sql)
+    text = str(statement.query)
+    if statement.type.name == "EXPLAIN":
+        explained = EXPLAINS.match(text)
+        inner = text[explained.end() :] if explained else ""
+        if _one_statement(inner, "explain of ").type.name != "SELECT":
+            _refuse(f"explain of {_kinds(inner)}")
+    elif statement.type.name != "SELECT":
+        _refuse(statement.type.name.lower())
+    return text
+
+
+def _one_statement(sql: str, before: str = "") -> duckdb.Statement:
     try:
         statements = duckdb.extract_statements(sql)
     except duckdb.Error as problem:
         raise WrongUse(_explained(problem)) from None
-    kinds = [statement.type.name for statement in statements]
-    if len(kinds) != 1 or kinds[0] not in READING:
-        found = ", ".join(kinds).lower() or "no statement"
-        raise WrongUse(
-            f"query: found {found}, one SELECT is needed (the archive is only read); ask one question at a time"
-        )
-    return str(statements[0].query)
+    if len(statements) != 1:
+        _refuse(before + (_kinds(sql) or "no statement"))
+    return statements[0]
+
+
+def _kinds(sql: str) -> str:
+    return ", ".join(statement.type.name for statement in duckdb.extract_statements(sql)).lower()
+
+
+def _refuse(found: str) -> NoReturn:
+    raise WrongUse(f"query: found {found}, one SELECT is needed (the archive is only read); ask one question at a time")
 
 
 def _explained(problem: duckdb.Error) -> str:
@@ -104,59 +126,31 @@ def _explained(problem: duckdb.Error) -> str:
     return f"query: {text}; correct the question (views: {', '.join(VIEWS)})"
 
 
-def _views(
-    archive: Archive, index: AuditIndex | None, *, compact: bool
-) -> Mapping[str, Callable[[duckdb.DuckDBPyConnection], None]]:
-    """How every view is made."""
-    out: dict[str, Callable[[duckdb.DuckDBPyConnection], None]] = {}
-    for name in FILES:
-        out[name] = _of_runs(archive, name)
+def _views(archive: Archive, index: AuditIndex | None, *, compact: bool) -> Mapping[str, Callable[[], Any]]:
+    """How the content of every view is come by, as something of Arrow."""
+    out: dict[str, Callable[[], Any]] = {name: partial(_of_runs, archive, name) for name in FILES}
     for name in SCHEMAS:
         plain = not compact and name in {"coefficients", "figures"}
-        out[name] = _of_runs(archive, name) if plain else _of_index(index, name)
-    out["calibrations"] = _of_ledger(archive)
+        out[name] = partial(_of_runs, archive, name) if plain else partial(_of_index, index, name)
+    out["calibrations"] = partial(_of_ledger, archive)
     return out
 
 
-def _of_index(index: AuditIndex | None, name: str) -> Callable[[duckdb.DuckDBPyConnection], None]:
-    def make(connection: duckdb.DuckDBPyConnection) -> None:
-        hidden = "EXCLUDE (stamp)" if name == "runs" else ""
-        if index is None or not index.parts or not isinstance(index.parts[0], Path):
-            content = index.table(name) if index is not None else SCHEMAS[name].empty_table()
-            connection.register(f"{name}_rows", content)
-            connection.execute(f"CREATE VIEW {name} AS SELECT * {hidden} FROM {name}_rows")  # noqa: S608 - our own names
-            return
-        connection.execute(f"CREATE VIEW {name} AS SELECT * {hidden} FROM read_parquet({_list(index.files(name))})")  # noqa: S608
-
-    return make
+def _of_index(index: AuditIndex | None, name: str) -> Any:
+    kept = [column for column in SCHEMAS[name].names if column != "stamp"]
+    if index is None or not index.parts or not isinstance(index.parts[0], Path):
+        return index.table(name, kept) if index is not None else SCHEMAS[name].empty_table().select(kept)
+    return datasets.of_index(index.files(name), pa.schema([SCHEMAS[name].field(column) for column in kept]))
 
 
-def _of_runs(archive: Archive, name: str) -> Callable[[duckdb.DuckDBPyConnection], None]:
-    def make(connection: duckdb.DuckDBPyConnection) -> None:
-        runs = archive.root / "runs"
-        if not isinstance(runs, Path):
-            connection.register(f"{name}_rows", _gathered(runs.glob(f"*/{name}.parquet")))
-            connection.execute(f"CREATE VIEW {name} AS SELECT * FROM {name}_rows")  # noqa: S608 - our own names
-            return
-        if next(runs.glob(f"*/{name}.parquet"), None) is None:
-            raise WrongUse(f"query: no run in {archive.root} has a table '{name}'; there is nothing to ask")
-        source = f"read_parquet({_text(f'{runs}/*/{name}.parquet')}, filename = true, union_by_name = true)"
-        run = "split_part(filename, '/', -2) AS run"
-        connection.execute(f"CREATE VIEW {name} AS SELECT {run}, * EXCLUDE (filename) FROM {source}")  # noqa: S608
-
-    return make
-
-
-def _gathered(files: Iterable[Any]) -> pa.Table:
-    """Tables of an object store, which DuckDB does not reach without an extension: read here, with their run."""
-    import pyarrow as pa
-    import pyarrow.parquet as pq
-
-    parts: list[pa.Table] = []
-    for place in files:
-        table = pq.ParquetFile(pa.BufferReader(place.read_bytes())).read()
-        parts.append(table.add_column(0, "run", pa.repeat(pa.scalar(place.parent.name), len(table))))
-    return pa.concat_tables(parts, promote_options="default") if parts else pa.table({"run": pa.array([], pa.string())})
+def _of_runs(archive: Archive, name: str) -> Any:
+    runs = archive.root / "runs"
+    if not isinstance(runs, Path):
+        return datasets.gathered(runs.glob(f"*/{name}.parquet"))
+    names = sorted(str(place) for place in runs.glob(f"*/{name}.parquet"))
+    if not names:
+        raise WrongUse(f"query: no run in {archive.root} has a table '{name}'; there is nothing to ask")
+    return datasets.of_runs(names)
 
 
 LEDGER: Mapping[str, Callable[[Calibration], str]] = {  # columns of the view, as a calibration's document names them
@@ -174,23 +168,8 @@ LEDGER: Mapping[str, Callable[[Calibration], str]] = {  # columns of the view, a
 }
 
 
-def _of_ledger(archive: Archive) -> Callable[[duckdb.DuckDBPyConnection], None]:
-    def make(connection: duckdb.DuckDBPyConnection) -> None:
-        import pyarrow as pa
+def _of_ledger(archive: Archive) -> pa.Table:
+    from pipelines.certificates.ledger import Ledger
 
-        from pipelines.certificates.ledger import Ledger
-
-        known = list(Ledger(archive).all())
-        rows = {name: pa.array([of(one) for one in known], pa.string()) for name, of in LEDGER.items()}
-        connection.register("calibrations_rows", pa.table(rows))
-        connection.execute("CREATE VIEW calibrations AS SELECT * FROM calibrations_rows")
-
-    return make
-
-
-def _list(names: Iterable[str]) -> str:
-    return f"[{', '.join(_text(name) for name in names)}]"
-
-
-def _text(value: str) -> str:
-    return "'" + value.replace("'", "''") + "'"
+    known = list(Ledger(archive).all())
+    return pa.table({name: pa.array([of(one) for one in known], pa.string()) for name, of in LEDGER.items()})

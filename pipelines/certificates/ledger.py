@@ -27,9 +27,7 @@ from schemas.errors import ArchiveUnusable, WrongUse
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Sequence
 
-    from pipelines.archive import Run
     from pipelines.archive.store import Place
-    from pipelines.certificates.certify import Certified
 
 CLOCK_SLACK = timedelta(minutes=5)  # clocks of hosts that write into one archive differ by less
 
@@ -77,22 +75,6 @@ class Ledger:
         for folder, problem in found.problems.items():
             raise ArchiveUnusable(f"calibrations: {folder} {problem}")
         return found.units
-
-    def certify(
-        self,
-        run: Run,
-        units: Sequence[str] = (),
-        start: str = "",
-        until: str = "",
-        *,
-        months: int = 12,
-        reason: str = "",
-        supersede: bool = False,
-    ) -> Certified:
-        """What became of certifying a run's units; see :func:`pipelines.certificates.certify.certify`."""
-        from pipelines.certificates.certify import certify  # reads tables, which looking up does not
-
-        return certify(self, run, units, start, until, months=months, reason=reason, supersede=supersede)
 
     def add(self, event: LedgerEntry, *, supersede: bool = False) -> tuple[LedgerEntry, bool]:
         """The event that certifies a calibration, as it was written, and whether it was there already.

@@ -1,6 +1,7 @@
 """The events of all units, as they were read before: a hundred thousand small files need not be read again.
 
-``index/ledger/<digit>.parquet`` holds the events of the units whose folder's name begins so. It is made from the ledger's files
+``index/ledger/<digit>.noted`` holds the events of the units whose folder's name begins so, behind a line that seals them. It is
+made from the ledger's files
 and from nothing else and can be removed at any time; an event is believed while its file has the size and the time that it had.
 """
 
@@ -14,7 +15,7 @@ from dataclasses import dataclass, field, fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from pipelines.archive import files
+from pipelines.archive import derived, files
 from pipelines.archive.store import ObjectPath, first_line
 from pipelines.certificates.entries import FOLDER, LedgerEntry, event_of, folder_of
 from schemas.errors import ArchiveUnusable
@@ -57,7 +58,7 @@ class Histories:
 def histories_of(root: Place) -> Histories:
     """The events of all units of an archive, from what was noted where it still holds."""
     found = Histories()
-    stamps = _stamps(root / FOLDER)
+    stamps = stamps_of(root / FOLDER)
     for digit in DIGITS:
         own = stamps.get(digit, {})
         if own:
@@ -67,16 +68,18 @@ def histories_of(root: Place) -> Histories:
 
 def _events(found: Histories, root: Place, digit: str, stamps: Mapping[str, str]) -> dict[str, LedgerEntry | str]:
     """Events by the places of their files, or what is wrong with a file; what is new is noted."""
-    place = root / NOTED / f"{digit}.parquet"
-    before = _noted(place)
+    place = root / NOTED / f"{digit}.noted"
+    before, state = noted_events(place)
+    if state == derived.EDITED:
+        derived.tell_edited(place)
     known = {name: one for name, one in before.items() if stamps.get(name) == one.stamp}
     missing = [name for name in stamps if name not in known]
-    read = _all_read(root / FOLDER, missing)
+    read = all_read(root / FOLDER, missing)
     found.read += len(read)
     new = {name: Noted(stamps[name], event) for name, event in read.items() if isinstance(event, LedgerEntry)}
-    if len(new) + len(before) - len(known) >= FEWEST_NEW:
+    if len(new) + len(before) - len(known) >= FEWEST_NEW or state == derived.EDITED:
         with suppress(ArchiveUnusable):  # who may only read the archive reads it without
-            files.publish(place, _encoded(known | new))
+            files.publish(place, derived.framed(_encoded(known | new)))
     return {name: known[name].event if name in known else read[name] for name in stamps}
 
 
@@ -106,7 +109,7 @@ def _wrong(event: LedgerEntry, folder: str, count: int, name: str) -> str:
     return ""
 
 
-def _all_read(top: Place, names: Sequence[str]) -> dict[str, LedgerEntry | str]:
+def all_read(top: Place, names: Sequence[str]) -> dict[str, LedgerEntry | str]:
     """The events of files below a folder, read by several threads: a cold disk answers many questions as fast as one."""
     groups = [names[k : k + AT_ONCE] for k in range(0, len(names), AT_ONCE)]
     out: dict[str, LedgerEntry | str] = {}
@@ -131,24 +134,30 @@ def _read(top: Place, name: str) -> LedgerEntry | str:
         return f"cannot be read ({first_line(problem)}); restore it from a copy"
 
 
-def _noted(place: Place) -> dict[str, Noted]:
-    """What was noted; nothing where there is nothing, or half of something that nobody needs."""
+def noted_events(place: Place) -> tuple[dict[str, Noted], str]:
+    """What was noted, by the place of the event's file, and how its seal stands; nothing of what is not sound."""
     import pyarrow as pa
     import pyarrow.parquet as pq
 
     try:
-        table = pq.ParquetFile(pa.BufferReader(place.read_bytes())).read(use_threads=False)
+        data, state = derived.unframed(place)
+    except (OSError, ArchiveUnusable):  # nothing was noted yet, or it cannot be read
+        return {}, derived.SOUND
+    if state != derived.SOUND:
+        return {}, state
+    try:
+        table = pq.ParquetFile(pa.BufferReader(data)).read(use_threads=False)
         if (table.schema.metadata or {}).get(VERSION) is None:
-            return {}
+            return {}, state
         columns = {name: table.column(name).to_pylist() for name in ("place", "stamp", *NAMES)}
-    except (OSError, ArchiveUnusable, pa.ArrowInvalid, KeyError):
-        return {}
+    except (pa.ArrowInvalid, KeyError):  # of another version
+        return {}, state
     for name in ("ends", "evidence"):  # of which many are the same
         known = {text: _tuples(json.loads(text)) for text in set(columns[name])}
         columns[name] = [known[text] for text in columns[name]]
     events = (LedgerEntry(*row) for row in zip(*(columns[name] for name in NAMES), strict=True))
     rows = zip(columns["place"], columns["stamp"], events, strict=True)
-    return {name: Noted(stamp, event) for name, stamp, event in rows}
+    return {name: Noted(stamp, event) for name, stamp, event in rows}, state
 
 
 def _tuples(value: Any) -> Any:
@@ -178,7 +187,7 @@ def _encoded(known: Mapping[str, Noted]) -> bytes:
     return sink.getvalue().to_pybytes()
 
 
-def _stamps(top: Place) -> dict[str, dict[str, str]]:
+def stamps_of(top: Place) -> dict[str, dict[str, str]]:
     """Size and time of every event's file: by the first digit of its folder, by its place below ``calibrations``."""
     out: dict[str, dict[str, str]] = {}
     if isinstance(top, ObjectPath):

@@ -1,21 +1,76 @@
-"""What the ledger refuses, and why: a strange serial, an overdue standard, one serial on two units, nothing to revoke."""
+"""What the ledger refuses, and why: a strange serial, an overdue standard, dates that are not allowed, and more."""
 
 from __future__ import annotations
 
 import re
 from typing import TYPE_CHECKING
 
-from pipelines.certificates.days import today
+from pipelines.archive import Run
+from pipelines.certificates.days import months_after, today
+from pipelines.certificates.measured import measured_on
 from schemas.errors import WrongUse
+from schemas.limits import MOST_MONTHS, VALIDITY_MONTHS
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from pipelines.certificates.entries import LedgerEntry
+    from pipelines.certificates.ledger import Ledger
     from pipelines.certificates.validity import Calibration
 
-START, END = "run.json", "readings.json"
 SERIAL = re.compile(r"[A-Za-z0-9][A-Za-z0-9._+-]{0,63}")
+
+
+def refuse_period(run: Run, first: str, last: str) -> None:
+    """Refuse a certificate that begins before the run's measurement was over, or too long after it, or lasts too long.
+
+    Parameters
+    ----------
+    first, last : first day, and the day after the last.
+    """
+    measured, months = measured_on(run), allowed_months(run)
+    limits = str((run.about.get("limits") or {}).get("name", ""))
+    if first < measured:
+        raise WrongUse(
+            f"certify: valid from {first}, run {run.id} was measured on {measured}, that day or a later one is needed; correct "
+            "--from"
+        )
+    rule = (
+        f"limits '{limits}' allow {months} months; state validity_months in a limits file before the units are graded"
+    )
+    if last > months_after(first, months):
+        raise WrongUse(
+            f"certify: valid from {first} until {last}, no more than until {months_after(first, months)} is allowed; {rule}"
+        )
+    if first >= months_after(measured, months):
+        raise WrongUse(
+            f"certify: valid from {first}, run {run.id} was measured on {measured} and can be certified until "
+            f"{months_after(measured, months)}; measure the units again ({rule})"
+        )
+
+
+def allowed_months(run: Run) -> int:
+    """Longest that a certificate of a run may hold, months: by its limits, else by policy."""
+    stated = (run.about.get("limits") or {}).get("validity_months")
+    return stated if type(stated) is int and 1 <= stated <= MOST_MONTHS else VALIDITY_MONTHS
+
+
+def refuse_meanwhile(ledger: Ledger, event: LedgerEntry, seen: int) -> None:
+    """Refuse a calibration where another of the unit was written since the ledger was looked at.
+
+    Parameters
+    ----------
+    seen : how many events the unit had then.
+    """
+    known = ledger.calibrations(event.serial)
+    for one in known:
+        again = (one.run, one.start, one.until) == (event.run, event.start, event.until)
+        if one.event.sequence > seen and not again and one.start < event.until and event.start < one.until:
+            raise WrongUse(
+                f"certify: unit {event.serial}: certificate {one.certificate} of run {one.run}, valid from {one.start} until "
+                f"{one.until}, was written by {one.event.who} while this command was at work; nothing was certified: look with "
+                f"'tumbleline show {event.serial}', then give the command again if it is to take its place"
+            )
 
 
 def refuse_serial(serial: str, where: str) -> None:

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from pipelines.certificates.days import today
 from pipelines.certificates.ledger import Ledger
+from schemas.errors import ArchiveUnusable
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -51,13 +52,32 @@ class Stated(NamedTuple):
 
 
 def stated(run: Run, serials: Iterable[str]) -> dict[str, Stated]:
-    """The certificates of a run's units by serial: of each the one that was not ended, else the last; none of other runs."""
+    """The certificates of a run's units by serial: of each the one that was not ended, else the last; none of other runs.
+
+    Raises
+    ------
+    ArchiveUnusable
+        One was given for other coefficients than the run has.
+    """
     ledger, out = Ledger(run.archive), dict[str, Stated]()
     for serial in serials:
         own = [one for one in ledger.calibrations(serial) if one.run == run.id]
         if own:
-            out[serial] = _stated(next((one for one in own if one.state == "valid"), own[-1]))
+            chosen = next((one for one in own if one.state == "valid"), own[-1])
+            _refuse_other_coefficients(run, chosen)
+            out[serial] = _stated(chosen)
     return out
+
+
+def _refuse_other_coefficients(run: Run, one: Calibration) -> None:
+    """Refuse to name a certificate beside coefficients that it was not given for; one that was revoked vouches for nothing."""
+    there = run.manifest("coefficients")["sha256"]
+    if one.state != "revoked" and there != one.event.coefficients:
+        raise ArchiveUnusable(
+            f"certificate {one.certificate} was given for other coefficients than run {run.id} has: their hash is "
+            f"{there[:12]}…, that in the certificate {one.event.coefficients[:12]}…; restore the table from a copy, or find out "
+            f"what moved with 'tumbleline rerun {run.id} --check' and certify the run again"
+        )
 
 
 def _stated(one: Calibration) -> Stated:

@@ -6,10 +6,19 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from pipelines.cli.options import ArchiveOption, JsonOption, RunArgument, console, print_json, print_table
+from pipelines.cli.options import (
+    ArchiveOption,
+    JsonOption,
+    RunArgument,
+    console,
+    error_console,
+    print_json,
+    print_table,
+)
 
 if TYPE_CHECKING:
-    from pipelines.certificates.certify import Certified
+    from pipelines.archive import Run
+    from pipelines.chain.certify import Certified
 
 
 def command(
@@ -17,8 +26,17 @@ def command(
     units: Annotated[str, typer.Option("--units", metavar="SN,…", help="Only these; all that passed by default.")] = "",
     start: Annotated[str, typer.Option("--from", metavar="DATE", help="First day of validity, UTC; today.")] = "",
     until: Annotated[str, typer.Option("--until", metavar="DATE", help="The day after the last.")] = "",
-    months: Annotated[int, typer.Option("--months", min=1, max=1200, help="Validity where no --until is given.")] = 12,
+    months: Annotated[
+        int,
+        typer.Option(
+            "--months", min=0, max=120, help="Validity where no --until is given; 0: as long as the limits allow."
+        ),
+    ] = 0,
     reason: Annotated[str, typer.Option("--reason", help="Kept with the event.")] = "",
+    key: Annotated[
+        list[str] | None,
+        typer.Option("--key", metavar="FILE|HEX", help="A public key that may have signed the run, beside the own."),
+    ] = None,
     archive: ArchiveOption = None,
     *,
     supersede: Annotated[
@@ -28,27 +46,45 @@ def command(
 ) -> None:
     """Certify the units of a run that passed: from when until when their calibration holds.
 
-    A calibration that began earlier ends where the new one begins; of one unit no two hold on one day. The run's report is made
-    again and names the certificates. Exit status 1: some
+    The run is verified first; what is not as it was written is not certified. A calibration that began earlier ends where the new
+    one begins; of one unit no two hold on one day. The run's report is made again and names the certificates. Exit status 1: some
     units of the run did not pass and got no certificate.
     """
     from pipelines.archive import Archive
+    from pipelines.archive.signatures import public_keys
     from pipelines.certificates import Ledger
+    from pipelines.chain.certify import certify
     from pipelines.report import renew_report
-    from schemas.errors import DONE, PART_FAILED
+    from schemas.errors import DONE, PART_FAILED, ArchiveUnusable
 
     store = Archive(archive)
     serials = tuple(serial.strip() for serial in units.split(",")) if units else ()
     found = store.run(run)
-    done = Ledger(store).certify(
-        found, serials, start, until, months=months, reason=reason, supersede=supersede
+    _tell_which(found)
+    done = certify(Ledger(store), found, serials, start, until, months=months, reason=reason, supersede=supersede,
+        keys=public_keys() | (public_keys(key) if key else {}),
     )  # fmt: skip
-    renew_report(found)
+    try:
+        renew_report(found)
+    except ArchiveUnusable as problem:  # the certificates are written; an older one may be of other coefficients
+        error_console().print(f"certify: the report was not made again: {problem}", markup=False, soft_wrap=True)
     if as_json:
         print_json(_document(found.id, done))
     else:
         _print(found.id, done)
     raise typer.Exit(PART_FAILED if done.left_out else DONE)
+
+
+def _tell_which(run: Run) -> None:
+    """Say which run is about to be signed, on the error stream, before it is."""
+    from pipelines.certificates.handed_out import library_remarks
+    from pipelines.certificates.measured import measured_on
+
+    units = [str(unit["serial"]) for unit in run.about.get("lot", {}).get("units", [])]
+    named = ", ".join(units) if len(units) <= 6 else f"{units[0]} … {units[-1]}"
+    lines = [f"run {run.id}, measured on {measured_on(run)}, {len(units)} units: {named}", *library_remarks(run)]
+    for line in lines:
+        error_console().print(f"certify: {line}", markup=False, soft_wrap=True)
 
 
 def _document(run: str, done: Certified) -> dict[str, Any]:

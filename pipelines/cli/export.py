@@ -40,6 +40,7 @@ def command(
 ) -> None:
     """Write coefficients: bias b and response K as polynomials in temperature, to apply as a = K⁻¹(ã − b)."""
     from pipelines.archive import Archive
+    from pipelines.certificates.handed_out import signature_remarks
     from pipelines.export import FORMATS, export_text, unit_calibrations
     from pipelines.jobs.model_files import use_formulas_of
     from schemas.errors import WrongUse, did_you_mean
@@ -52,7 +53,7 @@ def command(
     serials = tuple(serial.strip() for serial in units.split(",")) if units else ()
     chosen = unit_calibrations(found, serials, failed=failed, revoked=revoked)
     text = export_text(form, chosen, found.id, nominal)
-    _tell_certificates(found, chosen)
+    _tell_certificates(found, chosen, signature_remarks(found, [c.unit for c in chosen]))
     if output is None:
         typer.echo(text, nl=False)
         return
@@ -64,9 +65,10 @@ def command(
         ) from None
 
 
-def _tell_certificates(run: Run, chosen: Sequence[UnitCalibration]) -> None:
+def _tell_certificates(run: Run, chosen: Sequence[UnitCalibration], signers: Sequence[str]) -> None:
     """Say on the error stream what whoever loads these coefficients must know of their certificates."""
     from pipelines.certificates.days import today
+    from pipelines.certificates.handed_out import library_remarks
     from pipelines.export import revoked_units
 
     given, day = {c.unit for c in chosen}, today()
@@ -77,5 +79,6 @@ def _tell_certificates(run: Run, chosen: Sequence[UnitCalibration]) -> None:
         lines.append(
             f"not certified: {', '.join(bare)}; 'tumbleline certify {run.id}' says from when until when they hold"
         )
+    lines += [*library_remarks(run), *signers]
     for line in lines:
         error_console().print(f"export: {line}", markup=False, soft_wrap=True)

@@ -63,6 +63,7 @@ def command(
     there to seat the units.
     """
     from pipelines.archive import Archive
+    from pipelines.certificates.handed_out import library_remarks
     from pipelines.cli.summary import exit_status, print_summary, summary
     from pipelines.cli.terminal import attended, scanned
     from pipelines.jobs.job import Request
@@ -85,10 +86,13 @@ def command(
     requests = wanted.fillings(slots) if asks else [wanted]
     asks = asks and (bool(prompts) or len(requests) > 1 or config.kind == "modbus")
     jobs = [request.job(Archive(archive)) for request in requests]
-    documents = [
-        summary(_measured(request, job, Archive(archive), direct=direct, asks=asks))
+    runs = [
+        _measured(request, job, Archive(archive), direct=direct, asks=asks)
         for request, job in zip(requests, jobs, strict=True)
     ]
+    for line in (line for run in runs for line in library_remarks(run)):
+        error_console().print(f"run: {line}", markup=False, soft_wrap=True)
+    documents = [summary(run) for run in runs]
     if as_json:
         print_json(documents[0] if len(documents) == 1 else {"fillings": documents})
     else:

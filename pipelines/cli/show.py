@@ -6,10 +6,21 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from pipelines.cli.options import ArchiveOption, JsonOption, console, print_json, print_table, rows, short
+from pipelines.cli.options import (
+    ArchiveOption,
+    JsonOption,
+    console,
+    error_console,
+    print_json,
+    print_table,
+    rows,
+    short,
+)
 from schemas.errors import DONE, PART_FAILED
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from pipelines.archive import Archive, Run
 
 MANY = 40
@@ -61,6 +72,7 @@ def _show_run(run: Run, *, as_json: bool) -> None:
     from pipelines.cli.summary import print_summary, summary
 
     tables = run.tables()
+    tell_of(run, [str(unit["serial"]) for unit in run.about.get("lot", {}).get("units", [])])
     document = {
         **(summary(run) if "grades" in tables else {"run": run.id, "units": []}),
         "tables": tables,
@@ -74,6 +86,14 @@ def _show_run(run: Run, *, as_json: bool) -> None:
     else:
         console().print(_unfinished(run), markup=False, soft_wrap=True)
     console().print(f"tables  {', '.join(tables)}", markup=False)
+
+
+def tell_of(run: Run, serials: Sequence[str]) -> None:
+    """Say on the error stream whose signatures are missing, and which libraries differ, behind what is shown."""
+    from pipelines.certificates.handed_out import library_remarks, signature_remarks
+
+    for line in (*signature_remarks(run, serials), *library_remarks(run)):
+        error_console().print(f"show: {line}", markup=False, soft_wrap=True)
 
 
 def _unfinished(run: Run) -> str:

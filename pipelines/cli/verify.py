@@ -9,6 +9,8 @@ import typer
 from pipelines.cli.options import ArchiveOption, JsonOption, console, error_console, print_json
 from schemas.errors import DONE, PART_FAILED
 
+SHOWN = 8  # consequences of one finding
+
 if TYPE_CHECKING:
     from pipelines.integrity import Report
 
@@ -21,7 +23,9 @@ def command(
     key: Annotated[
         list[str] | None,
         typer.Option(
-            "--key", metavar="FILE|HEX", help="A public key; every manifest must be signed by one of those given."
+            "--key",
+            metavar="FILE|HEX",
+            help="A public key; each manifest must be signed by one of those given, else by the own.",
         ),
     ] = None,
     head: Annotated[
@@ -40,17 +44,20 @@ def command(
     """
     from pipelines.archive import Archive
     from pipelines.archive.signatures import public_keys
+    from pipelines.audit.index_check import check_index
     from pipelines.integrity import verify
 
     store = Archive(archive)
     store.refuse_none()
+    keys = public_keys(key or ())
     with error_console().status("reading") as status:
         report = verify(
             store,
             runs or (),
-            keys=public_keys(key or ()),
-            demanded=bool(key),
+            keys=keys,
+            demanded=bool(keys),
             head=head,
+            also=[check_index],
             progress=lambda done, total: status.update(f"reading {done}/{total}"),
         )
     if as_json:
@@ -64,6 +71,11 @@ def _print(report: Report) -> None:
     out, checked = console(), report.checked
     for finding in checked.findings:
         out.print(f"{finding.kind:<11} {finding.path} {finding.message}", markup=False, soft_wrap=True)
+        for line in finding.consequences[:SHOWN]:
+            out.print(f"            {line}", markup=False, style="dim", soft_wrap=True)
+        if len(finding.consequences) > SHOWN:
+            left = len(finding.consequences) - SHOWN
+            out.print(f"            and {left} more of this; --json names them", markup=False, style="dim")
     for remark in checked.remarks:
         out.print(f"  {remark}", markup=False, style="dim", soft_wrap=True)
     rate = f"{checked.rows / report.seconds:.3g} rows/s, {checked.bytes / report.seconds / 1e6:.3g} MB/s"

@@ -11,13 +11,15 @@ from typing import TYPE_CHECKING, Any
 from pipelines.archive import Archive, Run
 from pipelines.archive.signatures import GOOD, UNKNOWN, UNSIGNED
 from pipelines.archive.store import ObjectPath
+from pipelines.integrity.caches import check_ledger_index, check_list
 from pipelines.integrity.calibrations import check_shard
 from pipelines.integrity.captures import check_capture, check_strangers
+from pipelines.integrity.causes import by_cause
 from pipelines.integrity.chain import check_chain
-from pipelines.integrity.findings import MISSING, SIGNATURE, CheckedPart
+from pipelines.integrity.findings import MISSING, SIGNATURE, CheckedPart, IntegrityFinding
 from pipelines.integrity.runs import check_run
 from pipelines.integrity.seals import check_seals
-from pipelines.integrity.surroundings import SHOWN, check_mark, check_surroundings
+from pipelines.integrity.surroundings import SHOWN, check_links, check_mark, check_surroundings
 from schemas.errors import ArchiveUnusable
 
 if TYPE_CHECKING:
@@ -27,6 +29,7 @@ if TYPE_CHECKING:
 
     from pipelines.archive.store import Place
 
+NEEDED = "a signature by the own key, or by one given with --key, is needed"
 READERS = min(8, 2 * (os.cpu_count() or 1))
 READERS_OF_OBJECTS = 32  # an object store answers late, and many at once
 
@@ -80,6 +83,7 @@ def verify(
     keys: Mapping[str, Ed25519PublicKey],
     demanded: bool = False,
     head: str = "",
+    also: Sequence[Callable[[Archive, CheckedPart], None]] = (),
     progress: Callable[[int, int], None] = lambda _done, _total: None,
 ) -> Report:
     """What is wrong with an archive.
@@ -90,6 +94,7 @@ def verify(
     keys : public keys that are trusted, by name.
     demanded : whether a manifest without a signature by one of these is wrong.
     head : hash of an entry of the chain that was noted elsewhere.
+    also : more checks of the whole archive, of what this package does not know.
     """
     from schemas import tables
 
@@ -116,8 +121,14 @@ def verify(
     if not runs:
         _check_owners(chosen, captures, total)
         check_surroundings(archive, total)
+        check_list(archive, total)
+        check_ledger_index(archive, total)
+        for check in also:
+            check(archive, total)
+    else:
+        check_links(archive, [run.path for run in chosen] + captures, total)
     _tell_untrusted(total, demanded=demanded)
-    total.findings = list(dict.fromkeys(total.findings))  # a manifest may be missed by several that name it
+    total.findings = by_cause(total.findings, archive.root)
     return Report(total, told.head, _trust(total), len(chosen), len(captures), time.perf_counter() - start)
 
 
@@ -151,12 +162,12 @@ def _tell_untrusted(total: CheckedPart, *, demanded: bool) -> None:
     """Name the manifests that nobody known signed: wrong where a signature is demanded, said where others are signed."""
     for state, names in total.untrusted.items():
         what = "is not signed" if state == UNSIGNED else "is signed with a key that is not known here"
-        if demanded and len(names) == total.manifests:
-            all_of_them = f"{len(names)} of {total.manifests} manifests: each {what}; a signature by --key is demanded"
-            total.wrong(SIGNATURE, total.root, all_of_them)
+        if demanded and len(names) > SHOWN:
+            each = f"{len(names)} of {total.manifests} manifests: each {what}; {NEEDED}"
+            total.findings.append(IntegrityFinding(SIGNATURE, total.name(total.root), each, tuple(names)))
         elif demanded:
             for name in names:
-                total.wrong(SIGNATURE, total.root / name, f"{what}; a signature by --key is demanded")
+                total.wrong(SIGNATURE, total.root / name, f"{what}; {NEEDED}")
         elif len(names) < total.manifests:
             shown = f"{', '.join(names[:SHOWN])}{f' and {len(names) - SHOWN} more' if len(names) > SHOWN else ''}"
             total.remarks += [f"{shown} {what.replace('is', 'are', 1) if len(names) > 1 else what}"] if names else []

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 from pipelines.archive import files
+from pipelines.archive.names import NameLeadsOut
 from pipelines.archive.signatures import BAD, UNKNOWN, UNSIGNED, check
 from pipelines.archive.store import ObjectPath, first_line
 from schemas.errors import ArchiveUnusable
@@ -31,11 +32,13 @@ class IntegrityFinding:
     ----------
     kind : ``changed``, ``missing``, ``edited``, ``foreign``, ``newer``, ``unreadable``, ``signature`` or ``unchained``.
     path : the file, below the archive's root.
+    consequences : in words, what else was found because of it.
     """
 
     kind: str
     path: str
     message: str
+    consequences: tuple[str, ...] = ()
 
 
 @dataclass
@@ -89,6 +92,9 @@ class CheckedPart:
             content = files.parsed(data, place)
         except OSError as problem:
             self.wrong(MISSING, place, f"is not there or cannot be read ({first_line(problem)})")
+            return None
+        except NameLeadsOut as problem:
+            self.wrong(EDITED, place, str(problem).partition(f"{place} ")[2])
             return None
         except ArchiveUnusable:
             self.wrong(UNREADABLE, place, "is no manifest that can be read")

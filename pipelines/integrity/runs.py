@@ -5,22 +5,28 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from pipelines.archive import files, parquet, stage_key
+from pipelines.archive.listing import SEALED
 from pipelines.archive.records import COMPLETE
+from pipelines.archive.run import START
 from pipelines.archive.store import ObjectPath
+from pipelines.certificates.libraries import differing_libraries
 from pipelines.integrity.findings import EDITED, FOREIGN, MISSING, CheckedPart
 
 if TYPE_CHECKING:
     from pipelines.archive import Run
     from pipelines.archive.store import Place
 
-OURS = ("run.json", "sealed.json", "lock")
+OURS = ("run.json", SEALED, "lock")
 KEYED = ("stage", "inputs", "parameters", "code", "key")
 
 
 def check_run(run: Run, checked: CheckedPart, schema: int) -> CheckedPart:
     """What is wrong with a run."""
     names = {place.name: place for place in run.path.iterdir()}
-    if all(name == "lock" or name.startswith(files.TEMPORARY) for name in names):
+    left = any(name.startswith(files.TEMPORARY) for name in names)
+    begun = any(name != "lock" and not name.startswith(files.TEMPORARY) for name in names)
+    # a re-run publishes all of its files at once, this one last: a killed one left it under a temporary name
+    if not begun or (left and not names.keys() & {START, "report.json", SEALED}):
         checked.remarks.append(f"{checked.name(run.path)} holds no run: its writer was killed, or has just begun")
         return checked
     start = checked.manifest(run.path / "run.json", schema)
@@ -42,8 +48,10 @@ def check_run(run: Run, checked: CheckedPart, schema: int) -> CheckedPart:
     capture = str(about.get("capture") or "")
     _check_capture_link(run, capture, manifests, checked)
     _check_others(run, names, manifests, checked)
-    if not names.keys() & {"report.json"} and capture:
-        checked.remarks.append(f"run {run.id} is not finished: give its command again and it goes on")
+    checked.remarks += differing_libraries(run.id, manifests)
+    if not names.keys() & {"report.json", SEALED} and capture:
+        command = "'tumbleline rerun'" if about.get("rerun_of") else "its command"
+        checked.remarks.append(f"run {run.id} is not finished: give {command} again and it goes on")
     return checked
 
 

@@ -11,16 +11,17 @@ from pipelines.archive import files
 from pipelines.integrity.findings import CHANGED, FOREIGN, MISSING, SIGNATURE, UNREADABLE
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Iterable, Iterator
 
     from pipelines.archive import Archive
+    from pipelines.archive.store import Place
     from pipelines.integrity.findings import CheckedPart
 
 OURS = re.compile(
     r"archive\.json|(index|orchestrator)/.*|.*\.parquet"
     r"|captures/[^/]+/(lock|complete\.json|events/\d+\.json|state/\d+\.bin|\d+/record\.json)"
     r"|runs/[^/]+/(lock|report\.html|[^/.]+\.json)"
-    r"|calibrations/[0-9a-f]{2}/[0-9a-f]{16}/\d+\.json|chain/\d+/\d+\.json"
+    r"|calibrations/lock|calibrations/[0-9a-f]{2}/[0-9a-f]{16}/\d+\.json|chain/\d+/\d+\.json"
     r"|(releases|whatif)/(lock|[0-9a-f-]+\.json)"
 )
 KEY_MARK, KEY_BYTES = b"PRIVATE KEY-----", 16_384
@@ -59,6 +60,15 @@ def check_surroundings(archive: Archive, checked: CheckedPart) -> None:
     if strangers:
         more = f" and {len(strangers) - SHOWN} more" if len(strangers) > SHOWN else ""
         checked.remarks.append(f"{', '.join(strangers[:SHOWN])}{more}: nothing of the archive put that there")
+
+
+def check_links(archive: Archive, folders: Iterable[Place], checked: CheckedPart) -> None:
+    """Links in place of folders of a local archive, and in them: for checks that do not look at the whole archive."""
+    for folder in folders:
+        if isinstance(folder, Path) and isinstance(archive.root, Path):
+            for place in (folder, *folder.rglob("*")):
+                if place.is_symlink():
+                    _check_link(place.relative_to(archive.root).as_posix(), place, checked)
 
 
 def _all(root: Path) -> Iterator[tuple[str, Path]]:

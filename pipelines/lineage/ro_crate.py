@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Any
 from urllib.parse import quote
 
 from pipelines.archive import files
-from schemas.errors import WrongUse
+from pipelines.archive.names import is_below
+from schemas.errors import ArchiveUnusable, WrongUse
 
 if TYPE_CHECKING:
     from pipelines.archive import Archive
@@ -30,6 +31,11 @@ def write_crate(archive: Archive, found: Lineage, folder: Path) -> int:
             f"lineage: {folder} is there and not empty, a new folder is needed for the crate; name another with --crate"
         )
     contents = _contents(archive, found.graph)
+    for name in contents:
+        if not is_below(name):  # no manifest that can be read names such a place
+            raise ArchiveUnusable(
+                f"lineage: {name!r} is no place in a folder, the crate would be written elsewhere; do not use this archive"
+            )
     for name, data in contents.items():
         files.publish(folder / name, data, "lineage", "name another folder with --crate")
     document = json.dumps(crate_of(found, contents), indent=1, ensure_ascii=False, sort_keys=True) + "\n"
@@ -184,7 +190,7 @@ def _program(software: dict[str, Any]) -> str:
 def _place(node: Node) -> str:
     """Where a thing lies in the crate; empty for what has no file there."""
     if node.kind in SETTINGS:
-        return f"settings/{node.id.replace(':', '-', 1)}.json"
+        return f"settings/{quote(node.id.replace(':', '-', 1), safe=' @')}.json"  # a setting's name may hold anything
     return node.file
 
 

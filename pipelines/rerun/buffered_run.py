@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from pipelines.archive import Run, files
 from pipelines.archive.parquet import decoded
+from pipelines.archive.run import START
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -24,6 +25,12 @@ class BufferedRun(Run):
         self._known: dict[str, pd.DataFrame] = {}
         self._waiting: dict[str, bytes] = {}
         self._made: dict[str, pa.Table] = {}
+
+    def begin(self, about: dict[str, Any]) -> None:
+        """What a new run is started with; it is written with the rest."""
+        data = files.manifest_bytes(about)
+        self._put(START, data)
+        self.__dict__["about"] = files.parsed(data, self.path / START)
 
     @cached_property
     def about(self) -> dict[str, Any]:  # pyright: ignore[reportIncompatibleMethodOverride]  # it does not change
@@ -46,11 +53,22 @@ class BufferedRun(Run):
         waiting = self._waiting.get(f"{name}.json")
         return super().manifest(name) if waiting is None else json.loads(waiting)
 
-    def flush(self) -> None:
-        """Publish all that waits, tables and manifests in the order in which they were made."""
+    def flush(self, *, last: str = "") -> None:
+        """Publish all that waits, tables and manifests in the order in which they were made.
+
+        Parameters
+        ----------
+        last : a file that is published behind all others, by which readers know that they are there.
+        """
         if self._waiting:
+            if last in self._waiting:
+                self._waiting[last] = self._waiting.pop(last)
             files.publish_all(self.path, self._waiting)
             self._waiting = {}
+
+    def forget(self) -> None:
+        """Drop all that waits."""
+        self._waiting = {}
 
     def _adopted(self, name: str) -> pa.Table | None:
         """A table that was taken over and is not flushed."""

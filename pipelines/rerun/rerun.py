@@ -11,6 +11,8 @@ from threadpoolctl import ThreadpoolController
 
 from pipelines.archive import Archive, Run, files, stage_key
 from pipelines.archive.locks import alone
+from pipelines.archive.provenance import provenance
+from pipelines.archive.run import START
 from pipelines.chain.chain import RECORDS
 from pipelines.rerun.buffered_run import BufferedRun
 from pipelines.rerun.steps import RAW, plan_of
@@ -38,7 +40,7 @@ class Outcome:
 
 
 def again(archive: Archive, run_id: str, wanted: ModelChange, *, report: bool = False) -> Outcome:
-    """Run an archived run again, going on where an interrupted re-run was.
+    """Run an archived run again. A new run is published when all of it is there: one that fails or is stopped leaves nothing.
 
     Raises
     ------
@@ -51,21 +53,38 @@ def again(archive: Archive, run_id: str, wanted: ModelChange, *, report: bool = 
     plan = plan_of(old, wanted)
     raw = raw_samples(old)
     because = changes(old, plan, raw=raw)
-    new = BufferedRun(archive, _opened(archive, old, plan, because).id if because else old.id)
-    with _libraries().limit(limits=1), alone(new.path, wait=True):
-        files.sweep(new.path)
-        work = StageRunner(old, new, raw=raw)
-        try:
-            stages = {step.name: work.do(step) for step in plan.steps}
-        finally:
-            new.flush()  # an interrupted re-run goes on behind the last stage that was done
-        if report and new.about.get("capture"):
-            from pipelines.report import make_report  # plots are slow to import
+    new = BufferedRun(archive, archive.run_name(plan.name, plan.decisive) if because else old.id)
+    with _libraries().limit(limits=1):
+        if (new.path / START).is_file():
+            with alone(new.path, wait=True):
+                files.sweep(new.path)
+                try:
+                    stages = _done(old, new, plan, raw=raw)
+                finally:
+                    new.flush()  # a run that was there goes on behind the last stage that was done
+        else:
+            archive.prepare()
+            new.begin(_told(old, plan, because))
+            stages = _done(old, new, plan, raw=raw)
+            with alone(new.path, wait=True):
+                files.sweep(new.path)
+                if (new.path / START).is_file():  # another process did the same meanwhile, with the same bytes
+                    new.forget()
+                new.flush(last=START)
+        with alone(new.path, wait=True):
+            if report and new.about.get("capture"):
+                from pipelines.report import make_report  # plots are slow to import
 
-            stages["report"] = THERE if make_report(new) else COMPUTED
-        if COMPUTED in stages.values():
-            new.seal()
+                stages["report"] = THERE if make_report(new) else COMPUTED
+            if new.id != old.id or COMPUTED in stages.values():
+                new.seal()
     return Outcome(old.id, new.id, because, stages, time.perf_counter() - start)
+
+
+def _done(old: Run, new: BufferedRun, plan: Plan, *, raw: bool) -> dict[str, str]:
+    """What became of every stage."""
+    work = StageRunner(old, new, raw=raw)
+    return {step.name: work.do(step) for step in plan.steps}
 
 
 @cache
@@ -138,10 +157,11 @@ def _said(value: Any) -> str:
     )
 
 
-def _opened(archive: Archive, old: Run, plan: Plan, because: list[dict[str, str]]) -> Run:
+def _told(old: Run, plan: Plan, because: list[dict[str, str]]) -> dict[str, Any]:
+    """What a re-run is begun with."""
     about = old.about
     told = {"rerun_of": old.id, "because": because, "measured": about.get("measured", about["when"])}
-    return archive.open_run(plan.name, {**plan.about, **told}, plan.decisive)
+    return {**provenance(), **plan.about, **told}
 
 
 class StageRunner:

@@ -159,12 +159,64 @@ def test_questions_in_sql_see_the_same_from_index_and_files(made):
         ("SELECT * FROM read_text('../secret')", "disabled by configuration"),
         ("SELECT nothing FROM runs", "nothing"),
         ("", "no statement"),
+        ("EXPLAIN ANALYZE COPY (SELECT 1) TO 'x.csv'", "found explain of copy, one SELECT is needed"),
+        ("EXPLAIN ANALYZE CREATE TABLE t AS SELECT 1", "found explain of create"),
+        ("SELECT * FROM archive", "no view is called 'archive'"),  # a variable of the caller is no view
     ],
 )
 def test_a_question_that_cannot_be_answered_is_refused_clearly(made, question, words):
     with pytest.raises(WrongUse, match=r"^query: ") as refused:
         ask(Archive(made), question)
     assert words in str(refused.value)
+
+
+ATTACKS = (  # {t} is a table of the archive, {d} a folder in it
+    "EXPLAIN ANALYZE COPY (SELECT 1) TO '{t}'",
+    "EXPLAIN ANALYZE COPY (SELECT 1) TO '{t}' (USE_TMP_FILE false, FORMAT parquet)",
+    "explain/**/analyse--\n copy (SELECT 1) TO '{t}'",
+    "/* SELECT */ EXPLAIN /* a */ ANALYZE /* b */ COPY dwells TO '{t}'",
+    "EXPLAIN (ANALYZE) COPY (SELECT 1) TO '{t}'",
+    "EXPLAIN (FORMAT json, ANALYZE) COPY (SELECT 1) TO '{t}'",
+    "EXPLAIN EXPLAIN ANALYZE COPY (SELECT 1) TO '{t}'",
+    "WITH x AS MATERIALIZED (COPY (SELECT 1) TO '{t}' (USE_TMP_FILE false)) SELECT * FROM dwells",
+    "EXPLAIN ANALYZE WITH x AS MATERIALIZED (COPY (SELECT 1) TO '{t}' (USE_TMP_FILE false)) SELECT * FROM dwells",
+    "WITH x AS (INSERT INTO dwells SELECT * FROM dwells RETURNING *) SELECT * FROM x",
+    "SELECT * FROM query('COPY (SELECT 1) TO ''{t}''')",
+    "COPY (SELECT 1) TO '{t}'", "EXPORT DATABASE '{d}'", "IMPORT DATABASE '{d}'", "ATTACH '{d}/x.db'", "ATTACH '{t}' AS x",
+    "INSTALL httpfs", "LOAD httpfs", "LOAD '{t}'", "PRAGMA database_list", "PRAGMA enable_profiling", "CALL enable_logging()",
+    "SET enable_external_access = true", "RESET lock_configuration", "SET VARIABLE x = 1", "USE memory", "BEGIN", "VACUUM",
+    "CHECKPOINT", "PREPARE x AS SELECT 1", "EXECUTE x", "ANALYZE", "CREATE TABLE t (a int)", "CREATE MACRO m() AS 1",
+    "CREATE SECRET s (TYPE s3)", "INSERT INTO runs VALUES (1)", "UPDATE runs SET run = ''", "DELETE FROM runs", "DETACH memory",
+    "ALTER VIEW dwells RENAME TO x", "DROP VIEW dwells", "COMMENT ON VIEW dwells IS 'x'", "TRUNCATE runs",
+    "SELECT * FROM enable_logging(storage := 'file', storage_path := '{d}')", "SELECT * FROM enable_profiling()",
+    "SELECT * FROM read_text('{t}')", "SELECT * FROM read_parquet('{t}')", "SELECT * FROM '{t}'", "FROM glob('{d}/*')",
+    "SELECT * FROM read_csv('/etc/hosts')", "SELECT * FROM sniff_csv('{t}')", "SELECT * FROM 'https://example.org/x.csv'",
+    "SELECT 1; COPY (SELECT 1) TO '{t}'", "SELECT 1; -- \n EXPLAIN ANALYZE COPY (SELECT 1) TO '{t}'", ";;", "EXPLAIN",
+)  # fmt: skip
+
+
+def test_no_question_writes_or_reads_a_file_of_its_own_choice(made):
+    table = min((made / "runs").glob("*/dwells.parquet"))
+    ask(Archive(made), "SELECT count(*) FROM runs")  # the index is there
+    before = {path: path.read_bytes() for path in made.rglob("*") if path.is_file()}
+    for attack in ATTACKS:
+        question = attack.format(t=table, d=table.parent)
+        with pytest.raises(WrongUse, match=r"^query: "):
+            ask(Archive(made), question)
+        assert {path for path in made.rglob("*") if path.is_file()} == before.keys(), question
+    assert {path: path.read_bytes() for path in before} == before
+
+
+@pytest.mark.parametrize(
+    "question",
+    [
+        "EXPLAIN SELECT * FROM dwells", "EXPLAIN ANALYZE SELECT count(*) FROM dwells", "explain (format json) FROM units",
+        "-- how many\nEXPLAIN /* so */ ANALYZE WITH q AS (SELECT 1) SELECT * FROM q", "DESCRIBE units",
+        "SUMMARIZE units", "FROM units", "TABLE units", "VALUES (1)", "/* first */ SELECT 1 -- last",
+    ],
+)  # fmt: skip
+def test_every_way_to_read_is_answered(made, question):
+    assert ask(Archive(made), question).rows
 
 
 def test_the_query_command_prints_a_table_json_and_csv(made, typed):

@@ -14,6 +14,7 @@ from typer.testing import CliRunner
 from pipelines.archive import Archive, Run, files
 from pipelines.archive.signatures import VARIABLE, make_key, name_of, public_keys
 from pipelines.certificates import Ledger
+from pipelines.chain.certify import certify
 from pipelines.chain.runner import Runner
 from pipelines.cli import app
 from pipelines.integrity import Report, seals, verify
@@ -26,7 +27,7 @@ def make(folder: Path) -> Path:
     runner = Runner(small_job(folder), archive, measure=CaptureDouble())
     list(runner.all())
     ledger = Ledger(archive)
-    ledger.certify(runner.run, start="2026-01-01", until="2099-01-01")
+    certify(ledger, runner.run)
     ledger.revoke("A2", "dropped")
     return folder / "archive"
 

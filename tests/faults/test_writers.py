@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 from capture_double import CaptureDouble, PulledPlug, small_job, small_run
-from ledger_events import event
+from ledger_events import day, event
 from typer.testing import CliRunner
 
 from pipelines.archive import Archive, files, hash_chain, parquet
@@ -32,6 +32,7 @@ import sys
 from pathlib import Path
 sys.path[:0] = [{tests!r}, {root!r}]
 from capture_double import CaptureDouble, small_job
+from ledger_events import day
 from pipelines.archive import Archive
 from pipelines.chain import ORDER
 from pipelines.runner import Runner
@@ -45,7 +46,7 @@ for seed in (number, 99):  # a lot of its own, then the one that all of them wor
     for stage in ORDER[:-1]:
         runner.stage(stage)
     runner.run.seal()
-    Ledger(archive).certify(runner.run, start=f"2026-01-{{number:02d}}", until="2099-01-01", supersede=True)
+    certify(Ledger(archive), runner.run, start=day(number), until=day(300), supersede=True)
 """
 
 FLOOD = """
@@ -110,10 +111,10 @@ def test_eight_writers_at_once_lose_nothing_and_nobody_reads_half(tmp_path: Path
     assert len(archive.runs()) == WRITERS + 1
     ledger = Ledger(archive)
     for n in range(1, WRITERS + 1):
-        assert ledger.valid_at(f"S{n}", "2030-01-01") is not None
+        assert ledger.valid_at(f"S{n}", day(100)) is not None
     events = ledger.events("S99")
     assert [e.sequence for e in events] == list(range(1, WRITERS + 1))
-    assert {e.start for e in events} == {f"2026-01-{n:02d}" for n in range(1, WRITERS + 1)}
+    assert {e.start for e in events} == {day(n) for n in range(1, WRITERS + 1)}
     report = verify(archive, keys={})
     assert report.checked.findings == []
     assert hash_chain.last_number(root) >= 3 * WRITERS

@@ -16,6 +16,7 @@ from typer.testing import CliRunner
 from pipelines.archive import Archive, Run, files
 from pipelines.archive.signatures import VARIABLE
 from pipelines.certificates import Ledger
+from pipelines.chain.certify import certify
 from pipelines.chain.runner import Runner
 from pipelines.cli import app
 from pipelines.jobs.job import Request
@@ -50,7 +51,7 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> Run:
         job = Request(recipe=recipe_file(folder), station=station).job()
         runner = Runner(job, archive, measure=CaptureDouble())
         list(runner.all())
-        Ledger(archive).certify(runner.run, start="2026-01-01", until="2099-01-01")
+        certify(Ledger(archive), runner.run)
         Ledger(archive).revoke("A2", "dropped")
     return runner.run
 

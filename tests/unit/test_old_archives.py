@@ -9,6 +9,8 @@ from capture_double import CaptureDouble
 
 from pipelines.archive import Archive, Run, parquet
 from pipelines.certificates import Ledger
+from pipelines.certificates.measured import measured_on
+from pipelines.chain.certify import certify
 from pipelines.chain.runner import Runner
 from pipelines.integrity import verify
 from pipelines.jobs.job import job_of_run
@@ -59,7 +61,7 @@ def test_a_changed_byte_and_an_edited_manifest_are_found_there_too(run: Run) -> 
 
 
 def test_its_units_are_certified_and_traced(run: Run) -> None:
-    Ledger(run.archive).certify(run, start="2026-01-01", until="2027-01-01")
+    certify(Ledger(run.archive), run, start=measured_on(run))
     found = lineage(run.archive, "A1")
     kinds = {node.kind for node in found.graph.nodes.values()}
     assert {"certificate", "samples", "table", "station", "recipe"} <= kinds

@@ -12,8 +12,10 @@ from capture_double import CaptureDouble, small_job, small_run
 from pipelines.archive import Archive, Run, code_hash
 from pipelines.chain.chain import ORDER
 from pipelines.chain.runner import Runner
+from pipelines.integrity import verify
 from pipelines.jobs.model_change import ModelChange, wanted
 from pipelines.rerun import steps
+from pipelines.rerun.buffered_run import BufferedRun
 from pipelines.rerun.partition import Batch, run_again
 from pipelines.rerun.reproduce import LEFT_OUT, SAME, check
 from pipelines.rerun.rerun import again
@@ -109,19 +111,59 @@ def test_a_rerun_gives_the_bytes_of_a_first_run_with_that_model(run: Run, tmp_pa
     assert outcome.new == first.run.id
 
 
-def test_an_interrupted_rerun_goes_on(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize("trouble", [KeyboardInterrupt(), DataRejected("verify: no pose"), ValueError("a defect")])
+def test_a_rerun_that_fails_or_is_stopped_leaves_nothing(
+    run: Run, monkeypatch: pytest.MonkeyPatch, trouble: BaseException
+) -> None:
     change = wanted(effects=LARGER)
+    before = sorted(run.archive.root.rglob("*"))
 
     def unplugged(*_args: object) -> None:
-        raise KeyboardInterrupt
+        raise trouble
 
     with monkeypatch.context() as patch:
         patch.setattr("pipelines.chain.chain.verify", unplugged)
-        with pytest.raises(KeyboardInterrupt):
+        with pytest.raises(type(trouble)):
             again(run.archive, run.id, change)
+    assert sorted(run.archive.root.rglob("*")) == before
+    assert run.archive.run("latest").id == run.id
     outcome = again(run.archive, run.id, change)
-    assert outcome.stages["fit"] == "there"
     assert outcome.stages["verify"] == "computed"
+    assert verify(run.archive, keys={}).checked.findings == []
+
+
+@pytest.mark.parametrize("change", [{"effects": LARGER}, {"limits": "industrial"}])
+def test_a_rerun_is_finished_in_the_list_and_for_verify(run: Run, change: dict[str, str]) -> None:
+    new = again(run.archive, run.id, wanted(**change)).new
+    assert {info.id: info.finished for info in run.archive.runs()}[new]
+    report = verify(run.archive, keys={})
+    assert report.checked.findings == []
+    assert [remark for remark in report.checked.remarks if new in remark] == []
+
+
+def test_a_rerun_that_only_takes_over_is_sealed_too(run: Run) -> None:
+    """Interrupted by an older version before it was sealed: all stages are there, the chain does not name it."""
+    change = wanted(effects=LARGER)
+    new = run.archive.run(again(run.archive, run.id, change).new)
+    (new.path / "sealed.json").unlink()
+    shutil.rmtree(run.archive.root / "chain")
+    assert set(again(run.archive, run.id, change).stages.values()) == {"there"}
+    assert (new.path / "sealed.json").is_file()
+
+
+def test_two_reruns_at_once_leave_one_run(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
+    change, real = wanted(effects=LARGER), BufferedRun.begin
+    others: list[str] = []
+
+    def meanwhile(self: BufferedRun, about: dict) -> None:
+        real(self, about)
+        if not others:
+            others.append("")
+            others[0] = again(run.archive, run.id, change).new
+
+    monkeypatch.setattr(BufferedRun, "begin", meanwhile)
+    assert again(run.archive, run.id, change).new == others[0]
+    assert verify(run.archive, keys={}).checked.findings == []
 
 
 def test_an_old_capture_keeps_its_name_whatever_names_are_made_of_today(

@@ -6,14 +6,20 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 from pipelines.archive import Run, files
+from pipelines.archive.locks import alone
+from pipelines.archive.signatures import public_keys
 from pipelines.certificates.days import day_of, months_after, today
-from pipelines.certificates.entries import LedgerEntry
-from pipelines.certificates.refusals import END, START
+from pipelines.certificates.entries import FOLDER, LedgerEntry
+from pipelines.certificates.measured import END, measured_span
+from pipelines.certificates.refusals import allowed_months, refuse_meanwhile, refuse_period
+from pipelines.integrity import verify
 from pipelines.tables.frames import rows_of
-from schemas.errors import WrongUse, did_you_mean
+from schemas.errors import ArchiveUnusable, WrongUse, did_you_mean
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Mapping, Sequence
+
+    from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PublicKey
 
     from pipelines.certificates.ledger import Ledger
 
@@ -39,16 +45,17 @@ class Certified:
         return [*self.written, *self.there]
 
 
-def certify(
+def certify(  # noqa: PLR0913 - each is an option of the command
     ledger: Ledger,
     run: Run,
     units: Sequence[str] = (),
     start: str = "",
     until: str = "",
     *,
-    months: int = 12,
+    months: int = 0,
     reason: str = "",
     supersede: bool = False,
+    keys: Mapping[str, Ed25519PublicKey] | None = None,
 ) -> Certified:
     """The events that certify units of a run, written to the ledger.
 
@@ -56,22 +63,37 @@ def certify(
     ----------
     units : serials; every unit of the run that passed where empty.
     start : first day, today where empty.
-    until : day after the last, so many ``months`` after the first where empty.
+    until : day after the last, so many ``months`` after the first where empty, as many as are allowed where that is 0.
     supersede : end calibrations that begin later and overlap, too.
+    keys : public keys that are trusted; the own where None. Where there are any the run must be signed by one.
+
+    Raises
+    ------
+    ArchiveUnusable
+        The run is not as it was written, or not signed by a key that is trusted.
+    WrongUse
+        The dates are not allowed, a unit may not be certified, or another process certified one of the units meanwhile.
     """
     first = day_of(start, "--from") if start else today()
-    last = day_of(until, "--until") if until else months_after(first, months)
+    last = day_of(until, "--until") if until else months_after(first, months or allowed_months(run))
     if first >= last:
         raise WrongUse(
             f"certify: valid from {first} until {last}, a day after the first is needed; correct --from or --until"
         )
     proposals, result = _proposals(run, units, first, last, reason)
-    for proposal in proposals:
-        refuse_two_at_once(ledger, run, proposal.serial)
-    for proposal in proposals:
-        event, was_there = ledger.add(proposal, supersede=supersede)
-        (result.there if was_there else result.written).append(event)
-    ledger.anchor(result.written)
+    seen = {proposal.serial: len(ledger.events(proposal.serial)) for proposal in proposals}
+    refuse_unsound(run, public_keys() if keys is None else keys)
+    refuse_period(run, first, last)
+    # one at a time from here on: of two that certify one serial at the same moment the second is told of the first
+    with alone(ledger.root / FOLDER, wait=True):
+        for proposal in proposals:
+            refuse_two_at_once(ledger, run, proposal.serial)
+            if not supersede:
+                refuse_meanwhile(ledger, proposal, seen[proposal.serial])
+        for proposal in proposals:
+            event, was_there = ledger.add(proposal, supersede=supersede)
+            (result.there if was_there else result.written).append(event)
+        ledger.anchor(result.written)
     return result
 
 
@@ -119,6 +141,21 @@ def _blank(serial: str, **content: Any) -> LedgerEntry:
     )
 
 
+def refuse_unsound(run: Run, keys: Mapping[str, Ed25519PublicKey]) -> None:
+    """Refuse a run that ``tumbleline verify RUN`` finds something wrong with: it would lend its findings a certificate.
+
+    Parameters
+    ----------
+    keys : public keys that are trusted; where there are any, each file of the run must be signed by one.
+    """
+    findings = verify(run.archive, [run.id], keys=keys, demanded=bool(keys)).checked.findings
+    if findings:
+        more = f" (and {len(findings) - 1} more)" if len(findings) > 1 else ""
+        raise ArchiveUnusable(
+            f"certify: {findings[0].path} {findings[0].message}{more}; not certified, see 'tumbleline verify {run.id}'"
+        )
+
+
 def refuse_overdue(run: Run) -> None:
     """Refuse a run whose station had a reference standard that was due before it measured."""
     about = run.about
@@ -134,7 +171,7 @@ def refuse_overdue(run: Run) -> None:
 
 def refuse_two_at_once(ledger: Ledger, run: Run, serial: str) -> None:
     """Refuse a unit that was measured somewhere else at the same time: two units have one serial."""
-    own = _measured(run)
+    own = measured_span(run)
     for one in ledger.calibrations(serial):
         other = Run(run.archive, one.run)
         if (
@@ -143,17 +180,9 @@ def refuse_two_at_once(ledger: Ledger, run: Run, serial: str) -> None:
             or other.about.get("capture") == run.about.get("capture")
         ):
             continue
-        theirs = _measured(other)
+        theirs = measured_span(other)
         if own and theirs and own[0] < theirs[1] and theirs[0] < own[1]:
             raise WrongUse(
                 f"certify: unit {serial} was measured in run {run.id} from {own[0]} to {own[1]} and in run {other.id} from "
                 f"{theirs[0]} to {theirs[1]}: two units have one serial; find out which is which, and give one another"
             )
-
-
-def _measured(run: Run) -> tuple[str, str] | None:
-    """When a run began and its capture ended; None where that is not known, or not of its own."""
-    about = run.about
-    if about.get("rerun_of") or not about.get("capture") or not (run.path / END).is_file():
-        return None
-    return str(files.read_json(run.path / START)["when"]), str(files.read_json(run.path / END)["when"])

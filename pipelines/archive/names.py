@@ -1,0 +1,61 @@
+"""Names in manifests: what an archive's files say of other files leads to places in the archive, and nowhere else."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from schemas.errors import ArchiveUnusable
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Mapping
+
+    from pipelines.archive.store import Place
+
+ONE = ("capture", "run", "rerun_of", "taken_from")  # entries that name one folder of the archive
+SEVERAL = ("parents",)
+KEYS = ("content", "inputs", "manifests", "evidence", "events")  # entries whose keys name files of one folder
+PLACES = ("files",)  # entries whose keys are places below the archive's root
+
+
+class NameLeadsOut(ArchiveUnusable):
+    """A manifest that names a place outside of the archive."""
+
+
+def is_plain(name: str) -> bool:
+    """Whether a name is that of a file or folder, and no way to another: no separator, no ``..``, not absolute."""
+    return name not in {"", ".", ".."} and not any(mark in name for mark in "/\\\0")
+
+
+def is_below(name: str) -> bool:
+    """Whether a place with slashes is below the folder that it is told of."""
+    return all(is_plain(part) for part in name.split("/"))
+
+
+def refuse_leading_out(content: Mapping[str, Any], where: Place) -> None:
+    """Refuse a manifest that names something by a way that could lead out of the archive.
+
+    Raises
+    ------
+    NameLeadsOut
+        With the entry and the name.
+    """
+    for entry, name, sound in _named(content):
+        if not sound:
+            raise NameLeadsOut(
+                f"archive: {where} names {name[:80]!r} under '{entry}', a plain name without '/' and '..' is needed; the file "
+                "was edited, or the archive was made to lead elsewhere: do not use it"
+            )
+
+
+def _named(content: Mapping[str, Any]) -> Iterator[tuple[str, str, bool]]:
+    """Entries and the names under them, with whether each is sound; values of other kinds name nothing."""
+    for entry in ONE:
+        name = content.get(entry)
+        if isinstance(name, str) and name:
+            yield entry, name, is_plain(name)
+    for entry in SEVERAL:
+        names = content.get(entry)
+        yield from ((entry, str(name), is_plain(str(name))) for name in (names if isinstance(names, list) else ()))
+    for entry, sound in (*((key, is_plain) for key in KEYS), *((place, is_below) for place in PLACES)):
+        names = content.get(entry)
+        yield from ((entry, name, sound(name)) for name in (names if isinstance(names, dict) else ()))

@@ -1,0 +1,88 @@
+"""Tables of many runs as one Arrow data set: read where they lie, by whoever scans them, and never written through.
+
+A query engine that is given these needs no access to any file, and so can be denied all of it.
+"""
+
+from __future__ import annotations
+
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import pyarrow as pa
+import pyarrow.dataset as ds
+import pyarrow.parquet as pq
+
+from pipelines.archive.store import first_line
+from schemas.errors import ArchiveUnusable
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Sequence
+
+    from pipelines.archive.store import Place
+
+READERS = 8
+
+
+def of_index(names: Sequence[str], schema: pa.Schema) -> ds.Dataset:
+    """The files of one table of the index as one table.
+
+    Parameters
+    ----------
+    schema : of every one of them.
+    """
+    from pyarrow.fs import LocalFileSystem
+
+    form, system = ds.ParquetFileFormat(), LocalFileSystem()
+    return ds.FileSystemDataset(
+        [form.make_fragment(name, system) for name in names], schema=schema, format=form, filesystem=system
+    )
+
+
+def of_runs(names: Sequence[str]) -> ds.Dataset:
+    """Files ``…/<run>/<table>.parquet`` of a local archive as one table with the column ``run`` in front.
+
+    A column that some runs do not have is null there.
+
+    Raises
+    ------
+    ArchiveUnusable
+        One of them is no Parquet file, or they have a column of different types.
+    """
+    from pyarrow.fs import LocalFileSystem
+
+    with ThreadPoolExecutor(READERS) as pool:
+        found = list(pool.map(_schema, names))
+    try:
+        columns = pa.unify_schemas(found, promote_options="permissive").remove_metadata()
+    except (pa.ArrowInvalid, pa.ArrowTypeError) as problem:
+        raise ArchiveUnusable(
+            f"query: tables {Path(names[0]).name} of the runs do not fit together ({first_line(problem)}); see 'tumbleline "
+            "verify'"
+        ) from None
+    form, system = ds.ParquetFileFormat(), LocalFileSystem()
+    parts = [
+        form.make_fragment(name, system, partition_expression=ds.field("run") == Path(name).parent.name)
+        for name in names
+    ]
+    schema = pa.schema([("run", pa.string()), *(field for field in columns if field.name != "run")])
+    return ds.FileSystemDataset(parts, schema=schema, format=form, filesystem=system)
+
+
+def gathered(places: Iterable[Place]) -> pa.Table:
+    """Tables of an object store, read here, with the column ``run`` in front."""
+    parts: list[pa.Table] = []
+    for place in places:
+        table = pq.ParquetFile(pa.BufferReader(place.read_bytes())).read()
+        parts.append(table.add_column(0, "run", pa.repeat(pa.scalar(place.parent.name), len(table))))
+    return pa.concat_tables(parts, promote_options="default") if parts else pa.table({"run": pa.array([], pa.string())})
+
+
+def _schema(name: str) -> pa.Schema:
+    try:
+        return pq.read_schema(name).remove_metadata()
+    except (OSError, pa.ArrowInvalid) as problem:
+        raise ArchiveUnusable(
+            f"query: {name} is not a whole Parquet file ({first_line(problem)}); restore it from a copy, see 'tumbleline "
+            "verify'"
+        ) from None

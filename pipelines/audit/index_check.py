@@ -1,0 +1,64 @@
+"""The audit's index held against the runs that it was made from: every row derived anew."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.compute as pc
+import pyarrow.parquet as pq
+
+from pipelines.archive import derived
+from pipelines.archive.store import ObjectPath
+from pipelines.audit.index import FOLDER, part_folders, runs_of, standing_of, version_of_rows
+from pipelines.audit.run_files import read_runs, stamps_of
+from pipelines.audit.run_rows import SCHEMAS, TABLES, rows_of_runs
+from pipelines.integrity.findings import CHANGED
+
+if TYPE_CHECKING:
+    from pipelines.archive import Archive
+    from pipelines.archive.store import Place
+    from pipelines.integrity.findings import CheckedPart
+
+REMEDY = "remove it, it is made again from the runs"
+
+
+def check_index(archive: Archive, checked: CheckedPart) -> None:
+    """What is wrong with the index of an archive.
+
+    A part of another version is used by nobody and is passed over, as are runs that were written to since.
+    """
+    stamps, version = stamps_of(archive.root), version_of_rows()
+    for part in part_folders(archive.root / FOLDER):
+        runs = runs_of(part, version)
+        if standing_of(part) == derived.EDITED:
+            checked.wrong(CHANGED, part, f"was edited since it was made: {REMEDY}")
+        elif runs:
+            _check_rows(
+                archive, part, [(run, stamp) for run, stamp in runs.items() if stamps.get(run) == stamp], checked
+            )
+
+
+def _check_rows(archive: Archive, part: Place, runs: list[tuple[str, str]], checked: CheckedPart) -> None:
+    wanted = rows_of_runs(read_runs(archive.root / "runs", runs))
+    chosen = [run for run, _ in runs]
+    for name in TABLES:
+        place = part / f"{name}.parquet"
+        table = pq.read_table(pa.BufferReader(place.read_bytes()) if isinstance(place, ObjectPath) else str(place))
+        found = table.filter(pc.field("run").isin(pa.array(chosen, pa.string())))
+        if not _same(found, wanted[name], SCHEMAS[name]):
+            checked.wrong(CHANGED, place, f"tells other rows than the runs that it was made from: {REMEDY}")
+
+
+def _same(found: pa.Table, wanted: pa.Table, schema: pa.Schema) -> bool:
+    if found.schema.names != schema.names or len(found) != len(wanted):
+        return False
+    return all(_same_column(found[name], wanted[name], schema.field(name).type) for name in schema.names)
+
+
+def _same_column(found: pa.ChunkedArray, wanted: pa.ChunkedArray, kind: pa.DataType) -> bool:
+    a, b = found.cast(kind), wanted.cast(kind)
+    if not pa.types.is_floating(kind):
+        return a.combine_chunks().equals(b.combine_chunks())
+    return a.null_count == b.null_count and np.array_equal(a.to_numpy(), b.to_numpy(), equal_nan=True)

@@ -1,0 +1,237 @@
+"""What is certified, for how long, by whom, and once: the run is named, its dates are allowed, its files are sound and signed."""
+
+import json
+import shutil
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+from capture_double import small_run
+from ledger_events import day
+from typer.testing import CliRunner, Result
+
+from pipelines.archive import Archive, Run, files
+from pipelines.archive.signatures import VARIABLE, make_key
+from pipelines.certificates import Ledger, certify
+from pipelines.certificates.days import months_after
+from pipelines.certificates.handed_out import library_remarks
+from pipelines.certificates.refusals import allowed_months, measured_on
+from pipelines.chain.certify import certify
+from pipelines.cli import app
+from pipelines.jobs.model_change import wanted
+from pipelines.rerun.rerun import again
+from schemas.errors import ArchiveUnusable, RecipeInvalid, WrongUse
+from schemas.limits import VALIDITY_MONTHS, parse_limits
+
+Typed = Callable[..., Result]
+LIMITS = 'name = "half"\nvalidity_months = 6\n[figures]\nresidual_rms_ug = {max = 5000.0, unit = "µg"}\n'
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory: pytest.TempPathFactory) -> Run:
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv(VARIABLE, "")
+        run = small_run(tmp_path_factory.mktemp("run"))
+        run.seal()
+    return run
+
+
+@pytest.fixture
+def run(made: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Run:
+    monkeypatch.setenv(VARIABLE, "")
+    shutil.copytree(made.archive.root, tmp_path / "archive")
+    return Archive(tmp_path / "archive").run(made.id)
+
+
+@pytest.fixture
+def typed(run: Run) -> Typed:
+    def type_(*words: str) -> Result:
+        return CliRunner().invoke(app, [*words, "--archive", str(run.archive.root)])
+
+    return type_
+
+
+def test_the_run_is_named_before_it_is_signed(run: Run, typed: Typed, monkeypatch: pytest.MonkeyPatch) -> None:
+    def refused(*_args: object) -> None:
+        raise WrongUse("stopped before anything was written")
+
+    with monkeypatch.context() as patch:
+        patch.setattr(certify, "refuse_unsound", refused)
+        assert f"certify: run {run.id}, measured on {day()}, 3 units: A1, A2, A3" in typed("certify").stderr
+    done = typed("certify", "--json")
+    assert f"certify: run {run.id}, measured on {day()}" in done.stderr
+    assert json.loads(done.stdout)["run"] == run.id
+
+
+def test_a_certificate_does_not_begin_before_the_measurement(run: Run, typed: Typed) -> None:
+    refused = typed("certify", run.id, "--from", "2020-01-01").exception
+    assert isinstance(refused, WrongUse)
+    assert f"valid from 2020-01-01, run {run.id} was measured on {day()}, that day or a later one is needed" in str(
+        refused
+    )
+    assert typed("certify", run.id, "--from", day(-1)).exit_code == 1
+    assert Ledger(run.archive).events("A1") == []
+    assert typed("certify", run.id, "--from", day(1)).exit_code == 0
+
+
+@pytest.mark.parametrize(
+    "words", [("--months", "13"), ("--until", "2099-01-01"), ("--from", day(400)), ("--months", "1200")]
+)
+def test_a_certificate_lasts_no_longer_than_the_policy_allows(run: Run, typed: Typed, words: tuple[str, str]) -> None:
+    assert typed("certify", run.id, *words).exit_code != 0
+    assert Ledger(run.archive).events("A1") == []
+
+
+def test_without_dates_it_lasts_as_long_as_is_allowed(run: Run, typed: Typed) -> None:
+    assert allowed_months(run) == VALIDITY_MONTHS
+    typed("certify", run.id)
+    assert Ledger(run.archive).events("A1")[0].until == months_after(day(), VALIDITY_MONTHS)
+
+
+def test_the_limits_file_says_how_long(run: Run, tmp_path: Path) -> None:
+    (tmp_path / "half.toml").write_text(LIMITS, encoding="utf-8")
+    new = run.archive.run(again(run.archive, run.id, wanted(limits=str(tmp_path / "half.toml"))).new)
+    assert allowed_months(new) == 6
+    assert measured_on(new) == day()
+    ledger = Ledger(run.archive)
+    with pytest.raises(WrongUse, match=r"no more than until .* is allowed; limits 'half' allow 6 months"):
+        certify(ledger, new, months=7)
+    assert certify(ledger, new).written[0].until == months_after(day(), 6)
+
+
+@pytest.mark.parametrize("months", ["0", "121", '"6"', "true", "6.5"])
+def test_the_months_of_a_limits_file_are_bounded(months: str) -> None:
+    with pytest.raises(RecipeInvalid, match="validity_months"):
+        parse_limits(LIMITS.replace("= 6", f"= {months}"), "half.toml")
+
+
+def test_limits_that_do_not_say_how_long_are_kept_as_before() -> None:
+    """A run is named for its limits: those of earlier versions keep their names."""
+    assert "validity_months" not in parse_limits(LIMITS.replace("validity_months = 6\n", ""), "x").model_dump(
+        mode="json"
+    )
+
+
+def test_two_that_certify_at_the_same_moment_do_not_both_succeed(
+    run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """While one checks its run, the other certifies a run of the same units: the first is told, and writes nothing."""
+    (tmp_path / "half.toml").write_text(LIMITS, encoding="utf-8")
+    other = run.archive.run(again(run.archive, run.id, wanted(limits=str(tmp_path / "half.toml"))).new)
+    ledger, real, done = Ledger(run.archive), certify.refuse_unsound, []
+
+    def meanwhile(which: Run, keys: object) -> None:
+        real(which, keys)
+        if not done:
+            done.append(None)
+            done[0] = certify(ledger, other, ["A2"]).written
+
+    monkeypatch.setattr(certify, "refuse_unsound", meanwhile)
+    with pytest.raises(
+        WrongUse, match=r"unit A2: certificate A2/1 of run .* was written by .* while this command was at work"
+    ):
+        certify(ledger, run)
+    assert [len(ledger.events(serial)) for serial in ("A1", "A2", "A3")] == [0, 1, 0]
+    assert certify(ledger, run).events  # now it is known, and takes its place
+
+
+def test_the_same_certificate_at_the_same_moment_is_written_once(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
+    ledger, real, done = Ledger(run.archive), certify.refuse_unsound, []
+
+    def meanwhile(which: Run, keys: object) -> None:
+        real(which, keys)
+        if not done:
+            done.append(None)
+            done[0] = certify(ledger, run)
+
+    monkeypatch.setattr(certify, "refuse_unsound", meanwhile)
+    assert {event.certificate for event in certify(ledger, run).there} == {"A1/1", "A2/1", "A3/1"}
+    assert len(ledger.events("A1")) == 1
+
+
+@pytest.fixture
+def keys(tmp_path: Path) -> dict[str, Path]:
+    found = {name: tmp_path / f"{name}.key" for name in ("own", "foreign")}
+    for place in found.values():
+        make_key(place)
+    return found
+
+
+def sign(run: Run, key: Path | None) -> None:
+    """All manifests of a run anew by a key, and its entry of the chain."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv(VARIABLE, str(key or ""))
+        for name in ("coefficients", "covariance", "grades"):
+            path = run.path / f"{name}.json"
+            path.write_bytes(files.manifest_bytes(json.loads(path.read_text())))
+
+
+@pytest.mark.parametrize(("by", "said"), [("", "not signed"), ("foreign", "signed with a key that is not the own")])
+def test_show_export_and_verify_name_who_did_not_sign(
+    run: Run, typed: Typed, keys: dict[str, Path], monkeypatch: pytest.MonkeyPatch, by: str, said: str
+) -> None:
+    typed("certify", run.id)
+    sign(run, keys.get(by))
+    for words in (("show", run.id), ("show", "A1"), ("export", run.id)):
+        assert said not in typed(*words).stderr
+    monkeypatch.setenv(VARIABLE, str(keys["own"]))
+    for words in (("show", run.id), ("show", "A1"), ("export", run.id)):
+        done = typed(*words)
+        assert done.exit_code == 0, (words, done.exception)
+        assert f"{said}: " in done.stderr, words
+        assert f"runs/{run.id}/coefficients.json" in done.stderr
+        assert "calibrations/" in done.stderr  # the certificate was not signed either
+    assert typed("verify").exit_code == 1
+    refused = typed("certify", run.id, "--months", "6").exception
+    assert isinstance(refused, ArchiveUnusable)
+    assert "a signature by the own key, or by one given with --key, is needed" in str(refused)
+
+
+def test_an_edit_behind_a_signature_stops_show_and_export(
+    run: Run, typed: Typed, keys: dict[str, Path], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    sign(run, keys["own"])
+    path = run.path / "coefficients.json"
+    path.write_bytes(files.json_bytes({**json.loads(path.read_text()), "who": "somebody else"}))
+    monkeypatch.setenv(VARIABLE, str(keys["own"]))
+    for words in (("show", run.id), ("export", run.id)):
+        assert "was edited after it was signed" in str(typed(*words).exception)
+
+
+def test_verify_with_an_own_key_demands_it(run: Run, typed: Typed, keys: dict[str, Path], monkeypatch) -> None:
+    assert typed("verify").exit_code == 0
+    monkeypatch.setenv(VARIABLE, str(keys["own"]))
+    done = typed("verify")
+    assert done.exit_code == 1
+    assert "is not signed" in done.stdout
+
+
+def test_a_run_of_a_station_with_another_key_is_certified_where_that_key_is_trusted(
+    tmp_path: Path, keys: dict[str, Path], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv(VARIABLE, str(keys["foreign"]))
+    run = small_run(tmp_path)
+    run.seal()
+    pem = tmp_path / "station.pem"
+    write_public(keys["foreign"], pem)
+    monkeypatch.setenv(VARIABLE, str(keys["own"]))
+    words = ["certify", run.id, "--archive", str(run.archive.root)]
+    assert isinstance(CliRunner().invoke(app, words).exception, ArchiveUnusable)
+    assert CliRunner().invoke(app, [*words, "--key", str(pem)]).exit_code == 0
+
+
+def write_public(key: Path, place: Path) -> None:
+    from cryptography.hazmat.primitives.serialization import Encoding, PublicFormat, load_pem_private_key
+
+    public = load_pem_private_key(key.read_bytes(), None).public_key()
+    place.write_bytes(public.public_bytes(Encoding.PEM, PublicFormat.SubjectPublicKeyInfo))
+
+
+def test_tables_made_with_different_libraries_are_told_wherever_they_are_handed_out(run: Run, typed: Typed) -> None:
+    assert library_remarks(run) == []
+    path = run.path / "coefficients.json"
+    content = json.loads(path.read_text())
+    path.write_bytes(files.json_bytes({**content, "libraries": {**content["libraries"], "scipy": "0.1"}}))
+    for words in (("show", run.id), ("export", run.id), ("certify", run.id)):
+        assert "tables made with scipy 0.1 (coefficients)" in typed(*words).stderr, words
+    assert "tables made with scipy 0.1 (coefficients)" in typed("verify").stdout
