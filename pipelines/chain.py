@@ -74,7 +74,7 @@ def _noise(job: Job, run: Run) -> Tables:
     del job
     readings, *tables = (run.table(name) for name in ("readings", "coefficients", "covariance"))
     static = set(readings.loc[readings["kind"] == "allan", "record"])
-    return noise(_records(run).samples(static), readings, *tables)
+    return noise(_records(run).samples(static), readings, *tables, run.table("history"))
 
 
 _EVIDENCE = ("verdicts", "coefficients", "covariance", "residuals", "verification", "verification_poses", "noise")
@@ -129,7 +129,7 @@ STAGES: tuple[Stage, ...] = (
     ),
     Stage(
         name="noise",
-        inputs=(RECORDS, "readings", "coefficients", "covariance"),
+        inputs=(RECORDS, "readings", "coefficients", "covariance", "history"),
         outputs=("allan", "noise"),
         parameters=_none,
         call=_noise,
