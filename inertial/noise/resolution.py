@@ -6,9 +6,9 @@ from scipy.stats import norm
 
 Array = NDArray[np.float64]
 
-FINE = 0.5
+FINE = 0.45
 """Noise of a sample over the step from which on rounding adds q²/12 and nothing else (W. F. Sheppard 1898; B. Widrow, IRE Trans.
-Circuit Theory 3 (1956) 266): the part that depends on where the mean lies between two digits is then below 3 % of the variance."""
+Circuit Theory 3 (1956) 266): the part that depends on where the mean lies between two digits is then below a tenth of the variance."""
 
 _SAME = 1e-6
 """Differences of values that are this close, over the step, come from rounding of the numbers and not from the output."""
