@@ -44,6 +44,7 @@ def render(run: Run, certificates: Mapping[str, Stated] | None = None) -> str:
     """
     tables = {name: run.table(name) for name in ("verdicts", "dwells", "coefficients", "residuals", "verification")}
     tables |= {name: run.table(name) for name in ("verification_poses", "allan", "noise", "figures", "grades")}
+    tables |= {name: run.table(name) for name in ("wander",) if name in run.tables()}
     grades = tables["grades"].sort_values("slot")
     limit = _limit(run, "verification_norm_ug")
     known, coverage = certificates or {}, float(run.about["limits"]["coverage_factor"])
@@ -88,7 +89,9 @@ def _unit(row: dict[str, Any], tables: dict[str, pd.DataFrame], coverage: float)
         "figures": [_figure(f) for f in rows_of(own["figures"])],
         "short": {f["figure"]: plain(f["value"]) for f in rows_of(own["figures"])},
         "coefficients": _coefficients(own["coefficients"], coverage),
+        "bias": _bias(own.get("wander"), coverage),
         "noise": _noise(own["noise"]),
+        "notes": list(dict.fromkeys(_notes(own["noise"]))),
         "plots": [
             model_plots(fitted, own["residuals"]),
             check_plots(own["residuals"], own["verification"], own["allan"]),
@@ -125,6 +128,32 @@ def _coefficients(rows: pd.DataFrame, coverage: float) -> list[dict[str, Any]]:
     return list(lines.values())
 
 
+def _bias(rows: pd.DataFrame | None, coverage: float) -> list[dict[str, Any]]:
+    """U of the bias by measurand, one line each; none for runs of before, and for models without a bias."""
+    if rows is None or "bias_record_u_ug" not in rows or not np.isfinite(rows["bias_record_u_ug"]).all():
+        return []
+    own = {row["axis"]: row for row in rows_of(rows)}
+    names = {
+        "bias_record_u_ug": "mean of the record",
+        "bias_long_u_ug": "mean of the day after the record",
+        "bias_switch_on_u_ug": "mean of a day after the next switch-on",
+    }
+    return [
+        {
+            "name": name,
+            "cells": {axis: plain(coverage * own[axis][key]) or "not stated" for axis in "xyz"},
+        }
+        for key, name in names.items()
+    ]
+
+
+def _notes(rows: pd.DataFrame) -> list[str]:
+    """What is said of a unit's record besides its terms, with the axis."""
+    if "note" not in rows:
+        return []
+    return [f"{row['axis']}: {row['note']}" for row in rows_of(rows) if str(row["note"]) not in {"", "nan"}]
+
+
 def _noise(rows: pd.DataFrame) -> list[dict[str, Any]]:
     names = {
         "N": "N, velocity random walk (two-sided, IEEE 952)",
@@ -145,6 +174,8 @@ def _noise(rows: pd.DataFrame) -> list[dict[str, Any]]:
 
 
 def _noise_cell(row: dict[str, Any]) -> str:
+    if not row["identified"] and not np.isfinite(row["high"]):
+        return "–"
     if not row["identified"]:
         return f"≤ {plain(row['high'])}"
     return f"{plain(row['value'])} ({plain(row['low'])} … {plain(row['high'])})"
