@@ -7,6 +7,7 @@ with the estimators; the seeds are the ones below and served no choice of a cons
 from __future__ import annotations
 
 import argparse
+import inspect
 import os
 import sys
 from pathlib import Path
@@ -21,6 +22,7 @@ import independent_noise as made  # noqa: E402
 import numpy as np  # noqa: E402
 import pandas as pd  # noqa: E402
 
+from inertial.fits.ellipsoid import fit_ellipsoid  # noqa: E402
 from inertial.noise.allan import overlapping  # noqa: E402
 from inertial.noise.terms import fit_terms  # noqa: E402
 from pipelines.stages.fit import fit  # noqa: E402
@@ -112,7 +114,86 @@ def bias(records: int, seed: int) -> None:
             print(made.told(key, held, total))
 
 
-SCENES = {"terms": terms, "verification": verification, "bias": bias}
+def sphere(records: int, seed: int) -> None:
+    """Sphere fit of dwells whose poses are unknown: what twice the stated error of bias and scale holds."""
+    rng = np.random.default_rng(seed)
+    timed = "time" in inspect.signature(fit_ellipsoid).parameters
+    thrice = (25.0, 25.0, 25.0)
+    for name, noise in (
+        ("white 280 µg/√Hz", {"density": 280.0, "flicker": 0.0}),
+        ("25 µg/√Hz, B 30 µg", {"flicker": 30.0}),
+        ("25 µg/√Hz, B 30 µg, three rounds half an hour apart", {"flicker": 30.0, "temperatures": thrice}),
+        ("280 µg/√Hz, B 30 µg", {"density": 280.0, "flicker": 30.0}),
+        ("25 µg/√Hz, B 30 µg, K 4 µg/√s", {"flicker": 30.0, "walk": 4.0}),
+        ("25 µg/√Hz, B 30 µg, K 4 µg/√s, three rounds", {"flicker": 30.0, "walk": 4.0, "temperatures": thrice}),
+    ):
+        held = np.zeros(3, dtype=int)
+        for _ in range(records):
+            one = lots.world(rng, units=1, plan="fibonacci", checks=(), move_s=20, **noise)
+            rows = one.dwells
+            output, time = rows[["out_x", "out_y", "out_z"]].to_numpy(), rows["time_s"].to_numpy()
+            error = (rows["sd_x"] / np.sqrt(rows["n"])).to_numpy()
+            found = fit_ellipsoid(output, time=time, error=error) if timed else fit_ellipsoid(output)
+            wrong = np.abs(1e6 * found.bias - one.record[0])
+            held[0] += int(np.sum(wrong <= 2e6 * np.sqrt(np.diagonal(found.covariance)[:3])))
+            late = np.abs(1e6 * found.bias - one.day[0])
+            u = np.sqrt(np.diagonal(found.covariance)[:3])
+            if timed:
+                u = of_a_day(u, np.full(3, float(found.flicker)), time, slowest=4.0, widened=student(found.dof))
+            held[2] += int(np.sum(late <= 2e6 * u))
+            correction = np.linalg.cholesky(np.linalg.inv(one.gain[0] @ one.gain[0].T)).T
+            spread = np.sqrt(np.diagonal(found.covariance)[3:6])
+            held[1] += int(np.sum(np.abs(np.diagonal(found.correction) - np.diagonal(correction)) <= 2.0 * spread))
+        print(f"sphere fit, 24 poses of 10 s every 30 s, one unit, {name}")
+        print(made.told("  2·u holds the bias of the day after", int(held[2]), 3 * records))
+        print(made.told("  2·u holds the record's mean bias", int(held[0]), 3 * records))
+        print(made.told("  2·u holds the inverse of the scale", int(held[1]), 3 * records))
+
+
+def series(records: int, seed: int) -> None:
+    """Series of a level that stands still: change points and control charts that say that it moved; and a step that is there."""
+    rng = np.random.default_rng(seed)
+    kinds = (("white", 0.0, None), ("ρ = 0.6", 0.6, None), ("Student's t, 3 dof", 0.0, 3.0), ("ρ = 0.6, t 3 dof", 0.6, 3.0))
+    for n in (40, 100, 250):
+        for name, memory, dof in kinds:
+            made_ = made.autoregressive(rng, records, n, memory, dof=dof)
+            print(made.told(f"{n} points, {name}: a change at p ≤ 0.001", sum(bool(change_points(v)) for v in made_), records))
+            for step in (2.0, 4.0):
+                moved = made_ + step * (np.arange(n) >= n // 2)
+                found = sum(any(abs(c.first - n // 2) <= 3 for c in change_points(v)) for v in moved)
+                print(made.told(f"    a step of {step:g} σ half-way is found", found, records))
+    for name, memory, dof in kinds:
+        bad = {0.01: 0, 0.001: 0}
+        for v in made.autoregressive(rng, records, 100, memory, dof=dof):
+            chart = baseline(v, 40)
+            signalled, moving = signals(v, chart)
+            counted = np.arange(v.size) >= 40
+            p = chance(v, 40, 60).p_value(alarms(signalled, moving.outside, counted))
+            for level in bad:
+                bad[level] += int(p < level)
+        for level, count in bad.items():
+            print(made.told(f"control chart, 40 + 60 points, {name}: out of control at p < {level:g}", count, records))
+
+
+from pipelines.audit.statistics.change_points import change_points  # noqa: E402
+from pipelines.audit.statistics.control_charts import alarms, baseline, false_alarms, signals  # noqa: E402
+
+
+def chance(values, first, counted):
+    """What alarms are held against, as the audit takes it."""
+    try:
+        from pipelines.audit.statistics.memory import drawn_in, memory_of, tail_of
+    except ImportError:
+        return false_alarms(values.size, first, counted)
+    memory = float(np.ceil(10.0 * memory_of(drawn_in(values))) / 10.0)
+    return false_alarms(values.size, first, counted, memory, float(tail_of(values, memory)))
+
+
+try:
+    from inertial.fits.wander import student
+    from inertial.noise.measurands import of_a_day
+except ImportError: pass
+SCENES = {"series": series, "sphere": sphere, "terms": terms, "verification": verification, "bias": bias}
 
 
 def main() -> None:

@@ -14,11 +14,12 @@ UG = 1e-6
 
 @dataclass(frozen=True)
 class World:
-    """A lot's dwells, and the truth of its bias, (units, 3), µg: over the record, and over the day that follows it."""
+    """A lot's dwells, and the truth: bias (units, 3), µg, over the record and over the day that follows it; response (units, 3, 3)."""
 
     dwells: pd.DataFrame
     record: Array
     day: Array
+    gain: Array
 
 
 def world(
@@ -65,10 +66,9 @@ def world(
     noise = UG * noise.reshape(units, 3, -1)
     sd = UG * density * np.sqrt(100.0 / 2.0)
     f = force(angles)
-    frames = []
+    frames, gains = [], np.eye(3) + rng.normal(0.0, 0.003, (units, 3, 3))
     for u in range(units):
-        gain = np.eye(3) + rng.normal(0.0, 0.003, (3, 3))
-        out = f @ gain.T + noise[u].T
+        out = f @ gains[u].T + noise[u].T
         frames.append(
             pd.DataFrame(
                 {
@@ -83,7 +83,7 @@ def world(
     cut = length // step
     first, rest = slow[:, : max(cut, 1)].mean(axis=1), slow[:, cut:]
     day = rest.mean(axis=1) if rest.shape[1] else first
-    return World(pd.concat(frames, ignore_index=True), first.reshape(units, 3), day.reshape(units, 3))
+    return World(pd.concat(frames, ignore_index=True), first.reshape(units, 3), day.reshape(units, 3), gains)
 
 
 def static_record(values: Array, rate: float, *, pose: tuple[float, float] = (0.0, 0.0)) -> tuple[pd.DataFrame, pd.DataFrame]:

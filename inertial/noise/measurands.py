@@ -5,6 +5,9 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
+DAY_S = 86_400.0
+"""Window of a unit's long mean, s: the day after the record. Flicker has no mean for ever: a decade more adds B²·ln 10/π."""
+
 _OCTAVE = float(np.log(2.0))
 
 
@@ -43,3 +46,21 @@ def instability(deviation: Array, time: Array, *, slowest: float = 1.0) -> Array
         return np.full_like(deviation, np.nan)
     octaves = max(int(np.ceil(np.log2(3.0 * slowest * span / float(np.median(np.diff(when)))))), 2)
     return deviation * np.sqrt(np.pi / (octaves * _OCTAVE))
+
+
+def of_a_day(record: Array, wander: Array, time: Array, *, slowest: float = 1.0, widened: float = 1.0) -> Array:
+    """Standard uncertainty of a bias as the mean of the day after its record; the shape and unit of ``record``.
+
+    Flicker between the record and that day is added to the uncertainty of the record's mean. A walk is not carried beyond its record.
+
+    Parameters
+    ----------
+    record : standard error of the bias as the mean of its record; wander : standard deviation of the 1/f wander between dwells
+    time : (n,), s, of the dwells; slowest : as in :func:`instability`
+    widened : factor of the wander's share, as it is known from few degrees of freedom
+    """
+    span = float(np.ptp(time))
+    if not span > 0.0:
+        return np.full_like(record, np.nan)
+    apart = widened * instability(wander, time, slowest=slowest) * np.sqrt(between_means(span, DAY_S))
+    return np.hypot(record, apart)

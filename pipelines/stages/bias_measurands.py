@@ -6,15 +6,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from inertial.noise.measurands import between_means, instability
+from inertial.noise.measurands import DAY_S, instability, of_a_day
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     Array = NDArray[np.float64]
-
-DAY_S = 86_400.0
-"""Window of the unit's long mean: the day after the record. Flicker has no mean for ever: a decade more adds B²·ln 10/π."""
 
 COLUMNS = ("bias_instability_ug", "bias_record_u_ug", "bias_long_u_ug", "bias_long_s", "bias_switch_on_u_ug")
 
@@ -35,8 +32,6 @@ def bias_measurands(
     widened : factor of the wander's share, as it is known from few degrees of freedom
     switch_on : standard deviation of the bias from one switch-on to the next, µg
     """
-    found, span = instability(wander, time), float(np.ptp(time))
-    apart = widened * found * np.sqrt(between_means(span, DAY_S)) if span > 0.0 else np.full_like(record, np.nan)
-    long = np.hypot(record, apart)
+    found, long = instability(wander, time), of_a_day(record, wander, time, widened=widened)
     again = np.full_like(record, np.nan) if switch_on is None else np.hypot(long, switch_on)
     return dict(zip(COLUMNS, (found, record, long, np.full_like(record, DAY_S), again), strict=True))

@@ -12,11 +12,10 @@ from inertial.effects import SensorEffect
 from inertial.errors import NotIdentified
 from inertial.expected import expected_errors
 from inertial.noise.dwells import dwell_covariance
-from inertial.noise.measurands import between_means
+from inertial.noise.measurands import DAY_S, between_means
 from inertial.planning import SEEN, sights
 from inertial.reasons import reason
 from pipelines.planned import state_of
-from pipelines.stages.bias_measurands import DAY_S
 from pipelines.stages.calibration import unit_texts
 from pipelines.stages.capture import steps
 from pipelines.stages.minutes import itinerary, spent
