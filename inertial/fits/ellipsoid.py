@@ -106,6 +106,10 @@ def fit_ellipsoid(
     if n <= free + free_heat:
         msg = f"sphere fit: {n} dwells, more than {free + free_heat} are needed; add poses"
         raise NotIdentified(msg)
+    if not (np.all(np.isfinite(a)) and np.all(np.isfinite(heat))):
+        where = np.argwhere(~np.isfinite(a) if not np.all(np.isfinite(a)) else ~np.isfinite(heat))[0].tolist()
+        msg = f"sphere fit: dwell {where[len(lead)]} is not finite, every output and temperature must be; leave it out"
+        raise NotIdentified(msg)
     flat = a.reshape(-1, n, 3)
     rise = np.broadcast_to(heat - reference[..., None], (*lead, n)).reshape(-1, n)
     problem = _Sphere(flat, rise, norm, _which(free, free_heat))
@@ -185,8 +189,8 @@ class _Sphere:
         """Start (u, 12) from the linear fit of p·a² + q·a = 1 per axis, in units that keep it well conditioned."""
         centre = 0.5 * (self.output.max(axis=1) + self.output.min(axis=1))
         span = 0.5 * (self.output.max(axis=1) - self.output.min(axis=1))
-        if np.any(span <= 0.0):
-            axis = "xyz"[int(np.argwhere(span <= 0.0)[0][1])]
+        if not np.all(span > 0.0):
+            axis = "xyz"[int(np.argwhere(~(span > 0.0))[0][1])]
             msg = f"sphere fit: output {axis} never changes, all axes must be turned; check the channel"
             raise NotIdentified(msg)
         scaled = (self.output - centre[:, None, :]) / span[:, None, :]
@@ -251,12 +255,12 @@ class _Sphere:
         for _ in range(_STEPS):
             trial = theta + length[:, None] * step
             lower = self._cost(trial)
-            worse = lower > cost
+            worse = ~(lower <= cost)
             if not worse.any():
                 return trial, lower
             length[worse] *= 0.5
         trial = np.where(
-            (self._cost(theta + length[:, None] * step) > cost)[:, None], theta, theta + length[:, None] * step
+            (self._cost(theta + length[:, None] * step) <= cost)[:, None], theta + length[:, None] * step, theta
         )
         return trial, self._cost(trial)
 
@@ -266,7 +270,7 @@ def _scaled(rows: Array) -> tuple[Array, Array]:
     size = np.linalg.norm(rows, axis=1)
     unit = rows / np.where(size > 0.0, size, 1.0)[:, None, :]
     smallest = np.linalg.eigvalsh(np.swapaxes(unit, -1, -2) @ unit)[:, 0]
-    if np.any(smallest < _SINGULAR):
+    if not np.all(smallest >= _SINGULAR):
         msg = (
             f"sphere fit: unit {int(np.argmin(smallest))} of the batch: the orientations leave a coefficient undetermined; "
             "add poses in between, with every axis up and down"

@@ -126,7 +126,7 @@ def _by_birge(lot: LotArrays, plain: LotFit, used: NDArray[np.bool_]) -> _Noisy:
     stretch = birge_squared(plain)
     noise = lot.standard_error * np.sqrt(stretch)[:, None, :]
     columns = design.local_columns(design.split(plain.effects)[0], lot.state, plain.nonlinear)
-    known = np.where(stretch > 1.0, np.vectorize(student, otypes=[np.float64])(np.maximum(plain.dof, 1)), 1.0)
+    known = np.where(stretch <= 1.0, 1.0, np.vectorize(student, otypes=[np.float64])(np.maximum(plain.dof, 1)))
     covariance = plain.covariance * (known**2 * stretch)[..., None, None]
     unseen = columns[..., ~used, :]
     model = np.einsum("...np,...pq,...mq->...nm", unseen, covariance, unseen)

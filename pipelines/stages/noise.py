@@ -174,7 +174,7 @@ def limits_where_unexplained(curve: AllanCurve, terms: Terms) -> Terms:
         "R": sigma * np.sqrt(2.0) / tau,
     }
     limit = np.stack([np.min(ceilings[symbol], axis=-1) for symbol in terms.symbols], axis=-1)
-    unexplained = (terms.p_value < UNEXPLAINED_P)[..., None]
+    unexplained = ~(terms.p_value >= UNEXPLAINED_P)[..., None]
     return replace(
         terms,
         value=np.where(unexplained, np.nan, terms.value),
