@@ -1,13 +1,12 @@
-"""How often what is said of noise is wrong, on noise made by an independent generator: `python benchmarks/noise_verdicts.py terms`.
+"""How often what is said of noise is wrong, on noise of an independent generator: `python benchmarks/noise_verdicts.py terms`.
 
-Each scene prints counts with exact 95 % intervals (Clopper and Pearson). The generator (`tests/independent_noise.py`) shares no code
-with the estimators; the seeds are the ones below and served no choice of a constant.
+Each scene prints counts with exact 95 % intervals (Clopper and Pearson). The generator (`tests/independent_noise.py`) shares no
+code with the estimators.
 """
 
 from __future__ import annotations
 
 import argparse
-import inspect
 import os
 import sys
 from pathlib import Path
@@ -23,8 +22,13 @@ import numpy as np  # noqa: E402
 import pandas as pd  # noqa: E402
 
 from inertial.fits.ellipsoid import fit_ellipsoid  # noqa: E402
+from inertial.fits.wander import student  # noqa: E402
 from inertial.noise.allan import overlapping  # noqa: E402
+from inertial.noise.measurands import of_a_day  # noqa: E402
 from inertial.noise.terms import fit_terms  # noqa: E402
+from pipelines.audit.statistics.change_points import change_points  # noqa: E402
+from pipelines.audit.statistics.control_charts import FalseAlarms, alarms, baseline, false_alarms, signals  # noqa: E402
+from pipelines.audit.statistics.memory import drawn_in, memory_of, tail_of  # noqa: E402
 from pipelines.stages.fit import fit  # noqa: E402
 from pipelines.stages.verify import verify  # noqa: E402
 
@@ -47,7 +51,10 @@ def terms(records: int, seed: int) -> None:
             value, low, high = (part[:, place] for part in (found.value, found.low, found.high))
             known = np.isfinite(value)
             zero = int(np.sum(known & (low <= 0.0)))
-            print(made.told(f"  {symbol} identified", int(known.sum()), records) + f"   of these {zero} with an interval from 0")
+            print(
+                made.told(f"  {symbol} identified", int(known.sum()), records)
+                + f"   of these {zero} with an interval from 0"
+            )
             if known.any():
                 held = known & (low <= true) & (true <= high)
                 print(made.told(f"  {symbol} interval holds the truth", int(held.sum()), int(known.sum())))
@@ -62,13 +69,26 @@ CHECKS = ((35.0, 15.0), (125.0, -160.0), (70.0, 100.0), (160.0, 20.0), (100.0, -
 def verification(records: int, seed: int) -> None:
     """The RMS error of the verification: its standard deviation between runs, and what is told of it."""
     rng = np.random.default_rng(seed)
-    for name, noise in (("B 30 µg", {"flicker": 30.0}), ("B 300 µg", {"flicker": 300.0}), ("B 30 µg, K 1 µg/√s", {"flicker": 30.0, "walk": 1.0})):
+    for name, noise in (
+        ("B 30 µg", {"flicker": 30.0}),
+        ("B 300 µg", {"flicker": 300.0}),
+        ("B 30 µg, K 1 µg/√s", {"flicker": 30.0, "walk": 1.0}),
+    ):
         shown, told, plain = [], [], []
         for _ in range(records):
             dwells = lots.world(
-                rng, units=4, plan="fibonacci", temperatures=(-10.0, 25.0, 60.0), checks=CHECKS, move_s=20, day_s=0, **noise
+                rng,
+                units=4,
+                plan="fibonacci",
+                temperatures=(-10.0, 25.0, 60.0),
+                checks=CHECKS,
+                move_s=20,
+                day_s=0,
+                **noise,
             ).dwells
-            found = fit(dwells, lots.NO_HISTORY, ["bias", "scale", "misalignment", "bias_temperature", "scale_temperature"])
+            found = fit(
+                dwells, lots.NO_HISTORY, ["bias", "scale", "misalignment", "bias_temperature", "scale_temperature"]
+            )
             tables = (found[name] for name in ("coefficients", "covariance", "predictions"))
             rows = verify(dwells, lots.NO_HISTORY, *tables)["verification"]
             for _, own in rows.groupby("unit"):
@@ -78,7 +98,10 @@ def verification(records: int, seed: int) -> None:
                     plain.append(rms / np.sqrt(2.0 * len(own)))
                     told.append(float(own.get(f"rms_uncertainty_{axis}_ug", pd.Series([np.nan])).iloc[0]))
         centre, real = float(np.mean(shown)), float(np.std(shown))
-        print(f"{name}: rms error {centre:.1f} µg, between runs {real:.1f}; told rms/√(2n) {np.median(plain):.1f}, covariance {np.median(told):.1f}")
+        print(
+            f"{name}: rms error {centre:.1f} µg, between runs {real:.1f}; "
+            f"told rms/√(2n) {np.median(plain):.1f}, covariance {np.median(told):.1f}"
+        )
         for what, u in (("rms/√(2n)", plain), ("the verification's covariance", told)):
             held = int(np.sum(np.abs(np.array(shown) - centre) <= 2.0 * np.array(u)))
             print(made.told(f"  U (k = 2) by {what} holds the mean over runs", held, len(shown)))
@@ -117,7 +140,6 @@ def bias(records: int, seed: int) -> None:
 def sphere(records: int, seed: int) -> None:
     """Sphere fit of dwells whose poses are unknown: what twice the stated error of bias and scale holds."""
     rng = np.random.default_rng(seed)
-    timed = "time" in inspect.signature(fit_ellipsoid).parameters
     thrice = (25.0, 25.0, 25.0)
     for name, noise in (
         ("white 280 µg/√Hz", {"density": 280.0, "flicker": 0.0}),
@@ -133,13 +155,12 @@ def sphere(records: int, seed: int) -> None:
             rows = one.dwells
             output, time = rows[["out_x", "out_y", "out_z"]].to_numpy(), rows["time_s"].to_numpy()
             error = (rows["sd_x"] / np.sqrt(rows["n"])).to_numpy()
-            found = fit_ellipsoid(output, time=time, error=error) if timed else fit_ellipsoid(output)
+            found = fit_ellipsoid(output, time=time, error=error)
             wrong = np.abs(1e6 * found.bias - one.record[0])
             held[0] += int(np.sum(wrong <= 2e6 * np.sqrt(np.diagonal(found.covariance)[:3])))
             late = np.abs(1e6 * found.bias - one.day[0])
             u = np.sqrt(np.diagonal(found.covariance)[:3])
-            if timed:
-                u = of_a_day(u, np.full(3, float(found.flicker)), time, slowest=4.0, widened=student(found.dof))
+            u = of_a_day(u, np.full(3, float(found.flicker)), time, slowest=4.0, widened=student(found.dof))
             held[2] += int(np.sum(late <= 2e6 * u))
             correction = np.linalg.cholesky(np.linalg.inv(one.gain[0] @ one.gain[0].T)).T
             spread = np.sqrt(np.diagonal(found.covariance)[3:6])
@@ -153,11 +174,20 @@ def sphere(records: int, seed: int) -> None:
 def series(records: int, seed: int) -> None:
     """Series of a level that stands still: change points and control charts that say that it moved; and a step that is there."""
     rng = np.random.default_rng(seed)
-    kinds = (("white", 0.0, None), ("ρ = 0.6", 0.6, None), ("Student's t, 3 dof", 0.0, 3.0), ("ρ = 0.6, t 3 dof", 0.6, 3.0))
+    kinds = (
+        ("white", 0.0, None),
+        ("ρ = 0.6", 0.6, None),
+        ("Student's t, 3 dof", 0.0, 3.0),
+        ("ρ = 0.6, t 3 dof", 0.6, 3.0),
+    )
     for n in (40, 100, 250):
         for name, memory, dof in kinds:
             made_ = made.autoregressive(rng, records, n, memory, dof=dof)
-            print(made.told(f"{n} points, {name}: a change at p ≤ 0.001", sum(bool(change_points(v)) for v in made_), records))
+            print(
+                made.told(
+                    f"{n} points, {name}: a change at p ≤ 0.001", sum(bool(change_points(v)) for v in made_), records
+                )
+            )
             for step in (2.0, 4.0):
                 moved = made_ + step * (np.arange(n) >= n // 2)
                 found = sum(any(abs(c.first - n // 2) <= 3 for c in change_points(v)) for v in moved)
@@ -175,24 +205,12 @@ def series(records: int, seed: int) -> None:
             print(made.told(f"control chart, 40 + 60 points, {name}: out of control at p < {level:g}", count, records))
 
 
-from pipelines.audit.statistics.change_points import change_points  # noqa: E402
-from pipelines.audit.statistics.control_charts import alarms, baseline, false_alarms, signals  # noqa: E402
-
-
-def chance(values, first, counted):
+def chance(values: np.ndarray, first: int, counted: int) -> FalseAlarms:
     """What alarms are held against, as the audit takes it."""
-    try:
-        from pipelines.audit.statistics.memory import drawn_in, memory_of, tail_of
-    except ImportError:
-        return false_alarms(values.size, first, counted)
     memory = float(np.ceil(10.0 * memory_of(drawn_in(values))) / 10.0)
     return false_alarms(values.size, first, counted, memory, float(tail_of(values, memory)))
 
 
-try:
-    from inertial.fits.wander import student
-    from inertial.noise.measurands import of_a_day
-except ImportError: pass
 SCENES = {"series": series, "sphere": sphere, "terms": terms, "verification": verification, "bias": bias}
 
 

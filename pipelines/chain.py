@@ -72,9 +72,9 @@ def _verify(job: Job, run: Run) -> Tables:
 
 def _noise(job: Job, run: Run) -> Tables:
     del job
-    readings, *tables = (run.table(name) for name in ("readings", "coefficients", "covariance"))
+    readings, *tables = (run.table(name) for name in ("readings", "coefficients", "covariance", "history"))
     static = set(readings.loc[readings["kind"] == "allan", "record"])
-    return noise(_records(run).samples(static), readings, *tables, run.table("history"))
+    return noise(_records(run).samples(static), readings, *tables)
 
 
 _EVIDENCE = ("verdicts", "coefficients", "covariance", "residuals", "verification", "verification_poses", "noise")

@@ -14,7 +14,7 @@ UG = 1e-6
 
 @dataclass(frozen=True)
 class World:
-    """A lot's dwells, and the truth: bias (units, 3), µg, over the record and over the day that follows it; response (units, 3, 3)."""
+    """A lot's dwells, and the truth: bias (units, 3), µg, over the record and the day after it; response (units, 3, 3)."""
 
     dwells: pd.DataFrame
     record: Array
@@ -40,7 +40,8 @@ def world(
 ) -> World:
     """Dwells of units whose noise is made on a grid of ``step`` s over the record and ``day_s`` s after it.
 
-    The flicker reaches down to an eighth of the inverse of that whole time. Poses for verification stand between those of the fit.
+    The flicker reaches down to an eighth of the inverse of that whole time. Poses for verification stand between those of
+    the fit.
     """
     fit = directions(plan)
     every = max(len(fit) // max(len(checks), 1), 1)
@@ -72,7 +73,8 @@ def world(
         frames.append(
             pd.DataFrame(
                 {
-                    "unit": f"U{u:03d}", "dwell": np.arange(len(f)), "time_s": start + dwell_s / 2.0, "kind": np.tile(kinds, soaks),
+                    "unit": f"U{u:03d}", "dwell": np.arange(len(f)), "time_s": start + dwell_s / 2.0,
+                    "kind": np.tile(kinds, soaks),
                     "pose": np.tile(poses, soaks), "out_unit": "g", "unit_C": warm, "n": 100 * dwell_s,
                     **{f"force_{a}": f[:, i] for i, a in enumerate("xyz")},
                     **{f"out_{a}": out[:, i] for i, a in enumerate("xyz")},
@@ -86,13 +88,16 @@ def world(
     return World(pd.concat(frames, ignore_index=True), first.reshape(units, 3), day.reshape(units, 3), gains)
 
 
-def static_record(values: Array, rate: float, *, pose: tuple[float, float] = (0.0, 0.0)) -> tuple[pd.DataFrame, pd.DataFrame]:
+def static_record(
+    values: Array, rate: float, *, pose: tuple[float, float] = (0.0, 0.0)
+) -> tuple[pd.DataFrame, pd.DataFrame]:
     """Samples and readings of a static record of outputs (units, n, 3) in g."""
     units, n, _ = values.shape
     samples = pd.concat(
         [
             pd.DataFrame(
-                {"unit": f"U{u:03d}", "slot": u, "record": 99, "kind": "allan", "time_s": np.arange(n) / rate, "x": v[:, 0], "y": v[:, 1], "z": v[:, 2]}
+                {"unit": f"U{u:03d}", "slot": u, "record": 99, "kind": "allan", "time_s": np.arange(n) / rate,
+                 "x": v[:, 0], "y": v[:, 1], "z": v[:, 2]}
             )
             for u, v in enumerate(values)
         ],
@@ -114,7 +119,9 @@ def room(rng: np.random.Generator, units: int, seconds: float, size_K: float) ->
     """
     time = np.arange(0.0, seconds + 1.0, 10.0)
     phase = rng.uniform(0.0, 2.0 * np.pi, 3)
-    course = sum(np.sin(2.0 * np.pi * time / (seconds * part) + one) for part, one in zip((1.7, 0.9, 0.5), phase, strict=True))
+    course = sum(
+        np.sin(2.0 * np.pi * time / (seconds * part) + one) for part, one in zip((1.7, 0.9, 0.5), phase, strict=True)
+    )
     course = 25.0 + size_K * course / np.ptp(course)
     rows = [
         pd.DataFrame(

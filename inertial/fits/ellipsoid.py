@@ -87,9 +87,10 @@ def fit_ellipsoid(
     norm : local gravity in g
     temperature : (..., n), °C; adds an offset per °C and axis
     shape : "nine" for bias, scale and non-orthogonality, "six" for bias and scale
-    time : (n,), s, of the dwells: what wanders between them is then estimated, the dwells are weighted by it, and the covariance holds
-        under it (with Student's factor for k = 2). Without it, and beyond 1500 dwells, whose covariance would not fit, the residuals
-        are taken for white and alike
+    time : (n,), s, of the dwells: what wanders between them is then estimated, the dwells are weighted by it, and the
+    covariance holds
+        under it (with Student's factor for k = 2). Without it, and beyond 1500 dwells, whose covariance would not fit, the
+        residuals are taken for white and alike
     error : (..., n), white standard error of the norm of each dwell, g; alike and not known where None
 
     Raises
@@ -157,7 +158,8 @@ def _with_wander(problem: "_Sphere", theta: Array, time: Array, error: Array) ->
         _, force, size = problem.force(theta)
         residual, rows, direction = problem.residuals(theta), problem.rows(theta), force / size[..., None]
         noises = tuple(
-            norm_noise(*one, time, own) for *one, own in zip(residual, rows, direction, error, strict=True)
+            norm_noise(left, own, way, time, white)
+            for left, own, way, white in zip(residual, rows, direction, error, strict=True)
         )
         problem.whiten = np.stack([noise.whiten for noise in noises])
         theta = problem.solve(theta)

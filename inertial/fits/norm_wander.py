@@ -1,8 +1,8 @@
 """Noise of the norm of gravity between dwells: wander of an axis shows in it as far as the force points along that axis.
 
 The residual |f| − g of a dwell is fᵀ/|f| times the three axes' errors. Axes that wander alike and independently therefore give
-cov(ρ) = s²·(diag(e²) + (F·K_F + W·K_W) ∘ (u·uᵀ)) with the directions u of the force, flicker K_F and random walk K_W. Both shares and
-s² are estimated with the coefficients' columns projected out (restricted likelihood).
+cov(ρ) = s²·(diag(e²) + (F·K_F + W·K_W) ∘ (u·uᵀ)) with the directions u of the force, flicker K_F and random walk K_W. Both
+shares and s² are estimated with the coefficients' columns projected out (restricted likelihood).
 """
 
 from dataclasses import dataclass

@@ -14,7 +14,8 @@ _OCTAVE = float(np.log(2.0))
 def between_means(first: float, second: float, gap: float = 0.0) -> float:
     """Variance, for flicker with B = 1, of the difference of its means over two windows.
 
-    u² = (1/π)·(2L − ln a − ln b + 3) with L the mean of ln|s − t| over both windows: from the one-sided density B²/(π·f), for which
+    u² = (1/π)·(2L − ln a − ln b + 3) with L the mean of ln|s − t| over both windows: from the one-sided density B²/(π·f),
+    for which
     E(x(s) − x(t))² grows as (2/π)·ln|s − t|. What is slower than both does not count, so it needs no lowest frequency.
 
     Parameters
@@ -51,7 +52,8 @@ def instability(deviation: Array, time: Array, *, slowest: float = 1.0) -> Array
 def of_a_day(record: Array, wander: Array, time: Array, *, slowest: float = 1.0, widened: float = 1.0) -> Array:
     """Standard uncertainty of a bias as the mean of the day after its record; the shape and unit of ``record``.
 
-    Flicker between the record and that day is added to the uncertainty of the record's mean. A walk is not carried beyond its record.
+    Flicker between the record and that day is added to the uncertainty of the record's mean. A walk is not carried beyond
+    its record.
 
     Parameters
     ----------

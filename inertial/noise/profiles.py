@@ -29,7 +29,7 @@ _ROUGH = 0.02  # the same where each look takes the covariance anew
 
 
 class Found(NamedTuple):
-    """Strengths of one curve: NaN where a term is not identified; ends of the intervals; the mixture that runs through the points."""
+    """Strengths of one curve, NaN where not identified; ends of the intervals; the mixture that runs through the points."""
 
     value: Array
     low: Array

@@ -8,7 +8,8 @@ Array = NDArray[np.float64]
 
 FINE = 0.45
 """Noise of a sample over the step from which on rounding adds q²/12 and nothing else (W. F. Sheppard 1898; B. Widrow, IRE Trans.
-Circuit Theory 3 (1956) 266): the part that depends on where the mean lies between two digits is then below a tenth of the variance."""
+Circuit Theory 3 (1956) 266): what depends on where the mean lies between two digits is then below a tenth of the
+variance."""
 
 _SAME = 1e-6
 """Differences of values that are this close, over the step, come from rounding of the numbers and not from the output."""
@@ -28,8 +29,8 @@ def without_rounding(variance: Array, step: Array) -> Array:
 def ripple(spread: Array, step: Array) -> Array:
     """Largest part of the variance after rounding that Sheppard's correction leaves, by where the mean lies between two digits.
 
-    The first harmonic of the variance over the place of the mean, for normal noise of the standard deviation σ before rounding, has
-    the amplitude (4σ² + q²/π²)·exp(−2π²σ²/q²) (Widrow 1956).
+    The first harmonic of the variance over the place of the mean, for normal noise of the standard deviation σ before
+    rounding, has the amplitude (4σ² + q²/π²)·exp(−2π²σ²/q²) (Widrow 1956).
 
     Parameters
     ----------
@@ -41,8 +42,8 @@ def ripple(spread: Array, step: Array) -> Array:
 def most(step: float, outside: float, count: int) -> float:
     """Largest standard deviation of a sample (95 %, one-sided) of an output that seldom left its commonest digit.
 
-    The noise is largest where the mean lies in the middle of the digit: then the share outside is 2·(1 − Φ(q/2σ)). A wander of the
-    mean adds to the share, so the limit holds with it. Infinite for a share of a half or more.
+    The noise is largest where the mean lies in the middle of the digit: then the share outside is 2·(1 − Φ(q/2σ)). A wander
+    of the mean adds to the share, so the limit holds with it. Infinite for a share of a half or more.
 
     Parameters
     ----------

@@ -115,7 +115,8 @@ def fit_terms(curve: AllanCurve, *, confidence: float = 0.95) -> Terms:
     """Coefficients of each channel of `curve` by generalised least squares on the log-variance.
 
     The covariance of the estimates at all averaging times is that of the fitted mixture itself. A term that the curve
-    does not need is not identified and gets a limit: one whose removal costs less than chi-square 6.6, be it under the covariance of
+    does not need is not identified and gets a limit: one whose removal costs less than chi-square 6.6, be it under the
+    covariance of
     the fitted mixture or with that of what would stand in for it. Intervals are profiles with all other terms free, so a
     coefficient that another could replace has a wide one; an interval that reached zero would not be one of an identified term.
 

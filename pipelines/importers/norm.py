@@ -130,7 +130,11 @@ def _of_a_day(fit: EllipsoidFit, time: NDArray[np.float64]) -> NDArray[np.float6
 
 def _axis_line(k: int, fit: EllipsoidFit, day: NDArray[np.float64], unit: str) -> str:
     record, long = (COVERAGE * float(one[k]) for one in (_bias_error(fit), day))
-    later = "white noise only: too many dwells to estimate wander" if fit.flicker is None else f"± {long:.2g} over the next day"
+    later = (
+        "white noise only: too many dwells to estimate wander"
+        if fit.flicker is None
+        else f"± {long:.2g} over the next day"
+    )
     return (
         f"{AXES[k]}: bias {fit.bias[k]:.7g} ± {record:.2g} {unit} over the record ({later}; k = {COVERAGE:g}), "
         f"scale {fit.scale[k] / STANDARD_GRAVITY_M_S2:.6g} {unit} per m/s²"

@@ -21,13 +21,15 @@ def bias_measurands(
 ) -> dict[str, Array]:
     """Standard uncertainties of the bias by measurand, (units, 3) each, by the names of :data:`COLUMNS`.
 
-    ``record``: the mean over the dwells' own time, which is what a fit states. ``long``: the mean over the day after it, for the same
-    coefficient; flicker between the two is added. A walk is not carried beyond its record. ``switch_on``: the mean of a day after the
-    device was switched off and on; not a number where no repeatability of switching on is stated, never zero.
+    ``record``: the mean over the dwells' own time, which is what a fit states. ``long``: the mean over the day after it, for
+    the same
+    coefficient; flicker between the two is added. A walk is not carried beyond its record. ``switch_on``: the mean of a day
+    after the device was switched off and on; not a number where no repeatability of switching on is stated, never zero.
 
     Parameters
     ----------
-    record : (units, 3), µg, standard error of the bias; wander : (units, 3), µg, standard deviation of the 1/f wander between dwells
+    record : (units, 3), µg, standard error of the bias; wander : (units, 3), µg, standard deviation of the 1/f wander
+    between dwells
     time : (n,), s, of the dwells of the fit
     widened : factor of the wander's share, as it is known from few degrees of freedom
     switch_on : standard deviation of the bias from one switch-on to the next, µg

@@ -67,9 +67,10 @@ def told(digits: Coarse) -> str:
 def without_digits(terms: Terms, digits: Sequence[Coarse], rate_hz: float) -> Terms:
     """The terms (channels, 5) without what coarse digits put into N.
 
-    Rounding adds q²/12 of white variance to a sample of noise above half a digit; its intervals are widened by what depends on the
-    place of the mean between two digits. Below that the output shows how often the noise crossed to the next digit, and no more: N
-    then has a limit.
+    Rounding adds q²/12 of white variance to a sample of noise above half a digit; its intervals are widened by what depends
+    on the
+    place of the mean between two digits. Below that the output shows how often the noise crossed to the next digit, and no
+    more: N then has a limit.
 
     Parameters
     ----------

@@ -212,8 +212,8 @@ def _wander_rows(lot: LotArrays, found: _Noisy) -> pd.DataFrame:
 def _bias_of(lot: LotArrays, found: _Noisy, scale: Array) -> dict[str, Array]:
     """Uncertainties of the bias by measurand, (units, 3), µg; none for a model without a bias.
 
-    Scatter that the dwells' own samples do not show counts as flicker here: few dwells do not tell the kind of it, and white noise
-    would not reach beyond the record.
+    Scatter that the dwells' own samples do not show counts as flicker here: few dwells do not tell the kind of it, and white
+    noise would not reach beyond the record.
     """
     places = [[name for name, _ in names].index("bias") if ("bias", "K0") in names else -1 for names in found.fit.names]
     if min(places) < 0:
@@ -236,5 +236,9 @@ def _nothing() -> dict[str, pd.DataFrame]:
             texts="unit axis pose", numbers="force_g residual_ug standard_error_ug expected_ug unit_C", whole="dwell"
         ),
         "predictions": empty_table(texts="unit axis", numbers="covariance_ug2", whole="dwell other"),
-        "wander": empty_table(texts="unit axis method", numbers=" ".join(("white_ug flicker_ug walk_ug lack_of_fit", *COLUMNS)), whole="dof"),
+        "wander": empty_table(
+            texts="unit axis method",
+            numbers=" ".join(("white_ug flicker_ug walk_ug lack_of_fit", *COLUMNS)),
+            whole="dof",
+        ),
     }

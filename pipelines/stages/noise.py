@@ -73,7 +73,7 @@ def noise(
     ]
     curves, rows = list[pd.DataFrame](), list[tuple[object, ...]]()
     for group in _alike(channels):
-        curve = overlapping(np.stack([one.values for one in group]), rate / series.size)
+        curve = overlapping(np.stack([one.record for one in group]), rate / series.size)
         terms = limits_where_unexplained(curve, fit_terms(curve))
         terms = without_digits(terms, [one.digits for one in group], rate)
         curves.append(_curve_rows(group, curve, terms))
@@ -93,7 +93,7 @@ class _Channel:
 
     unit: str
     axis: str
-    values: np.ndarray
+    record: np.ndarray
     digits: Coarse
     warmth: str
     silent: str
@@ -111,7 +111,7 @@ def _channels(
     scale = np.diagonal(calibration.response[calibration.units.index(unit)]) / MICRO
     if len(static):
         start = float(static["start_s"].iloc[0])
-        time = start + (np.arange(len(output)) + 0.5) * series.size / rate
+        time = np.asarray(start + (np.arange(len(output)) + 0.5) * series.size / rate, dtype=np.float64)
         warm = warmed(calibration, unit, time, static.iloc[0], history)
     else:
         warm = Warmed(np.zeros_like(output), float("nan"), known=True)
@@ -119,7 +119,7 @@ def _channels(
         _Channel(
             unit=unit,
             axis=letter,
-            values=(output[:, axis] - warm.change[:, axis]) / scale[axis],
+            record=(output[:, axis] - warm.change[:, axis]) / scale[axis],
             digits=Coarse.of(series.digits[unit][axis], float(scale[axis])),
             warmth=_warmth(warm, float(np.ptp(warm.change[:, axis]) / abs(scale[axis])) if len(output) else 0.0),
             silent=_why_silent(output[:, axis]),
@@ -151,8 +151,8 @@ def _why_silent(values: np.ndarray) -> str:
 
 def _alike(channels: list[_Channel]) -> list[list[_Channel]]:
     """The channels that say something, those with records of one length together."""
-    lengths = dict.fromkeys(len(one.values) for one in channels if not one.silent)
-    return [[one for one in channels if not one.silent and len(one.values) == length] for length in lengths]
+    lengths = dict.fromkeys(len(one.record) for one in channels if not one.silent)
+    return [[one for one in channels if not one.silent and len(one.record) == length] for length in lengths]
 
 
 def _sorted(curves: pd.DataFrame, order: dict[tuple[str, str], int]) -> pd.DataFrame:

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 COUNTED = 1000
 """Different values of a channel that are counted: an output that takes more has no coarse digits."""
 SMOOTHED_S = 120.0
-"""Time over which the thermometer's readings are averaged, so that its own noise does not go through the tempco into the output."""
+"""Time over which the thermometer's readings are averaged: its own noise shall not go through the tempco into the output."""
 FEWEST_READINGS = 5
 
 
@@ -118,7 +118,9 @@ class Warmed:
     known: bool
 
 
-def warmed(calibration: Calibration, unit: str, time: Array, reading: pd.Series, history: pd.DataFrame | None) -> Warmed:
+def warmed(
+    calibration: Calibration, unit: str, time: Array, reading: pd.Series, history: pd.DataFrame | None
+) -> Warmed:
     """The known part of a record that its temperature made.
 
     The thermometer's readings between the dwells (table ``history``) are averaged over two minutes, put through the model's
@@ -159,6 +161,6 @@ def _smoothed(history: pd.DataFrame, unit: str, start: float, stop: float) -> tu
     if during < FEWEST_READINGS or not np.ptp(time) > 0.0:
         return None
     sums = np.concatenate([[0.0], np.cumsum(value)])
-    first, last = (np.searchsorted(time, time + side * 0.5 * SMOOTHED_S, side=where)
-                   for side, where in ((-1.0, "left"), (1.0, "right")))  # fmt: skip
+    first = np.searchsorted(time, time - 0.5 * SMOOTHED_S, side="left")
+    last = np.searchsorted(time, time + 0.5 * SMOOTHED_S, side="right")
     return time, (sums[last] - sums[first]) / (last - first)

@@ -50,9 +50,9 @@ def verify(
     toward = (corrected / norm[..., None])[:, unseen]
     scale = np.abs(np.diagonal(calibration.response, axis1=-2, axis2=-1))[:, None, :]
     reading = (lot.standard_error / scale)[:, unseen]
-    by_axis, covariance = MICRO * (corrected - truth)[:, unseen], _expected(predictions, lot.units)
-    expected = np.einsum("uja,uajk,uka->ujk", toward, covariance, toward)
-    of_rms = rms_uncertainty(np.swapaxes(by_axis, 1, 2), covariance)[:, None, :] + np.zeros_like(by_axis)
+    by_axis, spread = MICRO * (corrected - truth)[:, unseen], _expected(predictions, lot.units)
+    expected = np.einsum("uja,uajk,uka->ujk", toward, spread, toward)
+    of_rms = rms_uncertainty(np.swapaxes(by_axis, 1, 2), spread)[:, None, :] + np.zeros_like(by_axis)
     columns = {
         "norm_g": norm[:, unseen],
         "error_ug": MICRO * (norm - np.linalg.norm(lot.state.force, axis=-1))[:, unseen],

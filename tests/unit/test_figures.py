@@ -40,7 +40,7 @@ def test_the_coefficient_nearest_its_limit_with_its_uncertainty_is_judged(
     assert found[0][0].uncertainty == pytest.approx(error)
 
 
-def noise_rows(silent: bool) -> pd.DataFrame:
+def noise_rows(*, silent: bool) -> pd.DataFrame:
     rows = []
     for axis in "xyz":
         dead = silent and axis == "y"
@@ -65,7 +65,7 @@ def evidence(*, silent: bool) -> Evidence:
     )
     residuals = pd.DataFrame({"unit": "A", "residual_ug": [3.0, -4.0]})
     empty = pd.DataFrame({"unit": pd.Series(dtype=str)})
-    return Evidence(verdicts, coefficients, covariance, residuals, empty, empty, noise_rows(silent))
+    return Evidence(verdicts, coefficients, covariance, residuals, empty, empty, noise_rows(silent=silent))
 
 
 def test_figures_without_a_limit_carry_the_k_of_the_limits() -> None:

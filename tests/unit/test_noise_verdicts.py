@@ -46,7 +46,9 @@ def test_a_ramp_that_is_there_is_identified() -> None:
     [(10.0, 10.0, 0.0, 0.939437), (9000.0, 10.0, 0.0, 1.576869), (9000.0, 10.0, 86400.0, 2.142937),
      (18000.0, 3600.0, 31557600.0, 2.494491)],
 )  # fmt: skip
-def test_flicker_between_two_means_agrees_with_sums_of_processes(first: float, second: float, gap: float, u: float) -> None:
+def test_flicker_between_two_means_agrees_with_sums_of_processes(
+    first: float, second: float, gap: float, u: float
+) -> None:
     # found by sums of Ornstein-Uhlenbeck processes to 1e-4, in a computation of its own
     assert np.sqrt(between_means(first, second, gap)) == pytest.approx(u, abs=2e-5)
 

@@ -27,7 +27,9 @@ def calibration() -> dict[str, pd.DataFrame]:
     return fit(dwells, lots.NO_HISTORY, EFFECTS)
 
 
-def terms(calibration: dict[str, pd.DataFrame], values: np.ndarray, history: pd.DataFrame | None = None, n_rate: float = RATE):
+def terms(
+    calibration: dict[str, pd.DataFrame], values: np.ndarray, history: pd.DataFrame | None = None, n_rate: float = RATE
+):
     """Table ``noise`` of records (units, n, 3) in µg, by unit, axis and term."""
     samples, readings = lots.static_record(1e-6 * values, n_rate)
     tables = noise([samples], readings, calibration["coefficients"], calibration["covariance"], history)
@@ -73,7 +75,11 @@ def test_the_known_tempco_of_a_drifting_room_is_taken_out_of_a_record_and_told(c
     values = 0.25 * white(rng, n) + drift[None, :, None]
     raw, taken = terms(calibration, values), terms(calibration, values, history)
     walk = taken.xs("K", level="term")
-    false = raw.xs("K", level="term")["identified"] | raw.xs("R", level="term")["identified"] | raw.xs("B", level="term")["identified"]
+    false = (
+        raw.xs("K", level="term")["identified"]
+        | raw.xs("R", level="term")["identified"]
+        | raw.xs("B", level="term")["identified"]
+    )
     assert false.mean() > 0.5
     assert not walk["identified"].any()
     assert walk["note"].str.contains("known tempco's share").all()

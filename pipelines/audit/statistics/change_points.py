@@ -45,9 +45,10 @@ class Change:
 def change_points(values: Array, level: float = 1e-3) -> list[Change]:
     """The changes of level of a series (n,), found by binary segmentation, each then placed between its neighbours.
 
-    σ is that of the differences of neighbours, by their median, so that neither changes nor single outliers widen it. A series whose
-    neighbours agree by ρ has means that scatter √((1 + ρ)/(1 − ρ)) more than white ones, and is worth (1 − ρ)/(1 + ρ) of its points;
-    wild values are drawn in first. White noise assumed, a series of ρ = 0.6 had a "change" in six of ten cases.
+    σ is that of the differences of neighbours, by their median, so that neither changes nor single outliers widen it. A
+    series whose
+    neighbours agree by ρ has means that scatter √((1 + ρ)/(1 − ρ)) more than white ones, and is worth (1 − ρ)/(1 + ρ) of its
+    points; wild values are drawn in first. White noise assumed, a series of ρ = 0.6 had a "change" in six of ten cases.
 
     Parameters
     ----------

@@ -29,7 +29,8 @@ ODD = 3.0  # a unit whose own slope is so many σ from its kind's is no longer j
 TWO_SIDED_95 = 1.959964
 LIKELY = 2.71  # χ² of one degree of freedom that nine in ten stay below: no worse an explanation
 SHORTEST_Y = 30.0 / 365.25
-"""Calibrations that all lie within so many years tell no drift: a change of minutes divided by minutes is a number, and no drift."""
+"""Calibrations that all lie within so many years tell no drift: a change over minutes is no drift, however large
+it is a year."""
 SPREAD_OF_SQUARES = 2.0  # variance of the square of a normal value of variance one
 
 
@@ -51,9 +52,10 @@ class Kind:
 def kind_of(change: Array, years: Array, known: Array) -> Kind:
     """How a kind drifts, from pairs of calibrations of the same units: moments of the changes, weighted, outliers left out.
 
-    E(Δ²) = σ₁² + σ₂² + 2·mount² + walk²·t + slope²·t², solved with no negative part. Pairs should be of different lengths. Pairs closer
-    than :data:`SHORTEST_Y` tell of mounting only; where all are, walk and slopes are zero, and :func:`drifts_known` says that they are
-    not known.
+    E(Δ²) = σ₁² + σ₂² + 2·mount² + walk²·t + slope²·t², solved with no negative part. Pairs should be of different lengths.
+    Pairs closer
+    than :data:`SHORTEST_Y` tell of mounting only; where all are, walk and slopes are zero, and :func:`drifts_known` says
+    that they are not known.
 
     Parameters
     ----------

@@ -61,15 +61,22 @@ def _neighbours(left: Array) -> float:
 
 
 def tail_of(values: Array, memory: float) -> float:
-    """Degrees of freedom of the innovations of a series (n,): infinite for normal ones, unless heavier tails are surely better."""
-    level = median_filter(values, LOCAL, mode="nearest") if values.size >= LOCAL else np.full_like(values, np.median(values))
+    """Degrees of freedom of the innovations of a series (n,): infinite unless heavier tails are surely better."""
+    level = (
+        median_filter(values, LOCAL, mode="nearest")
+        if values.size >= LOCAL
+        else np.full_like(values, np.median(values))
+    )
     left = values - level if memory == 0.0 else np.diff(values)
     sigma = TO_SIGMA * float(np.median(np.abs(left)))
     if not sigma > 0.0:
         return np.inf
     scales = sigma * np.geomspace(0.6, 1.8, 12)
     likely = [
-        max(float(np.sum((norm.logpdf(left / s) if np.isinf(dof) else student.logpdf(left / s, dof)) - np.log(s))) for s in scales)
+        max(
+            float(np.sum((norm.logpdf(left / s) if np.isinf(dof) else student.logpdf(left / s, dof)) - np.log(s)))
+            for s in scales
+        )
         for dof in TAILS
     ]
     best = int(np.argmax(likely))
