@@ -30,6 +30,7 @@ from pipelines.audit.statistics.change_points import change_points  # noqa: E402
 from pipelines.audit.statistics.control_charts import FalseAlarms, alarms, baseline, false_alarms, signals  # noqa: E402
 from pipelines.audit.statistics.memory import drawn_in, memory_of, tail_of  # noqa: E402
 from pipelines.stages.fit import fit  # noqa: E402
+from pipelines.stages.noise import noise  # noqa: E402
 from pipelines.stages.verify import verify  # noqa: E402
 
 RATE, SAMPLES = 10.0, 36_000
@@ -69,7 +70,7 @@ CHECKS = ((35.0, 15.0), (125.0, -160.0), (70.0, 100.0), (160.0, 20.0), (100.0, -
 def verification(records: int, seed: int) -> None:
     """The RMS error of the verification: its standard deviation between runs, and what is told of it."""
     rng = np.random.default_rng(seed)
-    for name, noise in (
+    for name, world in (
         ("B 30 µg", {"flicker": 30.0}),
         ("B 300 µg", {"flicker": 300.0}),
         ("B 30 µg, K 1 µg/√s", {"flicker": 30.0, "walk": 1.0}),
@@ -84,7 +85,7 @@ def verification(records: int, seed: int) -> None:
                 checks=CHECKS,
                 move_s=20,
                 day_s=0,
-                **noise,
+                **world,
             ).dwells
             found = fit(
                 dwells, lots.NO_HISTORY, ["bias", "scale", "misalignment", "bias_temperature", "scale_temperature"]
@@ -110,7 +111,7 @@ def verification(records: int, seed: int) -> None:
 def bias(records: int, seed: int) -> None:
     """Six faces at one temperature: what the stated uncertainties of the bias hold."""
     rng = np.random.default_rng(seed)
-    for name, noise in (
+    for name, world in (
         ("ADXL355: 25 µg/√Hz, B 300 µg", {"flicker": 300.0}),
         ("25 µg/√Hz, B 30 µg", {"flicker": 30.0}),
         ("280 µg/√Hz, B 30 µg", {"flicker": 30.0, "density": 280.0}),
@@ -118,8 +119,8 @@ def bias(records: int, seed: int) -> None:
         sums: dict[str, int] = {}
         total, ratio = 0, []
         for _ in range(records):
-            world = lots.world(rng, units=4, **noise)
-            found = fit(world.dwells, lots.NO_HISTORY, ["bias", "scale", "misalignment"])
+            one = lots.world(rng, units=4, **world)
+            found = fit(one.dwells, lots.NO_HISTORY, ["bias", "scale", "misalignment"])
             rows = found["coefficients"]
             rows = rows[rows["effect"] == "bias"].sort_values(["unit", "axis"])
             value = 1e6 * rows["value"].to_numpy().reshape(-1, 3)
@@ -127,7 +128,7 @@ def bias(records: int, seed: int) -> None:
             own = found["wander"].sort_values(["unit", "axis"])
             stated |= {n: own[n].to_numpy().reshape(-1, 3) for n in ("bias_record_u_ug", "bias_long_u_ug") if n in own}
             for what, u in stated.items():
-                for whom, truth in (("the record's mean", world.record), ("the day's mean", world.day)):
+                for whom, truth in (("the record's mean", one.record), ("the day's mean", one.day)):
                     key = f"  2·{what} holds {whom}"
                     sums[key] = sums.get(key, 0) + int(np.sum(np.abs(value - truth) <= 2.0 * u))
             total += value.size
@@ -141,7 +142,7 @@ def sphere(records: int, seed: int) -> None:
     """Sphere fit of dwells whose poses are unknown: what twice the stated error of bias and scale holds."""
     rng = np.random.default_rng(seed)
     thrice = (25.0, 25.0, 25.0)
-    for name, noise in (
+    for name, world in (
         ("white 280 µg/√Hz", {"density": 280.0, "flicker": 0.0}),
         ("25 µg/√Hz, B 30 µg", {"flicker": 30.0}),
         ("25 µg/√Hz, B 30 µg, three rounds half an hour apart", {"flicker": 30.0, "temperatures": thrice}),
@@ -151,7 +152,7 @@ def sphere(records: int, seed: int) -> None:
     ):
         held = np.zeros(3, dtype=int)
         for _ in range(records):
-            one = lots.world(rng, units=1, plan="fibonacci", checks=(), move_s=20, **noise)
+            one = lots.world(rng, units=1, plan="fibonacci", checks=(), move_s=20, **world)
             rows = one.dwells
             output, time = rows[["out_x", "out_y", "out_z"]].to_numpy(), rows["time_s"].to_numpy()
             error = (rows["sd_x"] / np.sqrt(rows["n"])).to_numpy()
@@ -211,7 +212,54 @@ def chance(values: np.ndarray, first: int, counted: int) -> FalseAlarms:
     return false_alarms(values.size, first, counted, memory, float(tail_of(values, memory)))
 
 
-SCENES = {"series": series, "sphere": sphere, "terms": terms, "verification": verification, "bias": bias}
+def record(records: int, seed: int) -> None:
+    """Static records in a drifting room, and of coarse digits: what is said with the samples alone, and by the stage."""
+    rng = np.random.default_rng(seed)
+    dwells = lots.world(rng, units=1, temperatures=(0.0, 25.0, 50.0), flicker=0.0, density=1.0, day_s=0).dwells
+    for axis in "xyz":
+        dwells[f"out_{axis}"] += 50e-6 * (dwells["unit_C"] - 25.0)
+    fitted = fit(dwells, lots.NO_HISTORY, ["bias", "scale", "misalignment", "bias_temperature"])
+    tables = fitted["coefficients"], fitted["covariance"]
+    n, seconds = SAMPLES, SAMPLES / RATE
+    for room_k in (0.1, 0.3):
+        slow = {"samples alone": 0, "tempco taken out": 0}
+        for _ in range(records):
+            history, course = lots.room(rng, 1, seconds, room_k)
+            drift = 50.0 * np.interp(np.arange(n) / RATE, np.arange(0.0, seconds + 1.0, 10.0), course - 25.0)
+            values = made.white(rng, 3, n, 25.0, RATE).T + drift[:, None]
+            samples, readings = lots.static_record(1e-6 * values[None], RATE)
+            for name, past in (("samples alone", None), ("tempco taken out", history)):
+                rows = noise([samples], readings, *tables, past)["noise"]
+                slow[name] += int(rows[rows["term"].isin(["B", "K", "R"])].groupby("axis")["identified"].any().sum())
+        for name, count in slow.items():
+            print(
+                made.told(f"room of {room_k:g} K, 50 µg/K, 25 µg/√Hz, {name}: B, K or R identified", count, 3 * records)
+            )
+    for step in (1.0, 1.8, 3.0, 5.0):
+        lsb, plain, told, held, limits = step * 25.0 * np.sqrt(RATE / 2.0), [], [], 0, 0
+        for _ in range(records):
+            values = made.white(rng, 3, n, 25.0, RATE).T + rng.uniform(0.0, lsb, 3)
+            samples, readings = lots.static_record(1e-6 * lsb * np.round(values / lsb)[None], RATE)
+            rows = noise([samples], readings, *tables)["noise"]
+            rows = rows[rows["term"] == "n_d"]
+            plain += [float(np.sqrt(np.mean(np.diff(lsb * np.round(v / lsb)) ** 2) / RATE)) / 25.0 for v in values.T]
+            told += (rows["value"].dropna() / 25.0).tolist()
+            held += int(((rows["low"] <= 25.0) & (rows["high"] >= 25.0)).sum())
+            limits += int((rows["value"].isna() & rows["high"].notna()).sum())
+        low, middle, high = np.quantile(plain, (0.05, 0.5, 0.95))
+        print(f"digit of {step:g} σ: n_d of the samples {low:.2f} … {middle:.2f} … {high:.2f} of the truth; stated "
+              + (f"{np.mean(told):.3f} ± {np.std(told):.3f}" if told else "no value") + f", {limits} limits")  # fmt: skip
+        print(made.told("    interval or limit holds the truth", held, 3 * records))
+
+
+SCENES = {
+    "record": record,
+    "series": series,
+    "sphere": sphere,
+    "terms": terms,
+    "verification": verification,
+    "bias": bias,
+}
 
 
 def main() -> None:

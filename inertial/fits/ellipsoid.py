@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from inertial.criticism.noise import LONGEST
 from inertial.errors import NotIdentified
-from inertial.fits.norm_wander import NormNoise, norm_noise
+from inertial.fits.norm_wander import WALK_ABOUT_MEAN, NormNoise, norm_noise
 from inertial.fits.wander import student
 
 Array = NDArray[np.float64]
@@ -130,7 +130,7 @@ def fit_ellipsoid(
         scatter = np.sum(white_left**2, axis=-1) / dof
         known = scatter if error is None else np.mean(white**2, axis=-1)
         # scatter that the samples do not show counts as flicker: few dwells do not tell the kind of it
-        share = np.array([noise.flicker for noise in noises])
+        share = np.array([noise.flicker + noise.walk * WALK_ABOUT_MEAN for noise in noises])
         flicker = np.sqrt(scatter * share + np.maximum(scatter - known, 0.0)).reshape(lead)
     else:
         covariance = _covariance(rows, residual, dof)

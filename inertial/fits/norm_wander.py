@@ -17,6 +17,9 @@ from inertial.fits.wander import walk_kernel
 Array = NDArray[np.float64]
 
 _SHARES = np.concatenate([[0.0], 10.0 ** np.arange(-1.0, 5.0)])
+WALK_ABOUT_MEAN = 1.0 / 6.0
+"""Mean variance about the record's mean of a walk that gathers a variance of one over it."""
+
 _FINER = (10.0**0.5, 10.0**0.25)
 
 
@@ -43,8 +46,9 @@ def norm_noise(residual: Array, rows: Array, direction: Array, time: Array, erro
     white = error / np.sqrt(np.mean(error**2))
     along = direction @ direction.T
     # a walk that began at the first dwell would make the bias that of the first dwell; about its mean it is that of the record
-    walk = walk_kernel(time)
-    walk = walk - walk.mean(axis=0) - walk.mean(axis=1)[:, None] + walk.mean()
+    since = (time - time.min()) / max(float(np.ptp(time)), 1e-9)
+    with_mean = since - 0.5 * since**2
+    walk = walk_kernel(time) - with_mean - with_mean[:, None] + 1.0 / 3.0
     kernels = flicker_kernel(time) * along, walk * along
 
     def root(flicker: float, walk: float) -> Array:
