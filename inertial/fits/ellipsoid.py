@@ -6,11 +6,15 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from inertial.criticism.noise import LONGEST
 from inertial.errors import NotIdentified
+from inertial.fits.norm_wander import WALK_ABOUT_MEAN, NormNoise, norm_noise
+from inertial.fits.wander import student
 
 Array = NDArray[np.float64]
 Shape = Literal["nine", "six"]
 
+_ROUNDS = 3  # of the noise, which depends on the directions of the force
 _STEPS = 60  # of Gauss-Newton, and halvings of one
 _SETTLED = 1e-12  # share of the cost that a step no longer takes off
 _SINGULAR = 1e-10  # eigenvalue of the scaled normal matrix below which a parameter is not determined
@@ -34,6 +38,10 @@ class EllipsoidFit:
     norm_residuals: Array
     """(..., n) |f| - g, in g."""
     dof: int
+    wander: tuple[NormNoise, ...] = ()
+    """Of every unit, where the times of the dwells were given."""
+    flicker: Array | None = None
+    """(...,) standard deviation of the 1/f wander of an axis between dwells, g, where the times of the dwells were given."""
 
     @property
     def response(self) -> Array:
@@ -60,7 +68,13 @@ class EllipsoidFit:
 
 
 def fit_ellipsoid(
-    output: ArrayLike, *, norm: float = 1.0, temperature: ArrayLike | None = None, shape: Shape = "nine"
+    output: ArrayLike,
+    *,
+    norm: float = 1.0,
+    temperature: ArrayLike | None = None,
+    shape: Shape = "nine",
+    time: ArrayLike | None = None,
+    error: ArrayLike | None = None,
 ) -> EllipsoidFit:
     """Least-squares fit of |C·(a - b - h·(T - T0))| = norm to dwells of unknown orientation, units as a batch.
 
@@ -73,6 +87,11 @@ def fit_ellipsoid(
     norm : local gravity in g
     temperature : (..., n), °C; adds an offset per °C and axis
     shape : "nine" for bias, scale and non-orthogonality, "six" for bias and scale
+    time : (n,), s, of the dwells: what wanders between them is then estimated, the dwells are weighted by it, and the
+    covariance holds
+        under it (with Student's factor for k = 2). Without it, and beyond 1500 dwells, whose covariance would not fit, the
+        residuals are taken for white and alike
+    error : (..., n), white standard error of the norm of each dwell, g; alike and not known where None
 
     Raises
     ------
@@ -88,13 +107,33 @@ def fit_ellipsoid(
     if n <= free + free_heat:
         msg = f"sphere fit: {n} dwells, more than {free + free_heat} are needed; add poses"
         raise NotIdentified(msg)
+    if not (np.all(np.isfinite(a)) and np.all(np.isfinite(heat))):
+        where = np.argwhere(~np.isfinite(a) if not np.all(np.isfinite(a)) else ~np.isfinite(heat))[0].tolist()
+        msg = f"sphere fit: dwell {where[len(lead)]} is not finite, every output and temperature must be; leave it out"
+        raise NotIdentified(msg)
     flat = a.reshape(-1, n, 3)
     rise = np.broadcast_to(heat - reference[..., None], (*lead, n)).reshape(-1, n)
     problem = _Sphere(flat, rise, norm, _which(free, free_heat))
     theta = problem.solve(problem.algebraic())
-    residual, rows = problem.residuals(theta), problem.rows(theta)
     dof = n - free - free_heat
-    covariance = _covariance(rows, residual, dof)
+    noises: tuple[NormNoise, ...] = ()
+    flicker: Array | None = None
+    white = np.ones((len(flat), n)) if error is None else np.asarray(error, dtype=np.float64).reshape(len(flat), n)
+    if time is not None and n <= LONGEST:
+        when = np.asarray(time, dtype=np.float64)
+        theta, noises = _with_wander(problem, theta, when, white)
+    residual, rows = problem.residuals(theta), problem.rows(theta)
+    if noises:
+        whiten = np.stack([noise.whiten for noise in noises])
+        white_left = (whiten @ residual[..., None])[..., 0]
+        covariance = student(dof) ** 2 * _covariance(whiten @ rows, white_left, dof)
+        scatter = np.sum(white_left**2, axis=-1) / dof
+        known = scatter if error is None else np.mean(white**2, axis=-1)
+        # scatter that the samples do not show counts as flicker: few dwells do not tell the kind of it
+        share = np.array([noise.flicker + noise.walk * WALK_ABOUT_MEAN for noise in noises])
+        flicker = np.sqrt(scatter * share + np.maximum(scatter - known, 0.0)).reshape(lead)
+    else:
+        covariance = _covariance(rows, residual, dof)
     full = np.zeros((flat.shape[0], 12, 12))
     full[:, problem.free[:, None], problem.free] = covariance
     kept = 9 + free_heat
@@ -107,7 +146,25 @@ def fit_ellipsoid(
         covariance=full[:, :kept, :kept].reshape(*lead, kept, kept),
         norm_residuals=residual.reshape(*lead, n),
         dof=dof,
+        wander=noises,
+        flicker=flicker,
     )
+
+
+def _with_wander(problem: "_Sphere", theta: Array, time: Array, error: Array) -> tuple[Array, tuple[NormNoise, ...]]:
+    """Parameters (u, 12) weighted by the noise of the norms of each unit, and that noise."""
+    noises: tuple[NormNoise, ...] = ()
+    for _ in range(_ROUNDS):
+        _, force, size = problem.force(theta)
+        residual, rows, direction = problem.residuals(theta), problem.rows(theta), force / size[..., None]
+        noises = tuple(
+            norm_noise(left, own, way, time, white)
+            for left, own, way, white in zip(residual, rows, direction, error, strict=True)
+        )
+        problem.whiten = np.stack([noise.whiten for noise in noises])
+        theta = problem.solve(theta)
+    problem.whiten = None
+    return theta, noises
 
 
 def _which(free: int, free_heat: int) -> NDArray[np.int64]:
@@ -128,13 +185,14 @@ class _Sphere:
 
     def __init__(self, output: Array, rise: Array, norm: float, free: NDArray[np.int64]) -> None:
         self.output, self.rise, self.norm, self.free = output, rise, norm, free
+        self.whiten: Array | None = None
 
     def algebraic(self) -> Array:
         """Start (u, 12) from the linear fit of p·a² + q·a = 1 per axis, in units that keep it well conditioned."""
         centre = 0.5 * (self.output.max(axis=1) + self.output.min(axis=1))
         span = 0.5 * (self.output.max(axis=1) - self.output.min(axis=1))
-        if np.any(span <= 0.0):
-            axis = "xyz"[int(np.argwhere(span <= 0.0)[0][1])]
+        if not np.all(span > 0.0):
+            axis = "xyz"[int(np.argwhere(~(span > 0.0))[0][1])]
             msg = f"sphere fit: output {axis} never changes, all axes must be turned; check the channel"
             raise NotIdentified(msg)
         scaled = (self.output - centre[:, None, :]) / span[:, None, :]
@@ -175,7 +233,7 @@ class _Sphere:
         cost = self._cost(theta)
         for _ in range(_STEPS):
             step = np.zeros_like(theta)
-            step[:, self.free] = _solve(self.rows(theta), -self.residuals(theta))
+            step[:, self.free] = _solve(self._weighted(self.rows(theta)), -self._left(theta))
             theta, lower = self._advance(theta, step, cost)
             settled = np.all(cost - lower <= _SETTLED * (cost + np.finfo(float).tiny))
             cost = lower
@@ -184,7 +242,14 @@ class _Sphere:
         return theta
 
     def _cost(self, theta: Array) -> Array:
-        return np.sum(self.residuals(theta) ** 2, axis=-1)
+        return np.sum(self._left(theta) ** 2, axis=-1)
+
+    def _weighted(self, rows: Array) -> Array:
+        return rows if self.whiten is None else self.whiten @ rows
+
+    def _left(self, theta: Array) -> Array:
+        """Residuals (u, n), weighted where their noise is known."""
+        return self._weighted(self.residuals(theta)[..., None])[..., 0]
 
     def _advance(self, theta: Array, step: Array, cost: Array) -> tuple[Array, Array]:
         """Parameters and costs (u,) after a step that is halved for each unit until it does not harm."""
@@ -192,12 +257,12 @@ class _Sphere:
         for _ in range(_STEPS):
             trial = theta + length[:, None] * step
             lower = self._cost(trial)
-            worse = lower > cost
+            worse = ~(lower <= cost)
             if not worse.any():
                 return trial, lower
             length[worse] *= 0.5
         trial = np.where(
-            (self._cost(theta + length[:, None] * step) > cost)[:, None], theta, theta + length[:, None] * step
+            (self._cost(theta + length[:, None] * step) <= cost)[:, None], theta + length[:, None] * step, theta
         )
         return trial, self._cost(trial)
 
@@ -207,7 +272,7 @@ def _scaled(rows: Array) -> tuple[Array, Array]:
     size = np.linalg.norm(rows, axis=1)
     unit = rows / np.where(size > 0.0, size, 1.0)[:, None, :]
     smallest = np.linalg.eigvalsh(np.swapaxes(unit, -1, -2) @ unit)[:, 0]
-    if np.any(smallest < _SINGULAR):
+    if not np.all(smallest >= _SINGULAR):
         msg = (
             f"sphere fit: unit {int(np.argmin(smallest))} of the batch: the orientations leave a coefficient undetermined; "
             "add poses in between, with every axis up and down"

@@ -67,7 +67,7 @@ def fit_axis_polynomial(
     size = np.sqrt(np.einsum("...np,...np->...p", columns, columns))
     unit = columns / np.where(size > 0.0, size, 1.0)[..., None, :]
     gram = np.swapaxes(unit, -1, -2) @ unit
-    if np.any(np.linalg.eigvalsh(gram)[..., 0] < _SINGULAR):
+    if not np.all(np.linalg.eigvalsh(gram)[..., 0] >= _SINGULAR):
         msg = f"polynomial: the poses do not determine degree {degree} on every axis; add levels of specific force"
         raise NotIdentified(msg)
     z = np.swapaxes(np.broadcast_to(wanted, raw.shape), -1, -2)

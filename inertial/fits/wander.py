@@ -170,7 +170,7 @@ def fit_lot_with_wander(
 def lack_of_fit(chi2: Array, dof: int) -> Array:
     """Birge ratio squared of every block, where its scatter is more than noise of the lot's size makes; one elsewhere."""
     far = stats.chi2.isf(_LACKING / chi2.size, dof)
-    return np.where(chi2 > far, chi2 / dof, 1.0)
+    return np.where(chi2 <= far, 1.0, chi2 / dof)  # what is no number stays none
 
 
 def _solve(series: Series) -> tuple[tuple[float, float], Solved]:

@@ -60,8 +60,11 @@ class Sums:
 
     def covariance(self, strengths: Array, ramp: Array) -> Array:
         """Covariance of the Allan variances: strengths (..., 4) of `NOISES`, ramp (...) squared → (..., t, t)."""
-        noise = np.einsum("...c,...d,abcd->...ab", strengths, strengths, self.quadratic, optimize=True)
-        return noise + ramp[..., None, None] * np.einsum("...c,abc->...ab", strengths, self.ramp)
+        size = self.quadratic.shape[:2]
+        pairs = (strengths[..., :, None] * strengths[..., None, :]).reshape(*strengths.shape[:-1], -1)
+        noise = pairs @ self.quadratic.reshape(-1, pairs.shape[-1]).T
+        drift = strengths @ self.ramp.reshape(-1, strengths.shape[-1]).T
+        return (noise + ramp[..., None] * drift).reshape(*strengths.shape[:-1], *size)
 
 
 @lru_cache(maxsize=16)

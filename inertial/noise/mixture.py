@@ -92,6 +92,11 @@ class MixtureFit:
         residual = self.whiten @ (self.target - np.log(expected))
         return float(residual @ residual)
 
+    @property
+    def volume(self) -> float:
+        """Logarithm of the determinant of the covariance of the log-variances."""
+        return -2.0 * float(np.log(np.diagonal(self.whiten)).sum())
+
     def solve(self, free: NDArray[np.bool_], start: Array) -> tuple[Array, float]:
         """Best strengths and their chi-square: those not `free` stay at `start`, none falls below zero."""
         strengths = start.copy()
@@ -139,6 +144,36 @@ def problem(variance: Array, moments: Sums, strengths: Array) -> MixtureFit:
         target=np.log(variance) - (digamma(half) - np.log(half)),
         whiten=solve_triangular(_root(correlation * np.outer(spread, spread)), np.eye(len(half)), lower=True),
     )
+
+
+def settled(
+    variance: Array, moments: Sums, free: NDArray[np.bool_], start: Array, *, rounds: int = 3
+) -> tuple[MixtureFit, Array, float]:
+    """The problem whose covariance is that of its own solution, the solution and its chi-square."""
+    strengths = start
+    for _ in range(rounds):
+        strengths, _ = problem(variance, moments, strengths).solve(free, strengths)
+    task = problem(variance, moments, strengths)
+    return task, *task.solve(free, strengths)
+
+
+def deviance(
+    variance: Array, moments: Sums, free: NDArray[np.bool_], start: Array, *, rounds: int = 3
+) -> tuple[float, Array]:
+    """Twice the negative log-likelihood of a curve (t,) with the terms that are `free`, and their strengths (5,).
+
+    The covariance is that of the strengths at which it is taken: a ramp, which scatters nothing, then has to agree with the last
+    points of a curve exactly, and a walk only as well as so few independent differences allow. With one covariance for both the
+    one that it was taken under always wins. The best of all rounds counts: the strengths solve for a covariance that is given.
+    """
+    best, found, strengths = np.inf, start, start
+    for _ in range(rounds + 1):
+        task = problem(variance, moments, strengths)
+        now = task.cost(strengths) + task.volume
+        if now < best:
+            best, found = now, strengths
+        strengths, _ = task.solve(free, strengths)
+    return best, found
 
 
 def _root(covariance: Array) -> Array:

@@ -1,18 +1,15 @@
 """Noise coefficients Q, N, B, K, R under an Allan curve, fitted together, each with an interval or an upper limit."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import cast
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import brentq
 from scipy.stats import chi2
 
-from inertial.noise import mixture
+from inertial.noise import mixture, profiles
 from inertial.noise.allan import AllanCurve
-from inertial.noise.covariance import Sums, sums
-from inertial.noise.mixture import MixtureFit
+from inertial.noise.covariance import sums
 
 Array = NDArray[np.float64]
 
@@ -34,15 +31,6 @@ UNITS: Mapping[str, str] = {
 
 FLICKER_FLOOR = float(np.sqrt(2.0 * np.log(2.0) / np.pi))
 """sigma = 0.664·B on the flat part of the curve: IEEE Std 952-1997, C.1.1.3."""
-
-_KEPT_AT = 6.635
-"""Chi-square (1 % for one term) that a term must be worth to be called identified."""
-_ONE_SIDED_95 = 2.706
-_NEGLIGIBLE = 1e-6
-"""Share of the curve, as a variance, below which a term makes no difference."""
-_WIDEST = 40.0  # natural logarithm: how far above a strength its upper limit is looked for
-_RESOLUTION = 2e-3  # of an end of an interval, relative
-_ROUNDS = 3  # of the covariance, which depends on the strengths
 
 
 @dataclass(frozen=True)
@@ -91,6 +79,8 @@ class NoiseTerms:
     """(...,) of the curve about the fitted terms."""
     dof: Array
     """(...,)"""
+    mixture: Array
+    """(..., 5) coefficients of the likeliest mixture, which runs through the points whether or not its terms are identified."""
     bias_instability_bound: Array
     """(...,) min sigma / 0.664: an upper bound of B, reached only on a flat part: N and K alone report √(2.617·N·K)."""
 
@@ -125,8 +115,10 @@ def fit_terms(curve: AllanCurve, *, confidence: float = 0.95) -> NoiseTerms:
     """Coefficients of each channel of `curve` by generalised least squares on the log-variance.
 
     The covariance of the estimates at all averaging times is that of the fitted mixture itself. A term that the curve
-    does not need (its removal costs less than chi-square 6.6) is not identified and gets a limit. Intervals are profiles
-    with all other terms free, so a coefficient that another could replace has a wide one.
+    does not need is not identified and gets a limit: one whose removal costs less than chi-square 6.6, be it under the
+    covariance of
+    the fitted mixture or with that of what would stand in for it. Intervals are profiles with all other terms free, so a
+    coefficient that another could replace has a wide one; an interval that reached zero would not be one of an identified term.
 
     Parameters
     ----------
@@ -148,28 +140,29 @@ def fit_terms(curve: AllanCurve, *, confidence: float = 0.95) -> NoiseTerms:
         raise ValueError(msg)
     moments = sums(curve.n, tuple(curve.m.tolist()))
     variances = (curve.deviation**2).reshape(-1, curve.m.size)
-    rows = [_one(variance, moments, float(chi2.ppf(confidence, 1))) for variance in variances]
+    rows = [profiles.found(variance, moments, float(chi2.ppf(confidence, 1))) for variance in variances]
     lead = curve.deviation.shape[:-1]
     scale = np.sqrt(_per_sample(curve.rate_hz))
 
-    def coefficients(which: int) -> Array:
-        return np.sqrt(np.stack([row[which] for row in rows])).reshape(*lead, count) * scale
+    def coefficients(strengths: list[Array]) -> Array:
+        return np.sqrt(np.stack(strengths)).reshape(*lead, count) * scale
 
     return NoiseTerms(
         symbols=mixture.TERMS,
-        value=coefficients(0),
-        low=coefficients(1),
-        high=coefficients(2),
+        value=coefficients([row.value for row in rows]),
+        low=coefficients([row.low for row in rows]),
+        high=coefficients([row.high for row in rows]),
         confidence=confidence,
-        chi2=np.array([row[3] for row in rows]).reshape(lead),
-        dof=np.array([row[4] for row in rows]).reshape(lead),
+        chi2=np.array([row.chi2 for row in rows]).reshape(lead),
+        dof=np.array([row.dof for row in rows]).reshape(lead),
+        mixture=coefficients([row.mixture for row in rows]),
         bias_instability_bound=np.min(curve.deviation, axis=-1) / FLICKER_FLOOR,
     )
 
 
 def model_deviation(terms: NoiseTerms, tau: Array) -> Array:
-    """Allan deviation (..., t) of the identified terms at `tau` (t,) s: the line through the points of a plot."""
-    q, n, b, k, r = np.moveaxis(np.nan_to_num(terms.value), -1, 0)[..., None]
+    """Allan deviation (..., t) of the likeliest mixture at `tau` (t,) s: the line through the points of a plot."""
+    q, n, b, k, r = np.moveaxis(terms.mixture, -1, 0)[..., None]
     flat = (FLICKER_FLOOR * b) ** 2
     return np.sqrt(3.0 * q**2 / tau**2 + n**2 / tau + flat + k**2 * tau / 3.0 + r**2 * tau**2 / 2.0)
 
@@ -177,83 +170,3 @@ def model_deviation(terms: NoiseTerms, tau: Array) -> Array:
 def _per_sample(rate_hz: float) -> Array:
     """Squares of the coefficients Q, N, B, K, R per unit strength in samples."""
     return np.array([1.0 / rate_hz**2, 1.0 / rate_hz, 1.0, rate_hz, rate_hz**2])
-
-
-def _one(variance: Array, moments: Sums, threshold: float) -> tuple[Array, Array, Array, float, float]:
-    """Strengths (NaN where not needed), their ends, chi-square and degrees of freedom of one curve."""
-    everything = np.ones(len(mixture.TERMS), dtype=np.bool_)
-    task, strengths, best = _settled(variance, moments, everything, mixture.first_guess(variance, moments))
-    kept, reduced, cost = _needed(task, strengths, best)
-    low, high = np.zeros(kept.size), np.zeros(kept.size)
-    for j in range(kept.size):
-        if kept[j]:
-            low[j], high[j] = _profile(task, strengths, best, j, threshold)
-        else:
-            high[j] = _profile(task, strengths, best, j, _ONE_SIDED_95)[1]
-    value = np.where(kept, reduced, np.nan)
-    low = np.fmin(low, np.where(kept, reduced, 0.0))
-    return (
-        value,
-        low,
-        np.fmax(high, np.nan_to_num(value)),
-        cost,
-        float(variance.size - int(kept.sum())),
-    )
-
-
-def _settled(variance: Array, moments: Sums, free: NDArray[np.bool_], start: Array) -> tuple[MixtureFit, Array, float]:
-    """The problem whose covariance is that of its own solution, the solution and its chi-square."""
-    strengths = start
-    for _ in range(_ROUNDS):
-        strengths, _ = mixture.problem(variance, moments, strengths).solve(free, strengths)
-    task = mixture.problem(variance, moments, strengths)
-    return task, *task.solve(free, strengths)
-
-
-def _needed(task: MixtureFit, strengths: Array, best: float) -> tuple[NDArray[np.bool_], Array, float]:
-    """Terms that stay after dropping, one by one, the one whose loss costs least, while that is little."""
-    kept = strengths > 0.0
-    current, cost = np.where(kept, strengths, 0.0), best
-    while kept.sum() > 1:
-        trials: list[tuple[float, int, Array]] = []
-        for j in np.flatnonzero(kept).tolist():
-            fewer = kept.copy()
-            fewer[j] = False
-            start = np.where(fewer, np.maximum(current, 1e-9 * current.max()), 0.0)
-            fitted, worse = task.solve(fewer, start)
-            trials.append((worse, j, fitted))
-        worse, j, fitted = min(trials, key=lambda trial: trial[0])
-        if worse - cost > _KEPT_AT:
-            break
-        kept[j], current, cost = False, fitted, worse
-    return kept, current, cost
-
-
-def _profile(task: MixtureFit, strengths: Array, best: float, j: int, threshold: float) -> tuple[float, float]:
-    """Strengths of term j, below and above, at which chi-square has risen by `threshold`, all others free."""
-    free = np.ones(strengths.size, dtype=np.bool_)
-    free[j] = False
-    whole_curve = float(np.exp(np.min(task.target - np.log(task.model[:, j]))))
-
-    def excess(log_strength: float) -> float:
-        start = strengths.copy()
-        start[j] = np.exp(log_strength)
-        return min(task.solve(free, start)[1] - best - threshold, 1e6)
-
-    centre = float(np.log(max(strengths[j], _NEGLIGIBLE * whole_curve)))
-    inside, outside = centre, centre + 0.5
-    while excess(outside) < 0.0 and outside < centre + _WIDEST:
-        inside, outside = outside, outside + 1.5
-    high = _crossing(excess, inside, outside)
-    bottom = centre + np.log(_NEGLIGIBLE)
-    if strengths[j] <= 0.0 or excess(bottom) <= 0.0:
-        return 0.0, high
-    return _crossing(excess, bottom, centre), high
-
-
-def _crossing(excess: Callable[[float], float], a: float, b: float) -> float:
-    """Strength where `excess` of its logarithm changes sign; the nearer end where it does not."""
-    at_a, at_b = excess(a), excess(b)
-    if at_a * at_b > 0.0:
-        return float(np.exp(a if abs(at_a) < abs(at_b) else b))
-    return float(np.exp(cast("float", brentq(excess, a, b, xtol=_RESOLUTION))))

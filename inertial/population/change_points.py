@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.stats import t as student
 
+from inertial.population.memory import drawn_in, memory_of
+
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
@@ -28,8 +30,8 @@ class ChangePoint:
 
     first : index of the first point after it; low, high : earliest and latest that ``first`` may be, 95 %
     shift, error : level after minus level before and its standard error, the values' unit
-    p_value : that white noise of this length shows as large a change anywhere (Bonferroni over the places), σ known as from
-        the series' own differences
+    p_value : that noise of this length, as correlated as the series itself, shows as large a change anywhere (Bonferroni over the
+        places), σ known as from the series' own differences
     """
 
     first: int
@@ -43,27 +45,49 @@ class ChangePoint:
 def change_points(values: Array, level: float = 1e-3) -> list[ChangePoint]:
     """The changes of level of a series (n,), found by binary segmentation, each then placed between its neighbours.
 
-    σ is that of the differences of neighbours, by their median, so that neither changes nor single outliers widen it.
+    σ is that of the differences of neighbours, by their median, so that neither changes nor single outliers widen it. A
+    series whose
+    neighbours agree by ρ has means that scatter √((1 + ρ)/(1 − ρ)) more than white ones, and is worth (1 − ρ)/(1 + ρ) of its
+    points; wild values are drawn in first. White noise assumed, a series of ρ = 0.6 had a "change" in six of ten cases.
 
     Parameters
     ----------
     level : largest p-value of a change that is reported.
     """
-    n = values.size
-    sigma = noise_of(values)
-    if n < 2 * FEWEST or sigma == 0.0:
+    n, values = values.size, drawn_in(values)
+    noise = _Noise.of(values)
+    if n < 2 * FEWEST or not noise.sigma > 0.0:
         return []
-    places = sorted(_segment(values, (0, n), sigma, level))
+    places = sorted(_segment(values, (0, n), noise, level))
     out: list[ChangePoint] = []
     for number, place in enumerate(places):
         low = places[number - 1] if number else 0
         high = places[number + 1] if number + 1 < len(places) else n
         found = _best(values[low:high])
         if found is not None:
-            out.append(_described(values[low:high], low, found, (sigma, n)))
+            out.append(_described(values[low:high], low, found, noise))
         else:
-            out.append(_described(values[low:high], low, place - low, (sigma, n)))
+            out.append(_described(values[low:high], low, place - low, noise))
     return out
+
+
+@dataclass(frozen=True)
+class _Noise:
+    """Noise of a series.
+
+    sigma : what means of its values scatter by as if it were white; worth : independent points that it is worth
+    """
+
+    sigma: float
+    worth: float
+
+    @classmethod
+    def of(cls, values: Array) -> _Noise:
+        memory = memory_of(values)
+        # differences of neighbours have the variance 2·σ²·(1 − ρ)
+        own = noise_of(values) / np.sqrt(1.0 - memory)
+        stretch = (1.0 + memory) / (1.0 - memory)
+        return cls(float(own * np.sqrt(stretch)), values.size / stretch)
 
 
 def noise_of(values: Array) -> float:
@@ -79,16 +103,16 @@ def noise_of(values: Array) -> float:
     return max(middle, drawn_in) / np.sqrt(2.0)
 
 
-def _segment(values: Array, ends: tuple[int, int], sigma: float, level: float) -> list[int]:
+def _segment(values: Array, ends: tuple[int, int], noise: _Noise, level: float) -> list[int]:
     start, stop = ends
     place = _best(values[start:stop])
     if place is None:
         return []
     part = values[start:stop]
-    if _p_value(_statistic(part)[place - 1] / sigma, part.size, values.size) > level:
+    if not _p_value(_statistic(part)[place - 1] / noise.sigma, part.size, noise) <= level:
         return []
     split = start + place
-    return [split, *_segment(values, (start, split), sigma, level), *_segment(values, (split, stop), sigma, level)]
+    return [split, *_segment(values, (start, split), noise, level), *_segment(values, (split, stop), noise, level)]
 
 
 def _statistic(values: Array) -> Array:
@@ -108,20 +132,19 @@ def _best(values: Array) -> int | None:
     return int(np.argmax(allowed)) + FEWEST
 
 
-def _p_value(statistic: float, n: int, whole: int) -> float:
+def _p_value(statistic: float, n: int, noise: _Noise) -> float:
     """Of a statistic in n values; σ comes from the differences of the whole series."""
     places = max(n - 2 * FEWEST + 1, 1)
-    return float(min(1.0, 2.0 * student.sf(statistic, DOF_OF_DIFFERENCES * (whole - 1)) * places))
+    return float(min(1.0, 2.0 * student.sf(statistic, max(DOF_OF_DIFFERENCES * (noise.worth - 1.0), 1.0)) * places))
 
 
-def _described(values: Array, offset: int, place: int, noise: tuple[float, int]) -> ChangePoint:
-    """The change at a place of a part of a series; noise : σ, and of how many values."""
-    sigma, whole = noise
-    statistic = _statistic(values) / sigma
+def _described(values: Array, offset: int, place: int, noise: _Noise) -> ChangePoint:
+    """The change at a place of a part of a series."""
+    statistic = _statistic(values) / noise.sigma
     best = statistic[place - 1]
     likely = np.flatnonzero(best**2 - statistic**2 <= LIKELY) + 1
     n = values.size
     shift = float(values[place:].mean() - values[:place].mean())
-    error = float(sigma * np.sqrt(1.0 / place + 1.0 / (n - place)))
+    error = float(noise.sigma * np.sqrt(1.0 / place + 1.0 / (n - place)))
     low, high = int(likely.min()), int(likely.max())
-    return ChangePoint(offset + place, offset + low, offset + high, shift, error, _p_value(float(best), n, whole))
+    return ChangePoint(offset + place, offset + low, offset + high, shift, error, _p_value(float(best), n, noise))

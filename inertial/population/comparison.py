@@ -68,6 +68,9 @@ def _rank_p(values: Array, groups: Codes, counts: Codes, k: int) -> float:
 
 def holm(p_values: Array) -> Array:
     """p-values adjusted for their number, step by step (Holm 1979); (n,)."""
+    p_values = np.where(
+        np.isfinite(p_values), p_values, 1.0
+    )  # what could not be compared is no evidence, and spoils no other's
     order = np.argsort(p_values)
     n = p_values.size
     adjusted = np.minimum(1.0, np.maximum.accumulate(p_values[order] * (n - np.arange(n))))

@@ -83,23 +83,35 @@ class FalseAlarms:
 
 
 @cache
-def false_alarms(n: int, first: int, counted: int) -> FalseAlarms:
+def false_alarms(n: int, first: int, counted: int, memory: float = 0.0, tail: float = np.inf) -> FalseAlarms:
     """The alarms of charts in control, whose centre is known from their first points only.
 
     Parameters
     ----------
     n : points; first : of them, that make the centre; counted : the last so many count
+    memory : correlation of neighbours; tail : degrees of freedom of Student's innovations, infinite for normal ones
     """
-    rng = np.random.default_rng(np.random.SeedSequence([n, first, counted]))
+    code = [n, first, counted, round(100.0 * memory), 0 if np.isinf(tail) else round(tail)]
+    rng = np.random.default_rng(np.random.SeedSequence(code[:3] if code[3:] == [0, 0] else code))
     found: list[NDArray[np.int64]] = []
     for _ in range(10):
-        values = rng.standard_normal((CHARTS_SIMULATED // 10, n))
+        values = _in_control(rng, (CHARTS_SIMULATED // 10, n), memory, tail)
         sigma = np.mean(np.abs(np.diff(values)), axis=-1, keepdims=True) / D2_OF_TWO
         rules, moving = signals((values - values[:, :first].mean(axis=-1, keepdims=True)) / sigma, Baseline(0.0, 1.0))
         signalled, outside = np.any(rules, axis=0)[..., n - counted :], moving.outside[..., n - counted :]
         found.append(np.count_nonzero(signalled, axis=-1) + np.count_nonzero(outside, axis=-1))
     numbers = np.sort(np.concatenate(found)).astype(np.int64)
     return FalseAlarms(float(np.mean(numbers)), numbers)
+
+
+def _in_control(rng: np.random.Generator, shape: tuple[int, int], memory: float, tail: float) -> Array:
+    """Series (charts, n) of a process whose level stands still."""
+    if memory == 0.0 and np.isinf(tail):
+        return rng.standard_normal(shape)
+    before = 50 if memory else 0
+    whole = (shape[0], shape[1] + before)
+    drive = rng.standard_normal(whole) if np.isinf(tail) else rng.standard_t(tail, whole)
+    return np.asarray(lfilter([1.0], [1.0, -memory], drive, axis=-1), dtype=float)[:, before:]
 
 
 def western_electric(values: Array, chart: Baseline) -> Flags:

@@ -28,6 +28,9 @@ CLIP = 4.0  # pairs further out than so many σ tell of a unit, not of its kind
 ODD = 3.0  # a unit whose own slope is so many σ from its kind's is no longer judged by its kind
 TWO_SIDED_95 = 1.959964
 LIKELY = 2.71  # χ² of one degree of freedom that nine in ten stay below: no worse an explanation
+SHORTEST_Y = 30.0 / 365.25
+"""Calibrations that all lie within so many years tell no drift: a change over minutes is no drift, however large
+it is a year."""
 SPREAD_OF_SQUARES = 2.0  # variance of the square of a normal value of variance one
 
 
@@ -50,6 +53,9 @@ def kind_of(change: Array, years: Array, known: Array) -> DeviceDrift:
     """How a kind drifts, from pairs of calibrations of the same units: moments of the changes, weighted, outliers left out.
 
     E(Δ²) = σ₁² + σ₂² + 2·mount² + walk²·t + slope²·t², solved with no negative part. Pairs should be of different lengths.
+    Pairs closer
+    than :data:`SHORTEST_Y` tell of mounting only; where all are, walk and slopes are zero, and :func:`drifts_known` says
+    that they are not known.
 
     Parameters
     ----------
@@ -61,10 +67,15 @@ def kind_of(change: Array, years: Array, known: Array) -> DeviceDrift:
     mean, parts, keep = 0.0, np.zeros(3), np.ones(change.size, dtype=bool)
     for _ in range(ROUNDS):
         mean, keep, columns, target = _moments(change, years, known, expected, keep)
-        parts = _parts(columns, target)
+        parts = _parts(columns, target, (0, 1, 2) if drifts_known(years) else (0,))
         expected = known + _spread_of(parts, years) + 1e-12
     mount, walk, slope = np.sqrt(parts)
     return DeviceDrift(mean, float(slope), float(walk), float(mount), int(keep.sum()))
+
+
+def drifts_known(years: Array) -> bool:
+    """Whether any of some pairs lie far enough apart to tell a drift."""
+    return bool(np.any(years >= SHORTEST_Y))
 
 
 def prudent(kind: DeviceDrift, change: Array, years: Array, known: Array) -> DeviceDrift:
@@ -73,7 +84,7 @@ def prudent(kind: DeviceDrift, change: Array, years: Array, known: Array) -> Dev
     Pairs of one length do not tell mounting, walk and slope apart; drift that was taken for mounting was forecast to stand still.
     What the mean slope itself is uncertain by belongs to the slopes' spread.
     """
-    if change.size == 0:
+    if change.size == 0 or not drifts_known(years):
         return kind
     best = np.array([kind.mount_sd**2, kind.walk_sd**2, kind.slope_sd**2])
     expected = known + _spread_of(best, years) + 1e-12
@@ -91,7 +102,7 @@ def _moments(
     change: Array, years: Array, known: Array, expected: Array, keep: NDArray[np.bool_]
 ) -> tuple[float, NDArray[np.bool_], Array, Array]:
     """Mean slope, pairs that are no outliers, and their weighted squares with the columns that make them."""
-    weight = years / expected
+    weight = np.where(years >= SHORTEST_Y, years, 0.0) / expected
     mean = float(np.sum(weight[keep] * change[keep]) / max(float(np.sum((weight * years)[keep])), 1e-300))
     left = change - mean * years
     keep = left**2 <= CLIP**2 * expected
@@ -121,7 +132,8 @@ def _spread_of(parts: Array, years: Array) -> Array:
 class LatestState:
     """Where every unit stands at its last calibration: level and slope per year, (units,), and their covariance.
 
-    last : the value of that calibration; odd : distance of the unit's own slope from its kind's, in σ
+    last : the value of that calibration; odd : distance of the unit's own slope from its kind's, in σ; NaN for a unit whose
+        calibrations lie too close together to tell a slope of its own, which is then its kind's
     """
 
     level: Array
@@ -150,6 +162,7 @@ def standing(values: Array, errors: Array, years: Array, kind: DeviceDrift) -> L
     alone = _filtered(values, errors, years, kind, unknown)
     expected = np.sqrt(alone.slope_var + kind.slope_sd**2)
     odd = (alone.slope - kind.mean_slope) / np.where(expected > 0.0, expected, np.inf)
+    odd = np.where(span >= SHORTEST_Y, odd, np.nan)
     prior = np.where(np.abs(odd) > ODD, np.abs(alone.slope - kind.mean_slope), np.full(units, kind.slope_sd))
     return replace(_filtered(values, errors, years, kind, prior), odd=odd)
 

@@ -65,9 +65,9 @@ def counts(audit: Audit) -> dict[str, int]:
 
 def furthest(audit: Audit, most: int) -> list[UnitDrift]:
     """Parameters of units whose last change was in the period, the largest |E_n| first; each unit once."""
-    worst = [max(drifts, key=lambda d: abs(d.e_n)) for drifts in audit.units.values()]
+    worst = [max(drifts, key=lambda d: abs(d.e_n) if np.isfinite(d.e_n) else 0.0) for drifts in audit.units.values()]
     recent = [drift for drift in worst if drift.day >= audit.scope.since]
-    return sorted(recent, key=lambda d: (-abs(d.e_n), d.unit))[:most]
+    return sorted(recent, key=lambda d: (-np.nan_to_num(abs(d.e_n)), d.unit))[:most]
 
 
 def date_or_none(day: float) -> str | None:

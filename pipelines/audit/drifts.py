@@ -11,6 +11,7 @@ from inertial.population.agreement import e_n
 from inertial.population.drift import (
     DeviceDrift,
     LatestState,
+    drifts_known,
     forecast,
     in_tolerance,
     kind_of,
@@ -56,6 +57,7 @@ class KindDrift:
     ahead : what forecasts take for it, see :func:`~inertial.population.drift.prudent`
     beyond : share of the pairs with |E_n| > 1; out : share that moved further than the tolerance; median : of |change|
     reliable_months : for how long a unit of the kind stays in all its tolerances with the target's probability; NaN without one
+    known : whether any pair lies far enough apart to tell a drift; where none does, nothing is forecast
     """
 
     device: str
@@ -67,6 +69,7 @@ class KindDrift:
     median: float
     tolerance: float
     reliable_months: float
+    known: bool = True
 
 
 @dataclass(frozen=True)
@@ -77,6 +80,7 @@ class UnitDrift:
     limit, limit_day : the product's limit of the value itself, and day (expected, soonest, latest) when it leaves that
     reliable_day : until when the unit stays in tolerance with the target's probability, in all its parameters together
     odd : distance of its slope from its kind's, in σ; calibrations : that this rests on
+    slope, odd : NaN for a unit whose calibrations lie within 30 days: no drift is stated of it
     """
 
     unit: str
@@ -131,8 +135,10 @@ def kind_drifts(all_: Calibrations, good: Flags, rules: Rules, since: float) -> 
             together = tuple(np.concatenate(parts) for parts in both)
             kind = kind_of(*together)
             recent = kept & (all_.day[pairs.later] >= since)
-            own.append(_kind_drift(all_, pairs, recent, device, name, (kind, prudent(kind, *together)), rules))
-        months = _reliable_months(all_, pairs, own, rules.reliability_target)
+            found = _kind_drift(all_, pairs, recent, device, name, (kind, prudent(kind, *together)), rules)
+            own.append(replace(found, known=drifts_known(together[1])))
+        forecast_known = all(one.known for one in own)
+        months = float("nan") if not forecast_known else _reliable_months(all_, pairs, own, rules.reliability_target)
         out += [replace(one, reliable_months=months if np.isfinite(one.tolerance) else float("nan")) for one in own]
     return out
 
@@ -163,15 +169,16 @@ def _kind_drift(
     tolerance = rules.tolerance_of(device, FAMILY_OF[name])
     kind, ahead = kinds
     change, _ = _changes(all_, pairs, name)
-    numbers = _e_n(all_, pairs, name, kind)[recent]
+    numbers, moved = _e_n(all_, pairs, name, kind)[recent], np.abs(change[recent])
+    numbers, moved = numbers[np.isfinite(numbers)], moved[np.isfinite(moved)]
     return KindDrift(
         device=device,
         parameter=name,
         kind=kind,
         ahead=ahead,
         beyond=float(np.mean(np.abs(numbers) > 1.0)) if numbers.size else 0.0,
-        out=float(np.mean(np.abs(change[recent]) > tolerance)) if recent.any() else 0.0,
-        median=float(np.median(np.abs(change[recent]))) if recent.any() else 0.0,
+        out=float(np.mean(moved > tolerance)) if moved.size else 0.0,
+        median=float(np.median(moved)) if moved.size else 0.0,
         tolerance=tolerance,
         reliable_months=float("nan"),
     )
@@ -200,7 +207,7 @@ def unit_drifts(
             for found in kinds
             if found.device == device
         ]
-        bounded = any(np.isfinite(course.found.tolerance) for course in courses)
+        bounded = any(np.isfinite(course.found.tolerance) for course in courses) and all(c.found.known for c in courses)
         years = last_reliable(probability, rules.reliability_target, AHEAD) if bounded else np.inf
         until = all_.day[rows.later] + YEAR_D * years
         for course in courses:
@@ -236,8 +243,9 @@ def _course(
     if np.isfinite(found.tolerance):
         known = np.isfinite(now.last)
         probability[known] *= in_tolerance(mean[known], deviation[known], found.tolerance).astype(np.float32)
-    times = _leaving(mean, deviation, found.tolerance, day)
-    return _Course(found, now, counts, times, limit, _leaving(mean + now.last[:, None], deviation, limit, day))
+    bounds = (found.tolerance, limit) if found.known else (np.inf, np.inf)
+    times = _leaving(mean, deviation, bounds[0], day)
+    return _Course(found, now, counts, times, limit, _leaving(mean + now.last[:, None], deviation, bounds[1], day))
 
 
 def _unit_drifts(all_: Calibrations, rows: Pairs, course: _Course, until: Array) -> list[UnitDrift]:
@@ -254,7 +262,7 @@ def _unit_drifts(all_: Calibrations, rows: Pairs, course: _Course, until: Array)
             change=float(change[k]),
             years=float(rows.years[k]),
             e_n=float(numbers[k]),
-            slope=float(now.slope[k]),
+            slope=float(now.slope[k]) if np.isfinite(now.odd[k]) else float("nan"),
             tolerance=found.tolerance,
             leaves=float(times[0][k]),
             soonest=float(times[1][k]),

@@ -49,7 +49,10 @@ def exchanged_pairs(all_: Calibrations, own: Index, before: Index, rules: Rules)
 def _fits(all_: Calibrations, row: int, past: int, bound: Array) -> bool:
     change = np.abs(all_.values[row] - all_.values[past])
     expanded = COVERAGE * np.hypot(all_.errors[row], all_.errors[past])
-    return not bool(np.any(change > bound + expanded))  # what a model has not is NaN, and says nothing
+    told = np.isfinite(change) & np.isfinite(
+        bound
+    )  # what a model has not is NaN, and says nothing; nothing at all fits nothing
+    return bool(told.any() and np.all(change[told] <= (bound + expanded)[told]))
 
 
 def _distance(all_: Calibrations, row: int, past: int, bound: Array) -> float:

@@ -129,7 +129,7 @@ def _fits(k: int, values: Array, foreign: Flags, histories: Index, days: Array, 
     years = (days[k] - days[candidates]) / YEAR_D
     best, found = nearest(values[k], values[candidates], scale, years)
     fitting = histories[candidates[distance(values[k], values[candidates], scale, years) <= foreign_above(scale)]]
-    if found > alike_below(scale) or np.any(fitting != histories[candidates[best]]):
+    if not found <= alike_below(scale) or np.any(fitting != histories[candidates[best]]):
         return -1, -1
     return int(candidates[best]), int(histories[candidates[best]])
 

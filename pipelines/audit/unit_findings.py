@@ -74,7 +74,7 @@ def _out_of_tolerance(audit: Audit) -> Iterator[AuditFinding]:
         drift = max(outside, key=lambda d: (abs(d.change) - _expanded(d)) / d.tolerance)
         text = unit_text(drift.parameter)
         message = (
-            f"{drift.unit}: {drift.parameter} was {drift.change:+.4g} {text} off after {12 * drift.years:.0f} months, "
+            f"{drift.unit}: {drift.parameter} was {drift.change:+.4g} {text} off after {_after(drift)}, "
             f"tolerance {drift.tolerance:g} {text}, U {_expanded(drift):.3g}, E_n {drift.e_n:+.1f}{_besides(outside)}; what it "
             f"measured since {_before(drift)} is in doubt: tell whoever used it"
         )
@@ -95,8 +95,9 @@ def _leaving(audit: Audit) -> Iterator[AuditFinding]:
             continue
         days, what, bound, drift = min(found, key=lambda one: one[0][0])
         text, others = unit_text(drift.parameter), list(dict.fromkeys(one[3].parameter for one in found))
+        moves = f"moves {drift.slope:+.3g} {text} a year" if np.isfinite(drift.slope) else "moves as its kind does"
         message = (
-            f"{drift.unit}: {drift.parameter} moves {drift.slope:+.3g} {text} a year and leaves its {what} of {bound:g} {text} "
+            f"{drift.unit}: {drift.parameter} {moves} and leaves its {what} of {bound:g} {text} "
             f"about {date_or_never(days[0])} ({date_or_never(days[1])} to {date_or_never(days[2])})"
             f"{_besides(others)}, before it is due on {date_of(due)}; call it in"
         )
@@ -139,7 +140,8 @@ def _unlike_their_kind(audit: Audit) -> Iterator[AuditFinding]:
     """Units whose slope none of their kind has: each by its plainest parameter."""
     count = sum(len(drifts) for drifts in audit.units.values())
     for drifts in audit.units.values():
-        worst = max(drifts, key=lambda drift: abs(drift.odd), default=None)
+        told = [drift for drift in drifts if np.isfinite(drift.odd)]  # of calibrations within days no drift is stated
+        worst = max(told, key=lambda drift: abs(drift.odd), default=None)
         if worst is not None and abs(worst.odd) > outlier_limit(count) and worst.day >= audit.scope.since:
             text = unit_text(worst.parameter)
             when = f"{_when(worst)}: give it a shorter interval, or take it out of use"
@@ -153,9 +155,18 @@ def _unlike_their_kind(audit: Audit) -> Iterator[AuditFinding]:
 def _numbers(drift: UnitDrift) -> dict[str, Any]:
     return {
         "parameter": drift.parameter, "run": drift.run, "date": date_of(drift.day), "change": drift.change,
-        "months": 12 * drift.years, "e_n": drift.e_n, "slope_per_year": drift.slope, "tolerance": drift.tolerance,
+        "months": 12 * drift.years, "e_n": drift.e_n,
+        "slope_per_year": drift.slope if np.isfinite(drift.slope) else None, "tolerance": drift.tolerance,
         "leaves": date_or_never(drift.leaves), "soonest": date_or_never(drift.soonest), "latest": date_or_never(drift.latest),
     }  # fmt: skip
+
+
+def _after(drift: UnitDrift) -> str:
+    """Time between two calibrations, in a unit in which it is not zero."""
+    months, days = 12.0 * drift.years, 365.25 * drift.years
+    if months >= 1.5:
+        return f"{months:.0f} months"
+    return f"{days:.0f} days" if days >= 1.5 else f"{24.0 * days:.2g} hours"
 
 
 def _before(drift: UnitDrift) -> str:

@@ -88,7 +88,7 @@ def _verify(job: Job, run: Run) -> Tables:
 
 def _noise(job: Job, run: Run) -> Tables:
     del job
-    readings, *tables = (run.table(name) for name in ("readings", "coefficients", "covariance"))
+    readings, *tables = (run.table(name) for name in ("readings", "coefficients", "covariance", "history"))
     static = set(readings.loc[readings["kind"] == "allan", "record"])
     return noise(_records(run).samples(static), readings, *tables)
 
@@ -145,7 +145,7 @@ STAGES: tuple[Stage, ...] = (
     ),
     Stage(
         name="noise",
-        inputs=(RECORDS, "readings", "coefficients", "covariance"),
+        inputs=(RECORDS, "readings", "coefficients", "covariance", "history"),
         outputs=("allan", "noise"),
         parameters=_none,
         call=_noise,

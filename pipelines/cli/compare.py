@@ -80,10 +80,10 @@ def print_comparison(document: dict[str, Any], poses: int = POSES) -> None:
     ]
     if document["fresh_rms_ug"] is not None:
         lines.append(["fresh run, coefficients unchanged", short(document["fresh_rms_ug"])])
-    lines.append(["floor: the noise that is there", short(document["floor_ug"])])
+    lines.append(["noise as this model sees it", short(document["floor_ug"])])
     print_table(["error", "rms\nµg"], lines)
     out.print(
-        "The floor is the noise as this model sees it: what is missing counts as noise here; ask 'tumbleline diagnose'.",
+        "What is missing from the model counts as noise here, unlike in the floor of 'tumbleline diagnose'.",
         style="dim",
         soft_wrap=True,
     )

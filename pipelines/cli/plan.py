@@ -298,6 +298,12 @@ def _print(document: dict[str, Any]) -> None:
         f"{_longer(document['dwell_s'])}"
     )
     print_table(["coefficient", "error 1σ: x", "y", "z", "unit"], _coefficient_lines(document["coefficients"]))
+    if document["bias"] is not None:
+        bias = document["bias"]
+        out.print(
+            f"bias, 1σ of the worst axis: as the mean of the record {short(bias['record_u_ug'])} µg, of the day after it "
+            f"{short(bias['long_u_ug'])} µg; after the next switch-on: no repeatability is stated"
+        )
     seen = [row for row in document["effects"] if row["seen"]]
     print_table(
         ["seen", "left v", "1/v²", "floor 3σ", "unit", "it adds, µg", "not told from (= exactly)"],

@@ -8,6 +8,8 @@ import numpy as np
 from scipy.stats import chi2
 
 from inertial.fits.ellipsoid import EllipsoidFit, fit_ellipsoid
+from inertial.fits.wander import student
+from inertial.noise.measurands import of_a_day
 from inertial.state import T_REFERENCE
 from pipelines.importers.judged import FitAnswer, coefficient, dwells_of, gravity_of
 from schemas.units import AXES, MICRO, STANDARD_GRAVITY_M_S2
@@ -22,6 +24,9 @@ if TYPE_CHECKING:
 NORM_LIMIT = 1e-3
 """| |f| - g | over g at every dwell: the validation limit of the method."""
 
+COVERAGE = 2.0
+SLOWEST = 4.0  # of the flicker's time constants, over the record, in :func:`inertial.criticism.noise.flicker_kernel`
+
 OUT = ["out_x", "out_y", "out_z"]
 
 
@@ -35,7 +40,9 @@ def norm(data: Imported, mapping: Mapping) -> FitAnswer:
     gravity = gravity_of(mapping)
     output = dwells[OUT].to_numpy(dtype=np.float64)
     heat = _heat(dwells)
-    fit = fit_ellipsoid(output, norm=gravity, temperature=heat)
+    plain = fit_ellipsoid(output, norm=gravity, temperature=heat)
+    time = dwells["time_s"].to_numpy(dtype=np.float64)
+    fit = fit_ellipsoid(output, norm=gravity, temperature=heat, time=time, error=_norm_error(dwells, plain))
     six = fit_ellipsoid(output, norm=gravity, temperature=heat, shape="six")
     worst = float(np.max(np.abs(fit.norm_residuals)))
     floor, p_value = _white(dwells, fit)
@@ -47,11 +54,15 @@ def norm(data: Imported, mapping: Mapping) -> FitAnswer:
         "six_parameters_rms_ug": MICRO * float(six.rms),
         "floor_ug": None if floor is None else MICRO * floor,
         "p_value": p_value,
+        "dof": fit.dof,
+        "coverage_factor": COVERAGE,
     }
     document = {
         "adequate": adequate,
         "error": error,
         "bias": fit.bias.tolist(),
+        "bias_u_record": _bias_error(fit).tolist(),
+        "bias_u_day": None if fit.flicker is None else _of_a_day(fit, time).tolist(),
         "response_per_g": fit.response.tolist(),
         "scale_per_m_s2": (fit.scale / STANDARD_GRAVITY_M_S2).tolist(),
         "temperature_offset_per_C": None if heat is None else fit.temperature_offset.tolist(),
@@ -62,7 +73,7 @@ def norm(data: Imported, mapping: Mapping) -> FitAnswer:
     lines = (
         f"nine parameters, {len(dwells)} dwells: {found} (limit {MICRO * NORM_LIMIT * gravity:.0f}); {without}",
         _floor_line(floor, p_value),
-        *(_axis_line(k, fit, data.out_unit) for k in range(3)),
+        *(_axis_line(k, fit, _of_a_day(fit, time), data.out_unit) for k in range(3)),
     )
     return FitAnswer(
         "norm",
@@ -73,15 +84,23 @@ def norm(data: Imported, mapping: Mapping) -> FitAnswer:
     )
 
 
-def _white(dwells: pd.DataFrame, fit: EllipsoidFit) -> tuple[float | None, float | None]:
-    """Root mean square that white noise alone would leave in the norm (g), and the probability of what is left."""
+def _norm_error(dwells: pd.DataFrame, fit: EllipsoidFit) -> NDArray[np.float64] | None:
+    """White standard error of the norm of every dwell (n,), g; None where the samples' scatter is not known."""
     names = ("sd_x", "sd_y", "sd_z", "n")
     if not all(name in dwells.columns for name in names):
-        return None, None
+        return None
     sd = dwells[list(names[:3])].to_numpy(dtype=np.float64) / np.sqrt(dwells["n"].to_numpy(dtype=np.float64))[:, None]
     force = fit.apply(dwells[OUT].to_numpy(dtype=np.float64), _heat(dwells))
     direction = force / np.linalg.norm(force, axis=1, keepdims=True)
     error = np.sqrt(np.sum((direction @ fit.correction * sd) ** 2, axis=1))
+    return error if np.all(np.isfinite(error) & (error > 0.0)) else None
+
+
+def _white(dwells: pd.DataFrame, fit: EllipsoidFit) -> tuple[float | None, float | None]:
+    """Root mean square that white noise alone would leave in the norm (g), and the probability of what is left."""
+    error = _norm_error(dwells, fit)
+    if error is None:
+        return None, None
     statistic = float(np.sum((fit.norm_residuals / error) ** 2))
     return float(np.sqrt(np.mean(error**2))), float(chi2.sf(statistic, fit.dof))
 
@@ -98,10 +117,28 @@ def _floor_line(floor: float | None, p_value: float | None) -> str:
     )
 
 
-def _axis_line(k: int, fit: EllipsoidFit, unit: str) -> str:
-    error = float(np.sqrt(fit.covariance[k, k]))
-    scale = fit.scale[k] / STANDARD_GRAVITY_M_S2
-    return f"{AXES[k]}: bias {fit.bias[k]:.7g} ± {error:.2g} {unit}, scale {scale:.6g} {unit} per m/s²"
+def _bias_error(fit: EllipsoidFit) -> NDArray[np.float64]:
+    """Standard uncertainty (3,) of the bias as the mean of the record, output unit."""
+    return np.sqrt(np.diagonal(fit.covariance)[:3])
+
+
+def _of_a_day(fit: EllipsoidFit, time: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Standard uncertainty (3,) of the bias as the mean of the day after the record, output unit."""
+    wander = float(fit.flicker) * np.abs(fit.scale) if fit.flicker is not None else np.full(3, np.nan)
+    return of_a_day(_bias_error(fit), wander, time, slowest=SLOWEST, widened=student(fit.dof))
+
+
+def _axis_line(k: int, fit: EllipsoidFit, day: NDArray[np.float64], unit: str) -> str:
+    record, long = (COVERAGE * float(one[k]) for one in (_bias_error(fit), day))
+    later = (
+        "white noise only: too many dwells to estimate wander"
+        if fit.flicker is None
+        else f"± {long:.2g} over the next day"
+    )
+    return (
+        f"{AXES[k]}: bias {fit.bias[k]:.7g} ± {record:.2g} {unit} over the record ({later}; k = {COVERAGE:g}), "
+        f"scale {fit.scale[k] / STANDARD_GRAVITY_M_S2:.6g} {unit} per m/s²"
+    )
 
 
 def _norm_coefficients(unit: str, fit: EllipsoidFit, data: Imported) -> list[dict[str, Any]]:

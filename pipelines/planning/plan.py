@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -11,6 +11,7 @@ from inertial import effects as catalogue
 from inertial.effects import SensorEffect
 from inertial.errors import NotIdentified
 from inertial.noise.dwells import dwell_covariance
+from inertial.noise.measurands import DAY_S, between_means
 from inertial.planning.expected import expected_errors
 from inertial.planning.reasons import reason
 from inertial.planning.visibility import SEEN, sights
@@ -63,7 +64,7 @@ def plan(plan: PlanContext) -> dict[str, Any]:
         The recipe cannot identify its own model; the message says what is missing.
     """
     recipe, noise = plan.recipe, plan.noise
-    expected = identified(plan)
+    expected = identified(replace(plan, covariance=_of_record(plan)))
     found = sights(plan.state, recipe.effects, noise.error(recipe.dwell_s), covariance=plan.covariance)
     white, wander, together = (MICRO * f(recipe.dwell_s) for f in (noise.white, noise.wander, noise.error))
     return {
@@ -78,7 +79,37 @@ def plan(plan: PlanContext) -> dict[str, Any]:
         "dwell_s": {"planned": recipe.dwell_s, "white_as_large_as_wander": noise.balanced()},
         "minutes": spent(plan.stretches).document(),
         "coefficients": _coefficient_rows(expected),
+        "bias": _bias(plan, expected),
         "effects": [_row(s, plan.state, recipe.effects) for s in found],
+    }
+
+
+def _of_record(plan: PlanContext) -> NDArray[np.float64]:
+    """Covariance of the dwells as a fit sees it: what changes more slowly than the record is, for the record, the bias itself."""
+    time, length = plan.state.time, plan.recipe.dwell_s
+    return dwell_covariance(time, length, plan.noise, since=float(time.min()) - 0.5 * length)
+
+
+def _bias(plan: PlanContext, expected: Expected) -> dict[str, float | None] | None:
+    """Standard uncertainty of the bias by measurand, of the worst axis, as the fit will state it; None for a model without one.
+
+    See :func:`pipelines.stages.bias_measurands.bias_measurands`.
+    """
+    own = [
+        float(expected.errors[axis, k])
+        for axis, names in enumerate(expected.names)
+        for k, (effect, _) in enumerate(names)
+        if effect == "bias"
+    ]
+    if not own:
+        return None
+    span = float(np.ptp(plan.state.time))
+    apart = plan.noise.instability * np.sqrt(between_means(span, DAY_S)) if span > 0.0 else 0.0
+    return {
+        "record_u_ug": MICRO * max(own),
+        "long_u_ug": MICRO * float(np.hypot(max(own), apart)),
+        "long_s": DAY_S,
+        "switch_on_u_ug": None,
     }
 
 

@@ -18,6 +18,7 @@ INPUTS = (
     *("verdicts", "dwells", "coefficients", "residuals", "verification", "verification_poses"),
     *("allan", "noise", "figures", "grades"),
 )
+OPTIONAL = ("wander",)
 MODULES = ("schemas.limits", "schemas.tables", "pipelines.report")
 
 
@@ -26,7 +27,8 @@ def make_report(run: Run) -> bool:
     if run.about.get("parents") and run.report.is_file():
         return True  # a follow-up has no decisions: its report is the diagnosis of all runs together
     _refuse_unfinished(run)
-    inputs, code = {name: run.manifest(name)["sha256"] for name in INPUTS}, code_hash(MODULES)
+    names = [*INPUTS, *(name for name in OPTIONAL if name in run.tables())]
+    inputs, code = {name: run.manifest(name)["sha256"] for name in names}, code_hash(MODULES)
     certificates = stated(run, run.table("grades")["unit"])
     parameters = (
         {"certificates": {unit: list(one) for unit, one in sorted(certificates.items())}} if certificates else {}

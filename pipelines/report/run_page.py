@@ -20,7 +20,6 @@ if TYPE_CHECKING:
     from pipelines.archive import Run
     from pipelines.certificates.statement import Stated
 
-COVERAGE = 2.0
 TITLES = {
     "verification_norm_ug": "largest | |a| − g | of a pose not used, mean of its dwells",
     "verification_dwell_ug": "largest | |a| − g | of a single dwell there",
@@ -46,11 +45,12 @@ def render(run: Run, certificates: Mapping[str, Stated] | None = None) -> str:
     """
     tables = {name: run.table(name) for name in ("verdicts", "dwells", "coefficients", "residuals", "verification")}
     tables |= {name: run.table(name) for name in ("verification_poses", "allan", "noise", "figures", "grades")}
+    tables |= {name: run.table(name) for name in ("wander",) if name in run.tables()}
     grades = tables["grades"].sort_values("slot")
     limit = _limit(run, "verification_norm_ug")
-    known = certificates or {}
+    known, coverage = certificates or {}, float(run.about["limits"]["coverage_factor"])
     units: list[dict[str, Any]] = [
-        {**_unit(row, tables), "certificate": known.get(str(row["unit"]))} for row in rows_of(grades)
+        {**_unit(row, tables, coverage), "certificate": known.get(str(row["unit"]))} for row in rows_of(grades)
     ]
     calibrated = [unit["unit"] for unit in units if unit["outcome"] != "refused"]
     return template("page.html").render(
@@ -58,6 +58,7 @@ def render(run: Run, certificates: Mapping[str, Stated] | None = None) -> str:
         about=run.about,
         recipe=run.about["recipe"],
         rule=str(grades["rule"].iloc[0]),
+        coverage=f"{coverage:g}",
         units=units,
         passed=sum(unit["outcome"] == "pass" for unit in units),
         lot_svg=_lot_svg(tables, calibrated, limit),
@@ -77,7 +78,7 @@ def _limit(run: Run, figure: str) -> float:
     return float(run.about["limits"]["figures"].get(figure, {}).get("max", np.nan))
 
 
-def _unit(row: dict[str, Any], tables: dict[str, pd.DataFrame]) -> dict[str, Any]:
+def _unit(row: dict[str, Any], tables: dict[str, pd.DataFrame], coverage: float) -> dict[str, Any]:
     """What the page says of one unit; a refused one has its reasons and nothing else."""
     unit = str(row["unit"])
     own = {name: table[table["unit"] == unit] for name, table in tables.items()}
@@ -89,8 +90,10 @@ def _unit(row: dict[str, Any], tables: dict[str, pd.DataFrame]) -> dict[str, Any
         **shown,
         "figures": [_figure(f) for f in rows_of(own["figures"])],
         "short": {f["figure"]: plain(f["value"]) for f in rows_of(own["figures"])},
-        "coefficients": _coefficients(own["coefficients"]),
+        "coefficients": _coefficients(own["coefficients"], coverage),
+        "bias": _bias(own.get("wander"), coverage),
         "noise": _noise(own["noise"]),
+        "notes": list(dict.fromkeys(_notes(own["noise"]))),
         "plots": [
             model_plots(fitted, own["residuals"]),
             check_plots(own["residuals"], own["verification"], own["allan"]),
@@ -112,7 +115,7 @@ def _figure(row: dict[str, Any]) -> dict[str, Any]:
     }
 
 
-def _coefficients(rows: pd.DataFrame) -> list[dict[str, Any]]:
+def _coefficients(rows: pd.DataFrame, coverage: float) -> list[dict[str, Any]]:
     """One line per coefficient with its three axes side by side."""
     lines: dict[tuple[str, int], dict[str, Any]] = {}
     seen: dict[tuple[str, str], int] = {}
@@ -122,9 +125,35 @@ def _coefficients(rows: pd.DataFrame) -> list[dict[str, Any]]:
         line = lines.setdefault(
             (row["effect"], place), {"effect": row["effect"], "unit": row["unit_text"], "cells": {}}
         )
-        value, expanded = with_uncertainty(row["value"], COVERAGE * row["standard_error"])
+        value, expanded = with_uncertainty(row["value"], coverage * row["standard_error"])
         line["cells"][row["axis"]] = {"name": row["name"], "value": value, "uncertainty": expanded}
     return list(lines.values())
+
+
+def _bias(rows: pd.DataFrame | None, coverage: float) -> list[dict[str, Any]]:
+    """U of the bias by measurand, one line each; none for runs of before, and for models without a bias."""
+    if rows is None or "bias_record_u_ug" not in rows or not np.isfinite(rows["bias_record_u_ug"]).all():
+        return []
+    own = {row["axis"]: row for row in rows_of(rows)}
+    names = {
+        "bias_record_u_ug": "mean of the record",
+        "bias_long_u_ug": "mean of the day after the record",
+        "bias_switch_on_u_ug": "mean of a day after the next switch-on",
+    }
+    return [
+        {
+            "name": name,
+            "cells": {axis: plain(coverage * own[axis][key]) or "not stated" for axis in "xyz"},
+        }
+        for key, name in names.items()
+    ]
+
+
+def _notes(rows: pd.DataFrame) -> list[str]:
+    """What is said of a unit's record besides its terms, with the axis."""
+    if "note" not in rows:
+        return []
+    return [f"{row['axis']}: {row['note']}" for row in rows_of(rows) if str(row["note"]) not in {"", "nan"}]
 
 
 def _noise(rows: pd.DataFrame) -> list[dict[str, Any]]:
@@ -147,6 +176,8 @@ def _noise(rows: pd.DataFrame) -> list[dict[str, Any]]:
 
 
 def _noise_cell(row: dict[str, Any]) -> str:
+    if not row["identified"] and not np.isfinite(row["high"]):
+        return "–"
     if not row["identified"]:
         return f"≤ {plain(row['high'])}"
     return f"{plain(row['value'])} ({plain(row['low'])} … {plain(row['high'])})"

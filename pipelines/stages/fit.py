@@ -12,6 +12,7 @@ from inertial import design
 from inertial.errors import InertialError
 from inertial.fits.linear import LotFit, felt_force, fit_lot
 from inertial.fits.wander import WanderFit, fit_lot_with_wander, student
+from pipelines.stages.bias_measurands import COLUMNS, bias_measurands
 from pipelines.stages.nonlinear import profiled
 from pipelines.tables.calibration import coefficient_rows, covariance_rows
 from pipelines.tables.dwells import KINDS, LotArrays, lot_arrays
@@ -123,7 +124,7 @@ def _by_birge(lot: LotArrays, plain: LotFit, used: NDArray[np.bool_]) -> _Noisy:
     stretch = birge_squared(plain)
     noise = lot.standard_error * np.sqrt(stretch)[:, None, :]
     columns = design.local_columns(design.split(plain.effects)[0], lot.state, plain.nonlinear)
-    known = np.where(stretch > 1.0, np.vectorize(student, otypes=[np.float64])(np.maximum(plain.dof, 1)), 1.0)
+    known = np.where(stretch <= 1.0, 1.0, np.vectorize(student, otypes=[np.float64])(np.maximum(plain.dof, 1)))
     covariance = plain.covariance * (known**2 * stretch)[..., None, None]
     unseen = columns[..., ~used, :]
     model = np.einsum("...np,...pq,...mq->...nm", unseen, covariance, unseen)
@@ -201,8 +202,28 @@ def _wander_rows(lot: LotArrays, found: _Noisy) -> pd.DataFrame:
             **{name: (MICRO * values / scale).ravel() for name, values in parts.items()},
             "lack_of_fit": found.lack_of_fit.ravel(),
             "dof": found.fit.dof.ravel(),
+            **{name: values.ravel() for name, values in _bias_of(lot, found, scale).items()},
         }
     )
+
+
+def _bias_of(lot: LotArrays, found: _Noisy, scale: Array) -> dict[str, Array]:
+    """Uncertainties of the bias by measurand, (units, 3), µg; none for a model without a bias.
+
+    Scatter that the dwells' own samples do not show counts as flicker here: few dwells do not tell the kind of it, and white
+    noise would not reach beyond the record.
+    """
+    places = [[name for name, _ in names].index("bias") if ("bias", "K0") in names else -1 for names in found.fit.names]
+    if min(places) < 0:
+        return {name: np.full(scale.shape, np.nan) for name in COLUMNS}
+    used = lot.of_kind("dwell")
+    errors = np.sqrt(np.diagonal(found.fit.covariance, axis1=-2, axis2=-1))
+    record = np.stack([errors[:, axis, place] for axis, place in enumerate(places)], axis=1)
+    own = np.mean(lot.standard_error[:, used] ** 2, axis=1)
+    wander = np.sqrt(found.flicker**2 + np.maximum(found.white**2 - own, 0.0))
+    widened = student(max(int(np.sum(found.fit.dof)) - 2, 1))
+    time = np.broadcast_to(lot.state.time, (len(lot.units), used.size))[0, used]
+    return bias_measurands(MICRO * record / scale, MICRO * wander / scale, time, widened)
 
 
 def _nothing() -> dict[str, pd.DataFrame]:
@@ -213,5 +234,9 @@ def _nothing() -> dict[str, pd.DataFrame]:
             texts="unit axis pose", numbers="force_g residual_ug standard_error_ug expected_ug unit_C", whole="dwell"
         ),
         "predictions": empty_table(texts="unit axis", numbers="covariance_ug2", whole="dwell other"),
-        "wander": empty_table(texts="unit axis method", numbers="white_ug flicker_ug walk_ug lack_of_fit", whole="dof"),
+        "wander": empty_table(
+            texts="unit axis method",
+            numbers=" ".join(("white_ug flicker_ug walk_ug lack_of_fit", *COLUMNS)),
+            whole="dof",
+        ),
     }

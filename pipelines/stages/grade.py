@@ -68,7 +68,8 @@ def grade(evidence: Evidence, limits: Limits, zero_g: float = 0.0) -> dict[str, 
     zero_g : nominal output at 0 g, output unit.
     """
     rule = describe_rule(limits)
-    own = _coefficient_figures(evidence, zero_g)
+    guard = limits.coverage_factor if limits.rule == "guarded_acceptance" else 0.0
+    own = _coefficient_figures(evidence, zero_g, guard)
     shown = [
         ByUnit(t) for t in (evidence.residuals, evidence.verification, evidence.verification_poses, evidence.noise)
     ]
@@ -79,9 +80,13 @@ def grade(evidence: Evidence, limits: Limits, zero_g: float = 0.0) -> dict[str, 
         if verdict["refused"] or not own:
             grade_rows.append(_grade_row(verdict, "refused", NO_GRADE, str(verdict["reason"])))
             continue
-        figures = list(figures_of(UnitTables(*(table.of(unit) for table in shown)), own[unit]))
-        decisions = [decide(limits, f.name, f.value, f.uncertainty) for f in figures if f.name in limits.figures]
-        figure_rows += [_figure_row(unit, figure, decisions) for figure in figures]
+        figures = list(figures_of(UnitTables(*(table.of(unit) for table in shown)), own[unit], guard))
+        decisions = [
+            decide(limits, f.name, f.value, f.uncertainty)
+            for f in figures
+            if f.name in limits.figures and not f.why_not
+        ]
+        figure_rows += [_figure_row(unit, figure, decisions, limits) for figure in figures if not figure.why_not]
         grade_rows.append(_decided(verdict, figures, decisions, limits))
     return {
         "figures": _table(figure_rows) if figure_rows else empty_table(texts=FIGURE_TEXTS, numbers=FIGURE_NUMBERS),
@@ -89,12 +94,12 @@ def grade(evidence: Evidence, limits: Limits, zero_g: float = 0.0) -> dict[str, 
     }
 
 
-def _coefficient_figures(evidence: Evidence, zero_g: float) -> dict[str, list[Figure]]:
+def _coefficient_figures(evidence: Evidence, zero_g: float, guard: float) -> dict[str, list[Figure]]:
     """By unit the figures of its coefficients; none where no unit was calibrated."""
     if evidence.coefficients.empty:
         return {}
     calibration = read_calibration(evidence.coefficients, evidence.covariance)
-    return dict(zip(calibration.units, coefficient_figures(calibration, zero_g), strict=True))
+    return dict(zip(calibration.units, coefficient_figures(calibration, zero_g, guard), strict=True))
 
 
 def _table(rows: list[dict[str, object]]) -> pd.DataFrame:
@@ -105,6 +110,11 @@ def _table(rows: list[dict[str, object]]) -> pd.DataFrame:
 def _decided(verdict: dict, figures: list[Figure], decisions: list[Decision], limits: Limits) -> dict[str, object]:
     best = NO_GRADE
     reasons = [decision.sentence for decision in decisions if not decision.passed]
+    reasons += [
+        f"{figure.name}: not determined ({figure.why_not}), limit {limits.figures[figure.name].max:.4g}"
+        for figure in figures
+        if figure.why_not and figure.name in limits.figures
+    ]
     for figure in figures:
         if figure.name == GRADE_FIGURE:
             best = grade_of(figure.value, limits.coverage_factor * figure.uncertainty, limits.rule) or NO_GRADE
@@ -128,13 +138,13 @@ def _grade_row(verdict: dict, outcome: str, best: str, reasons: str) -> dict[str
     }
 
 
-def _figure_row(unit: str, figure: Figure, decisions: list[Decision]) -> dict[str, object]:
+def _figure_row(unit: str, figure: Figure, decisions: list[Decision], limits: Limits) -> dict[str, object]:
     decision = next((d for d in decisions if d.figure == figure.name), None)
     return {
         "unit": unit,
         "figure": figure.name,
         "value": figure.value,
-        "uncertainty": decision.uncertainty if decision else 2.0 * figure.uncertainty,
+        "uncertainty": limits.coverage_factor * figure.uncertainty,
         "limit": decision.limit if decision else np.nan,
         "unit_text": FIGURES[figure.name],
         "outcome": decision.outcome if decision else "no limit",

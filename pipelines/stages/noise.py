@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -10,33 +10,49 @@ import pandas as pd
 
 from inertial.noise.allan import AllanCurve, overlapping
 from inertial.noise.terms import FLICKER_FLOOR, NoiseTerms, fit_terms, model_deviation
+from pipelines.stages.coarse_digits import Coarse, told, without_digits
+from pipelines.stages.static_record import Series, Warmed, warmed
 from pipelines.tables.calibration import read_calibration
 from pipelines.tables.frames import empty_table
 from pipelines.tables.samples import by_record
-from schemas.errors import DataRejected
 from schemas.units import AXES, MICRO
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Sequence
+    from collections.abc import Iterable
 
-    from numpy.typing import NDArray
+    from pipelines.tables.calibration import Calibration
 
 MOST_SAMPLES = (
     2**18
 )  # of a channel that lie in memory: 24 h at 100 Hz are means of 33 samples, and tau begins at 0.33 s
 UNEXPLAINED_P = 1e-6  # the covariance of the curve is itself estimated, so only a plain misfit counts
+FEWEST = 192  # samples of a channel: six averaging times, as many as five terms need
+MOVED_K = 0.01  # by which the temperature of a record must have moved to be told
 N_ONE_SIDED = "n_d"
 B_BOUND = "B_bound"
+TERM_COLUMNS = ["unit", "axis", "term", "value", "low", "high", "identified", "unit_text", "note"]
 
 
 def noise(
-    samples: Iterable[pd.DataFrame], readings: pd.DataFrame, coefficients: pd.DataFrame, covariance: pd.DataFrame
+    samples: Iterable[pd.DataFrame],
+    readings: pd.DataFrame,
+    coefficients: pd.DataFrame,
+    covariance: pd.DataFrame,
+    history: pd.DataFrame | None = None,
 ) -> dict[str, pd.DataFrame]:
     """Allan curves (table ``allan``) and noise terms (table ``noise``) of every calibrated unit, in µg.
 
     Terms: Q, N, B, K, R as in IEEE Std 952 (N is two-sided: σ(τ) = N/√τ); ``n_d`` = N·√2 is the one-sided density of
     data sheets; ``B_bound`` = min σ/0.664 is only an upper bound of B. Records longer than 2¹⁸ samples are read table by
     table and averaged down to that many, so that their curves begin at a longer averaging time.
+
+    What the temperature of the record did to the output, by the model's tempco, is taken out first. The rounding of coarse digits
+    is taken out of N where that can be done. A channel that is silent, too short or not finite has rows without a value. The
+    column ``note`` says each of these.
+
+    Parameters
+    ----------
+    history : temperatures between the dwells; nothing is taken out where None
     """
     static = readings[(readings["kind"] == "allan") & (readings["status"] == "ok")]
     if static.empty or coefficients.empty:
@@ -44,19 +60,104 @@ def noise(
     calibration = read_calibration(coefficients, covariance)
     records = set(static["record"])
     size = -(-int(static.loc[static["unit"].isin(calibration.units), "n"].max()) // MOST_SAMPLES)
-    series = StaticRecord(calibration.units, size)
+    series = Series(calibration.units, size)
     for record, tables in by_record(samples):
         for table in tables:
             if record in records:
                 series.add(table)
-    scale = np.diagonal(calibration.response, axis1=-2, axis2=-1)
-    curve = overlapping(MICRO * series.values() / scale[..., None], float(static["rate_hz"].iloc[0]) / size)
-    try:
-        terms = fit_terms(curve)
-    except ValueError as problem:
-        raise DataRejected(str(problem)) from None
-    terms = limits_where_unexplained(curve, terms)
-    return {"allan": _curve_rows(calibration.units, curve, terms), "noise": _term_rows(calibration.units, terms)}
+    rate = float(static["rate_hz"].iloc[0])
+    channels = [
+        channel
+        for unit in calibration.units
+        for channel in _channels(series, calibration, unit, static[static["unit"] == unit], rate, history)
+    ]
+    curves, rows = list[pd.DataFrame](), list[tuple[object, ...]]()
+    for group in _alike(channels):
+        curve = overlapping(np.stack([one.record for one in group]), rate / series.size)
+        terms = limits_where_unexplained(curve, fit_terms(curve))
+        terms = without_digits(terms, [one.digits for one in group], rate)
+        curves.append(_curve_rows(group, curve, terms))
+        rows += [row for place, one in enumerate(group) for row in _term_rows(one, terms, place)]
+    rows += [row for one in channels if one.silent for row in _silent_rows(one)]
+    order = {(one.unit, one.axis): place for place, one in enumerate(channels)}
+    rows.sort(key=lambda row: order[str(row[0]), str(row[1])])
+    return {
+        "allan": _sorted(pd.concat(curves, ignore_index=True), order) if curves else _nothing()["allan"],
+        "noise": pd.DataFrame(rows, columns=TERM_COLUMNS),
+    }
+
+
+@dataclass(frozen=True)
+class _Channel:
+    """One axis of one unit: its record (n,) in µg, without what its temperature did; why there is none, if so."""
+
+    unit: str
+    axis: str
+    record: np.ndarray
+    digits: Coarse
+    warmth: str
+    silent: str
+
+
+def _channels(
+    series: Series,
+    calibration: Calibration,
+    unit: str,
+    static: pd.DataFrame,
+    rate: float,
+    history: pd.DataFrame | None,
+) -> list[_Channel]:
+    output = series.of(unit)
+    scale = np.diagonal(calibration.response[calibration.units.index(unit)]) / MICRO
+    if len(static):
+        start = float(static["start_s"].iloc[0])
+        time = np.asarray(start + (np.arange(len(output)) + 0.5) * series.size / rate, dtype=np.float64)
+        warm = warmed(calibration, unit, time, static.iloc[0], history)
+    else:
+        warm = Warmed(np.zeros_like(output), float("nan"), known=True)
+    return [
+        _Channel(
+            unit=unit,
+            axis=letter,
+            record=(output[:, axis] - warm.change[:, axis]) / scale[axis],
+            digits=Coarse.of(series.digits[unit][axis], float(scale[axis])),
+            warmth=_warmth(warm, float(np.ptp(warm.change[:, axis]) / abs(scale[axis])) if len(output) else 0.0),
+            silent=_why_silent(output[:, axis]),
+        )
+        for axis, letter in enumerate(AXES)
+    ]
+
+
+def _warmth(warm: Warmed, change_ug: float) -> str:
+    """What is said of the temperature during a record."""
+    if not warm.span_K > MOVED_K:
+        return ""
+    moved = f"the temperature moved by {warm.span_K:.2g} K during the record"
+    if warm.known:
+        return f"{moved}; the known tempco's share, {change_ug:.2g} µg, is taken out"
+    return f"{moved}; the model has no tempco to take it out with, so B, K and R may be the temperature's"
+
+
+def _why_silent(values: np.ndarray) -> str:
+    """Why a channel says nothing of its noise; empty where it does."""
+    if len(values) < FEWEST:
+        return f"{len(values)} samples in the static record, {FEWEST} are needed; record longer"
+    if not np.all(np.isfinite(values)):
+        return "a sample of the static record is not finite; measure again"
+    if np.ptp(values) == 0.0:
+        return "the output never changed: the channel is dead, or its noise is below its last digit"
+    return ""
+
+
+def _alike(channels: list[_Channel]) -> list[list[_Channel]]:
+    """The channels that say something, those with records of one length together."""
+    lengths = dict.fromkeys(len(one.record) for one in channels if not one.silent)
+    return [[one for one in channels if not one.silent and len(one.record) == length] for length in lengths]
+
+
+def _sorted(curves: pd.DataFrame, order: dict[tuple[str, str], int]) -> pd.DataFrame:
+    place = [order[key] for key in zip(curves["unit"], curves["axis"], strict=True)]
+    return curves.iloc[np.argsort(place, kind="stable")].reset_index(drop=True)
 
 
 def limits_where_unexplained(curve: AllanCurve, terms: NoiseTerms) -> NoiseTerms:
@@ -73,7 +174,7 @@ def limits_where_unexplained(curve: AllanCurve, terms: NoiseTerms) -> NoiseTerms
         "R": sigma * np.sqrt(2.0) / tau,
     }
     limit = np.stack([np.min(ceilings[symbol], axis=-1) for symbol in terms.symbols], axis=-1)
-    unexplained = (terms.p_value < UNEXPLAINED_P)[..., None]
+    unexplained = ~(terms.p_value >= UNEXPLAINED_P)[..., None]
     return replace(
         terms,
         value=np.where(unexplained, np.nan, terms.value),
@@ -82,40 +183,12 @@ def limits_where_unexplained(curve: AllanCurve, terms: NoiseTerms) -> NoiseTerms
     )
 
 
-class StaticRecord:
-    """Outputs of the static record, gathered table by table; of a long one the means of ``size`` samples each.
-
-    The Allan deviation of means is that of the samples themselves, from an averaging time of ``size`` samples on.
-    """
-
-    def __init__(self, units: Sequence[str], size: int) -> None:
-        self._size = max(size, 1)
-        self._rest: dict[str, NDArray[np.float64]] = {unit: np.zeros((0, 3)) for unit in units}
-        self._means: dict[str, list[NDArray[np.float64]]] = {unit: [] for unit in units}
-
-    def add(self, samples: pd.DataFrame) -> None:
-        """Takes the samples that follow those before."""
-        output = samples[list(AXES)].to_numpy(dtype=float)
-        for unit, rows in samples.groupby("unit", sort=False).indices.items():
-            if unit in self._rest:
-                joined = np.concatenate((self._rest[str(unit)], output[rows]))
-                whole = len(joined) // self._size * self._size
-                self._means[str(unit)].append(joined[:whole].reshape(-1, self._size, 3).mean(axis=1))
-                self._rest[str(unit)] = joined[whole:]
-
-    def values(self) -> NDArray[np.float64]:
-        """Outputs (units, 3, n), as long as the shortest."""
-        series = [np.concatenate(parts or [np.zeros((0, 3))]) for parts in self._means.values()]
-        shortest = min(len(one) for one in series)
-        return np.stack([one[:shortest].T for one in series])
-
-
-def _curve_rows(units: tuple[str, ...], curve: AllanCurve, terms: NoiseTerms) -> pd.DataFrame:
-    u, a, t = (i.ravel() for i in np.meshgrid(*(np.arange(s) for s in curve.deviation.shape), indexing="ij"))
+def _curve_rows(channels: list[_Channel], curve: AllanCurve, terms: NoiseTerms) -> pd.DataFrame:
+    c, t = (i.ravel() for i in np.indices(curve.deviation.shape))
     return pd.DataFrame(
         {
-            "unit": np.asarray(units, dtype=object)[u],
-            "axis": np.asarray(AXES, dtype=object)[a],
+            "unit": np.array([one.unit for one in channels], dtype=object)[c],
+            "axis": np.array([one.axis for one in channels], dtype=object)[c],
             "tau_s": curve.tau[t],
             "deviation_ug": curve.deviation.ravel(),
             "low_ug": curve.low.ravel(),
@@ -125,32 +198,38 @@ def _curve_rows(units: tuple[str, ...], curve: AllanCurve, terms: NoiseTerms) ->
     )
 
 
-def _fitted(curve: AllanCurve, terms: NoiseTerms) -> NDArray[np.float64]:
-    """Deviation of the fitted terms; NaN for channels that they do not explain."""
-    identified = np.any(np.isfinite(terms.value), axis=-1)[..., None]
-    return np.where(identified, model_deviation(terms, curve.tau), np.nan)
+def _fitted(curve: AllanCurve, terms: NoiseTerms) -> np.ndarray:
+    """Deviation of the likeliest mixture; NaN for channels that no mixture explains."""
+    explained = (terms.p_value >= UNEXPLAINED_P)[..., None]
+    return np.where(explained, model_deviation(terms, curve.tau), np.nan)
 
 
-def _term_rows(units: tuple[str, ...], terms: NoiseTerms) -> pd.DataFrame:
-    rows = []
-    for u, unit in enumerate(units):
-        for a, axis in enumerate(AXES):
-            for symbol, term in terms.one(u, a).items():
-                value = np.nan if term.value is None else term.value
-                text = term.unit.format("µg")
-                rows.append((unit, axis, symbol, value, term.low, term.high, term.identified, text))
-                if symbol == "N":
-                    root2 = np.sqrt(2.0)
-                    ends = (root2 * value, root2 * term.low, root2 * term.high)
-                    rows.append((unit, axis, N_ONE_SIDED, *ends, term.identified, "µg/√Hz"))
-            bound = float(terms.bias_instability_bound[u, a])
-            rows.append((unit, axis, B_BOUND, np.nan, 0.0, bound, False, "µg"))
-    names = ["unit", "axis", "term", "value", "low", "high", "identified", "unit_text"]
-    return pd.DataFrame(rows, columns=names)
+def _term_rows(channel: _Channel, terms: NoiseTerms, place: int) -> list[tuple[object, ...]]:
+    rows = list[tuple[object, ...]]()
+    for symbol, term in terms.one(place).items():
+        value = np.nan if term.value is None else term.value
+        note = "; ".join(filter(None, [channel.warmth, told(channel.digits) if symbol in {"Q", "N"} else ""]))
+        text = term.unit.format("µg")
+        where = (channel.unit, channel.axis)
+        rows.append((*where, symbol, value, term.low, term.high, term.identified, text, note))
+        if symbol == "N":
+            ends = tuple(np.sqrt(2.0) * one for one in (value, term.low, term.high))
+            rows.append((*where, N_ONE_SIDED, *ends, term.identified, "µg/√Hz", note))
+    bound = float(terms.bias_instability_bound[place])
+    return [*rows, (channel.unit, channel.axis, B_BOUND, np.nan, 0.0, bound, False, "µg", "")]
+
+
+def _silent_rows(channel: _Channel) -> list[tuple[object, ...]]:
+    """Rows of a channel that says nothing: no value and no limit, and why."""
+    units = {"Q": "µg·s", "N": "µg/√Hz", N_ONE_SIDED: "µg/√Hz", "B": "µg", "K": "µg/√s", "R": "µg/s", B_BOUND: "µg"}
+    return [
+        (channel.unit, channel.axis, term, np.nan, 0.0, np.nan, False, text, channel.silent)
+        for term, text in units.items()
+    ]
 
 
 def _nothing() -> dict[str, pd.DataFrame]:
     return {
         "allan": empty_table(texts="unit axis", numbers="tau_s deviation_ug low_ug high_ug fitted_ug"),
-        "noise": empty_table(texts="unit axis term unit_text", numbers="value low high", flags="identified"),
+        "noise": empty_table(texts="unit axis term unit_text note", numbers="value low high", flags="identified"),
     }

@@ -8,6 +8,7 @@ import numpy as np
 import pandas as pd
 
 from inertial.correction import correct, station_change
+from pipelines.stages.rms_error import rms_uncertainty
 from pipelines.tables.calibration import read_calibration
 from pipelines.tables.dwells import LotArrays, lot_arrays
 from pipelines.tables.frames import empty_table, picked
@@ -31,6 +32,7 @@ def verify(
     ``error_ug`` is |a_corr| − g, which needs no angle; ``error_x_ug`` … compare with the table's angles too.
     ``uncertainty_ug`` (k = 1) is what may be expected there of a model that is right: white noise, wander since the fit's
     own dwells, and what both have done to the coefficients. ``reading_ug`` (k = 1) is the white noise of the dwell alone.
+    ``rms_uncertainty_x_ug`` … (k = 1), the same in all rows of a unit, belong to the RMS of ``error_x_ug`` … over its dwells.
 
     In ``verification_poses`` the error is the mean over the dwells of one pose: what the calibration leaves, while wander, which
     no calibration removes, averages out as far as it does. Its uncertainty is that of this mean, with the correlation of
@@ -47,15 +49,18 @@ def verify(
     toward = (corrected / norm[..., None])[:, unseen]
     scale = np.abs(np.diagonal(calibration.response, axis1=-2, axis2=-1))[:, None, :]
     reading = (lot.standard_error / scale)[:, unseen]
-    expected = np.einsum("uja,uajk,uka->ujk", toward, _expected(predictions, lot.units), toward)
+    by_axis, spread = MICRO * (corrected - truth)[:, unseen], _expected(predictions, lot.units)
+    expected = np.einsum("uja,uajk,uka->ujk", toward, spread, toward)
+    of_rms = rms_uncertainty(np.swapaxes(by_axis, 1, 2), spread)[:, None, :] + np.zeros_like(by_axis)
     columns = {
         "norm_g": norm[:, unseen],
         "error_ug": MICRO * (norm - np.linalg.norm(lot.state.force, axis=-1))[:, unseen],
         "uncertainty_ug": np.sqrt(np.diagonal(expected, axis1=-2, axis2=-1)),
         "reading_ug": MICRO * np.sqrt(np.sum((toward * reading) ** 2, axis=-1)),
+        **{f"rms_uncertainty_{letter}_ug": of_rms[..., axis] for axis, letter in enumerate(AXES)},
     }
     return {
-        "verification": _rows(lot, unseen, columns, MICRO * (corrected - truth)[:, unseen]),
+        "verification": _rows(lot, unseen, columns, by_axis),
         "verification_poses": _pose_rows(lot, unseen, columns["error_ug"], expected),
     }
 
@@ -110,6 +115,7 @@ def _rows(lot: LotArrays, unseen: NDArray[np.bool_], columns: dict[str, Array], 
 
 def _nothing() -> dict[str, pd.DataFrame]:
     numbers = "norm_g error_ug uncertainty_ug reading_ug error_x_ug error_y_ug error_z_ug unit_C"
+    numbers += " rms_uncertainty_x_ug rms_uncertainty_y_ug rms_uncertainty_z_ug"
     return {
         "verification": empty_table(texts="unit pose", whole="dwell", numbers=numbers),
         "verification_poses": empty_table(texts="unit pose", whole="dwells", numbers="error_ug uncertainty_ug"),

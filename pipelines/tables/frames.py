@@ -32,6 +32,9 @@ class ByUnit:
         """The units, in the order in which they come first."""
         return list(self._places)
 
+    def __contains__(self, name: str) -> bool:
+        return name in self._table
+
     def column(self, name: str) -> NDArray[Any]:
         """A column of the table, (rows,)."""
         if name not in self._columns:
@@ -54,6 +57,10 @@ class UnitRows:
 
     def __len__(self) -> int:
         return self._count
+
+    def __contains__(self, column: str) -> bool:
+        """Whether the table has a column; runs of before lack some."""
+        return column in self._table
 
     def __getitem__(self, column: str) -> NDArray[Any]:
         return self._table.column(column)[self._where]

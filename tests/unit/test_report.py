@@ -84,3 +84,17 @@ def test_rounds_to_the_uncertainty(value: float, expanded: float, shown: tuple[s
 def test_rounded_numbers_stay_close(value: float) -> None:
     shown = float(plain(value).replace("\u202f", "").replace("−", "-"))
     assert abs(shown - value) <= 0.0051 * value
+
+
+def test_k_is_printed_as_it_is(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
+    about = {**run.about, "limits": {**run.about["limits"], "coverage_factor": 2.5}}
+    monkeypatch.setattr(type(run), "about", property(lambda _: about))
+    page = render(run)
+    assert "k = 2.5" in page
+    assert "k = 2)" not in page
+
+
+def test_the_bias_has_an_uncertainty_for_each_of_its_measurands(page: str) -> None:
+    for words in ("mean of the record", "mean of the day after the record", "mean of a day after the next switch-on"):
+        assert page.count(words) >= 3
+    assert "not stated" in page

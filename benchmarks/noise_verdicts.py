@@ -1,0 +1,276 @@
+"""How often what is said of noise is wrong, on noise of an independent generator: `python benchmarks/noise_verdicts.py terms`.
+
+Each scene prints counts with exact 95 % intervals (Clopper and Pearson). The generator (`tests/independent_noise.py`) shares no
+code with the estimators.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import sys
+from pathlib import Path
+
+os.environ.setdefault("OMP_NUM_THREADS", "1")
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+ROOT = Path(__file__).resolve().parents[1]
+sys.path[:0] = [str(ROOT), str(ROOT / "tests")]
+
+import independent_lots as lots  # noqa: E402
+import independent_noise as made  # noqa: E402
+import numpy as np  # noqa: E402
+import pandas as pd  # noqa: E402
+
+from inertial.fits.ellipsoid import fit_ellipsoid  # noqa: E402
+from inertial.fits.wander import student  # noqa: E402
+from inertial.noise.allan import overlapping  # noqa: E402
+from inertial.noise.measurands import of_a_day  # noqa: E402
+from inertial.noise.terms import fit_terms  # noqa: E402
+from inertial.population.change_points import change_points  # noqa: E402
+from inertial.population.control_charts import FalseAlarms, alarms, baseline, false_alarms, signals  # noqa: E402
+from inertial.population.memory import drawn_in, memory_of, tail_of  # noqa: E402
+from pipelines.stages.fit import fit  # noqa: E402
+from pipelines.stages.noise import noise  # noqa: E402
+from pipelines.stages.verify import verify  # noqa: E402
+
+RATE, SAMPLES = 10.0, 36_000
+
+
+def terms(records: int, seed: int) -> None:
+    """White noise and a walk: the ramp that is not there, and whether the limits and intervals of N, B, K, R hold the truth."""
+    rng = np.random.default_rng(seed)
+    density = 100.0
+    for walk, flicker in ((0.3, 0.0), (1.0, 0.0), (3.0, 0.0), (10.0, 0.0), (0.0, 0.0), (0.0, 30.0), (3.0, 30.0)):
+        x = made.white(rng, records, SAMPLES, density, RATE) + made.walk(rng, records, SAMPLES, walk, RATE)
+        if flicker:
+            x = x + made.flicker(rng, records, SAMPLES, flicker)
+        found = fit_terms(overlapping(x, RATE))
+        truth = {"Q": 0.0, "N": density / np.sqrt(2.0), "B": flicker, "K": walk, "R": 0.0}
+        print(f"white {density:g} µg/√Hz, K {walk:g} µg/√s, B {flicker:g} µg, one hour at {RATE:g} Hz")
+        for symbol, true in truth.items():
+            place = found.symbols.index(symbol)
+            value, low, high = (part[:, place] for part in (found.value, found.low, found.high))
+            known = np.isfinite(value)
+            zero = int(np.sum(known & (low <= 0.0)))
+            print(
+                made.told(f"  {symbol} identified", int(known.sum()), records)
+                + f"   of these {zero} with an interval from 0"
+            )
+            if known.any():
+                held = known & (low <= true) & (true <= high)
+                print(made.told(f"  {symbol} interval holds the truth", int(held.sum()), int(known.sum())))
+            if not known.all():
+                held = ~known & (true <= high)
+                print(made.told(f"  {symbol} upper limit holds the truth", int(held.sum()), int((~known).sum())))
+
+
+CHECKS = ((35.0, 15.0), (125.0, -160.0), (70.0, 100.0), (160.0, 20.0), (100.0, -60.0), (20.0, -120.0))
+
+
+def verification(records: int, seed: int) -> None:
+    """The RMS error of the verification: its standard deviation between runs, and what is told of it."""
+    rng = np.random.default_rng(seed)
+    for name, world in (
+        ("B 30 µg", {"flicker": 30.0}),
+        ("B 300 µg", {"flicker": 300.0}),
+        ("B 30 µg, K 1 µg/√s", {"flicker": 30.0, "walk": 1.0}),
+    ):
+        shown, told, plain = [], [], []
+        for _ in range(records):
+            dwells = lots.world(
+                rng,
+                units=4,
+                plan="fibonacci",
+                temperatures=(-10.0, 25.0, 60.0),
+                checks=CHECKS,
+                move_s=20,
+                day_s=0,
+                **world,
+            ).dwells
+            found = fit(
+                dwells, lots.NO_HISTORY, ["bias", "scale", "misalignment", "bias_temperature", "scale_temperature"]
+            )
+            tables = (found[name] for name in ("coefficients", "covariance", "predictions"))
+            rows = verify(dwells, lots.NO_HISTORY, *tables)["verification"]
+            for _, own in rows.groupby("unit"):
+                for axis in "xyz":
+                    rms = float(np.sqrt(np.mean(own[f"error_{axis}_ug"] ** 2)))
+                    shown.append(rms)
+                    plain.append(rms / np.sqrt(2.0 * len(own)))
+                    told.append(float(own.get(f"rms_uncertainty_{axis}_ug", pd.Series([np.nan])).iloc[0]))
+        centre, real = float(np.mean(shown)), float(np.std(shown))
+        print(
+            f"{name}: rms error {centre:.1f} µg, between runs {real:.1f}; "
+            f"told rms/√(2n) {np.median(plain):.1f}, covariance {np.median(told):.1f}"
+        )
+        for what, u in (("rms/√(2n)", plain), ("the verification's covariance", told)):
+            held = int(np.sum(np.abs(np.array(shown) - centre) <= 2.0 * np.array(u)))
+            print(made.told(f"  U (k = 2) by {what} holds the mean over runs", held, len(shown)))
+
+
+def bias(records: int, seed: int) -> None:
+    """Six faces at one temperature: what the stated uncertainties of the bias hold."""
+    rng = np.random.default_rng(seed)
+    for name, world in (
+        ("ADXL355: 25 µg/√Hz, B 300 µg", {"flicker": 300.0}),
+        ("25 µg/√Hz, B 30 µg", {"flicker": 30.0}),
+        ("280 µg/√Hz, B 30 µg", {"flicker": 30.0, "density": 280.0}),
+    ):
+        sums: dict[str, int] = {}
+        total, ratio = 0, []
+        for _ in range(records):
+            one = lots.world(rng, units=4, **world)
+            found = fit(one.dwells, lots.NO_HISTORY, ["bias", "scale", "misalignment"])
+            rows = found["coefficients"]
+            rows = rows[rows["effect"] == "bias"].sort_values(["unit", "axis"])
+            value = 1e6 * rows["value"].to_numpy().reshape(-1, 3)
+            stated = {"standard error": 1e6 * rows["standard_error"].to_numpy().reshape(-1, 3)}
+            own = found["wander"].sort_values(["unit", "axis"])
+            stated |= {n: own[n].to_numpy().reshape(-1, 3) for n in ("bias_record_u_ug", "bias_long_u_ug") if n in own}
+            for what, u in stated.items():
+                for whom, truth in (("the record's mean", one.record), ("the day's mean", one.day)):
+                    key = f"  2·{what} holds {whom}"
+                    sums[key] = sums.get(key, 0) + int(np.sum(np.abs(value - truth) <= 2.0 * u))
+            total += value.size
+            ratio.append(np.mean(stated["standard error"]))
+        print(f"six faces, one temperature, 4 units, {name}; standard error {np.mean(ratio):.1f} µg")
+        for key, held in sums.items():
+            print(made.told(key, held, total))
+
+
+def sphere(records: int, seed: int) -> None:
+    """Sphere fit of dwells whose poses are unknown: what twice the stated error of bias and scale holds."""
+    rng = np.random.default_rng(seed)
+    thrice = (25.0, 25.0, 25.0)
+    for name, world in (
+        ("white 280 µg/√Hz", {"density": 280.0, "flicker": 0.0}),
+        ("25 µg/√Hz, B 30 µg", {"flicker": 30.0}),
+        ("25 µg/√Hz, B 30 µg, three rounds half an hour apart", {"flicker": 30.0, "temperatures": thrice}),
+        ("280 µg/√Hz, B 30 µg", {"density": 280.0, "flicker": 30.0}),
+        ("25 µg/√Hz, B 30 µg, K 4 µg/√s", {"flicker": 30.0, "walk": 4.0}),
+        ("25 µg/√Hz, B 30 µg, K 4 µg/√s, three rounds", {"flicker": 30.0, "walk": 4.0, "temperatures": thrice}),
+    ):
+        held = np.zeros(3, dtype=int)
+        for _ in range(records):
+            one = lots.world(rng, units=1, plan="fibonacci", checks=(), move_s=20, **world)
+            rows = one.dwells
+            output, time = rows[["out_x", "out_y", "out_z"]].to_numpy(), rows["time_s"].to_numpy()
+            error = (rows["sd_x"] / np.sqrt(rows["n"])).to_numpy()
+            found = fit_ellipsoid(output, time=time, error=error)
+            wrong = np.abs(1e6 * found.bias - one.record[0])
+            held[0] += int(np.sum(wrong <= 2e6 * np.sqrt(np.diagonal(found.covariance)[:3])))
+            late = np.abs(1e6 * found.bias - one.day[0])
+            u = np.sqrt(np.diagonal(found.covariance)[:3])
+            u = of_a_day(u, np.full(3, float(found.flicker)), time, slowest=4.0, widened=student(found.dof))
+            held[2] += int(np.sum(late <= 2e6 * u))
+            correction = np.linalg.cholesky(np.linalg.inv(one.gain[0] @ one.gain[0].T)).T
+            spread = np.sqrt(np.diagonal(found.covariance)[3:6])
+            held[1] += int(np.sum(np.abs(np.diagonal(found.correction) - np.diagonal(correction)) <= 2.0 * spread))
+        print(f"sphere fit, 24 poses of 10 s every 30 s, one unit, {name}")
+        print(made.told("  2·u holds the bias of the day after", int(held[2]), 3 * records))
+        print(made.told("  2·u holds the record's mean bias", int(held[0]), 3 * records))
+        print(made.told("  2·u holds the inverse of the scale", int(held[1]), 3 * records))
+
+
+def series(records: int, seed: int) -> None:
+    """Series of a level that stands still: change points and control charts that say that it moved; and a step that is there."""
+    rng = np.random.default_rng(seed)
+    kinds = (
+        ("white", 0.0, None),
+        ("ρ = 0.6", 0.6, None),
+        ("Student's t, 3 dof", 0.0, 3.0),
+        ("ρ = 0.6, t 3 dof", 0.6, 3.0),
+    )
+    for n in (40, 100, 250):
+        for name, memory, dof in kinds:
+            made_ = made.autoregressive(rng, records, n, memory, dof=dof)
+            print(
+                made.told(
+                    f"{n} points, {name}: a change at p ≤ 0.001", sum(bool(change_points(v)) for v in made_), records
+                )
+            )
+            for step in (2.0, 4.0):
+                moved = made_ + step * (np.arange(n) >= n // 2)
+                found = sum(any(abs(c.first - n // 2) <= 3 for c in change_points(v)) for v in moved)
+                print(made.told(f"    a step of {step:g} σ half-way is found", found, records))
+    for name, memory, dof in kinds:
+        bad = {0.01: 0, 0.001: 0}
+        for v in made.autoregressive(rng, records, 100, memory, dof=dof):
+            chart = baseline(v, 40)
+            signalled, moving = signals(v, chart)
+            counted = np.arange(v.size) >= 40
+            p = chance(v, 40, 60).p_value(alarms(signalled, moving.outside, counted))
+            for level in bad:
+                bad[level] += int(p < level)
+        for level, count in bad.items():
+            print(made.told(f"control chart, 40 + 60 points, {name}: out of control at p < {level:g}", count, records))
+
+
+def chance(values: np.ndarray, first: int, counted: int) -> FalseAlarms:
+    """What alarms are held against, as the audit takes it."""
+    memory = float(np.ceil(10.0 * memory_of(drawn_in(values))) / 10.0)
+    return false_alarms(values.size, first, counted, memory, float(tail_of(values, memory)))
+
+
+def record(records: int, seed: int) -> None:
+    """Static records in a drifting room, and of coarse digits: what is said with the samples alone, and by the stage."""
+    rng = np.random.default_rng(seed)
+    dwells = lots.world(rng, units=1, temperatures=(0.0, 25.0, 50.0), flicker=0.0, density=1.0, day_s=0).dwells
+    for axis in "xyz":
+        dwells[f"out_{axis}"] += 50e-6 * (dwells["unit_C"] - 25.0)
+    fitted = fit(dwells, lots.NO_HISTORY, ["bias", "scale", "misalignment", "bias_temperature"])
+    tables = fitted["coefficients"], fitted["covariance"]
+    n, seconds = SAMPLES, SAMPLES / RATE
+    for room_k in (0.1, 0.3):
+        slow = {"samples alone": 0, "tempco taken out": 0}
+        for _ in range(records):
+            history, course = lots.room(rng, 1, seconds, room_k)
+            drift = 50.0 * np.interp(np.arange(n) / RATE, np.arange(0.0, seconds + 1.0, 10.0), course - 25.0)
+            values = made.white(rng, 3, n, 25.0, RATE).T + drift[:, None]
+            samples, readings = lots.static_record(1e-6 * values[None], RATE)
+            for name, past in (("samples alone", None), ("tempco taken out", history)):
+                rows = noise([samples], readings, *tables, past)["noise"]
+                slow[name] += int(rows[rows["term"].isin(["B", "K", "R"])].groupby("axis")["identified"].any().sum())
+        for name, count in slow.items():
+            print(
+                made.told(f"room of {room_k:g} K, 50 µg/K, 25 µg/√Hz, {name}: B, K or R identified", count, 3 * records)
+            )
+    for step in (1.0, 1.8, 3.0, 5.0):
+        lsb, plain, told, held, limits = step * 25.0 * np.sqrt(RATE / 2.0), [], [], 0, 0
+        for _ in range(records):
+            values = made.white(rng, 3, n, 25.0, RATE).T + rng.uniform(0.0, lsb, 3)
+            samples, readings = lots.static_record(1e-6 * lsb * np.round(values / lsb)[None], RATE)
+            rows = noise([samples], readings, *tables)["noise"]
+            rows = rows[rows["term"] == "n_d"]
+            plain += [float(np.sqrt(np.mean(np.diff(lsb * np.round(v / lsb)) ** 2) / RATE)) / 25.0 for v in values.T]
+            told += (rows["value"].dropna() / 25.0).tolist()
+            held += int(((rows["low"] <= 25.0) & (rows["high"] >= 25.0)).sum())
+            limits += int((rows["value"].isna() & rows["high"].notna()).sum())
+        low, middle, high = np.quantile(plain, (0.05, 0.5, 0.95))
+        print(f"digit of {step:g} σ: n_d of the samples {low:.2f} … {middle:.2f} … {high:.2f} of the truth; stated "
+              + (f"{np.mean(told):.3f} ± {np.std(told):.3f}" if told else "no value") + f", {limits} limits")  # fmt: skip
+        print(made.told("    interval or limit holds the truth", held, 3 * records))
+
+
+SCENES = {
+    "record": record,
+    "series": series,
+    "sphere": sphere,
+    "terms": terms,
+    "verification": verification,
+    "bias": bias,
+}
+
+
+def main() -> None:
+    """Runs one scene."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("scene", choices=sorted(SCENES))
+    parser.add_argument("--records", type=int, default=100)
+    parser.add_argument("--seed", type=int, default=1_300_501)
+    given = parser.parse_args()
+    SCENES[given.scene](given.records, given.seed)
+
+
+if __name__ == "__main__":
+    main()

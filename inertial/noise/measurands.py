@@ -1,0 +1,68 @@
+"""What a bias is the bias of: the mean of its record, of a longer time, of another switch-on; and how far these lie apart."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+DAY_S = 86_400.0
+"""Window of a unit's long mean, s: the day after the record. Flicker has no mean for ever: a decade more adds B²·ln 10/π."""
+
+_OCTAVE = float(np.log(2.0))
+
+
+def between_means(first: float, second: float, gap: float = 0.0) -> float:
+    """Variance, for flicker with B = 1, of the difference of its means over two windows.
+
+    u² = (1/π)·(2L − ln a − ln b + 3) with L the mean of ln|s − t| over both windows: from the one-sided density B²/(π·f),
+    for which
+    E(x(s) − x(t))² grows as (2/π)·ln|s − t|. What is slower than both does not count, so it needs no lowest frequency.
+
+    Parameters
+    ----------
+    first, second, gap : lengths a and b of the windows and the time between them, s
+    """
+
+    def integral(x: float) -> float:
+        return 0.5 * x * x * float(np.log(x)) - 0.75 * x * x if x > 0.0 else 0.0
+
+    area = integral(gap + first + second) - integral(gap + first) - integral(gap + second) + integral(gap)
+    apart = area / (first * second)
+    return max((2.0 * apart - float(np.log(first)) - float(np.log(second)) + 3.0) / np.pi, 0.0)
+
+
+def instability(deviation: Array, time: Array, *, slowest: float = 1.0) -> Array:
+    """Bias instability B of the flicker that has a standard deviation between dwells; the deviation's shape and unit.
+
+    The flicker of a fit is a sum of Ornstein–Uhlenbeck processes an octave apart, from a third of the spacing of the dwells to
+    ``slowest`` times the record; each has the variance B²·ln 2/π (:func:`inertial.noise.dwells.flicker_of_means`).
+
+    Parameters
+    ----------
+    time : (n,), s, of the dwells
+    """
+    when = np.unique(time)
+    span = float(np.ptp(when))
+    if not span > 0.0:
+        return np.full_like(deviation, np.nan)
+    octaves = max(int(np.ceil(np.log2(3.0 * slowest * span / float(np.median(np.diff(when)))))), 2)
+    return deviation * np.sqrt(np.pi / (octaves * _OCTAVE))
+
+
+def of_a_day(record: Array, wander: Array, time: Array, *, slowest: float = 1.0, widened: float = 1.0) -> Array:
+    """Standard uncertainty of a bias as the mean of the day after its record; the shape and unit of ``record``.
+
+    Flicker between the record and that day is added to the uncertainty of the record's mean. A walk is not carried beyond
+    its record.
+
+    Parameters
+    ----------
+    record : standard error of the bias as the mean of its record; wander : standard deviation of the 1/f wander between dwells
+    time : (n,), s, of the dwells; slowest : as in :func:`instability`
+    widened : factor of the wander's share, as it is known from few degrees of freedom
+    """
+    span = float(np.ptp(time))
+    if not span > 0.0:
+        return np.full_like(record, np.nan)
+    apart = widened * instability(wander, time, slowest=slowest) * np.sqrt(between_means(span, DAY_S))
+    return np.hypot(record, apart)

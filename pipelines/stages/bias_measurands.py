@@ -1,0 +1,39 @@
+"""The bias as three measurands, each with its standard uncertainty: mean of the record, mean of a day, next switch-on."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from inertial.noise.measurands import DAY_S, instability, of_a_day
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    Array = NDArray[np.float64]
+
+COLUMNS = ("bias_instability_ug", "bias_record_u_ug", "bias_long_u_ug", "bias_long_s", "bias_switch_on_u_ug")
+
+
+def bias_measurands(
+    record: Array, wander: Array, time: Array, widened: float, switch_on: float | None = None
+) -> dict[str, Array]:
+    """Standard uncertainties of the bias by measurand, (units, 3) each, by the names of :data:`COLUMNS`.
+
+    ``record``: the mean over the dwells' own time, which is what a fit states. ``long``: the mean over the day after it, for
+    the same
+    coefficient; flicker between the two is added. A walk is not carried beyond its record. ``switch_on``: the mean of a day
+    after the device was switched off and on; not a number where no repeatability of switching on is stated, never zero.
+
+    Parameters
+    ----------
+    record : (units, 3), µg, standard error of the bias; wander : (units, 3), µg, standard deviation of the 1/f wander
+    between dwells
+    time : (n,), s, of the dwells of the fit
+    widened : factor of the wander's share, as it is known from few degrees of freedom
+    switch_on : standard deviation of the bias from one switch-on to the next, µg
+    """
+    found, long = instability(wander, time), of_a_day(record, wander, time, widened=widened)
+    again = np.full_like(record, np.nan) if switch_on is None else np.hypot(long, switch_on)
+    return dict(zip(COLUMNS, (found, record, long, np.full_like(record, DAY_S), again), strict=True))

@@ -1,0 +1,166 @@
+"""The static record of a lot, gathered table by table: its samples, their last digit, and the temperature's known share."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from inertial import design
+from inertial.frames import force_from_angles
+from inertial.noise.resolution import step_of
+from inertial.state import State
+from schemas.units import AXES
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    import pandas as pd
+    from numpy.typing import NDArray
+
+    from pipelines.tables.calibration import Calibration
+
+    Array = NDArray[np.float64]
+
+COUNTED = 1000
+"""Different values of a channel that are counted: an output that takes more has no coarse digits."""
+SMOOTHED_S = 120.0
+"""Time over which the thermometer's readings are averaged: its own noise shall not go through the tempco into the output."""
+FEWEST_READINGS = 5
+
+
+@dataclass
+class Digits:
+    """How often one channel gave each of its values, and the variance of its samples by the differences of neighbours."""
+
+    counts: dict[float, int] = field(default_factory=dict)
+    many: bool = False
+    n: int = 0
+    squares: float = 0.0
+    last: float = float("nan")
+
+    def add(self, values: Array) -> None:
+        """Takes note of samples (n,) that follow those before."""
+        if not values.size:
+            return
+        steps = np.diff(np.concatenate([[self.last], values]) if self.n else values)
+        self.squares += float(np.sum(steps**2))
+        self.n, self.last = self.n + values.size, float(values[-1])
+        if self.many:
+            return
+        for value, count in zip(*np.unique(values, return_counts=True), strict=True):
+            self.counts[float(value)] = self.counts.get(float(value), 0) + int(count)
+        self.many = len(self.counts) > COUNTED
+
+    @property
+    def step(self) -> float:
+        """Step between two digits, unit of the output; zero where none is seen."""
+        return 0.0 if self.many else step_of(np.array(list(self.counts)))
+
+    @property
+    def variance(self) -> float:
+        """Variance of a sample by the differences of neighbours, unit of the output squared."""
+        return 0.5 * self.squares / max(self.n - 1, 1)
+
+    @property
+    def outside(self) -> float:
+        """Share of the samples that are not at the commonest value."""
+        return 1.0 - max(self.counts.values(), default=0) / max(self.n, 1)
+
+
+class Series:
+    """Outputs of the static record, gathered table by table; of a long one the means of ``size`` samples each.
+
+    The Allan deviation of means is that of the samples themselves, from an averaging time of ``size`` samples on.
+    """
+
+    def __init__(self, units: Sequence[str], size: int) -> None:
+        self.size = max(size, 1)
+        self._rest: dict[str, Array] = {unit: np.zeros((0, 3)) for unit in units}
+        self._means: dict[str, list[Array]] = {unit: [] for unit in units}
+        self.digits = {unit: tuple(Digits() for _ in AXES) for unit in units}
+
+    def add(self, samples: pd.DataFrame) -> None:
+        """Takes the samples that follow those before."""
+        output = samples[list(AXES)].to_numpy(dtype=float)
+        for unit, rows in samples.groupby("unit", sort=False).indices.items():
+            if unit in self._rest:
+                joined = np.concatenate((self._rest[str(unit)], output[rows]))
+                whole = len(joined) // self.size * self.size
+                self._means[str(unit)].append(joined[:whole].reshape(-1, self.size, 3).mean(axis=1))
+                self._rest[str(unit)] = joined[whole:]
+                for axis, digits in enumerate(self.digits[str(unit)]):
+                    digits.add(output[rows, axis])
+
+    def of(self, unit: str) -> Array:
+        """Outputs (n, 3) of a unit; none where it was not recorded."""
+        return np.concatenate(self._means[unit] or [np.zeros((0, 3))])
+
+    def values(self) -> Array:
+        """Outputs (units, 3, n), as long as the shortest."""
+        series = [self.of(unit) for unit in self._means]
+        shortest = min(len(one) for one in series)
+        return np.stack([one[:shortest].T for one in series])
+
+
+@dataclass(frozen=True)
+class Warmed:
+    """What the temperature of the static record did to an output, by the tempco of the model.
+
+    change : (n, 3), of the output, its mean taken out; zero where nothing is known
+    span_K : by which the smoothed temperature moved, NaN where it was not read often enough
+    known : whether the model has a tempco
+    """
+
+    change: Array
+    span_K: float
+    known: bool
+
+
+def warmed(
+    calibration: Calibration, unit: str, time: Array, reading: pd.Series, history: pd.DataFrame | None
+) -> Warmed:
+    """The known part of a record that its temperature made.
+
+    The thermometer's readings between the dwells (table ``history``) are averaged over two minutes, put through the model's
+    temperature effects in the pose of the record, and interpolated.
+
+    Parameters
+    ----------
+    time : (n,), s, of the values
+    reading : row of the static record: angles of the table
+    """
+    still = np.zeros((time.size, 3))
+    own = None if history is None or not time.size else _smoothed(history, unit, float(time[0]), float(time[-1]))
+    effects = [e for e in design.split(calibration.effects)[0] if "temperature" in e.id]
+    if own is None:
+        return Warmed(still, float("nan"), bool(effects))
+    when, temperature = own
+    span = float(np.ptp(temperature))
+    if not effects:
+        return Warmed(still, span, known=False)
+    outer, inner = (np.radians(float(reading[name])) for name in ("outer_deg", "inner_deg"))
+    force = np.broadcast_to(force_from_angles(outer, inner), (when.size, 3))
+    if not np.all(np.isfinite(force)):
+        return Warmed(still, span, known=False)
+    columns = design.local_columns(effects, State(force=force, time=when, temperature=temperature), {})
+    place = calibration.units.index(unit)
+    coefficients = np.concatenate([calibration.value(e.id)[place] for e in effects], axis=-1)
+    change = np.einsum("anp,ap->na", columns, coefficients)
+    along = np.stack([np.interp(time, when, part) for part in change.T], axis=1)
+    return Warmed(along - along.mean(axis=0), span, known=True)
+
+
+def _smoothed(history: pd.DataFrame, unit: str, start: float, stop: float) -> tuple[Array, Array] | None:
+    """Times (m,) and averaged temperatures (m,) of a unit during its record; None where it was read too seldom."""
+    rows = history[(history["unit"] == unit) & history["time_s"].between(start - SMOOTHED_S, stop + SMOOTHED_S)]
+    rows = rows[np.isfinite(rows["unit_C"].to_numpy(dtype=float))].sort_values("time_s")
+    time, value = rows["time_s"].to_numpy(dtype=float), rows["unit_C"].to_numpy(dtype=float)
+    during = np.count_nonzero((time >= start) & (time <= stop))
+    if during < FEWEST_READINGS or not np.ptp(time) > 0.0:
+        return None
+    sums = np.concatenate([[0.0], np.cumsum(value)])
+    first = np.searchsorted(time, time - 0.5 * SMOOTHED_S, side="left")
+    last = np.searchsorted(time, time + 0.5 * SMOOTHED_S, side="right")
+    return time, (sums[last] - sums[first]) / (last - first)
