@@ -12,10 +12,12 @@ from typer.testing import CliRunner, Result
 
 from pipelines.archive import Archive, Run, files
 from pipelines.archive.signatures import VARIABLE, make_key
-from pipelines.certificates import Ledger, certify
+from pipelines.certificates import Ledger
 from pipelines.certificates.days import months_after
 from pipelines.certificates.handed_out import library_remarks
-from pipelines.certificates.refusals import allowed_months, measured_on
+from pipelines.certificates.measured import measured_on
+from pipelines.certificates.refusals import allowed_months
+from pipelines.chain import certify as certifying
 from pipelines.chain.certify import certify
 from pipelines.cli import app
 from pipelines.jobs.model_change import wanted
@@ -56,7 +58,7 @@ def test_the_run_is_named_before_it_is_signed(run: Run, typed: Typed, monkeypatc
         raise WrongUse("stopped before anything was written")
 
     with monkeypatch.context() as patch:
-        patch.setattr(certify, "refuse_unsound", refused)
+        patch.setattr(certifying, "refuse_unsound", refused)
         assert f"certify: run {run.id}, measured on {day()}, 3 units: A1, A2, A3" in typed("certify").stderr
     done = typed("certify", "--json")
     assert f"certify: run {run.id}, measured on {day()}" in done.stderr
@@ -118,7 +120,7 @@ def test_two_that_certify_at_the_same_moment_do_not_both_succeed(
     """While one checks its run, the other certifies a run of the same units: the first is told, and writes nothing."""
     (tmp_path / "half.toml").write_text(LIMITS, encoding="utf-8")
     other = run.archive.run(again(run.archive, run.id, wanted(limits=str(tmp_path / "half.toml"))).new)
-    ledger, real, done = Ledger(run.archive), certify.refuse_unsound, []
+    ledger, real, done = Ledger(run.archive), certifying.refuse_unsound, []
 
     def meanwhile(which: Run, keys: object) -> None:
         real(which, keys)
@@ -126,7 +128,7 @@ def test_two_that_certify_at_the_same_moment_do_not_both_succeed(
             done.append(None)
             done[0] = certify(ledger, other, ["A2"]).written
 
-    monkeypatch.setattr(certify, "refuse_unsound", meanwhile)
+    monkeypatch.setattr(certifying, "refuse_unsound", meanwhile)
     with pytest.raises(
         WrongUse, match=r"unit A2: certificate A2/1 of run .* was written by .* while this command was at work"
     ):
@@ -136,7 +138,7 @@ def test_two_that_certify_at_the_same_moment_do_not_both_succeed(
 
 
 def test_the_same_certificate_at_the_same_moment_is_written_once(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
-    ledger, real, done = Ledger(run.archive), certify.refuse_unsound, []
+    ledger, real, done = Ledger(run.archive), certifying.refuse_unsound, []
 
     def meanwhile(which: Run, keys: object) -> None:
         real(which, keys)
@@ -144,7 +146,7 @@ def test_the_same_certificate_at_the_same_moment_is_written_once(run: Run, monke
             done.append(None)
             done[0] = certify(ledger, run)
 
-    monkeypatch.setattr(certify, "refuse_unsound", meanwhile)
+    monkeypatch.setattr(certifying, "refuse_unsound", meanwhile)
     assert {event.certificate for event in certify(ledger, run).there} == {"A1/1", "A2/1", "A3/1"}
     assert len(ledger.events("A1")) == 1
 
