@@ -18,6 +18,13 @@ Array = NDArray[np.float64]
 
 Joined = Literal["mean", "max"]
 
+LARGEST = 1e30
+"""Of any number in a file: its square, and sums of such squares, are still numbers."""
+LARGEST_TIME_S = 1e11
+"""Seconds on a clock: the year 5138 of Unix time."""
+_KELVIN_0_C, _HOTTEST_C = -273.15, 2000.0
+_MANY_TURNS_DEG = 1e6  # an encoder may count on over many turns
+
 
 @dataclass(frozen=True)
 class Quantity:
@@ -39,6 +46,7 @@ class Quantity:
     clock : whether it only grows with time: it is followed by a curve, never by levels
     shown : factor and unit in pictures, where they are not the column's
     joined : how the values of neighbouring dwells become one
+    lowest, highest : where values of the column can lie; anything else in a file is a slip
     usual, spread : a value that a plan may take for granted, and how far it wanders about it on a station
     reading : whether every station reads it beside its records
     """
@@ -61,6 +69,8 @@ class Quantity:
     usual: float = 0.0
     spread: float = 0.0
     reading: bool = False
+    lowest: float = -LARGEST
+    highest: float = LARGEST
 
     def about(self, wander: Array) -> Array:
         """Values about the usual one, for standard normal numbers; in the column's unit."""
@@ -78,22 +88,27 @@ RECORDED: tuple[Quantity, ...] = (
     Quantity(
         "unit_C", "temperature", "°C", "temperature of the unit",
         formula="temperature", meaning="temperature of the sensor, °C", mapped="temperature", usual=25.0, reading=True,
+        lowest=_KELVIN_0_C, highest=_HOTTEST_C,
     ),
     Quantity(
         "chamber_C", "chamber", "°C", "temperature of the chamber",
         formula="chamber", meaning="temperature of the chamber, °C", mapped="chamber", usual=25.0, reading=True,
+        lowest=_KELVIN_0_C, highest=_HOTTEST_C,
     ),
     Quantity(
         "time_s", "time", "s", "time", clock=True, shown=HOURS,
         formula="hours", formula_factor=1.0 / 3600.0, meaning="time since the run began, h", column_meaning="the same, s",
+        lowest=-LARGEST_TIME_S, highest=LARGEST_TIME_S,
     ),
     Quantity(
         "since_move_s", "since_move", "s", "time since the last move",
         formula="since_move", meaning="time since the table last moved, s", usual=2.0, reading=True,
+        lowest=0.0, highest=LARGEST_TIME_S,
     ),
     Quantity(
         "since_power_s", "since_power", "s", "time since power-on", clock=True, shown=HOURS,
         formula="since_power", meaning="time since power-on, s", usual=600.0, reading=True,
+        lowest=0.0, highest=LARGEST_TIME_S,
     ),
     Quantity(
         "supply_V", "supply", "V", "supply",
@@ -102,16 +117,22 @@ RECORDED: tuple[Quantity, ...] = (
     Quantity(
         "vibration_g", "vibration", "g rms", "vibration",
         formula="vibration", meaning="vibration, g rms", mapped="vibration", usual=1e-3, spread=1e-4, reading=True,
+        lowest=0.0,
     ),
     # of runs that switch their devices off and on: it tells apart what a power-on changes, and is no driver by itself
-    Quantity("power_off_s", "power_off", "s", "time without power", driver=False, joined="max"),
+    Quantity(
+        "power_off_s", "power_off", "s", "time without power", driver=False, joined="max",
+        lowest=0.0, highest=LARGEST_TIME_S,
+    ),
     Quantity(
         "outer_deg", "outer", "°", "outer angle", factor=math.pi / 180.0, driver=False, mapped="outer",
+        lowest=-_MANY_TURNS_DEG, highest=_MANY_TURNS_DEG,
     ),
     Quantity(
         "inner_deg", "inner", "°", "inner angle", factor=math.pi / 180.0, driver=False, mapped="inner",
+        lowest=-_MANY_TURNS_DEG, highest=_MANY_TURNS_DEG,
     ),
-    Quantity("slot", "slot", "", "slot", once=True, driver=False),
+    Quantity("slot", "slot", "", "slot", once=True, driver=False, lowest=0.0, highest=2.0**53),
     Quantity("humidity_pct", "", "% RH", "relative humidity", usual=45.0, spread=3.0),
     Quantity("pressure_hPa", "", "hPa", "air pressure", usual=1013.0, spread=3.0),
 )  # fmt: skip

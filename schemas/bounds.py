@@ -13,7 +13,6 @@ LONGEST_RUN_S = 366 * DAY_S
 """All that a recipe asks for."""
 COLDEST_C, HOTTEST_C = -200.0, 400.0
 """Liquid nitrogen to the hottest devices that are sold."""
-ABSOLUTE_ZERO_C = -273.15
 LARGEST_TIME_S = 1e11
 """Seconds on a clock: the year 5138 of Unix time."""
 LARGEST = 1e15

@@ -62,7 +62,11 @@ def shown(value: object, longest: int = LONGEST_QUOTE) -> str:
     except (ValueError, RecursionError):  # integers of thousands of digits, endless nesting
         return f"a {type(value).__name__} too large to show"
     text = "".join(letter if letter.isprintable() else "\N{REPLACEMENT CHARACTER}" for letter in text)
-    return text if len(text) <= longest else f"{text[:longest]}… ({len(text)} characters)"
+    if len(text) <= longest:
+        return text
+    head = longest // 2  # of a path the end tells which file it is
+    count = f" ({len(text)} characters)" if len(text) > 4 * longest else ""
+    return f"{text[:head]}…{text[head - longest :]}{count}"
 
 
 def is_file(path: str | Path) -> bool:

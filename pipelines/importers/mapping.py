@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator
 
-from inertial.quantities import RECORDED
+from inertial.quantities import FORCE_COLUMNS, OUTPUT_COLUMNS, RECORDED, SPREAD_COLUMNS
 from schemas.bounds import FASTEST_HZ, LONGEST_WAIT_S
 from schemas.errors import RecipeInvalid, WrongUse, close_matches, did_you_mean
 from schemas.foreign import shown
@@ -21,19 +21,14 @@ MEANINGS: dict[str, str] = {
     **{row.mapped: row.column for row in RECORDED if row.mapped},
     "n": "n",
     "duration": "duration_s",
-    "sd_x": "sd_x",
-    "sd_y": "sd_y",
-    "sd_z": "sd_z",
-    "force_x": "force_x",
-    "force_y": "force_y",
-    "force_z": "force_z",
+    **{name: name for name in (*SPREAD_COLUMNS, *FORCE_COLUMNS)},
 }
 """Further names of a mapping and the columns that they become."""
 KNOWN = ("time", *NEEDED, "unit", "dwell", *MEANINGS)
 RESERVED = frozenset({
-    *("slot", "record", "kind", "pose", "soak", "time_s", "out_unit", "status", "rate_hz"),
-    *("out_x", "out_y", "out_z", "since_move_s", "since_power_s", "power_off_s"),
+    *("record", "kind", "pose", "soak", "out_unit", "status", "rate_hz", *OUTPUT_COLUMNS),
     *("outer_command_deg", "inner_command_deg", *MEANINGS.values()),
+    *(row.column for row in RECORDED if row.attribute),
 })  # fmt: skip
 """Columns that the tables of an import have with a meaning of their own: no covariate may be called so."""
 SHORTEST_BLOCK_S = 1e-3

@@ -7,30 +7,27 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pandas as pd
 
-from schemas.bounds import ABSOLUTE_ZERO_C, LARGEST_TIME_S
+from inertial.quantities import BY_COLUMN, FORCE_COLUMNS, LARGEST, LARGEST_TIME_S, RECORDED, SPREAD_COLUMNS
 from schemas.errors import DataRejected
 from schemas.foreign import foreign, shown
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-LARGEST = 1e30
-"""Of any number: its square, and sums of such squares, are still numbers."""
 _FORCE_G = 1e4
-_DEGREES = 1e6  # angles may be counted on over many turns
-_HOTTEST_C = 2000.0
-
-NOT_NEGATIVE: tuple[float, float] = (0.0, LARGEST_TIME_S)
+ANGLES = ("outer", "inner")
 BOUNDS: dict[str, tuple[float, float]] = {
-    "time_s": (-LARGEST_TIME_S, LARGEST_TIME_S),
-    **dict.fromkeys(("duration_s", "since_move_s", "since_power_s", "power_off_s"), NOT_NEGATIVE),
-    **dict.fromkeys(("unit_C", "chamber_C"), (ABSOLUTE_ZERO_C, _HOTTEST_C)),
-    **dict.fromkeys(("force_x", "force_y", "force_z"), (-_FORCE_G, _FORCE_G)),
-    **dict.fromkeys(("outer_deg", "inner_deg", "outer_command_deg", "inner_command_deg"), (-_DEGREES, _DEGREES)),
-    **dict.fromkeys(("sd_x", "sd_y", "sd_z", "vibration_g", "full_scale"), (0.0, LARGEST)),
+    **{row.column: (row.lowest, row.highest) for row in RECORDED},
+    **{
+        f"{angle}_command_deg": (BY_COLUMN[f"{angle}_deg"].lowest, BY_COLUMN[f"{angle}_deg"].highest)
+        for angle in ANGLES
+    },
+    "duration_s": (0.0, LARGEST_TIME_S),
+    **dict.fromkeys(FORCE_COLUMNS, (-_FORCE_G, _FORCE_G)),
+    **dict.fromkeys((*SPREAD_COLUMNS, "full_scale"), (0.0, LARGEST)),
     "rate_hz": (1e-9, 1e9),
     "n": (1.0, 2.0**53),
-    **dict.fromkeys(("dwell", "slot", "soak", "record"), (0.0, 2.0**53)),
+    **dict.fromkeys(("dwell", "soak", "record"), (0.0, 2.0**53)),
 }
 """Where values of a column with a meaning can lie, in its unit; other columns lie within ± ``LARGEST``."""
 

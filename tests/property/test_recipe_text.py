@@ -23,6 +23,7 @@ def maybe(strategy):
 
 
 TEXTS = st.text(st.characters(exclude_categories=["Cs"]), max_size=30)
+NAMES = st.text(st.characters(exclude_categories=["Cs"]), min_size=1, max_size=30)
 SERIALS = st.from_regex(r"[A-Za-z0-9][A-Za-z0-9._+-]{0,8}", fullmatch=True)
 FAULTS = st.builds(
     FaultOrder,
@@ -64,7 +65,7 @@ def recipe_files(draw):
     return RecipeFile(
         name=draw(st.from_regex(r"[a-z0-9][a-z0-9._-]{0,12}", fullmatch=True)),
         description=draw(TEXTS),
-        device=draw(TEXTS),
+        device=draw(NAMES),
         local_gravity_m_s2=draw(st.floats(9.71, 9.89)),
         temperatures_C=temperatures,
         soaks=[part.model_copy(update={"temperature_C": t}) for part, t in zip(parts, temperatures, strict=False)],
@@ -78,9 +79,9 @@ def recipe_files(draw):
         zero_output=draw(numbers(-5.0, 5.0)),
         span_min_g=draw(numbers(1.0, 1.4)),
         effects=draw(st.lists(st.sampled_from(EFFECTS), min_size=1, unique=True)),
-        limits=draw(TEXTS),
+        limits=draw(NAMES),
         units=draw(st.lists(SERIALS, max_size=3, unique=True)),
-        seed=draw(st.integers(-(2**60), 2**60)),
+        seed=draw(st.integers(0, 2**60)),
         faults=draw(st.lists(FAULTS, max_size=2)),
         poses=poses,
         verification=verification,
