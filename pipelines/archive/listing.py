@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from pipelines.archive import derived, files
 from pipelines.archive.keys import digest
+from pipelines.archive.run_files import SEALED, names_in, stages_of
 from pipelines.archive.store import ObjectPath
 from schemas.errors import ArchiveUnusable
 
@@ -17,8 +18,6 @@ if TYPE_CHECKING:
 
     from pipelines.archive.run import Run
     from pipelines.archive.store import Place
-
-SEALED = "sealed.json"
 
 
 @dataclass(frozen=True)
@@ -36,7 +35,7 @@ class RunInfo:
 
 def info_of(run: Run) -> RunInfo | None:
     """The line of a run; None for a folder in which none was begun yet."""
-    names = _names(run.path)
+    names = names_in(run.path)
     if "run.json" not in names:
         return None
     about = run.about
@@ -48,18 +47,8 @@ def info_of(run: Run) -> RunInfo | None:
         units=tuple(unit["serial"] for unit in lot.get("units", [])),
         started=about["when"],
         finished="report.html" in names or SEALED in names,  # a re-run is sealed without a report
-        stages=tuple(_sealed_stages(run, names) or stages_of(run, names)),
+        stages=tuple(_sealed_stages(run, names) or stages_of(run.path, names)),
     )
-
-
-def stages_of(run: Run, names: set[str] | None = None) -> list[str]:
-    """The stages that made the run's tables."""
-    names = _names(run.path) if names is None else names
-    tables = sorted(name.removesuffix(".parquet") for name in names if name.endswith(".parquet"))
-    made = (
-        str(files.read_json(run.path / f"{name}.json").get("stage", "")) for name in tables if f"{name}.json" in names
-    )
-    return list(dict.fromkeys(made))
 
 
 def _sealed_stages(run: Run, names: set[str]) -> list[str]:
@@ -70,10 +59,6 @@ def _sealed_stages(run: Run, names: set[str]) -> list[str]:
     there = {name for name in names if name.endswith(".json") and name != SEALED}
     named = {name.rpartition("/")[2] for name in noted["files"] if name.startswith("runs/")}
     return noted.get("stages", []) if there == named else []
-
-
-def _names(folder: Place) -> set[str]:
-    return {place.name for place in folder.iterdir()} if folder.is_dir() else set()
 
 
 FEWEST_NEW = 32  # fewer are read again sooner than they are written

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Protocol
 
 from pipelines.archive import files, hash_chain
-from pipelines.archive.listing import SEALED, stages_of
 from pipelines.archive.parquet import columns_of, encoded, read_table
 from pipelines.archive.provenance import provenance
 from pipelines.archive.records import COMPLETE, PARTS, Records
+from pipelines.archive.run_files import SEALED, stages_of
 from pipelines.archive.signatures import ENTRY
 from schemas.errors import ArchiveUnusable, WrongUse, did_you_mean
 from schemas.version import refuse_newer
@@ -19,16 +19,24 @@ if TYPE_CHECKING:
     import pandas as pd
     import pyarrow as pa
 
-    from pipelines.archive.archive import Archive
     from pipelines.archive.store import Place
 
 START = "run.json"
 
 
+class Rooted(Protocol):
+    """The archive as its runs know it: a place."""
+
+    @property
+    def root(self) -> Place:
+        """Folder or place in an object store."""
+        ...
+
+
 class Run:
     """One run: its tables, their manifests, and what it was started with."""
 
-    def __init__(self, archive: Archive, run_id: str) -> None:
+    def __init__(self, archive: Rooted, run_id: str) -> None:
         self.archive, self.id = archive, run_id
         self.path = archive.root / "runs" / run_id
 
@@ -117,7 +125,7 @@ class Run:
         if before.get("files") == sealed:
             return int(before["entry"])
         entry = hash_chain.append(self.archive.root, "run", sealed, {**provenance(), "run": self.id})
-        files.publish(mark, files.json_bytes({"entry": entry, "files": sealed, "stages": stages_of(self)}))
+        files.publish(mark, files.json_bytes({"entry": entry, "files": sealed, "stages": stages_of(self.path)}))
         return entry
 
     def has_report(self, key: str) -> bool:

@@ -63,7 +63,7 @@ def _manifests(run: Run) -> list[Place]:
 
 
 def _certificates(run: Run, serials: Iterable[str]) -> list[Place]:
-    ledger, root = Ledger(run.archive), run.archive.root
+    ledger, root = Ledger(run.archive.root), run.archive.root
     return [
         root / folder_of(serial) / f"{one.event.sequence:06d}.json"
         for serial in serials

@@ -15,7 +15,6 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from pipelines.certificates.entries import LedgerEntry
-    from pipelines.certificates.ledger import Ledger
     from pipelines.certificates.validity import Calibration
 
 SERIAL = re.compile(r"[A-Za-z0-9][A-Za-z0-9._+-]{0,63}")
@@ -53,24 +52,6 @@ def allowed_months(run: Run) -> int:
     """Longest that a certificate of a run may hold, months: by its limits, else by policy."""
     stated = (run.about.get("limits") or {}).get("validity_months")
     return stated if type(stated) is int and 1 <= stated <= MOST_MONTHS else VALIDITY_MONTHS
-
-
-def refuse_meanwhile(ledger: Ledger, event: LedgerEntry, seen: int) -> None:
-    """Refuse a calibration where another of the unit was written since the ledger was looked at.
-
-    Parameters
-    ----------
-    seen : how many events the unit had then.
-    """
-    known = ledger.calibrations(event.serial)
-    for one in known:
-        again = (one.run, one.start, one.until) == (event.run, event.start, event.until)
-        if one.event.sequence > seen and not again and one.start < event.until and event.start < one.until:
-            raise WrongUse(
-                f"certify: unit {event.serial}: certificate {one.certificate} of run {one.run}, valid from {one.start} until "
-                f"{one.until}, was written by {one.event.who} while this command was at work; nothing was certified: look with "
-                f"'tumbleline show {event.serial}', then give the command again if it is to take its place"
-            )
 
 
 def refuse_serial(serial: str, where: str) -> None:

@@ -59,7 +59,7 @@ def stated(run: Run, serials: Iterable[str]) -> dict[str, Stated]:
     ArchiveUnusable
         One was given for other coefficients than the run has.
     """
-    ledger, out = Ledger(run.archive), dict[str, Stated]()
+    ledger, out = Ledger(run.archive.root), dict[str, Stated]()
     for serial in serials:
         own = [one for one in ledger.calibrations(serial) if one.run == run.id]
         if own:

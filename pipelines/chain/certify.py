@@ -5,13 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
-from pipelines.archive import Run, files
+from pipelines.archive import Archive, Run, files
 from pipelines.archive.locks import alone
 from pipelines.archive.signatures import public_keys
 from pipelines.certificates.days import day_of, months_after, today
 from pipelines.certificates.entries import FOLDER, LedgerEntry
 from pipelines.certificates.measured import END, measured_span
-from pipelines.certificates.refusals import allowed_months, refuse_meanwhile, refuse_period
+from pipelines.certificates.refusals import allowed_months, refuse_period
 from pipelines.integrity import verify
 from pipelines.tables.frames import rows_of
 from schemas.errors import ArchiveUnusable, WrongUse, did_you_mean
@@ -148,12 +148,30 @@ def refuse_unsound(run: Run, keys: Mapping[str, Ed25519PublicKey]) -> None:
     ----------
     keys : public keys that are trusted; where there are any, each file of the run must be signed by one.
     """
-    findings = verify(run.archive, [run.id], keys=keys, demanded=bool(keys)).checked.findings
+    findings = verify(Archive(run.archive.root), [run.id], keys=keys, demanded=bool(keys)).checked.findings
     if findings:
         more = f" (and {len(findings) - 1} more)" if len(findings) > 1 else ""
         raise ArchiveUnusable(
             f"certify: {findings[0].path} {findings[0].message}{more}; not certified, see 'tumbleline verify {run.id}'"
         )
+
+
+def refuse_meanwhile(ledger: Ledger, event: LedgerEntry, seen: int) -> None:
+    """Refuse a calibration where another of the unit was written since the ledger was looked at.
+
+    Parameters
+    ----------
+    seen : how many events the unit had then.
+    """
+    known = ledger.calibrations(event.serial)
+    for one in known:
+        again = (one.run, one.start, one.until) == (event.run, event.start, event.until)
+        if one.event.sequence > seen and not again and one.start < event.until and event.start < one.until:
+            raise WrongUse(
+                f"certify: unit {event.serial}: certificate {one.certificate} of run {one.run}, valid from {one.start} until "
+                f"{one.until}, was written by {one.event.who} while this command was at work; nothing was certified: look with "
+                f"'tumbleline show {event.serial}', then give the command again if it is to take its place"
+            )
 
 
 def refuse_overdue(run: Run) -> None:

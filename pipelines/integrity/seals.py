@@ -72,7 +72,7 @@ def _check_stages(run: Run, content: dict[str, Any], checked: CheckedPart) -> No
     named = {name.rpartition("/")[2] for name in content["files"] if name.startswith("runs/")}
     there = {place.name for place in run.path.glob("*.json") if place.name != MARK}
     try:
-        if named == there and "stages" in content and content["stages"] != stages_of(run):
+        if named == there and "stages" in content and content["stages"] != stages_of(run.path):
             checked.wrong(EDITED, run.path / MARK, "tells other stages than those that made the tables")
     except ArchiveUnusable:  # told where the run is checked
         return

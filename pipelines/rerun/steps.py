@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import pandas as pd
 from pydantic import ValidationError
 
-from pipelines.archive import code_hash
+from pipelines.archive import Archive, code_hash
 from pipelines.archive.signatures import ENTRY
 from pipelines.chain.chain import BY_NAME, RECORDS, STAGES, Tables
 from pipelines.chain.runner import captured_tables
@@ -130,7 +130,7 @@ def _capture_step(run: Run, job: ArchivedJob) -> StageCall:
     more = tuple(name for name in ("events", "soaks") if name in there or "readings" not in there)
 
     def gathered(new: Run) -> Tables:
-        tables = captured_tables(new.archive.capture(job.capture_id))
+        tables = captured_tables(Archive(new.archive.root).capture(job.capture_id))
         return {name: tables[name] for name in (*CAPTURED, *more)}
 
     return StageCall("capture", (RECORDS,), (*CAPTURED, *more), {"capture": job.capture_id}, "", gathered)
