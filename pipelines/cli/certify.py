@@ -11,6 +11,10 @@ from pipelines.cli.options import ArchiveOption, JsonOption, RunArgument, consol
 if TYPE_CHECKING:
     from pipelines.certificates.certify import Certified
 
+PART = "Certificates, trace, audit"
+ORDER = 410
+SUMMARY = "Certify the units of a run that passed, from a first to a last day of validity."
+
 
 def command(
     run: RunArgument = "latest",

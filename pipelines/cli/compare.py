@@ -25,6 +25,10 @@ from pipelines.cli.options import (
 if TYPE_CHECKING:
     import pandas as pd
 
+PART = "Is the model good enough, and what is missing?"
+ORDER = 240
+SUMMARY = "Compare a model with dwells, and with a fresh run of the same units."
+
 POSES = 6
 
 

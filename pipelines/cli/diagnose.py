@@ -25,6 +25,10 @@ if TYPE_CHECKING:
 
     from inertial.criticism.diagnosis import Diagnosis
 
+PART = "Is the model good enough, and what is missing?"
+ORDER = 220
+SUMMARY = "Judge whether a model is adequate, where it fails, and which effect is missing."
+
 
 def command(
     dwells: DwellsArgument,

@@ -12,6 +12,10 @@ from schemas.errors import DONE, PART_FAILED
 if TYPE_CHECKING:
     from pipelines.archive import Archive, Run
 
+PART = "Results"
+ORDER = 320
+SUMMARY = "Show a run, one of its tables, or the calibration of a unit that is valid on a date."
+
 MANY = 40
 
 

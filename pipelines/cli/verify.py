@@ -12,6 +12,10 @@ from schemas.errors import DONE, PART_FAILED
 if TYPE_CHECKING:
     from pipelines.integrity import Report
 
+PART = "Certificates, trace, audit"
+ORDER = 440
+SUMMARY = "Recompute every hash of the archive: find files that were changed, edited or lost."
+
 
 def command(
     runs: Annotated[
