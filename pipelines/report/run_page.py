@@ -10,6 +10,7 @@ from pipelines.capture.interruptions import interruptions
 from pipelines.report.numbers import plain, with_uncertainty
 from pipelines.report.plots import check_plots, lot_plot, model_plots
 from pipelines.report.templates import template
+from pipelines.stages.figures import FIGURES
 from pipelines.tables.frames import rows_of
 
 if TYPE_CHECKING:
@@ -21,20 +22,6 @@ if TYPE_CHECKING:
     from pipelines.certificates.statement import Stated
 
 COVERAGE = 2.0
-TITLES = {
-    "verification_norm_ug": "largest | |a| − g | of a pose not used, mean of its dwells",
-    "verification_dwell_ug": "largest | |a| − g | of a single dwell there",
-    "verification_ratio": "largest error over what the uncertainty allows",
-    "bias_error_ug": "rms error of the worst axis on poses not used",
-    "residual_rms_ug": "rms residual of the fit",
-    "zero_g_offset_mg": "zero-g offset, worst axis",
-    "misalignment_mrad": "misalignment, worst",
-    "bias_temperature_ug_K": "bias over temperature, worst axis",
-    "scale_temperature_ppm_K": "scale over temperature, worst axis",
-    "velocity_random_walk_ug_rtHz": "velocity random walk N, worst axis",
-    "bias_instability_ug": "bias instability B, worst axis",
-    "rate_random_walk_ug_rts": "rate random walk K, worst axis",
-}
 
 
 def render(run: Run, certificates: Mapping[str, Stated] | None = None) -> str:
@@ -102,7 +89,7 @@ def _figure(row: dict[str, Any]) -> dict[str, Any]:
     value, expanded = with_uncertainty(row["value"], row["uncertainty"])
     limited = bool(np.isfinite(row["limit"]))
     return {
-        "title": TITLES.get(row["figure"], row["figure"]),
+        "title": FIGURES[row["figure"]].label if row["figure"] in FIGURES else row["figure"],
         "value": value,
         "uncertainty": expanded,
         "limit": plain(row["limit"]) if limited else "",
