@@ -54,9 +54,9 @@ def grade(evidence: Evidence, limits: Limits, zero_g: float = 0.0) -> dict[str, 
     """
     rule = describe_rule(limits)
     coefficients, places = _coefficients(evidence, zero_g)
-    tables = [
-        ByUnit(t) for t in (evidence.residuals, evidence.verification, evidence.verification_poses, evidence.noise)
-    ]
+    residuals, verification, verification_poses, noise = map(
+        ByUnit, (evidence.residuals, evidence.verification, evidence.verification_poses, evidence.noise)
+    )
     figure_rows: list[dict[str, object]] = []
     grade_rows: list[dict[str, object]] = []
     for verdict in evidence.verdicts.to_dict("records"):
@@ -64,7 +64,13 @@ def grade(evidence: Evidence, limits: Limits, zero_g: float = 0.0) -> dict[str, 
         if verdict["refused"] or coefficients is None:
             grade_rows.append(_grade_row(verdict, "refused", NO_GRADE, str(verdict["reason"])))
             continue
-        own = UnitTables(*(table.of(unit) for table in tables), coefficients.of(places[unit]))
+        own = UnitTables(
+            residuals.of(unit),
+            verification.of(unit),
+            verification_poses.of(unit),
+            noise.of(unit),
+            coefficients.of(places[unit]),
+        )
         figures = list(figures_of(own))
         decisions = [decide(limits, f.name, f.value, f.uncertainty) for f in figures if f.name in limits.figures]
         figure_rows += [_figure_row(unit, figure, decisions) for figure in figures]
