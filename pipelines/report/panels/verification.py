@@ -14,8 +14,7 @@ ORDER = 40
 TITLE = "Verification on poses not used by the fit"
 TEMPLATE = """\
 {{ plot | safe }}
-<p class="note">Blue: mean over the dwells of a pose, which the limit (dashed) applies to; red: a mean beyond the limit. Grey: single dwells, which include the
-wander of the device.</p>
+<p class="note">Blue: mean over the dwells of a pose, to which the limit (dashed) applies; red: beyond it. Grey: single dwells, with the wander of the device.</p>
 """
 
 
