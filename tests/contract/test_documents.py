@@ -14,10 +14,13 @@ from pipelines.cli import COMMANDS, app
 
 KEPT = Path(__file__).resolve().parents[1] / "archives" / "v1.tar.xz"
 BY_HEAD = {head_of(kind): kind for kind in documents()}
+MODEL = (
+    "bias,scale,misalignment,bias_temperature,scale_temperature,bias_temperature_quadratic,scale_temperature_quadratic"
+)
 CASES = {
     "plan --json": ["plan"],
     "station status --json": ["station", "status"],
-    "diagnose --json": ["diagnose", "latest"],
+    "diagnose --json": ["diagnose", "latest", "--effects", MODEL],
     "compare --json": ["compare", "latest", "--fresh", "latest"],
     "history --json": ["history", "{folder}/model.toml", "--dwells", "latest"],
     "list --json": ["list"],
