@@ -35,9 +35,10 @@ from inertial import poses  # noqa: E402
 from pipelines.archive import files, parquet  # noqa: E402
 from pipelines.archive.archive import FORMAT  # noqa: E402
 from pipelines.archive.keys import digest, libraries, stage_key  # noqa: E402
+from pipelines.stages.figures import UNITS  # noqa: E402
 from pipelines.tables.calibration import column_names, unit_texts  # noqa: E402
 from schemas import tables  # noqa: E402
-from schemas.limits import Limits, describe_rule  # noqa: E402
+from schemas.limits import describe_rule, limits_of  # noqa: E402
 from schemas.recipe import Pose, Recipe  # noqa: E402
 from schemas.station import load_station  # noqa: E402
 from stations.plant.device import stream  # noqa: E402
@@ -83,8 +84,9 @@ def write_archive(folder: Path, lots: int, *, years: float = 5.0, seed: int = 1,
     folder.mkdir(parents=True)
     (folder / "archive.json").write_bytes(files.json_bytes({"product": "tumbleline", "format": FORMAT}))
     recipes = {device: recipe_for(device) for device in factory.presets}
-    limits = Limits.model_validate(
-        {"name": "line", "figures": {name: {"max": limit, "unit": unit} for name, (limit, unit) in LIMITS.items()}}
+    limits = limits_of(
+        {"name": "line", "figures": {name: {"max": limit, "unit": unit} for name, (limit, unit) in LIMITS.items()}},
+        UNITS,
     )
     station = load_station().model_dump(mode="json")
     _context.update(

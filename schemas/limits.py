@@ -14,6 +14,7 @@ from pydantic import (
     Field,
     SerializerFunctionWrapHandler,
     ValidationError,
+    ValidationInfo,
     field_validator,
     model_serializer,
     model_validator,
@@ -32,21 +33,6 @@ MOST_MONTHS = 120
 
 Rule = Literal["guarded_acceptance", "simple_acceptance"]
 Outcome = Literal["pass", "conditional pass", "conditional fail", "fail"]
-
-FIGURES: Mapping[str, str] = {
-    "verification_norm_ug": "µg",
-    "verification_dwell_ug": "µg",
-    "verification_ratio": "1",
-    "bias_error_ug": "µg",
-    "residual_rms_ug": "µg",
-    "zero_g_offset_mg": "mg",
-    "misalignment_mrad": "mrad",
-    "bias_temperature_ug_K": "µg/K",
-    "scale_temperature_ppm_K": "ppm/K",
-    "velocity_random_walk_ug_rtHz": "µg/√Hz",
-    "bias_instability_ug": "µg",
-    "rate_random_walk_ug_rts": "µg/√s",
-}
 
 # The notes give the grades by the bias that is left: consumer to 1000 µg, industrial to 200 µg, navigation under 50 µg.
 GRADES: Mapping[str, float] = {
@@ -92,21 +78,30 @@ class Limits(Strict):
 
     @field_validator("figures")
     @classmethod
-    def _known(cls, figures: dict[str, Limit]) -> dict[str, Limit]:
+    def _known(cls, figures: dict[str, Limit], info: ValidationInfo) -> dict[str, Limit]:
+        units = _units(info)
         for name in figures:
-            if name not in FIGURES:
-                raise ValueError(f"unknown figure '{name}'; {did_you_mean(name, FIGURES)}")
+            if name not in units:
+                raise ValueError(f"unknown figure '{name}'; {did_you_mean(name, units)}")
         return figures
 
     @model_validator(mode="after")
-    def _units_agree(self) -> Limits:
+    def _units_agree(self, info: ValidationInfo) -> Limits:
+        units = _units(info)
         for name, limit in self.figures.items():
-            if limit.unit != FIGURES[name]:
+            if limit.unit != units[name]:
                 raise ValueError(
-                    f"figures.{name}: the limit is in {limit.unit}, the figure is in {FIGURES[name]}; "
-                    f"give the limit in {FIGURES[name]}"
+                    f"figures.{name}: the limit is in {limit.unit}, the figure is in {units[name]}; "
+                    f"give the limit in {units[name]}"
                 )
         return self
+
+
+def _units(info: ValidationInfo) -> Mapping[str, str]:
+    """The known figures with their units, which the caller hands in: this room does not compute figures."""
+    if info.context is None:
+        raise TypeError("limits are checked against the known figures; make them by limits_of or parse_limits")
+    return info.context
 
 
 @dataclass(frozen=True)
@@ -158,7 +153,7 @@ def decide(limits: Limits, figure: str, value: float, standard_uncertainty: floa
         value=value,
         uncertainty=expanded,
         limit=limit,
-        unit=FIGURES[figure],
+        unit=limits.figures[figure].unit,
         rule=describe_rule(limits),
         outcome=_outcome(limits.rule, abs(value), limit, expanded),
     )
@@ -188,10 +183,25 @@ def grade_of(value_ug: float, expanded_ug: float, rule: Rule) -> str | None:
     return None
 
 
-def parse_limits(text: str, source: str) -> Limits:
-    """The limits of a file, or :class:`RecipeInvalid` naming the key and what is needed."""
+def limits_of(document: Mapping[str, Any], units: Mapping[str, str]) -> Limits:
+    """The limits of a document that was checked when it was archived.
+
+    Parameters
+    ----------
+    units : unit of every known figure, by name.
+    """
+    return Limits.model_validate(document, context=units)
+
+
+def parse_limits(text: str, source: str, units: Mapping[str, str]) -> Limits:
+    """The limits of a file, or :class:`RecipeInvalid` naming the key and what is needed.
+
+    Parameters
+    ----------
+    units : unit of every known figure, by name.
+    """
     try:
-        return Limits.model_validate(parse_toml(text, source))
+        return limits_of(parse_toml(text, source), units)
     except ValidationError as problem:
         raise explain(problem, source, Limits) from None
 

@@ -64,8 +64,8 @@ def libraries() -> dict[str, str]:
 
 OWN = ("inertial", "schemas", "stations", "pipelines")
 
-DISCOVERED = {"inertial.effects": "tumbleline.effects"}
-"""Packages whose modules are found and not named, with the entry points under which others add to them."""
+DISCOVERED = {"inertial.effects": "tumbleline.effects", "pipelines.stages.figures": ""}
+"""Packages whose modules are found and not named, with the entry points under which others add to them, if any."""
 
 
 def sources(modules: Sequence[str]) -> dict[str, Path]:
@@ -86,7 +86,7 @@ def sources(modules: Sequence[str]) -> dict[str, Path]:
         left += _imports(module, path)
         if module in DISCOVERED:
             left += _with_below(module)
-            found |= _added(DISCOVERED[module])
+            found |= _added(DISCOVERED[module]) if DISCOVERED[module] else {}
     return dict(sorted(found.items()))
 
 

@@ -14,6 +14,10 @@ if TYPE_CHECKING:
     from pipelines.audit.audit import Audit, Scope
     from pipelines.audit.finding import AuditFinding
 
+PART = "Certificates, trace, audit"
+ORDER = 450
+SUMMARY = "Audit the archive: drift, calibrations due, stations that changed, the population."
+
 SHOWN = 12  # findings of one kind
 
 

@@ -20,6 +20,10 @@ if TYPE_CHECKING:
     from pipelines.archive import Run
     from pipelines.chain.certify import Certified
 
+PART = "Certificates, trace, audit"
+ORDER = 410
+SUMMARY = "Certify the units of a run that passed, from a first to a last day of validity."
+
 
 def command(
     run: RunArgument = "latest",

@@ -25,6 +25,10 @@ from pipelines.cli.options import (
 if TYPE_CHECKING:
     import pandas as pd
 
+PART = "Is the model good enough, and what is missing?"
+ORDER = 240
+SUMMARY = "Compare a model with dwells, and with a fresh run of the same units."
+
 POSES = 6
 
 
@@ -61,12 +65,12 @@ def compared(
     fresh: pd.DataFrame | None,
     fresh_history: pd.DataFrame | None,
 ) -> dict[str, Any]:
-    """The comparison, worked out on one thread: the matrices are small."""
+    """The comparison, computed on one thread: the matrices are small."""
     from threadpoolctl import threadpool_limits
 
-    from pipelines.diagnosis.diagnose import compare
-
     with threadpool_limits(1), error_console().status("fitting"):
+        from pipelines.diagnosis.diagnose import compare  # loads scipy.stats: after the first line
+
         return compare(dwells, effects, history, fresh, fresh_history)
 
 

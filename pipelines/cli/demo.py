@@ -17,6 +17,10 @@ if TYPE_CHECKING:
     from pipelines.demo.scenes import Scene
     from schemas.progress import Progress
 
+PART = "Is the model good enough, and what is missing?"
+ORDER = 210
+SUMMARY = "Hide an effect in the simulated station, find it, add it and see the error fall."
+
 
 def command(
     effect: Annotated[

@@ -25,6 +25,10 @@ if TYPE_CHECKING:
 
     from inertial.criticism.diagnosis import Diagnosis
 
+PART = "Is the model good enough, and what is missing?"
+ORDER = 220
+SUMMARY = "Judge whether a model is adequate, where it fails, and which effect is missing."
+
 
 def command(
     dwells: DwellsArgument,
@@ -69,9 +73,13 @@ def diagnosed(
     """The document of a diagnosis, and its report where one is wanted."""
     from threadpoolctl import threadpool_limits
 
-    from pipelines.diagnosis.diagnose import default_model, document, examined
+    with threadpool_limits(1), error_console().status("looking for missing effects"):
+        from pipelines.diagnosis.diagnose import (
+            default_model,
+            document,
+            examined,
+        )  # loads scipy.stats: after the first line
 
-    with threadpool_limits(1), error_console().status("looking for what is missing"):
         effects = judged or default_model(table)
         found, faults, diagnosis = examined(table, history, effects)
     told = {**document(found, faults, diagnosis), **_extras(found.units, effects, diagnosis)}

@@ -12,6 +12,10 @@ from pipelines.cli.options import STYLES, ArchiveOption, JsonOption, console, pr
 if TYPE_CHECKING:
     from rich.text import Text
 
+PART = "Old data, new models"
+ORDER = 530
+SUMMARY = "Show what differs between two runs, by how much, and the cause."
+
 SHOWN = 12
 
 

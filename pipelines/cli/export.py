@@ -10,6 +10,10 @@ import typer
 
 from pipelines.cli.options import ArchiveOption, JsonOption, RunArgument, error_console
 
+PART = "Results"
+ORDER = 340
+SUMMARY = "Write coefficients for firmware and autopilots."
+
 _FOLDER = Path(__file__).parent.parent / "export" / "formats"
 _NAMES = ", ".join(found.name for found in iter_modules([str(_FOLDER)]))  # their names, without importing them
 

@@ -10,6 +10,10 @@ import typer
 from pipelines.cli.options import EffectFileOption, JsonOption, console, print_json
 from schemas.errors import WrongUse
 
+PART = "Is the model good enough, and what is missing?"
+ORDER = 230
+SUMMARY = "Write the next version of a model with one more effect."
+
 
 def command(
     model: Annotated[

@@ -15,6 +15,10 @@ from pipelines.cli.options import (
     print_json,
 )
 
+PART = "Old data, new models"
+ORDER = 510
+SUMMARY = "Fit archived data again, with another model or other limits."
+
 
 def command(
     run: RunArgument = "latest",

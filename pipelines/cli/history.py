@@ -21,6 +21,10 @@ from pipelines.cli.options import (
     short,
 )
 
+PART = "Is the model good enough, and what is missing?"
+ORDER = 250
+SUMMARY = "Show the error of a model, version by version."
+
 
 def command(
     model: Annotated[Path, typer.Argument(metavar="MODEL", help="A model file.")],

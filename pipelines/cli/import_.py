@@ -14,6 +14,10 @@ from schemas.foreign import shown
 if TYPE_CHECKING:
     from pipelines.importers.mapping import Mapping
 
+PART = "Measure"
+ORDER = 160
+SUMMARY = "Import recordings of other systems into the archive."
+
 METHODS = ("norm", "faces", "temperature")
 VERDICTS = {
     True: ("adequate", "bold green"),

@@ -32,6 +32,10 @@ if TYPE_CHECKING:
     from pipelines.inquiry.loop import Approval, Consent, Participants, Settings
     from pipelines.jobs.job import Request
 
+PART = "Measure"
+ORDER = 130
+SUMMARY = "Measure a lot, then measure only what separates the effects that may be missing."
+
 SETTLED = frozenset({"adequate", "told_apart"})
 
 

@@ -9,6 +9,10 @@ import typer
 
 from pipelines.cli.options import ArchiveOption, JsonOption, console, print_json
 
+PART = "Certificates, trace, audit"
+ORDER = 430
+SUMMARY = "Show the origin of certificates, tables and samples, and what was made of them."
+
 
 def command(
     target: Annotated[

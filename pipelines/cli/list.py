@@ -6,6 +6,10 @@ from dataclasses import asdict
 
 from pipelines.cli.options import ArchiveOption, JsonOption, console, print_json, print_table
 
+PART = "Results"
+ORDER = 310
+SUMMARY = "List the runs of the archive."
+
 
 def command(archive: ArchiveOption = None, *, as_json: JsonOption = False) -> None:
     """List the runs of the archive, the one started first first."""

@@ -12,6 +12,10 @@ if TYPE_CHECKING:
     from pipelines.chain.attendance import Answer
     from pipelines.flows.operator import Waiting
 
+PART = "Measure"
+ORDER = 140
+SUMMARY = "Answer the questions of runs that wait for an operator."
+
 
 def command(
     run: Annotated[

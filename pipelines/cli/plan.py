@@ -27,6 +27,10 @@ if TYPE_CHECKING:
     from pipelines.planning.plan import PlanContext
     from schemas.recipe import Recipe
 
+PART = "Measure"
+ORDER = 120
+SUMMARY = "Show what a recipe can and cannot determine, before anything is measured."
+
 RECIPE = "recipe"
 MICRO = 1e-6
 

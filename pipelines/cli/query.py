@@ -11,6 +11,10 @@ import typer
 from pipelines.cli.options import ArchiveOption, JsonOption, console, print_json, print_table, short
 from schemas.errors import WrongUse
 
+PART = "Results"
+ORDER = 350
+SUMMARY = "Query the archive in SQL."
+
 MANY = 100
 
 

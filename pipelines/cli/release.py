@@ -14,6 +14,10 @@ if TYPE_CHECKING:
     from pipelines.archive import Archive
     from pipelines.jobs.releases import Release
 
+PART = "Old data, new models"
+ORDER = 550
+SUMMARY = "Release a model to the line from a date, or list the releases."
+
 
 def command(
     model: Annotated[Path | None, typer.Argument(metavar="[MODEL]", help="A model file.")] = None,

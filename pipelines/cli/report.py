@@ -6,6 +6,10 @@ import typer
 
 from pipelines.cli.options import ArchiveOption, JsonOption, RunArgument, print_json
 
+PART = "Results"
+ORDER = 330
+SUMMARY = "Print the path of a run's report; write the report if it is missing."
+
 
 def command(run: RunArgument = "latest", archive: ArchiveOption = None, *, as_json: JsonOption = False) -> None:
     """Say where a run's report is; make it again where it is missing or the run's tables are newer."""

@@ -31,6 +31,10 @@ if TYPE_CHECKING:
     from pipelines.rerun.reproduce import Reproduction
     from pipelines.rerun.rerun import Outcome
 
+PART = "Old data, new models"
+ORDER = 520
+SUMMARY = "Run archived runs through today's code, another model or other limits."
+
 SHOWN = 40
 
 

@@ -8,6 +8,10 @@ import typer
 
 from pipelines.cli.options import ArchiveOption, JsonOption, console, print_json
 
+PART = "Certificates, trace, audit"
+ORDER = 420
+SUMMARY = "Revoke the calibration of a unit, with the reason."
+
 
 def command(
     serial: Annotated[str, typer.Argument(metavar="SERIAL", help="The unit.")],

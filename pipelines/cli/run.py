@@ -27,6 +27,10 @@ if TYPE_CHECKING:
     from pipelines.jobs.job import Job, Request
     from schemas.progress import Progress
 
+PART = "Measure"
+ORDER = 110
+SUMMARY = "Measure and calibrate a lot, from recipe to report: the main job."
+
 
 def command(
     recipe: RecipeArgument = "production",

@@ -23,6 +23,10 @@ if TYPE_CHECKING:
 
     from pipelines.archive import Archive, Run
 
+PART = "Results"
+ORDER = 320
+SUMMARY = "Show a run, one of its tables, or the calibration of a unit that is valid on a date."
+
 MANY = 40
 
 

@@ -18,6 +18,10 @@ if TYPE_CHECKING:
     from schemas.profile import Profile
     from stations.serving import Served
 
+PART = "Measure"
+ORDER = 150
+SUMMARY = "Show, check, serve and describe stations."
+
 SHORT = {"read": "r", "write": "w", "read_write": "rw"}
 
 app = typer.Typer(

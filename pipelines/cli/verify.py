@@ -14,6 +14,10 @@ SHOWN = 8  # consequences of one finding
 if TYPE_CHECKING:
     from pipelines.integrity import Report
 
+PART = "Certificates, trace, audit"
+ORDER = 440
+SUMMARY = "Recompute every hash of the archive: find files that were changed, edited or lost."
+
 
 def command(
     runs: Annotated[

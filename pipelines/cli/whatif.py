@@ -26,6 +26,10 @@ if TYPE_CHECKING:
     from pipelines.jobs.model_change import ModelChange
     from pipelines.rerun.lot_comparison import Fresh, LotComparison
 
+PART = "Old data, new models"
+ORDER = 540
+SUMMARY = "Show the effect of a model on the archive's lots before it is released."
+
 SHOWN = 12
 
 

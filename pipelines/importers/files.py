@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from pipelines.importers import matlab, parquet
+from pipelines.importers import parquet
 from pipelines.importers.unpacking import gunzipped
 from schemas.errors import DataRejected, WrongUse
 from schemas.foreign import foreign, shown
@@ -52,6 +52,8 @@ def read(path: Path) -> tuple[pd.DataFrame, SourceFile]:
     if data.startswith(_PARQUET):
         form, table = "parquet", parquet.table_of(path.name, data)
     elif data.startswith(b"MATLAB 5.0"):
+        from pipelines.importers import matlab  # scipy.io takes a third of a second
+
         form, table = "matlab", matlab.table_of(path.name, data)
     elif data.startswith(_ZIP):
         raise DataRejected(

@@ -11,11 +11,12 @@ from pipelines.archive.keys import digest
 from pipelines.jobs.model_files import read_model, refuse_unknown_effects, use_formulas
 from pipelines.jobs.recipes import MAIN_JOB, load_limits, load_recipe, lot_of, units_of
 from pipelines.schedule.planned_state import refuse_unidentified
+from pipelines.stages.figures import UNITS
 from pipelines.stages.grade import refuse_limits_without_figures
 from pipelines.tables.dwell_table import covariates
 from schemas.errors import RecipeInvalid, WrongUse
 from schemas.fault import parse_fault
-from schemas.limits import Limits
+from schemas.limits import Limits, limits_of
 from schemas.recipe import Lot, Recipe
 from schemas.station import StationConfig, load_station, with_faults
 from stations.profile_files import recorded_columns
@@ -167,7 +168,7 @@ def job_of_run(run: Run, *, effects: Sequence[str] = (), model: Path | None = No
         use_formulas(recipe.formulas, f"run {run.id}")
         refuse_unknown_effects(effects, "fit")
         recipe = recipe.model_copy(update={"effects": list(effects)})
-    chosen = Limits.model_validate(about["limits"])
+    chosen = limits_of(about["limits"], UNITS)
     if limits:
         recipe = recipe.model_copy(update={"limits": limits})
         chosen = load_limits(recipe)

@@ -94,13 +94,15 @@ def load_limits(recipe: Recipe, folder: Path | None = None) -> Limits:
 
 def read_limits(name: str, folder: Path | None = None) -> Limits:
     """The limits of a file in a folder or anywhere, or the built-in ones of this name."""
+    from pipelines.stages.figures import UNITS
+
     for path in ((folder or Path()) / name, Path(name)):
         if is_file(path):
-            return parse_limits(read_text(path, "limits"), f"limits {path.name}")
+            return parse_limits(read_text(path, "limits"), f"limits {path.name}", UNITS)
     built_in = files("schemas") / "samples" / f"limits-{name}.toml"
     if name not in sample_names("limits-"):
         raise unknown_limits(name, sample_names("limits-"))
-    return parse_limits(built_in.read_text(encoding="utf-8"), f"limits {name}")
+    return parse_limits(built_in.read_text(encoding="utf-8"), f"limits {name}", UNITS)
 
 
 def lot_of(

@@ -1,39 +1,20 @@
-"""The page: what the template needs, in words and rounded numbers."""
+"""The report of a run: one page composed of the panels that are found."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
-import numpy as np
-
-from pipelines.capture.interruptions import interruptions
-from pipelines.report.numbers import plain, with_uncertainty
-from pipelines.report.plots import check_plots, lot_plot, model_plots
+from pipelines.report.context import ReportContext
+from pipelines.report.panel import rendered
 from pipelines.report.templates import template
-from pipelines.tables.frames import rows_of
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    import pandas as pd
-
     from pipelines.archive import Run
     from pipelines.certificates.statement import Stated
 
-TITLES = {
-    "verification_norm_ug": "largest | |a| − g | of a pose not used, mean of its dwells",
-    "verification_dwell_ug": "largest | |a| − g | of a single dwell there",
-    "verification_ratio": "largest error over what the uncertainty allows",
-    "bias_error_ug": "rms error of the worst axis on poses not used",
-    "residual_rms_ug": "rms residual of the fit",
-    "zero_g_offset_mg": "zero-g offset, worst axis",
-    "misalignment_mrad": "misalignment, worst",
-    "bias_temperature_ug_K": "bias over temperature, worst axis",
-    "scale_temperature_ppm_K": "scale over temperature, worst axis",
-    "velocity_random_walk_ug_rtHz": "velocity random walk N, worst axis",
-    "bias_instability_ug": "bias instability B, worst axis",
-    "rate_random_walk_ug_rts": "rate random walk K, worst axis",
-}
+PANELS = "pipelines.report.panels"
 
 
 def render(run: Run, certificates: Mapping[str, Stated] | None = None) -> str:
@@ -41,156 +22,7 @@ def render(run: Run, certificates: Mapping[str, Stated] | None = None) -> str:
 
     Parameters
     ----------
-    certificates : of its units, as the ledger has them now
+    certificates : of the run's units, as they are in the ledger now.
     """
-    tables = {name: run.table(name) for name in ("verdicts", "dwells", "coefficients", "residuals", "verification")}
-    tables |= {name: run.table(name) for name in ("verification_poses", "allan", "noise", "figures", "grades")}
-    tables |= {name: run.table(name) for name in ("wander",) if name in run.tables()}
-    grades = tables["grades"].sort_values("slot")
-    limit = _limit(run, "verification_norm_ug")
-    known, coverage = certificates or {}, float(run.about["limits"]["coverage_factor"])
-    units: list[dict[str, Any]] = [
-        {**_unit(row, tables, coverage), "certificate": known.get(str(row["unit"]))} for row in rows_of(grades)
-    ]
-    calibrated = [unit["unit"] for unit in units if unit["outcome"] != "refused"]
-    return template("page.html").render(
-        run=run.id,
-        about=run.about,
-        recipe=run.about["recipe"],
-        rule=str(grades["rule"].iloc[0]),
-        coverage=f"{coverage:g}",
-        units=units,
-        passed=sum(unit["outcome"] == "pass" for unit in units),
-        lot_svg=_lot_svg(tables, calibrated, limit),
-        verification_poses=len({pose["name"] for pose in run.about["recipe"]["verification"]}),
-        interruptions=interruptions(run),
-        provenance=_provenance(run),
-    )
-
-
-def _lot_svg(tables: dict[str, pd.DataFrame], units: list[str], limit: float) -> str:
-    if not len(tables["verification"]):
-        return ""
-    return lot_plot(tables["verification"], tables["verification_poses"], units, limit)
-
-
-def _limit(run: Run, figure: str) -> float:
-    return float(run.about["limits"]["figures"].get(figure, {}).get("max", np.nan))
-
-
-def _unit(row: dict[str, Any], tables: dict[str, pd.DataFrame], coverage: float) -> dict[str, Any]:
-    """What the page says of one unit; a refused one has its reasons and nothing else."""
-    unit = str(row["unit"])
-    own = {name: table[table["unit"] == unit] for name, table in tables.items()}
-    shown = {**row, "reasons": [part for part in str(row["reasons"]).split("; ") if part]}
-    if row["outcome"] == "refused":
-        return {**shown, "figures": [], "short": {}, "coefficients": [], "noise": [], "plots": []}
-    fitted = own["dwells"][own["dwells"]["kind"] == "dwell"]
-    return {
-        **shown,
-        "figures": [_figure(f) for f in rows_of(own["figures"])],
-        "short": {f["figure"]: plain(f["value"]) for f in rows_of(own["figures"])},
-        "coefficients": _coefficients(own["coefficients"], coverage),
-        "bias": _bias(own.get("wander"), coverage),
-        "noise": _noise(own["noise"]),
-        "notes": list(dict.fromkeys(_notes(own["noise"]))),
-        "plots": [
-            model_plots(fitted, own["residuals"]),
-            check_plots(own["residuals"], own["verification"], own["allan"]),
-        ],
-    }
-
-
-def _figure(row: dict[str, Any]) -> dict[str, Any]:
-    value, expanded = with_uncertainty(row["value"], row["uncertainty"])
-    limited = bool(np.isfinite(row["limit"]))
-    return {
-        "title": TITLES.get(row["figure"], row["figure"]),
-        "value": value,
-        "uncertainty": expanded,
-        "limit": plain(row["limit"]) if limited else "",
-        "margin": plain(row["limit"] - abs(row["value"])) if limited else "",
-        "unit": "" if row["unit_text"] == "1" else row["unit_text"],
-        "outcome": row["outcome"] if limited else "",
-    }
-
-
-def _coefficients(rows: pd.DataFrame, coverage: float) -> list[dict[str, Any]]:
-    """One line per coefficient with its three axes side by side."""
-    lines: dict[tuple[str, int], dict[str, Any]] = {}
-    seen: dict[tuple[str, str], int] = {}
-    for row in rows_of(rows):
-        place = seen.get((row["effect"], row["axis"]), 0)
-        seen[row["effect"], row["axis"]] = place + 1
-        line = lines.setdefault(
-            (row["effect"], place), {"effect": row["effect"], "unit": row["unit_text"], "cells": {}}
-        )
-        value, expanded = with_uncertainty(row["value"], coverage * row["standard_error"])
-        line["cells"][row["axis"]] = {"name": row["name"], "value": value, "uncertainty": expanded}
-    return list(lines.values())
-
-
-def _bias(rows: pd.DataFrame | None, coverage: float) -> list[dict[str, Any]]:
-    """U of the bias by measurand, one line each; none for runs of before, and for models without a bias."""
-    if rows is None or "bias_record_u_ug" not in rows or not np.isfinite(rows["bias_record_u_ug"]).all():
-        return []
-    own = {row["axis"]: row for row in rows_of(rows)}
-    names = {
-        "bias_record_u_ug": "mean of the record",
-        "bias_long_u_ug": "mean of the day after the record",
-        "bias_switch_on_u_ug": "mean of a day after the next switch-on",
-    }
-    return [
-        {
-            "name": name,
-            "cells": {axis: plain(coverage * own[axis][key]) or "not stated" for axis in "xyz"},
-        }
-        for key, name in names.items()
-    ]
-
-
-def _notes(rows: pd.DataFrame) -> list[str]:
-    """What is said of a unit's record besides its terms, with the axis."""
-    if "note" not in rows:
-        return []
-    return [f"{row['axis']}: {row['note']}" for row in rows_of(rows) if str(row["note"]) not in {"", "nan"}]
-
-
-def _noise(rows: pd.DataFrame) -> list[dict[str, Any]]:
-    names = {
-        "N": "N, velocity random walk (two-sided, IEEE 952)",
-        "n_d": "n_d = N·√2, noise density (one-sided, data sheets)",
-        "B": "B, bias instability",
-        "K": "K, rate random walk",
-        "Q": "Q, quantisation",
-        "R": "R, ramp",
-    }
-    lines = []
-    for term, name in names.items():
-        own = rows[rows["term"] == term]
-        if own.empty:
-            continue
-        cells = {row["axis"]: _noise_cell(row) for row in rows_of(own)}
-        lines.append({"name": name, "unit": own["unit_text"].iloc[0], "cells": cells})
-    return lines
-
-
-def _noise_cell(row: dict[str, Any]) -> str:
-    if not row["identified"] and not np.isfinite(row["high"]):
-        return "–"
-    if not row["identified"]:
-        return f"≤ {plain(row['high'])}"
-    return f"{plain(row['value'])} ({plain(row['low'])} … {plain(row['high'])})"
-
-
-def _provenance(run: Run) -> list[tuple[str, str]]:
-    about = run.about
-    stages = {run.manifest(name)["stage"]: run.manifest(name)["code"][:12] for name in run.tables()}
-    return [
-        ("run", run.id),
-        ("capture", str(about.get("capture"))),
-        ("started", f"{about['when'][:19].replace('T', ' ')} UTC by {about['who']} on {about['where']}"),
-        ("station", f"{about['station']['name']} ({about['station']['kind']})"),
-        ("libraries", ", ".join(f"{name} {version}" for name, version in about["libraries"].items())),
-        ("code", ", ".join(f"{stage} {code}" for stage, code in stages.items() if code)),
-    ]
+    panels = rendered(PANELS, ReportContext(run, certificates or {}))
+    return template("page.html").render(run=run.id, panels=panels)

@@ -115,7 +115,8 @@ def _of_column(name: str, before: pd.Series, after: pd.Series) -> str:
         if not other.any():
             return ""
         size = np.abs(b - a)[other]
-        relative = size / np.maximum(np.abs(a[other]), np.finfo(float).tiny)
+        with np.errstate(over="ignore"):  # infinite where the value was zero
+            relative = size / np.maximum(np.abs(a[other]), np.finfo(float).tiny)
         return f"{name} in {int(other.sum())} of {len(a)} rows, by at most {size.max():.2g} ({relative.max():.1g} relative)"
     other = before.astype(str).to_numpy() != after.astype(str).to_numpy()
     return f"{name} in {int(other.sum())} of {len(before)} rows" if other.any() else ""

@@ -15,12 +15,13 @@ from pipelines.chain.runner import captured_tables
 from pipelines.diagnosis.diagnose import default_model
 from pipelines.jobs.job import Job
 from pipelines.jobs.model_files import refuse_unknown_effects, use_formulas
+from pipelines.stages.figures import UNITS
 from pipelines.stages.fit import fit
 from pipelines.stages.grade import Evidence, grade, refuse_limits_without_figures
 from pipelines.stages.verify import verify
 from pipelines.tables.frames import empty_table
 from schemas.errors import DataRejected
-from schemas.limits import Limits
+from schemas.limits import Limits, limits_of
 from schemas.recipe import FormulaSpec, Lot, Recipe, explain
 from schemas.station import StationConfig
 
@@ -87,7 +88,7 @@ def archived_job(run: Run, wanted: ModelChange) -> ArchivedJob:
     about = run.about
     try:
         recipe = Recipe.model_validate({**about["recipe"], **_dumped(wanted)})
-        limits = wanted.limits or Limits.model_validate(about["limits"])
+        limits = wanted.limits or limits_of(about["limits"], UNITS)
         lot = Lot.model_validate(about["lot"])
     except ValidationError as problem:
         raise explain(problem, f"run {run.id}", Recipe) from None
@@ -143,7 +144,7 @@ def _imported(run: Run, wanted: ModelChange) -> Plan:
     model = _model_of(run, dwells, wanted)
     use_formulas([FormulaSpec.model_validate(f) for f in model["formulas"]], f"run {run.id}")
     refuse_unknown_effects(model["effects"], f"run {run.id}")
-    limits = wanted.limits or (Limits.model_validate(about["limits"]) if about.get("limits") else None)
+    limits = wanted.limits or (limits_of(about["limits"], UNITS) if about.get("limits") else None)
     history = "history" in run.tables()
     steps = [_import_step(history), _fit_step(model, history), _verify_step(history)]
     steps += [_grade_step(limits)] if limits else []

@@ -8,19 +8,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pandas as pd
 
-from pipelines.stages.figures import (
-    NEEDS_EFFECT,
-    NEEDS_STATIC,
-    NEEDS_VERIFICATION,
-    Figure,
-    UnitTables,
-    coefficient_figures,
-    figures_of,
-)
+from pipelines.stages.figures import FIGURES, Figure, LotCoefficients, UnitTables, figures_of
 from pipelines.tables.calibration import read_calibration
 from pipelines.tables.frames import ByUnit, empty_table
 from schemas.errors import RecipeInvalid
-from schemas.limits import FIGURES, GRADE_FIGURE, GRADES, Decision, Limits, decide, describe_rule, grade_of
+from schemas.limits import GRADE_FIGURE, GRADES, Decision, Limits, decide, describe_rule, grade_of
 
 if TYPE_CHECKING:
     from schemas.recipe import Recipe
@@ -45,14 +37,7 @@ class Evidence:
 def refuse_limits_without_figures(limits: Limits, recipe: Recipe) -> None:
     """Refuse limits on figures that the recipe cannot yield, before anything is measured."""
     for name in limits.figures:
-        needed = NEEDS_EFFECT.get(name)
-        missing = ""
-        if name in NEEDS_STATIC and recipe.static_record_s <= 0.0:
-            missing = "a static record (static_record_s > 0)"
-        elif name in NEEDS_VERIFICATION and not recipe.verification:
-            missing = "verification poses"
-        elif needed is not None and needed not in recipe.effects:
-            missing = f"effect {needed} in the model"
+        missing = FIGURES[name].missing(recipe)
         if missing:
             raise RecipeInvalid(
                 f"limits {limits.name}: {name} needs {missing}, the recipe has none; add it, or drop the limit",
@@ -69,18 +54,26 @@ def grade(evidence: Evidence, limits: Limits, zero_g: float = 0.0) -> dict[str, 
     """
     rule = describe_rule(limits)
     guard = limits.coverage_factor if limits.rule == "guarded_acceptance" else 0.0
-    own = _coefficient_figures(evidence, zero_g, guard)
-    shown = [
-        ByUnit(t) for t in (evidence.residuals, evidence.verification, evidence.verification_poses, evidence.noise)
-    ]
+    coefficients, places = _coefficients(evidence, zero_g)
+    residuals, verification, verification_poses, noise = map(
+        ByUnit, (evidence.residuals, evidence.verification, evidence.verification_poses, evidence.noise)
+    )
     figure_rows: list[dict[str, object]] = []
     grade_rows: list[dict[str, object]] = []
     for verdict in evidence.verdicts.to_dict("records"):
         unit = str(verdict["unit"])
-        if verdict["refused"] or not own:
+        if verdict["refused"] or coefficients is None:
             grade_rows.append(_grade_row(verdict, "refused", NO_GRADE, str(verdict["reason"])))
             continue
-        figures = list(figures_of(UnitTables(*(table.of(unit) for table in shown)), own[unit], guard))
+        own = UnitTables(
+            residuals.of(unit),
+            verification.of(unit),
+            verification_poses.of(unit),
+            noise.of(unit),
+            coefficients.of(places[unit]),
+            guard,
+        )
+        figures = list(figures_of(own))
         decisions = [
             decide(limits, f.name, f.value, f.uncertainty)
             for f in figures
@@ -94,12 +87,12 @@ def grade(evidence: Evidence, limits: Limits, zero_g: float = 0.0) -> dict[str, 
     }
 
 
-def _coefficient_figures(evidence: Evidence, zero_g: float, guard: float) -> dict[str, list[Figure]]:
-    """By unit the figures of its coefficients; none where no unit was calibrated."""
+def _coefficients(evidence: Evidence, zero_g: float) -> tuple[LotCoefficients | None, dict[str, int]]:
+    """The coefficients of the lot and the place of each unit in them; None where no unit was calibrated."""
     if evidence.coefficients.empty:
-        return {}
+        return None, {}
     calibration = read_calibration(evidence.coefficients, evidence.covariance)
-    return dict(zip(calibration.units, coefficient_figures(calibration, zero_g, guard), strict=True))
+    return LotCoefficients(calibration, zero_g), {unit: place for place, unit in enumerate(calibration.units)}
 
 
 def _table(rows: list[dict[str, object]]) -> pd.DataFrame:
@@ -123,9 +116,9 @@ def _decided(verdict: dict, figures: list[Figure], decisions: list[Decision], li
     return _grade_row(verdict, "fail" if reasons else "pass", best, "; ".join(reasons))
 
 
-def _good_enough(found: str, wanted: str) -> bool:
+def _good_enough(grade: str, required: str) -> bool:
     order = list(GRADES)
-    return found in order and order.index(found) <= order.index(wanted)
+    return grade in order and order.index(grade) <= order.index(required)
 
 
 def _grade_row(verdict: dict, outcome: str, best: str, reasons: str) -> dict[str, object]:
@@ -146,7 +139,7 @@ def _figure_row(unit: str, figure: Figure, decisions: list[Decision], limits: Li
         "value": figure.value,
         "uncertainty": limits.coverage_factor * figure.uncertainty,
         "limit": decision.limit if decision else np.nan,
-        "unit_text": FIGURES[figure.name],
+        "unit_text": figure.unit,
         "outcome": decision.outcome if decision else "no limit",
         "rule": decision.rule if decision else "",
     }

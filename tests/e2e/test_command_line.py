@@ -1,9 +1,9 @@
 """The command line on the simulated station: what it prints, where, and with which status."""
 
 import json
+import resource
 import subprocess
 import sys
-import time
 from pathlib import Path
 
 import pytest
@@ -105,11 +105,36 @@ def test_help_imports_nothing_heavy() -> None:
 
 
 def test_help_answers_at_once() -> None:
-    best = min(_seconds([sys.executable, "-m", "pipelines.cli", "--help"]) for _ in range(5))
-    assert best < 0.5
+    best = min(_processor_seconds([sys.executable, "-m", "pipelines.cli", "--help"]) for _ in range(5))
+    assert best <= 0.3
 
 
-def _seconds(command: list[str]) -> float:
-    start = time.perf_counter()
+def _processor_seconds(command: list[str]) -> float:
+    """Processor time of a command, which other work on the machine does not lengthen."""
+    before = resource.getrusage(resource.RUSAGE_CHILDREN)
     subprocess.run(command, capture_output=True, check=True)
-    return time.perf_counter() - start
+    after = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return after.ru_utime - before.ru_utime + after.ru_stime - before.ru_stime
+
+
+FIRST_LINE = """
+import sys
+import pipelines.cli.diagnose as module
+
+class Stop:
+    def status(self, text):
+        print(*sys.modules)
+        sys.exit()
+
+module.error_console = Stop
+sys.argv = ["tumbleline", "diagnose", "latest", "--archive", sys.argv[1]]
+from pipelines.cli import main
+main()
+"""
+
+
+def test_diagnose_shows_its_first_line_before_it_loads_what_only_the_diagnosis_needs(archive: Path) -> None:
+    done = subprocess.run([sys.executable, "-c", FIRST_LINE, str(archive)], capture_output=True, text=True, check=True)
+    loaded = set(done.stdout.split())
+    assert "pandas" in loaded
+    assert not loaded & {"scipy.stats", "scipy.io", "matplotlib", "prefect", "pymodbus", "duckdb", "jinja2"}

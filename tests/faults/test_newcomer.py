@@ -148,6 +148,6 @@ def test_ctrl_c_in_a_capture_says_that_it_goes_on_and_it_does(tmp_path: Path) ->
     os.kill(process.pid, signal.SIGINT)
     out, message = process.communicate(timeout=60)
     assert (process.returncode, out) == (130, "")
-    assert "goes on where it was when its command is given again" in message
+    assert "continues where it was when its command is given again" in message
     assert "Traceback" not in message
     assert list(archive.rglob(".tmp-*")) == []

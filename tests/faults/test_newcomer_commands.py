@@ -29,7 +29,7 @@ def test_the_version_is_told() -> None:
 
 def test_help_puts_commands_under_what_they_are_for() -> None:
     text = CliRunner().invoke(app, ["--help"]).stdout
-    assert all(part in text for part in {part for _, part, _ in COMMANDS.values()})
+    assert all(part in text for part in {command.part for command in COMMANDS.values()})
     assert " Commands " not in text
 
 

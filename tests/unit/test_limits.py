@@ -5,6 +5,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from pipelines.jobs.recipes import sample_names
+from pipelines.stages.figures import UNITS
 from schemas.errors import RecipeInvalid
 from schemas.limits import GRADES, Limits, decide, grade_of, parse_limits
 
@@ -17,7 +18,7 @@ bias_error_ug = {{ max = 100.0, unit = "µg" }}
 
 
 def limits(rule: str = "guarded_acceptance") -> Limits:
-    return parse_limits(TEXT.format(rule=rule), "limits test")
+    return parse_limits(TEXT.format(rule=rule), "limits test", UNITS)
 
 
 @pytest.mark.parametrize(
@@ -45,12 +46,14 @@ def test_names_value_uncertainty_limit_margin_and_rule() -> None:
 
 def test_refuses_a_limit_in_another_unit_than_its_figure() -> None:
     with pytest.raises(RecipeInvalid, match="the limit is in mg, the figure is in µg"):
-        parse_limits(TEXT.format(rule="simple_acceptance").replace('"µg"', '"mg"'), "limits test")
+        parse_limits(TEXT.format(rule="simple_acceptance").replace('"µg"', '"mg"'), "limits test", UNITS)
 
 
 def test_names_close_figures() -> None:
     with pytest.raises(RecipeInvalid, match="did you mean bias_error_ug"):
-        parse_limits(TEXT.format(rule="simple_acceptance").replace("bias_error_ug", "bias_eror_ug"), "limits test")
+        parse_limits(
+            TEXT.format(rule="simple_acceptance").replace("bias_error_ug", "bias_eror_ug"), "limits test", UNITS
+        )
 
 
 def test_names_the_rules_where_one_is_unknown() -> None:

@@ -1,0 +1,151 @@
+"""``python -m docs.documents_page``: the keys of the documents of ``--json``, from their types; ``--check`` only compares."""
+
+from __future__ import annotations
+
+import re
+import sys
+from importlib import import_module
+from pathlib import Path
+from types import NoneType, UnionType
+from typing import (
+    Annotated,
+    Any,
+    Literal,
+    NotRequired,
+    Required,
+    Union,
+    get_args,
+    get_origin,
+    get_type_hints,
+)
+
+from typing_extensions import is_typeddict
+
+from pipelines.cli import COMMANDS
+
+ROOT = Path(__file__).resolve().parents[1]
+PAGE = ROOT / "docs" / "decisions" / "documents.md"
+BEGIN, END = "<!-- written by python -m docs.documents_page -->\n", "<!-- end of the written part -->\n"
+COMMAND = re.compile(r"``([a-z]+)")
+NAMES = {str: "text", bool: "true or false", int: "integer", float: "number", Any: "any", NoneType: "null"}
+
+
+def documents() -> list[type]:
+    """The type of every document that a command prints, in the order of the help.
+
+    It is a TypedDict in a module ``documents`` of a room of pipelines, whose docstring begins with the command.
+    """
+    modules = [
+        import_module(f"pipelines.{path.parent.name}.documents") for path in ROOT.glob("pipelines/*/documents.py")
+    ]
+    types = {
+        item
+        for module in modules
+        for item in vars(module).values()
+        if is_typeddict(item) and item.__module__ == module.__name__ and command_of(item)
+    }
+    order = list(COMMANDS)
+    return sorted(types, key=lambda one: (order.index(command_of(one)), len(head_of(one)), head_of(one)))
+
+
+def command_of(kind: type) -> str:
+    """The command that a document's docstring names first; empty for a part of documents."""
+    match = COMMAND.match(kind.__doc__ or "")
+    return match[1] if match else ""
+
+
+def head_of(kind: type) -> str:
+    """The command line in a document's docstring."""
+    return re.sub(r"\s+", " ", kind.__doc__ or "").split("``")[1]
+
+
+def tables() -> str:
+    """A section with a table of keys per document."""
+    return "\n".join(_section(kind) for kind in documents())
+
+
+def _section(kind: type) -> str:
+    head = head_of(kind)
+    meaning = re.sub(r"\s+", " ", kind.__doc__ or "").split("``", 2)[2].removeprefix(":").strip().replace("``", "`")
+    bases = [f"Also the keys of `{head_of(base)}`.\n" for base in _bases(kind)]
+    lines = [f"## {head.replace(' --json', '')}\n", f"`{head}`: {meaning}\n", *bases]
+    return "\n".join([*lines, "| key | value | meaning |", "|---|---|---|", *_rows(kind, "", fixed=True), ""])
+
+
+def _bases(kind: type) -> list[type]:
+    """The documents whose keys a document has too."""
+    return [base for base in getattr(kind, "__orig_bases__", ()) if is_typeddict(base) and command_of(base)]
+
+
+def _rows(kind: type, prefix: str, *, fixed: bool) -> list[str]:
+    rows: list[str] = []
+    hints = get_type_hints(kind, include_extras=True)
+    for base in _bases(kind):
+        hints = {name: hint for name, hint in hints.items() if name not in get_type_hints(base)}
+    for name in sorted(hints, key=lambda name: not _plain(hints[name])[2]):
+        hint, meaning, required = _plain(hints[name])
+        required = fixed and required
+        key = f"**`{prefix}{name}`**" if required else f"`{prefix}{name}`"
+        rows.append(f"| {key} | {_text(hint)} | {meaning} |")
+        for part, mark in _parts(hint):
+            rows += _rows(part, f"{prefix}{name}{mark}.", fixed=required)
+    return rows
+
+
+def _plain(hint: Any) -> tuple[Any, str, bool]:
+    """A type without its remarks, its meaning, and whether it is not marked NotRequired."""
+    meaning, required = "", True
+    while get_origin(hint) in (Annotated, NotRequired, Required):
+        required = required and get_origin(hint) is not NotRequired
+        if get_origin(hint) is Annotated:
+            meaning = next((one for one in hint.__metadata__ if isinstance(one, str)), meaning)
+        hint = get_args(hint)[0]
+    return hint, meaning, required
+
+
+def _parts(hint: Any) -> list[tuple[type, str]]:
+    """The documents inside a type, with the mark of their container: ``[]`` for a list, ``{}`` for values by name."""
+    if is_typeddict(hint):
+        return [] if command_of(hint) else [(hint, "")]
+    marks = {list: "[]", dict: "{}"}
+    mark = marks.get(get_origin(hint), "")
+    return [(kind, mark + below) for one in get_args(hint) for kind, below in _parts(_plain(one)[0])]
+
+
+def _text(hint: Any) -> str:
+    """A type in words."""
+    origin, arguments = get_origin(hint), get_args(hint)
+    if is_typeddict(hint):
+        return f"document of `{head_of(hint)}`" if command_of(hint) else "object"
+    if origin is list:
+        return f"list of {_text(arguments[0])}"
+    if origin is dict:
+        return f"{_text(arguments[1])} by name"
+    if origin is Literal:
+        return " or ".join(f"`{value}`" for value in arguments)
+    if origin in (Union, UnionType):
+        return " or ".join(_text(one) for one in arguments)
+    return NAMES[hint]
+
+
+def page(text: str) -> str:
+    """The page with its written part renewed."""
+    before, rest = text.split(BEGIN)
+    return f"{before}{BEGIN}\n{tables()}\n{END}{rest.split(END)[1]}"
+
+
+def main(arguments: list[str]) -> int:
+    """Write the page, or check it; 1 where it is out of date."""
+    old = PAGE.read_text(encoding="utf-8")
+    new = page(old)
+    if "--check" in arguments:
+        sys.stdout.write(
+            "" if old == new else f"{PAGE.name} is out of date; write it again with 'python -m docs.documents_page'\n"
+        )
+        return int(old != new)
+    PAGE.write_text(new, encoding="utf-8")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))

@@ -1,0 +1,54 @@
+"""``python -m docs.figures_page``: the reference of figures of merit, from their modules; ``--check`` only compares."""
+
+from __future__ import annotations
+
+import sys
+from importlib import import_module
+from pathlib import Path
+from types import SimpleNamespace
+from typing import TYPE_CHECKING, Any
+
+from pipelines.stages import figures
+
+if TYPE_CHECKING:
+    from pipelines.stages.figures import FigureKind
+
+PAGE = Path(__file__).resolve().parent / "reference" / "figures.md"
+EMPTY: Any = SimpleNamespace(static_record_s=0.0, verification=[], effects=[])
+HEAD = """\
+# Figures of merit
+
+Written by `python -m docs.figures_page` from `pipelines/stages/figures/`; change a figure's file, not this page. The names are
+the keys of `[figures]` in limits files and the column `figure` of the table `figures`. A limits file states the unit again:
+`bias_error_ug = { max = 100.0, unit = "µg" }`.
+
+| figure | unit | meaning | the recipe needs |
+|---|---|---|---|
+"""
+
+
+def page() -> str:
+    """The whole page as Markdown."""
+    return HEAD + "".join(f"{_row(kind)}\n" for kind in figures.FIGURES.values())
+
+
+def _row(kind: FigureKind) -> str:
+    meaning = (import_module(f"{figures.__name__}.{kind.name.lower()}").__doc__ or "").partition("\n")[0]
+    return f"| `{kind.name}` | {kind.unit} | {meaning} | {kind.missing(EMPTY)} |"
+
+
+def main(arguments: list[str]) -> int:
+    """Write the page, or check it; 1 where it is out of date."""
+    text = page()
+    if "--check" in arguments:
+        same = PAGE.is_file() and PAGE.read_text(encoding="utf-8") == text
+        sys.stdout.write(
+            "" if same else f"{PAGE.name} is out of date; write it again with 'python -m docs.figures_page'\n"
+        )
+        return 0 if same else 1
+    PAGE.write_text(text, encoding="utf-8")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))

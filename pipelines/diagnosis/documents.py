@@ -1,0 +1,172 @@
+"""The JSON documents of diagnose, compare and history: keys that other programs read.
+
+A required key is never renamed or left out; a key that is NotRequired may be missing. Errors are divided by each unit's
+scale, in µg.
+"""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, Literal, NotRequired
+
+from typing_extensions import TypedDict
+
+
+class BlockingFault(TypedDict):
+    """A data fault; no physics is judged in its units."""
+
+    fault: str
+    units: list[str]
+    dwells: list[int]
+    evidence: str
+
+
+class ErrorFigures(TypedDict):
+    """Residual of the model; null where every unit has a data fault."""
+
+    rms_ug: Annotated[float | None, "root mean square residual of the units without a fault, µg"]
+    floor_ug: Annotated[float | None, "noise floor, µg"]
+    p_value: Annotated[float | None, "probability of such a residual if the model is adequate, at least 1e-300"]
+    wander_share: NotRequired[Annotated[float, "share ρ of the wander that units have in common"]]
+
+
+class FailingDriver(TypedDict):
+    """A recorded quantity along which the model fails."""
+
+    driver: str
+    axes: list[str]
+    share: Annotated[float, "share of the excess residual that follows the driver"]
+    p_value: float
+
+
+class EffectClassDocument(TypedDict):
+    """Effects that this plan cannot separate; one effect if it is identified."""
+
+    effects: Annotated[list[str], "ids, the simplest first"]
+    scope: Literal["sensor", "slot", "station", "data"]
+    rms_after_ug: Annotated[float, "residual with the effect added, µg"]
+    heldout_after_ug: Annotated[float, "cross-validated residual with the effect added, µg"]
+    p_value: float
+    size_ug: Annotated[float, "size of the effect, µg"]
+    nonlinear: NotRequired[Annotated[dict[str, Any], "estimated time constants, widths, …"]]
+    plausible: NotRequired[Annotated[bool, "whether the size is in the usual range of the effect"]]
+
+
+class UnexplainedExcess(TypedDict):
+    """Residual that follows a quantity, but no effect of the catalogue."""
+
+    driver: str
+    shape: str
+    p_value: float
+
+
+class NextMeasurement(TypedDict):
+    """A step of the proposed measurement."""
+
+    outer_deg: float
+    inner_deg: float
+    chamber_C: float
+    why: Annotated[str, "effects that it separates, or `not seen so far: …`"]
+    wait_s: NotRequired[Annotated[float, "time at rest before the dwell, s"]]
+    soaked: NotRequired[Annotated[bool, "false: read before the temperature has settled"]]
+    off_s: NotRequired[Annotated[float, "time with the devices switched off before the step, s"]]
+    repeats: NotRequired[Annotated[int, "dwells in a row"]]
+    minutes: NotRequired[Annotated[float, "station time of all rows with the same `why`"]]
+    separation_before: NotRequired[Annotated[float, "χ² between the best effect and its nearest rival so far"]]
+    separation_after: NotRequired[Annotated[float, "the same with these rows measured"]]
+
+
+class SuggestedFormula(TypedDict):
+    """A formula for a model file that follows the unexplained quantity."""
+
+    id: str
+    columns: list[str]
+    why: str
+    toml: Annotated[str, "the formula as text for the model file"]
+
+
+class DiagnosisDocument(TypedDict):
+    """``diagnose --json``: adequacy of a model, where it fails, and which effects are missing."""
+
+    adequate: Annotated[bool | None, "null: cannot be judged"]
+    blocked_by: list[BlockingFault]
+    error: ErrorFigures
+    where: Annotated[list[FailingDriver], "most significant first"]
+    classes: Annotated[list[EffectClassDocument], "best first"]
+    recommended: Annotated[list[str], "one effect per class; empty if the model is adequate or the cause unknown"]
+    unexplained: UnexplainedExcess | None
+    unseen: Annotated[list[str], "effects that this plan could not have seen"]
+    next_measurements: list[NextMeasurement]
+    effects: NotRequired[Annotated[list[str], "the model that was judged"]]
+    units: NotRequired[list[str]]
+    breakers: NotRequired[Annotated[dict[str, str], "per unseen effect, a measurement that would show it"]]
+    reasons: NotRequired[Annotated[dict[str, str], "per unseen effect, what hides it in this plan"]]
+    offer: NotRequired[SuggestedFormula | None]
+
+
+class UnitComparison(TypedDict):
+    """Errors of one unit."""
+
+    rms_ug: float
+    fresh_rms_ug: float | None
+
+
+class PoseComparison(TypedDict):
+    """Error of one pose over all units and axes."""
+
+    force: Annotated[list[float], "specific force on x, y, z, g"]
+    dwells: int
+    rms_ug: float
+
+
+class StationParameter(TypedDict):
+    """A parameter of the station that the fit shares over all units."""
+
+    effect: str
+    name: str
+    value: float
+    standard_error: float
+
+
+class ComparisonDocument(TypedDict):
+    """``compare --json``: error of a model on the run it is fitted to, on poses left out, and on a fresh run."""
+
+    rms_ug: Annotated[float, "residual of the fit, µg"]
+    floor_ug: Annotated[float, "noise floor, µg"]
+    fresh_rms_ug: Annotated[
+        float | None, "error on the fresh run with the coefficients unchanged, µg; null without `--fresh`"
+    ]
+    by_unit: dict[str, UnitComparison]
+    by_pose: Annotated[list[PoseComparison], "worst first; empty if only the norm is known"]
+    effects: NotRequired[list[str]]
+    heldout_rms_ug: NotRequired[Annotated[float | None, "cross-validated error, µg"]]
+    by_axis: NotRequired[Annotated[dict[str, float], "µg by axis, or `norm` alone"]]
+    nonlinear: NotRequired[Annotated[dict[str, Any], "estimated parameters by effect"]]
+    station: NotRequired[list[StationParameter]]
+    fresh_by_pose: NotRequired[list[PoseComparison]]
+
+
+class VersionDocument(TypedDict):
+    """A version of a model; its errors are null without `--dwells`."""
+
+    version: int
+    added: list[str]
+    removed: list[str]
+    effects: list[str]
+    by: str
+    at: Annotated[str, "ISO date and time; empty if the file does not have it"]
+    why: str
+    run: str
+    rms_ug: Annotated[float | None, "residual of the fit, µg"]
+    heldout_rms_ug: Annotated[float | None, "cross-validated error, µg"]
+    fresh_rms_ug: Annotated[float | None, "error on the fresh run, µg"]
+    floor_ug: Annotated[float | None, "noise floor, µg"]
+    confirmed: Annotated[bool | None, "whether data that were not fitted confirm the change; null: cannot be decided"]
+    words: Annotated[str, "`confirmed` as a sentence"]
+
+
+class HistoryDocument(TypedDict):
+    """``history --json``: the versions of a model, oldest first, with their errors."""
+
+    model: str
+    file: str
+    versions: list[VersionDocument]

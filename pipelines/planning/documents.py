@@ -1,0 +1,80 @@
+"""The JSON document of plan: keys that other programs read. A key that is NotRequired may be missing."""
+
+from __future__ import annotations
+
+from typing import Annotated, NotRequired
+
+from typing_extensions import TypedDict
+
+
+class DwellError(TypedDict):
+    """Expected standard error of one dwell, µg."""
+
+    white: float
+    wander: float
+    together: float
+
+
+class DwellTime(TypedDict):
+    """Length of a dwell, s."""
+
+    planned: float
+    white_as_large_as_wander: float | None
+
+
+class StationMinutes(TypedDict):
+    """Station time, min."""
+
+    soaks: float
+    moves: float
+    dwells: float
+    static_record: float
+    total: float
+    power_off: NotRequired[float]
+
+
+class PlannedCoefficient(TypedDict):
+    """Expected uncertainty of one coefficient of the recipe's model."""
+
+    effect: str
+    name: str
+    axis: Annotated[str, "`*`: shared by all units"]
+    uncertainty_ug: Annotated[float, "standard uncertainty, in `unit`"]
+    unit: str
+
+
+class PlannedEffect(TypedDict):
+    """What the plan can see of one effect of the catalogue."""
+
+    effect: str
+    seen: bool
+    left: Annotated[float, "fraction of the effect that the other effects do not cover, 0 … 1"]
+    variance_inflation: Annotated[float | None, "1/left²; null if nothing remains"]
+    floor_ug: Annotated[float | None, "smallest coefficient that is detected (3σ), in `floor_unit`; null: none"]
+    alias: Annotated[list[str], "effects that it is mistaken for"]
+    breaker: Annotated[str, "a measurement that would show it"]
+    left_by_axis: NotRequired[list[float]]
+    floor_unit: NotRequired[str | None]
+    floor_size_ug: NotRequired[Annotated[float | None, "the same as a specific force, µg"]]
+    typical_ug: NotRequired[Annotated[list[float], "usual size, from and to, µg"]]
+    faint: NotRequired[Annotated[bool, "whether its usual size is below the smallest detected one"]]
+    alias_exact: NotRequired[list[str]]
+    why: NotRequired[Annotated[str, "what hides it; empty if it is seen"]]
+
+
+class PlanDocument(TypedDict):
+    """``plan --json``: what a recipe can determine, with its station time and expected uncertainties."""
+
+    effects: list[PlannedEffect]
+    recipe: NotRequired[str]
+    device: NotRequired[str]
+    station: NotRequired[str]
+    model: NotRequired[list[str]]
+    poses: NotRequired[int]
+    dwells: NotRequired[int]
+    temperatures_C: NotRequired[list[float]]
+    dwell_error_ug: NotRequired[DwellError]
+    dwell_s: NotRequired[DwellTime]
+    minutes: NotRequired[StationMinutes]
+    coefficients: NotRequired[list[PlannedCoefficient]]
+    page: NotRequired[Annotated[str, "path of the page that `--page` wrote"]]

@@ -1,0 +1,83 @@
+"""What panels of a run's report are computed from: the run, its tables, and the part of each unit."""
+
+from __future__ import annotations
+
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from pipelines.tables.frames import rows_of
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    import pandas as pd
+
+    from pipelines.archive import Run
+    from pipelines.certificates.statement import Stated
+
+TABLES = (
+    *("verdicts", "dwells", "coefficients", "residuals", "verification", "verification_poses"),
+    *("allan", "noise", "figures", "grades"),
+)
+OPTIONAL = ("wander",)  # runs of earlier versions have none
+
+
+class ReportContext:
+    """A run as its panels read it.
+
+    Parameters
+    ----------
+    certificates : of the run's units, as they are in the ledger now.
+    """
+
+    def __init__(self, run: Run, certificates: Mapping[str, Stated]) -> None:
+        self.run = run
+        self.certificates = certificates
+        self.about: dict[str, Any] = run.about
+        self.recipe: dict[str, Any] = run.about["recipe"]
+        self.tables: dict[str, pd.DataFrame] = {name: run.table(name) for name in TABLES}
+        self.tables |= {name: run.table(name) for name in OPTIONAL if name in run.tables()}
+
+    @property
+    def coverage(self) -> float:
+        """The coverage factor k of the limits, by which every uncertainty of the page is expanded."""
+        return float(self.about["limits"]["coverage_factor"])
+
+    @property
+    def rule(self) -> str:
+        """The decision rule."""
+        return str(self.tables["grades"].sort_values("slot")["rule"].iloc[0])
+
+    @cached_property
+    def units(self) -> list[UnitContext]:
+        """Every unit, by slot."""
+        return [UnitContext(self, row) for row in rows_of(self.tables["grades"].sort_values("slot"))]
+
+    @property
+    def calibrated(self) -> list[UnitContext]:
+        """The units that were not refused, by slot."""
+        return [unit for unit in self.units if unit.outcome != "refused"]
+
+    def limit(self, figure: str) -> float:
+        """The limit of a figure, in the figure's unit; nan where it has none."""
+        return float(self.about["limits"]["figures"].get(figure, {}).get("max", np.nan))
+
+
+class UnitContext:
+    """A unit of a run as its panels read it."""
+
+    def __init__(self, report: ReportContext, row: dict[str, Any]) -> None:
+        self.report = report
+        self.unit = str(row["unit"])
+        self.slot = row["slot"]
+        self.outcome: str = row["outcome"]
+        self.grade: str = row["grade"]
+        self.reasons = [reason for reason in str(row["reasons"]).split("; ") if reason]
+        self.certificate = report.certificates.get(self.unit)
+
+    @cached_property
+    def tables(self) -> dict[str, pd.DataFrame]:
+        """The rows of this unit in the run's tables."""
+        return {name: table[table["unit"] == self.unit] for name, table in self.report.tables.items()}

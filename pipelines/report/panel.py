@@ -1,0 +1,57 @@
+"""The panels of a report: each is one module of a package and is found there."""
+
+from __future__ import annotations
+
+from collections import Counter
+from functools import cache
+from importlib import import_module
+from pkgutil import iter_modules
+from typing import Any, Protocol, cast
+
+
+class Panel(Protocol):
+    """A module of ``pipelines.report.panels`` (of the run) or ``pipelines.report.unit_panels`` (of each unit).
+
+    ORDER : place in the page, ascending · TITLE : heading, empty for none
+    """
+
+    ORDER: int
+    TITLE: str
+
+    def render(self, context: Any, /) -> str | None:
+        """The panel as HTML without its heading; None where this run, or unit, has nothing to show in it."""
+        ...
+
+
+class IncompletePanel(Exception):
+    """A module that is a panel in part only, or stands in another's place: its author repairs the module."""
+
+
+@cache
+def panels(package: str) -> tuple[Panel, ...]:
+    """The panels that the modules of a package are, in the order of the page.
+
+    Raises
+    ------
+    IncompletePanel
+        A module lacks ORDER, TITLE or ``render``, or two have one ORDER.
+    """
+    found: list[Panel] = []
+    for info in iter_modules(import_module(package).__path__):
+        module = import_module(f"{package}.{info.name}")
+        kinds = {"ORDER": int, "TITLE": str}
+        missing = [name for name, kind in kinds.items() if not isinstance(getattr(module, name, None), kind)]
+        missing += [] if callable(getattr(module, "render", None)) else ["render"]
+        if missing:
+            raise IncompletePanel(f"{package}.{info.name}: a panel without {', '.join(missing)}; add it")
+        found.append(cast("Panel", module))
+    order, count = Counter(panel.ORDER for panel in found).most_common(1)[0]
+    if count > 1:
+        raise IncompletePanel(f"{package}: {count} panels have the ORDER {order}; choose another number")
+    return tuple(sorted(found, key=lambda panel: panel.ORDER))
+
+
+def rendered(package: str, context: Any) -> list[tuple[str, str]]:
+    """Title and HTML of every panel that has something to show."""
+    shown = ((panel.TITLE, panel.render(context)) for panel in panels(package))
+    return [(title, html) for title, html in shown if html is not None]

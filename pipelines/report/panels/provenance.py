@@ -1,0 +1,35 @@
+"""Run, capture, station, libraries and code that the numbers come from."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from pipelines.report.templates import fill
+
+if TYPE_CHECKING:
+    from pipelines.report.context import ReportContext
+
+ORDER = 80
+TITLE = "Provenance"
+TEMPLATE = """\
+<table>
+{% for name, value in lines %}<tr><td>{{ name }}</td><td>{{ value }}</td></tr>
+{% endfor %}
+</table>
+"""
+
+
+def render(report: ReportContext) -> str:
+    """One table."""
+    run, about = report.run, report.about
+    manifests = [run.manifest(name) for name in run.tables()]
+    code = {manifest["stage"]: manifest["code"][:12] for manifest in manifests}
+    lines = [
+        ("run", run.id),
+        ("capture", str(about.get("capture"))),
+        ("started", f"{about['when'][:19].replace('T', ' ')} UTC by {about['who']} on {about['where']}"),
+        ("station", f"{about['station']['name']} ({about['station']['kind']})"),
+        ("libraries", ", ".join(f"{name} {version}" for name, version in about["libraries"].items())),
+        ("code", ", ".join(f"{stage} {short}" for stage, short in code.items() if short)),
+    ]
+    return fill(TEMPLATE, lines=lines)

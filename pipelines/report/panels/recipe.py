@@ -1,0 +1,26 @@
+"""Model, dwell, static record and local gravity of the recipe."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from pipelines.report.templates import fill
+
+if TYPE_CHECKING:
+    from pipelines.report.context import ReportContext
+
+ORDER = 70
+TITLE = "Recipe"
+TEMPLATE = """\
+<table>
+<tr><td>model</td><td>{% if recipe.model_name %}{{ recipe.model_name }} version {{ recipe.model_version }}: {% endif %}{{ recipe.effects | join(", ") }}</td></tr>
+<tr><td>dwell</td><td>{{ recipe.dwell_s }} s at {{ recipe.rate_hz }} Hz after {{ recipe.settle_s }} s of settling</td></tr>
+<tr><td>static record</td><td>{% if recipe.static_record_s %}{{ (recipe.static_record_s / 60) | round(1) }} min at {{ recipe.static_temperature_C }} °C{% else %}none{% endif %}</td></tr>
+<tr><td>local gravity</td><td>{{ recipe.local_gravity_m_s2 }} m/s²</td></tr>
+</table>
+"""
+
+
+def render(report: ReportContext) -> str:
+    """One table."""
+    return fill(TEMPLATE, recipe=report.recipe)

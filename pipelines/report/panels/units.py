@@ -1,0 +1,57 @@
+"""Result, grade and main figures of every unit, with the reasons of each failure."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from pipelines.report.numbers import plain
+from pipelines.report.templates import fill
+from pipelines.tables.frames import rows_of
+
+if TYPE_CHECKING:
+    from pipelines.report.context import ReportContext, UnitContext
+
+ORDER = 20
+TITLE = "Units"
+FIGURES = (
+    "residual_rms_ug",
+    "verification_norm_ug",
+    "bias_error_ug",
+    "zero_g_offset_mg",
+    "velocity_random_walk_ug_rtHz",
+    "bias_instability_ug",
+)
+TEMPLATE = """\
+<table>
+<tr><th class="n">slot</th><th>unit</th><th>result</th><th>grade</th>
+<th class="n">fit<br><small>rms, µg</small></th><th class="n">verification<br><small>largest, µg</small></th><th class="n">error<br><small>worst axis, µg</small></th>
+<th class="n">zero-g offset<br><small>mg</small></th><th class="n">N<br><small>µg/√Hz</small></th><th class="n">B<br><small>µg</small></th></tr>
+{% for unit in units %}
+<tr><td class="n">{{ unit.slot }}</td><td>{% if unit.outcome != "refused" %}<a href="#{{ unit.unit }}">{{ unit.unit }}</a>{% else %}{{ unit.unit }}{% endif %}</td>
+<td><span class="tag {{ unit.outcome }}">{{ unit.outcome }}</span></td><td>{{ unit.grade }}</td>
+{% for name in figures %}
+<td class="n">{{ unit["values"].get(name, "") }}</td>
+{% endfor %}</tr>
+{% if unit.reasons %}<tr><td></td><td colspan="9"><ul class="reasons">{% for reason in unit.reasons %}<li>{{ reason }}</li>{% endfor %}</ul></td></tr>{% endif %}
+{% endfor %}
+</table>
+<p class="note">Decided by {{ rule }}. fit: residual of the model on the poses it was fitted to. verification: largest difference between the magnitude of the corrected
+specific force and local gravity on poses that the fit has not seen, mean over the dwells of a pose. N and B: noise of the worst axis, an upper limit where the record does not identify the term.</p>
+"""
+
+
+def render(report: ReportContext) -> str:
+    """One line per unit, by slot."""
+    return fill(TEMPLATE, units=[_line(unit) for unit in report.units], figures=FIGURES, rule=report.rule)
+
+
+def _line(unit: UnitContext) -> dict[str, Any]:
+    figures = [] if unit.outcome == "refused" else rows_of(unit.tables["figures"])
+    return {
+        "unit": unit.unit,
+        "slot": unit.slot,
+        "outcome": unit.outcome,
+        "grade": unit.grade,
+        "reasons": unit.reasons,
+        "values": {figure["figure"]: plain(figure["value"]) for figure in figures},
+    }

@@ -1,0 +1,28 @@
+"""Error of every unit on poses that the fit has not used, against the limit."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from pipelines.report.plots import lot_plot
+from pipelines.report.templates import fill
+
+if TYPE_CHECKING:
+    from pipelines.report.context import ReportContext
+
+ORDER = 40
+TITLE = "Verification on poses not used by the fit"
+TEMPLATE = """\
+{{ plot | safe }}
+<p class="note">Blue: mean over the dwells of a pose, to which the limit (dashed) applies; red: beyond it. Grey: single dwells, with the wander of the device.</p>
+"""
+
+
+def render(report: ReportContext) -> str | None:
+    """One plot of the lot; None without verification poses."""
+    if not len(report.tables["verification"]):
+        return None
+    units, limit = [unit.unit for unit in report.calibrated], report.limit("verification_norm_ug")
+    return fill(
+        TEMPLATE, plot=lot_plot(report.tables["verification"], report.tables["verification_poses"], units, limit)
+    )

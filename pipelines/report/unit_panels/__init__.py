@@ -1,0 +1,1 @@
+"""The panels of each unit in a run's report: each module states ORDER and TITLE and renders one part."""

@@ -1,0 +1,48 @@
+"""Uncertainty of a unit's bias, by what it is the bias of."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from pipelines.report.numbers import plain
+from pipelines.report.templates import fill
+from pipelines.tables.frames import rows_of
+
+if TYPE_CHECKING:
+    from pipelines.report.context import UnitContext
+
+ORDER = 35
+TITLE = "Uncertainty of the bias by measurand"
+MEASURANDS = {
+    "bias_record_u_ug": "mean of the record",
+    "bias_long_u_ug": "mean of the day after the record",
+    "bias_switch_on_u_ug": "mean of a day after the next switch-on",
+}
+TEMPLATE = """\
+<table>
+<tr><th>measurand</th><th class="n">U x</th><th class="n">U y</th><th class="n">U z</th><th>unit</th></tr>
+{% for line in lines %}
+<tr><td>{{ line.name }}</td>{% for axis in ["x", "y", "z"] %}<td class="n">{{ line.cells[axis] }}</td>{% endfor %}<td>µg</td></tr>
+{% endfor %}
+</table>
+<p class="note">U with k = {{ coverage }}. The coefficient is the same for all; flicker between the record and the later time is added. Not stated: no repeatability of
+switching on is known; a walk is not carried beyond its record.</p>
+"""
+
+
+def render(unit: UnitContext) -> str | None:
+    """One line per measurand; None for runs of earlier versions, and for models without a bias."""
+    rows = unit.tables.get("wander")
+    if rows is None or "bias_record_u_ug" not in rows or not np.isfinite(rows["bias_record_u_ug"]).all():
+        return None
+    by_axis, coverage = {row["axis"]: row for row in rows_of(rows)}, unit.report.coverage
+    lines = [
+        {
+            "name": name,
+            "cells": {axis: plain(coverage * by_axis[axis][column]) or "not stated" for axis in "xyz"},
+        }
+        for column, name in MEASURANDS.items()
+    ]
+    return fill(TEMPLATE, lines=lines, coverage=f"{coverage:g}")

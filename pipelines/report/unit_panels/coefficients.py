@@ -1,0 +1,42 @@
+"""Coefficients of a unit with their expanded uncertainty."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from pipelines.report.numbers import with_uncertainty
+from pipelines.report.templates import fill
+from pipelines.tables.frames import rows_of
+
+if TYPE_CHECKING:
+    from pipelines.report.context import UnitContext
+
+ORDER = 30
+TITLE = "Coefficients"
+TEMPLATE = """\
+<table>
+<tr><th>effect</th><th class="n">x</th><th class="n">y</th><th class="n">z</th><th>unit</th></tr>
+{% for line in lines %}
+<tr><td>{{ line.effect }}</td>
+{% if "*" in line.cells %}<td class="n" colspan="3">{{ line.cells["*"].name }} = {{ line.cells["*"].value }}</td>
+{% else %}{% for axis in ["x", "y", "z"] %}<td class="n"><small>{{ line.cells[axis].name }}</small> {{ line.cells[axis].value }} <small>± {{ line.cells[axis].uncertainty }}</small></td>{% endfor %}{% endif %}
+<td>{{ line.unit }}</td></tr>
+{% endfor %}
+</table>
+<p class="note">output = Σ coefficient · column, temperatures counted from 25 °C; ± is U with k = {{ coverage }}, lack of fit included; that of the bias is of the record's mean.</p>
+"""
+
+
+def render(unit: UnitContext) -> str:
+    """One line per coefficient with its three axes side by side."""
+    lines: dict[tuple[str, int], dict[str, Any]] = {}
+    counts: dict[tuple[str, str], int] = {}
+    for row in rows_of(unit.tables["coefficients"]):
+        place = counts.get((row["effect"], row["axis"]), 0)
+        counts[row["effect"], row["axis"]] = place + 1
+        line = lines.setdefault(
+            (row["effect"], place), {"effect": row["effect"], "unit": row["unit_text"], "cells": {}}
+        )
+        value, expanded = with_uncertainty(row["value"], unit.report.coverage * row["standard_error"])
+        line["cells"][row["axis"]] = {"name": row["name"], "value": value, "uncertainty": expanded}
+    return fill(TEMPLATE, lines=list(lines.values()), coverage=f"{unit.report.coverage:g}")

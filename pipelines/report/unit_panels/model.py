@@ -1,0 +1,32 @@
+"""Measurement and model, residuals, verification and Allan deviation of a unit."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from pipelines.report.plots import check_plots, model_plots
+from pipelines.report.templates import fill
+
+if TYPE_CHECKING:
+    from pipelines.report.context import UnitContext
+
+ORDER = 10
+TITLE = "Model and measurement"
+TEMPLATE = """\
+{{ model | safe }}
+<p class="note">Colours: temperature of the soak, from blue (cold) to red (warm).</p>
+{{ checks | safe }}
+<p class="note">Grey band: error expected from the covariance of the coefficients and the wander of a dwell. Allan deviation: band 68 % interval, line fitted terms where they explain
+the curve; dotted: slopes −½ and +½.</p>
+"""
+
+
+def render(unit: UnitContext) -> str:
+    """Two rows of plots."""
+    tables = unit.tables
+    fitted = tables["dwells"][tables["dwells"]["kind"] == "dwell"]
+    return fill(
+        TEMPLATE,
+        model=model_plots(fitted, tables["residuals"]),
+        checks=check_plots(tables["residuals"], tables["verification"], tables["allan"]),
+    )

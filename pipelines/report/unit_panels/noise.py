@@ -1,0 +1,63 @@
+"""Noise terms of a unit's static record."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from pipelines.report.numbers import plain
+from pipelines.report.templates import fill
+from pipelines.tables.frames import rows_of
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+    from pipelines.report.context import UnitContext
+
+ORDER = 40
+TITLE = "Noise of the static record"
+NAMES = {
+    "N": "N, velocity random walk (two-sided, IEEE 952)",
+    "n_d": "n_d = N·√2, noise density (one-sided, data sheets)",
+    "B": "B, bias instability",
+    "K": "K, rate random walk",
+    "Q": "Q, quantisation",
+    "R": "R, ramp",
+}
+TEMPLATE = """\
+<table>
+<tr><th>term</th><th class="n">x</th><th class="n">y</th><th class="n">z</th><th>unit</th></tr>
+{% for line in lines %}
+<tr><td>{{ line.name }}</td>{% for axis in ["x", "y", "z"] %}<td class="n">{{ line.cells[axis] }}</td>{% endfor %}<td>{{ line.unit }}</td></tr>
+{% endfor %}
+</table>
+<p class="note">In brackets: 95 % interval. ≤: not identified, upper limit. –: not determined.{% for note in notes %}<br>{{ note }}{% endfor %}</p>
+"""
+
+
+def render(unit: UnitContext) -> str | None:
+    """One line per term with its three axes; None without a static record."""
+    rows = unit.tables["noise"]
+    lines: list[dict[str, Any]] = []
+    for term, name in NAMES.items():
+        own = rows[rows["term"] == term]
+        if len(own):
+            cells = {row["axis"]: _cell(row) for row in rows_of(own)}
+            lines.append({"name": name, "unit": own["unit_text"].iloc[0], "cells": cells})
+    return fill(TEMPLATE, lines=lines, notes=list(dict.fromkeys(_notes(rows)))) if lines else None
+
+
+def _notes(rows: pd.DataFrame) -> list[str]:
+    """Remarks on a unit's record besides its terms, with the axis."""
+    if "note" not in rows:
+        return []
+    return [f"{row['axis']}: {row['note']}" for row in rows_of(rows) if str(row["note"]) not in {"", "nan"}]
+
+
+def _cell(row: dict[str, Any]) -> str:
+    if not row["identified"] and not np.isfinite(row["high"]):
+        return "–"
+    if not row["identified"]:
+        return f"≤ {plain(row['high'])}"
+    return f"{plain(row['value'])} ({plain(row['low'])} … {plain(row['high'])})"

@@ -1,0 +1,84 @@
+"""The figures of merit of a calibrated unit, which limits apply to: each is one module of this package and is found here.
+
+Nothing else names a figure: limits files, tables, the report and the reference read :data:`FIGURES`.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from importlib import import_module
+from pkgutil import iter_modules
+from typing import TYPE_CHECKING, NamedTuple
+
+from pipelines.stages.figures.base import FigureKind, LotCoefficients, UnitTables
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Iterator, Mapping
+
+__all__ = [
+    "FIGURES",
+    "UNITS",
+    "Figure",
+    "FigureKind",
+    "IncompleteFigure",
+    "LotCoefficients",
+    "UnitTables",
+    "figures_of",
+]
+
+SHARED = "base"
+
+
+class IncompleteFigure(Exception):
+    """A module that defines no figure, or one whose name or place another figure has: its author repairs the module."""
+
+
+class Figure(NamedTuple):
+    """Value and standard uncertainty of one figure of one unit, in the figure's unit.
+
+    why_not : why there is no value, where there is none; the value is then infinite and passes no limit
+    """
+
+    name: str
+    unit: str
+    value: float
+    uncertainty: float
+    why_not: str = ""
+
+
+def find_figures(package: str, path: Iterable[str]) -> dict[str, FigureKind]:
+    """The figures that the modules of a package define, by name in the order of tables.
+
+    Raises
+    ------
+    IncompleteFigure
+        A module has no FIGURE, or two figures have one name or one order.
+    """
+    kinds: list[FigureKind] = []
+    for info in iter_modules(path):
+        if info.name == SHARED:
+            continue
+        kind = getattr(import_module(f"{package}.{info.name}"), "FIGURE", None)
+        if not isinstance(kind, FigureKind):
+            raise IncompleteFigure(f"{package}.{info.name}: no FIGURE, one is needed; define FIGURE = FigureKind(…)")
+        kinds.append(kind)
+    for attribute in ("name", "order"):
+        value, count = Counter(getattr(kind, attribute) for kind in kinds).most_common(1)[0]
+        if count > 1:
+            raise IncompleteFigure(
+                f"{package}: {count} figures have the {attribute} {value}; choose another {attribute}"
+            )
+    return {kind.name: kind for kind in sorted(kinds, key=lambda kind: kind.order)}
+
+
+FIGURES: Mapping[str, FigureKind] = find_figures(__name__, __path__)
+UNITS: Mapping[str, str] = {name: kind.unit for name, kind in FIGURES.items()}
+"""The unit of each figure, against which limits files are checked."""
+
+
+def figures_of(tables: UnitTables) -> Iterator[Figure]:
+    """Every figure that the tables of one unit yield, in the order of the table ``figures``."""
+    for kind in FIGURES.values():
+        value = kind.value(tables)
+        if value is not None:
+            yield Figure(kind.name, kind.unit, *value)

@@ -1,0 +1,183 @@
+"""What a figure of merit is, the tables of one unit that it is computed from, and the formulas that several share."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from pipelines.stages.noise import B_BOUND
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from numpy.typing import NDArray
+
+    from pipelines.tables.calibration import Calibration
+    from pipelines.tables.frames import UnitRows
+    from schemas.recipe import Recipe
+
+NORMAL_95 = 1.959964
+
+
+class Value(NamedTuple):
+    """Value and standard uncertainty of a figure of one unit, in the figure's unit.
+
+    why_not : why there is no value, where there is none; the value is then infinite and passes no limit
+    """
+
+    value: float
+    uncertainty: float
+    why_not: str = ""
+
+    def reach(self, guard: float) -> float:
+        """Magnitude with the guard band: what comes nearest to a limit."""
+        return abs(self.value) + guard * self.uncertainty
+
+
+class LotCoefficients:
+    """Coefficients of a calibrated lot; those of an effect are taken out of the calibration once for all units.
+
+    Parameters
+    ----------
+    zero_g : nominal output at 0 g, output unit.
+    """
+
+    def __init__(self, calibration: Calibration, zero_g: float) -> None:
+        self.zero_g = zero_g
+        self._calibration = calibration
+        self._scale = np.abs(np.diagonal(calibration.response, axis1=-2, axis2=-1))[..., None]
+        self._values: dict[str, NDArray[np.float64]] = {}
+        self._errors: dict[str, NDArray[np.float64]] = {}
+
+    def of(self, unit: int) -> UnitCoefficients:
+        """The coefficients of the unit at a place of the lot."""
+        return UnitCoefficients(self, unit)
+
+    def effect(self, effect: str, unit: int) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+        """Coefficients (3, columns) and standard errors (3, columns) of an effect, and the scale (3, 1) in output per g."""
+        if effect not in self._values:
+            self._values[effect] = self._calibration.value(effect)
+            self._errors[effect] = self._calibration.standard_error(effect)
+        return self._values[effect][unit], self._errors[effect][unit], self._scale[unit]
+
+
+class UnitCoefficients(NamedTuple):
+    """The coefficients of one unit of a lot."""
+
+    lot: LotCoefficients
+    unit: int
+
+    def nearest(self, effect: str, factor: float, guard: float, *, nominal: float = 0.0) -> Value | None:
+        """The coefficient of an effect that comes nearest to a limit, times a factor; None where the model lacks the effect.
+
+        Parameters
+        ----------
+        factor : the figure's unit per g.
+        guard : width of the guard band in standard uncertainties.
+        nominal : subtracted from every coefficient first, output unit.
+        """
+        coefficients, errors, scale = self.lot.effect(effect, self.unit)
+        values = (factor * (coefficients - nominal) / scale).ravel()
+        if not values.size:
+            return None
+        spread = (factor * errors / scale).ravel()
+        place = int(np.argmax(np.abs(values) + guard * spread))
+        return Value(float(values[place]), float(spread[place]))
+
+
+class UnitTables(NamedTuple):
+    """The rows of one unit in the tables that figures are computed from, and its coefficients.
+
+    guard : width of the guard band in standard uncertainties, zero under simple acceptance; of several axes, poses or
+        coefficients the one that comes nearest to a limit with it is judged
+    """
+
+    residuals: UnitRows
+    verification: UnitRows
+    verification_poses: UnitRows
+    noise: UnitRows
+    coefficients: UnitCoefficients
+    guard: float
+
+
+def nothing(recipe: Recipe) -> str:
+    """No requirement: every recipe yields the figure."""
+    del recipe
+    return ""
+
+
+def static_record(recipe: Recipe) -> str:
+    """The requirement of figures of noise."""
+    return "" if recipe.static_record_s > 0.0 else "a static record (static_record_s > 0)"
+
+
+def verification_poses(recipe: Recipe) -> str:
+    """The requirement of figures of verification."""
+    return "" if recipe.verification else "verification poses"
+
+
+def effect_in_model(effect: str) -> Callable[[Recipe], str]:
+    """The requirement of figures of one effect's coefficients."""
+    return lambda recipe: "" if effect in recipe.effects else f"effect {effect} in the model"
+
+
+@dataclass(frozen=True)
+class FigureKind:
+    """A figure of merit: every module of this package defines one as FIGURE.
+
+    Parameters
+    ----------
+    name : key in limits files and tables; ends in the unit where it has one.
+    unit : unit of the value, "1" for a ratio.
+    label : heading in the report.
+    order : place in tables, ascending.
+    value : the figure of a unit, None where its tables do not yield one.
+    missing : what a recipe lacks to yield the figure, empty where it lacks nothing.
+    """
+
+    name: str
+    unit: str
+    label: str
+    order: int
+    value: Callable[[UnitTables], Value | None]
+    missing: Callable[[Recipe], str] = nothing
+
+
+def rms(errors: NDArray[np.float64]) -> Value:
+    """Root mean square, with the standard uncertainty rms/√(2n) of one from n normal values."""
+    value = float(np.sqrt(np.mean(errors**2)))
+    return Value(value, value / np.sqrt(2.0 * errors.size))
+
+
+def largest_error(rows: UnitRows, uncertainty: str, guard: float) -> Value:
+    """The error that comes closest to any limit under a guard band, as a magnitude."""
+    errors, spread = rows["error_ug"], rows[uncertainty]
+    worst = int(np.argmax(np.abs(errors) + guard * spread))
+    return Value(abs(float(errors[worst])), float(spread[worst]))
+
+
+def worst_axis(rows: UnitRows, term: str, guard: float) -> Value | None:
+    """A noise term of the worst axis; a term that is not identified counts with its upper limit.
+
+    A silent axis has no figure, and so the unit has none: what was not measured is not within a limit.
+    """
+    if not len(rows):
+        return None
+    by_axis = [_noise_term(place, rows) for place in np.flatnonzero(rows["term"] == term).tolist()]
+    return max(by_axis, key=lambda figure: figure.reach(guard))
+
+
+def _noise_term(place: int, rows: UnitRows) -> Value:
+    value, low, high = (float(rows[column][place]) for column in ("value", "low", "high"))
+    axis = rows["axis"][place]
+    if rows["identified"][place]:
+        return Value(value, (high - low) / (2.0 * NORMAL_95))
+    if rows["term"][place] == "B":  # two upper bounds: the smaller holds
+        bound = rows["high"][(rows["term"] == B_BOUND) & (rows["axis"] == axis)]
+        high = float(np.fmin(high, bound[0]))
+    if not np.isfinite(high):
+        why = str(rows["note"][place]) if "note" in rows else "no upper limit"
+        return Value(np.inf, 0.0, f"axis {axis}: {why}")
+    return Value(high, 0.0)

@@ -1,0 +1,36 @@
+"""Error of the worst axis on poses not used by the fit, root mean square."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from pipelines.stages.figures.base import FigureKind, UnitTables, Value, rms, verification_poses
+from schemas.units import AXES
+
+if TYPE_CHECKING:
+    from pipelines.tables.frames import UnitRows
+
+
+def _value(tables: UnitTables) -> Value | None:
+    if not len(tables.verification):
+        return None
+    return max((_of_axis(tables.verification, axis) for axis in AXES), key=lambda value: value.reach(tables.guard))
+
+
+def _of_axis(rows: UnitRows, axis: str) -> Value:
+    """RMS error of one axis, with the uncertainty of the verification's covariance.
+
+    See :func:`pipelines.stages.rms_error.rms_uncertainty`; runs of earlier versions have the one of uncertainty is that of white noise.
+    """
+    name, plain = f"rms_uncertainty_{axis}_ug", rms(rows[f"error_{axis}_ug"])
+    return plain._replace(uncertainty=float(rows[name][0])) if name in rows else plain
+
+
+FIGURE = FigureKind(
+    name="bias_error_ug",
+    unit="µg",
+    label="rms error of the worst axis on poses not used",
+    order=50,
+    value=_value,
+    missing=verification_poses,
+)

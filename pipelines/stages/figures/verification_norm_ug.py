@@ -1,0 +1,21 @@
+"""Largest error of the norm in a pose not used by the fit, mean over the dwells of the pose."""
+
+from __future__ import annotations
+
+from pipelines.stages.figures.base import FigureKind, UnitTables, Value, largest_error, verification_poses
+
+
+def _value(tables: UnitTables) -> Value | None:
+    if not len(tables.verification):
+        return None
+    return largest_error(tables.verification_poses, "uncertainty_ug", tables.guard)
+
+
+FIGURE = FigureKind(
+    name="verification_norm_ug",
+    unit="µg",
+    label="largest | |a| − g | of a pose not used, mean of its dwells",
+    order=20,
+    value=_value,
+    missing=verification_poses,
+)

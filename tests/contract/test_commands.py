@@ -1,0 +1,89 @@
+"""Every command that is found: it is in the help, explains itself and its options, and is named in the documents."""
+
+import re
+from collections import Counter
+from collections.abc import Iterator
+from importlib import import_module
+from itertools import pairwise
+from pathlib import Path
+
+import pytest
+from typer.core import TyperCommand
+from typer.main import get_command
+from typer.testing import CliRunner
+
+from pipelines.cli import COMMANDS, app
+from pipelines.cli.discovery import IncompleteCommand, find_commands
+
+ROOT = Path(__file__).resolve().parents[2]
+PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md"))]
+NAMED = set(re.findall(r"tumbleline +([a-z]+)", "\n".join(page.read_text(encoding="utf-8") for page in PAGES)))
+WHOLE = 'PART = "Results"\nORDER = 310\nSUMMARY = "Do it."\n\n\ndef command(\n) -> None: ...\n'
+
+
+def leaves(command: object) -> Iterator[TyperCommand]:
+    """A command, or its subcommands at any depth."""
+    below = getattr(command, "commands", {})
+    if not below:
+        yield command
+    for one in below.values():
+        yield from leaves(one)
+
+
+@pytest.mark.parametrize("name", COMMANDS)
+def test_a_command_is_in_the_help_with_a_sentence(name: str) -> None:
+    text = CliRunner().invoke(app, ["--help"], env={"COLUMNS": "200"}).stdout
+    summary = COMMANDS[name].summary
+    assert re.search(rf"│ {name} +{re.escape(summary)} +│", text)
+    assert summary.endswith(".")
+    assert len(summary) <= 90
+
+
+@pytest.mark.parametrize("name", COMMANDS)
+def test_a_command_explains_itself_and_every_option(name: str) -> None:
+    module = import_module(f"pipelines.cli.{COMMANDS[name].module}")
+    assert (module.__doc__ or "").startswith(f"``tumbleline {name}``: ")
+    for leaf in leaves(get_command(app).get_command(None, name)._load()):
+        assert leaf.help, leaf.name
+        assert [p.name for p in leaf.params if not getattr(p, "help", None)] == [], leaf.name
+
+
+@pytest.mark.parametrize("name", COMMANDS)
+def test_a_command_is_named_in_the_documents(name: str) -> None:
+    assert name in NAMED
+
+
+def test_a_part_of_the_help_has_several_commands_that_stand_together() -> None:
+    parts = [command.part for command in COMMANDS.values()]
+    assert min(Counter(parts).values()) > 1  # a part of one command is a heading mistyped
+    assert sum(one != other for one, other in pairwise(parts)) == len(set(parts)) - 1
+
+
+def test_one_file_is_a_command(tmp_path: Path) -> None:
+    (tmp_path / "lambda_.py").write_text(WHOLE, encoding="utf-8")
+    (tmp_path / "helpers.py").write_text("def helper() -> None: ...\n", encoding="utf-8")
+    assert {name: tuple(c) for name, c in find_commands(tmp_path).items()} == {
+        "lambda": ("lambda_", "Results", 310, "Do it.")
+    }
+
+
+@pytest.mark.parametrize(
+    ("line", "missing"),
+    [
+        ('PART = "Results"\n', "PART"),
+        ("ORDER = 310\n", "ORDER"),
+        ('SUMMARY = "Do it."\n', "SUMMARY"),
+        ("def command(\n) -> None: ...\n", "a function 'command'"),
+    ],
+)
+def test_a_command_that_is_half_there_is_refused(tmp_path: Path, line: str, missing: str) -> None:
+    (tmp_path / "half.py").write_text(WHOLE.replace(line, ""), encoding="utf-8")
+    with pytest.raises(IncompleteCommand, match=rf"half\.py: a command without {missing}"):
+        find_commands(tmp_path)
+
+
+def test_two_commands_in_one_place_of_the_help_are_refused(tmp_path: Path) -> None:
+    for name in ("one", "two"):
+        (tmp_path / f"{name}.py").write_text(WHOLE, encoding="utf-8")
+    with pytest.raises(IncompleteCommand, match=r"two\.py: ORDER is 310, as in one\.py"):
+        find_commands(tmp_path)

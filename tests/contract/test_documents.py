@@ -1,0 +1,98 @@
+"""What commands print with ``--json`` is what the types of the documents say, and their page is written from the types."""
+
+import json
+import shutil
+import tarfile
+from pathlib import Path
+
+import pytest
+from pydantic import TypeAdapter, ValidationError
+from typer.testing import CliRunner
+
+from docs.documents_page import PAGE, documents, head_of, page
+from pipelines.cli import COMMANDS, app
+
+KEPT = Path(__file__).resolve().parents[1] / "archives" / "v1.tar.xz"
+BY_HEAD = {head_of(kind): kind for kind in documents()}
+MODEL = (
+    "bias,scale,misalignment,bias_temperature,scale_temperature,bias_temperature_quadratic,scale_temperature_quadratic"
+)
+CASES = {
+    "plan --json": ["plan"],
+    "station status --json": ["station", "status"],
+    "diagnose --json": ["diagnose", "latest", "--effects", MODEL],
+    "compare --json": ["compare", "latest", "--fresh", "latest"],
+    "history --json": ["history", "{folder}/model.toml", "--dwells", "latest"],
+    "list --json": ["list"],
+    "show RUN --json": ["show"],
+    "show RUN TABLE --json": ["show", "latest", "coefficients"],
+    "show UNIT --at DATE --json": ["show", "A1", "--at", "2026-06-01"],
+    "verify --json": ["verify"],
+    "audit --json": ["audit"],
+    "rerun --json": ["rerun", "latest", "--effects", "bias,scale,misalignment,bias_temperature"],
+    "rerun --check --json": ["rerun", "latest", "--check"],
+    "run --json": ["fit", "latest", "--limits", "consumer"],
+}
+WITHOUT_ARCHIVE = {"plan", "station"}
+
+
+@pytest.fixture(scope="module")
+def kept(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A kept archive whose units are certified, and a model file."""
+    folder = tmp_path_factory.mktemp("kept")
+    with tarfile.open(KEPT) as archive:
+        archive.extractall(folder / "archive", filter="data")
+    certify = ["certify", "latest", "--from", "2026-01-01", "--archive", str(folder / "archive")]
+    assert CliRunner().invoke(app, certify).exit_code == 0
+    model = '[model]\nname = "m"\nversion = 1\neffects = ["bias", "scale", "misalignment"]\n'
+    (folder / "model.toml").write_text(model, encoding="utf-8")
+    return folder
+
+
+def validate(kind: type, text: str) -> None:
+    """Refuse a document with a value of another type, or a key that is missing or that the type does not have."""
+    TypeAdapter(kind).validate_json(text, strict=True, extra="forbid")
+
+
+@pytest.mark.parametrize("head", CASES)
+def test_a_command_prints_the_document_of_its_type(head: str, kept: Path, tmp_path: Path) -> None:
+    shutil.copytree(kept, tmp_path / "own")
+    words = [word.format(folder=tmp_path / "own") for word in CASES[head]]
+    place = [] if words[0] in WITHOUT_ARCHIVE else ["--archive", str(tmp_path / "own" / "archive")]
+    result = CliRunner().invoke(app, [*words, "--json", *place])
+    assert result.exit_code in (0, 1), result.output
+    validate(BY_HEAD[head], result.stdout)
+
+
+def test_every_typed_document_is_printed_by_a_test() -> None:
+    untested = {"run --json (several fillings)", "show RUN --json (no grades)"}  # lots of other tests' runs
+    assert set(BY_HEAD) - set(CASES) == untested
+
+
+def test_every_document_names_a_command() -> None:
+    assert {head.split()[0] for head in BY_HEAD} <= set(COMMANDS)
+
+
+def test_the_page_of_the_documents_is_up_to_date() -> None:
+    text = PAGE.read_text(encoding="utf-8")
+    assert page(text) == text, "write it again with 'python -m docs.documents_page'"
+
+
+def test_a_document_with_another_key_or_type_is_refused() -> None:
+    document = {"archive": "a", "runs": []}
+    validate(BY_HEAD["list --json"], json.dumps(document))
+    for wrong in (
+        {**document, "more": 1},
+        {"archive": "a"},
+        {**document, "archive": 1},
+        {**document, "runs": [{"id": "r"}]},
+    ):
+        with pytest.raises(ValidationError):
+            validate(BY_HEAD["list --json"], json.dumps(wrong))
+
+
+def test_a_key_that_is_not_required_may_be_missing_and_any_other_may_not() -> None:
+    document = {"run": "r", "same": True}
+    validate(BY_HEAD["rerun --check --json"], json.dumps({"selected": 1, "same": 1, "runs": [document]}))
+    with pytest.raises(ValidationError, match="same"):
+        validate(BY_HEAD["rerun --check --json"], json.dumps({"selected": 1, "runs": [document]}))

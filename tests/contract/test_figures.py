@@ -1,0 +1,125 @@
+"""Every figure of merit that is found: limits files may name it, it says what it needs, has a value, a label and documents."""
+
+import sys
+import tarfile
+from pathlib import Path
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from docs.figures_page import PAGE, page
+from pipelines.archive import Archive
+from pipelines.archive.keys import sources
+from pipelines.stages.figures import FIGURES, UNITS, FigureKind, IncompleteFigure, find_figures
+from pipelines.stages.grade import Evidence, grade, refuse_limits_without_figures
+from schemas.errors import RecipeInvalid
+from schemas.limits import Limits, limits_of, parse_limits
+
+KEPT = Path(__file__).resolve().parents[1] / "archives" / "v1.tar.xz"
+ALL = {"name": "all", "figures": {name: {"max": 1e9, "unit": unit} for name, unit in UNITS.items()}}
+ONE = """
+from pipelines.stages.figures.base import FigureKind, rms
+
+FIGURE = FigureKind("{name}", "µg", "label", {order}, lambda tables: rms(tables.residuals["residual_ug"]))
+"""
+
+
+@pytest.fixture(scope="module")
+def table(tmp_path_factory: pytest.TempPathFactory):
+    """Figures of a kept archive, graded by limits on every figure."""
+    folder = tmp_path_factory.mktemp("kept")
+    with tarfile.open(KEPT) as kept:
+        kept.extractall(folder, filter="data")
+    run = Archive(folder).run("latest")
+    evidence = Evidence(*(run.table(name) for name in Evidence.__dataclass_fields__))
+    return grade(evidence, limits_of(ALL, UNITS))["figures"]
+
+
+@pytest.mark.parametrize("name", FIGURES)
+def test_a_figure_is_in_the_table_with_its_unit_and_decision(name: str, table) -> None:
+    rows = table[table["figure"] == name]
+    assert len(rows) == table["unit"].nunique() > 1
+    assert np.isfinite(rows["value"]).all()
+    assert (rows["uncertainty"] >= 0.0).all()
+    assert set(rows["unit_text"]) == {FIGURES[name].unit}
+    assert set(rows["outcome"]) == {"pass"}
+
+
+def test_the_table_has_the_figures_in_their_order(table) -> None:
+    first = table.loc[table["unit"] == table["unit"].iloc[0], "figure"]
+    assert first.tolist() == list(FIGURES)
+
+
+@pytest.mark.parametrize("name", FIGURES)
+def test_a_figure_says_what_a_recipe_lacks(name: str) -> None:
+    missing = FIGURES[name].missing(SimpleNamespace(static_record_s=0.0, verification=[], effects=[]))
+    full = SimpleNamespace(static_record_s=1.0, verification=["v1"], effects=[missing.split()[1]] if missing else [])
+    assert FIGURES[name].missing(full) == ""
+    limits = limits_of({"name": "one", "figures": {name: {"max": 1.0, "unit": UNITS[name]}}}, UNITS)
+    refuse_limits_without_figures(limits, full)
+    if missing:
+        bare = SimpleNamespace(static_record_s=0.0, verification=[], effects=[])
+        with pytest.raises(RecipeInvalid, match=name):
+            refuse_limits_without_figures(limits, bare)
+
+
+@pytest.mark.parametrize("name", FIGURES)
+def test_a_figure_is_named_in_parts_that_agree(name: str) -> None:
+    kind = FIGURES[name]
+    module = sys.modules[f"pipelines.stages.figures.{name.lower()}"]
+    assert module.FIGURE is kind
+    assert module.__doc__
+    assert kind.label
+    units = {"_ug": "µg", "_mg": "mg", "_mrad": "mrad", "_ug_K": "µg/K", "_ppm_K": "ppm/K", "_rtHz": "µg/√Hz"}
+    assert kind.unit == next((u for end, u in units.items() if name.endswith(end)), kind.unit)
+
+
+def test_the_page_of_the_figures_is_up_to_date() -> None:
+    assert PAGE.read_text(encoding="utf-8") == page(), "write it again with 'python -m docs.figures_page'"
+
+
+def test_every_figure_is_part_of_the_key_of_grade() -> None:
+    assert {f"pipelines.stages.figures.{name.lower()}" for name in FIGURES} <= set(sources(("pipelines.stages.grade",)))
+
+
+def figures_in(folder: Path, monkeypatch: pytest.MonkeyPatch, **texts: str) -> dict[str, FigureKind]:
+    """The figures of a package made of these modules."""
+    package = folder / folder.name.replace("-", "_")
+    package.mkdir()
+    for name, text in {"__init__": "", **texts}.items():
+        (package / f"{name}.py").write_text(text, encoding="utf-8")
+    monkeypatch.syspath_prepend(folder)
+    return find_figures(package.name, [str(package)])
+
+
+def test_one_file_is_a_figure_that_limits_may_name(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    added = figures_in(tmp_path, monkeypatch, own_ug=ONE.format(name="own_ug", order=1))
+    units = {name: kind.unit for name, kind in added.items()}
+    text = 'name = "own"\n[figures]\nown_ug = { max = 1.0, unit = "µg" }\n'
+    assert parse_limits(text, "limits own", units).figures["own_ug"].max == 1.0
+    with pytest.raises(RecipeInvalid, match="unknown figure 'own_ug'"):
+        parse_limits(text, "limits own", UNITS)
+
+
+@pytest.mark.parametrize(
+    ("texts", "message"),
+    [
+        ({"one": "LABEL = 1\n"}, "no FIGURE, one is needed"),
+        ({"one": ONE.format(name="a_ug", order=1), "two": ONE.format(name="a_ug", order=2)}, "2 figures have the name"),
+        (
+            {"one": ONE.format(name="a_ug", order=1), "two": ONE.format(name="b_ug", order=1)},
+            "2 figures have the order",
+        ),
+    ],
+)
+def test_a_figure_that_is_half_there_is_refused(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, texts: dict[str, str], message: str
+) -> None:
+    with pytest.raises(IncompleteFigure, match=message):
+        figures_in(tmp_path, monkeypatch, **texts)
+
+
+def test_limits_are_never_made_without_the_known_figures() -> None:
+    with pytest.raises(TypeError, match="known figures"):
+        Limits.model_validate(ALL)

@@ -1,0 +1,104 @@
+"""Every panel of a run's report that is found: it has a place, a heading and documents, and one file adds one."""
+
+import re
+import tarfile
+from pathlib import Path
+
+import pytest
+
+from pipelines.archive import Archive
+from pipelines.report import panel, render
+from pipelines.report.context import ReportContext
+from pipelines.report.panel import IncompletePanel, panels, rendered
+from pipelines.report.panels.unit_by_unit import UNIT_PANELS
+from pipelines.report.run_page import PANELS
+
+ROOT = Path(__file__).resolve().parents[2]
+KEPT = ROOT / "tests" / "archives" / "v1.tar.xz"
+GUIDE = (ROOT / "docs" / "how-to" / "read-a-report.md").read_text(encoding="utf-8")
+ONE = 'ORDER = {order}\nTITLE = "Own"\n\n\ndef render(report):\n    return f"<p>{{len(report.units)}} units</p>"\n'
+FOUND = [*panels(PANELS), *panels(UNIT_PANELS)]
+
+
+@pytest.fixture(scope="module")
+def report(tmp_path_factory: pytest.TempPathFactory) -> ReportContext:
+    folder = tmp_path_factory.mktemp("kept")
+    with tarfile.open(KEPT) as kept:
+        kept.extractall(folder, filter="data")
+    return ReportContext(Archive(folder).run("latest"), {})
+
+
+@pytest.mark.parametrize("one", FOUND, ids=lambda module: module.__name__)
+def test_a_panel_explains_itself_and_is_in_the_guide(one) -> None:
+    assert one.__doc__
+    assert one.render.__doc__
+    assert not one.TITLE or f"**{one.TITLE}.**" in GUIDE
+
+
+@pytest.mark.parametrize("one", panels(PANELS), ids=lambda module: module.__name__)
+def test_a_panel_of_the_run_is_whole_html(one, report: ReportContext) -> None:
+    html = one.render(report)
+    assert html
+    assert closed(html)
+
+
+@pytest.mark.parametrize("one", panels(UNIT_PANELS), ids=lambda module: module.__name__)
+def test_a_panel_of_a_unit_is_whole_html(one, report: ReportContext) -> None:
+    for unit in report.calibrated:
+        html = one.render(unit)
+        assert html
+        assert closed(html)
+
+
+def closed(html: str) -> bool:
+    """Whether every table, list and block that is opened is closed."""
+    text = re.sub(r"<svg.*?</svg>", "", html, flags=re.DOTALL)
+    return all(
+        len(re.findall(rf"<{tag}\b", text)) == text.count(f"</{tag}>")
+        for tag in ("table", "tr", "td", "p", "div", "details", "ul", "span", "small")
+    )
+
+
+def test_the_page_has_the_panels_in_their_order(report: ReportContext) -> None:
+    page = render(report.run)
+    headings = re.findall(r"<h2>(.*?)</h2>", page)
+    assert headings == [one.TITLE for one in panels(PANELS) if one.TITLE]
+
+
+def made(folder: Path, monkeypatch: pytest.MonkeyPatch, **texts: str) -> str:
+    """The name of a package made of these modules."""
+    package = folder / folder.name.replace("-", "_")
+    package.mkdir()
+    for name, text in {"__init__": "", **texts}.items():
+        (package / f"{name}.py").write_text(text, encoding="utf-8")
+    monkeypatch.syspath_prepend(folder)
+    return package.name
+
+
+def test_one_file_is_a_panel(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, report: ReportContext) -> None:
+    package = made(tmp_path, monkeypatch, own=ONE.format(order=5))
+    assert rendered(package, report) == [("Own", "<p>2 units</p>")]
+    both = (*panels(package), *panels(PANELS))
+    monkeypatch.setattr(panel, "panels", lambda name: both if name == PANELS else panels(name))
+    assert "<h2>Own</h2>\n<p>2 units</p>" in render(report.run)
+
+
+def test_a_panel_with_nothing_to_show_has_no_heading(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    empty = ONE.format(order=5).replace('f"<p>{len(report.units)} units</p>"', "None")
+    assert rendered(made(tmp_path, monkeypatch, own=empty), None) == []
+
+
+@pytest.mark.parametrize(
+    ("texts", "message"),
+    [
+        ({"own": ONE.format(order=5).replace("ORDER", "PLACE")}, "own: a panel without ORDER"),
+        ({"own": ONE.format(order=5).replace("TITLE", "HEAD")}, "own: a panel without TITLE"),
+        ({"own": ONE.format(order=5).replace("render", "draw")}, "own: a panel without render"),
+        ({"own": ONE.format(order=5), "other": ONE.format(order=5)}, "2 panels have the ORDER 5"),
+    ],
+)
+def test_a_panel_that_is_half_there_is_refused(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, texts: dict[str, str], message: str
+) -> None:
+    with pytest.raises(IncompletePanel, match=message):
+        panels(made(tmp_path, monkeypatch, **texts))
