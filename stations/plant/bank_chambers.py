@@ -11,20 +11,20 @@ from stations.plant.bank import Bank, number
 if TYPE_CHECKING:
     from schemas.profile import Profile
     from stations.plant.chamber import Chamber
-    from stations.plant.plant import Plant
+    from stations.plant.world import World
 
 Sources = dict[str, Callable[[], Value]]
 FREE = (-100.0, 250.0)  # where a profile gives no limits
 HUMIDITY = 40.0
 
 
-def chamber_bank(plant: Plant, profile: Profile) -> Bank:
+def chamber_bank(world: World, profile: Profile) -> Bank:
     """The registers of the controller behind a profile."""
-    chamber = plant.fixture.chamber
+    chamber = world.fixture.chamber
     own, command = _BY_ADAPTER[profile.adapter](chamber, profile)
     point = profile.register("set_point")
     sources: Sources = {
-        "temperature": plant.air_reading,
+        "temperature": world.air_reading,
         "set_point": lambda: chamber.set_point,
         "working_set_point": lambda: chamber.working,
         "set_point_low": lambda: FREE[0] if point.minimum is None else point.minimum,

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from schemas.profile import Profile
-    from stations.plant.plant import Plant
+    from stations.plant.world import World
 
 SET = re.compile(r"TEMP, S(-?\d+(?:\.\d+)?)")
 MODES = {"CONSTANT": True, "STANDBY": False, "OFF": False}
@@ -17,8 +17,8 @@ UNKNOWN, OUTSIDE, WRONG = "NA:CMD ERR", "NA:DATA OUT OF RANGE", "NA:PARA ERR"
 class P300:
     """The controller in front of the plant's chamber; it begins in constant operation."""
 
-    def __init__(self, plant: Plant, profile: Profile) -> None:
-        self._plant = plant
+    def __init__(self, world: World, profile: Profile) -> None:
+        self._world = world
         point = profile.command("set_point")
         self._low, self._high = point.minimum or 0.0, point.maximum or 0.0
         self._mode = "CONSTANT"
@@ -34,9 +34,9 @@ class P300:
         return UNKNOWN, False
 
     def _told(self, question: str) -> str:
-        chamber = self._plant.fixture.chamber
+        chamber = self._world.fixture.chamber
         answers = {
-            "TEMP?": f"{self._plant.air_reading():.1f},{chamber.set_point:.1f},{self._high:.1f},{self._low:.1f}",
+            "TEMP?": f"{self._world.air_reading():.1f},{chamber.set_point:.1f},{self._high:.1f},{self._low:.1f}",
             "MODE?": self._mode,
             "ALARM?": "0",
         }
@@ -49,7 +49,7 @@ class P300:
         value = float(found[1])
         if not self._low <= value <= self._high:
             return OUTSIDE, False
-        self._plant.fixture.chamber.set_point = value
+        self._world.fixture.chamber.set_point = value
         return f"OK:{line}", True
 
     def _switch(self, line: str) -> tuple[str, bool]:
@@ -57,5 +57,5 @@ class P300:
         if mode not in MODES:
             return WRONG, False
         self._mode = mode
-        self._plant.fixture.chamber.running = MODES[mode]
+        self._world.fixture.chamber.running = MODES[mode]
         return f"OK:{line}", True

@@ -36,7 +36,7 @@ class LineServer:
                 """One answer for each line; none where the device is mute."""
                 with suppress(OSError):
                     while line := self.rfile.readline(LONGEST):
-                        answer = plant.say(device_id, line.rstrip(END).decode("ascii", errors="replace"))
+                        answer = plant.send_line(device_id, line.rstrip(END).decode("ascii", errors="replace"))
                         if answer is not None:
                             self.wfile.write(answer.encode("ascii", errors="replace") + END)
 

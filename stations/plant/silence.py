@@ -32,8 +32,8 @@ class IdleStop:
         if self._seconds == 0.0:
             return
         with self._plant.lock:
-            self._asked.update(dict.fromkeys(self._plant.heard & self._stops.keys(), now))
-            self._plant.heard.clear()
+            self._asked.update(dict.fromkeys(self._plant.requested & self._stops.keys(), now))
+            self._plant.requested.clear()
             late = [device_id for device_id, asked in self._asked.items() if now - asked > self._seconds]
             for device_id in late:
                 self._stops[device_id]()

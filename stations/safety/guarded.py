@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 from schemas.errors import LeaseLost, OperatorNeeded
 from stations.safety.folder import state_folder, told
 from stations.safety.leases import Leases, addresses, new_holder
-from stations.safety.watching import Watchdog
+from stations.safety.watchdog_client import Watchdog
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Generator

@@ -166,7 +166,7 @@ def test_a_controller_in_fahrenheit_is_refused(name):
 
 def test_an_espec_with_a_program_or_an_alarm_needs_a_person_and_refuses_by_name():
     with opened(chamber="espec_p300") as (station, plant):
-        speaker = plant.speakers[3]
+        speaker = plant.line_devices[3]
         speaker._mode = "RUN"
         with pytest.raises(OperatorNeeded, match="program is in state runs"):
             station.chamber.set_temperature(40.0)

@@ -19,9 +19,10 @@ from typer.testing import CliRunner
 from pipelines.cli import app
 from schemas.errors import STATION, OperatorNeeded, StationRefused
 from schemas.safety import SAFE_WITHIN_S
+from stations import watchdog
 from stations.opening import open_station
-from stations.plant.faults.proxy import ChaosProxy, Meddling
-from stations.safety import folder, lease_files, leases, watchdog, watching
+from stations.plant.faults.proxy import ChaosProxy, WireAction
+from stations.safety import folder, lease_files, leases, watchdog_client
 from stations.safety.leases import Leases, addresses, holders, new_holder
 from stations.safety.standing import not_safe
 
@@ -97,7 +98,7 @@ def test_a_run_that_cannot_have_a_watchdog_any_more_ends_and_leaves_its_station_
 def ends_without_watchdog(config, monkeypatch):
     with open_station(config, lot_of()) as station:
         station.require()
-        monkeypatch.setattr(watching.sys, "executable", "/bin/false")
+        monkeypatch.setattr(watchdog_client.sys, "executable", "/bin/false")
         os.kill(told("driven")["watchdog"], signal.SIGKILL)
         end = time.monotonic() + SOON_S
         while time.monotonic() < end:
@@ -121,7 +122,7 @@ def away_and_back(seconds):
     away = []
     with (
         served() as port,
-        ChaosProxy("127.0.0.1", port, lambda _way, _frame: Meddling("drop", "request") if away else None) as proxy,
+        ChaosProxy("127.0.0.1", port, lambda _way, _frame: WireAction("drop", "request") if away else None) as proxy,
     ):
         config = modbus_station(proxy.port, limits=SLOW)
         with driver(config) as process:

@@ -28,7 +28,7 @@ from stations.opening import open_devices
 from stations.safety.folder import told
 from stations.safety.leases import Leases, Part, addresses, new_holder
 from stations.safety.safe_state import SafeStep, reach_safe_state
-from stations.safety.words import BEAT, DONE, READY
+from stations.safety.watchdog_protocol import BEAT, DONE, READY
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator

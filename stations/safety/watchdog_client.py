@@ -14,7 +14,7 @@ from typing import IO, TYPE_CHECKING
 from schemas.errors import StationTimeout
 from stations.clock import steady
 from stations.safety.folder import told
-from stations.safety.words import BEAT, DONE, READY
+from stations.safety.watchdog_protocol import BEAT, DONE, READY
 
 if TYPE_CHECKING:
     from schemas.station import StationConfig
@@ -49,7 +49,7 @@ class Watchdog:
         self._watches.clear()
         with _errors(self.leases) as errors:
             self._process = subprocess.Popen(
-                [sys.executable, "-m", "stations.safety.watchdog"],
+                [sys.executable, "-m", "stations.watchdog"],
                 stdin=subprocess.PIPE,
                 stdout=subprocess.PIPE,
                 stderr=errors,
