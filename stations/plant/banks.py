@@ -6,14 +6,13 @@ from typing import TYPE_CHECKING
 
 from stations.codec import NotEncodable, Value
 from stations.plant.bank import Bank, Busy, number
-from stations.plant.bank_axes import axis_bank
-from stations.plant.bank_chambers import chamber_bank
-from stations.plant.bank_lines import P300
+from stations.plant.simulations import axis_bank, chamber_bank, chamber_line_device
 from stations.profile_files import profile_of
 
 if TYPE_CHECKING:
     from schemas.profile import Profile
     from schemas.station import Devices
+    from stations.plant.line_device import LineDevice
     from stations.plant.world import World
 
 UNITS = {"V": "volt", "LSB": "lsb"}
@@ -33,10 +32,10 @@ def build_banks(world: World, devices: Devices) -> dict[int, Bank]:
     return banks
 
 
-def build_line_devices(world: World, devices: Devices) -> dict[int, P300]:
+def build_line_devices(world: World, devices: Devices) -> dict[int, LineDevice]:
     """Devices with a text protocol, by device id."""
     profile = profile_of(devices.chamber)
-    return {devices.chamber.device_id: P300(world, profile)} if profile.commands else {}
+    return {devices.chamber.device_id: chamber_line_device(world, profile)} if profile.commands else {}
 
 
 def _reader(world: World, profile: Profile, slots: int) -> Bank:
