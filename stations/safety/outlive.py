@@ -1,7 +1,7 @@
-"""Runs a command and ends only when everything that it left behind has ended too: watchdogs that still make a station safe.
+"""Runs a command and ends only after all of its orphaned processes have ended: watchdogs that still make a station safe.
 
-For the first process of a container or of a systemd unit: when that ends, the system kills whatever is left. It passes signals
-on to the command, takes the orphans in, and ends with the command's status.
+Use it as the first process of a container or systemd unit, whose end makes the system kill all remaining processes. It forwards
+signals to the command, adopts orphans, and ends with the command's status.
 
     python -m stations.safety.outlive prefect worker start --pool line
 """
@@ -15,18 +15,18 @@ import subprocess
 import sys
 from contextlib import suppress
 
-PR_SET_CHILD_SUBREAPER = 36  # linux/prctl.h: orphans become this process' children, as they do under process 1
+PR_SET_CHILD_SUBREAPER = 36  # linux/prctl.h: orphans become children of this process
 PASSED_ON = (signal.SIGTERM, signal.SIGINT, signal.SIGHUP, signal.SIGUSR1, signal.SIGUSR2)
-USAGE = "outlive: no command, one is needed; write it behind: python -m stations.safety.outlive COMMAND …"
-SIGNALLED = 128  # as shells tell of a command that a signal ended
+USAGE = "outlive: no command given, one is needed; add it: python -m stations.safety.outlive COMMAND …"
+SIGNALLED = 128  # exit status of a command that a signal ended, as in shells
 
 
 def main(command: list[str]) -> int:
-    """The command's status, once nothing is left of it."""
+    """Runs a command; its exit status after the last of its processes has ended."""
     if not command:
         sys.stderr.write(USAGE + "\n")
         return 2
-    with suppress(OSError, AttributeError):  # process 1 gets the orphans anyway, and elsewhere there is no such call
+    with suppress(OSError, AttributeError):  # process 1 adopts orphans anyway; other systems have no such call
         ctypes.CDLL(None).prctl(PR_SET_CHILD_SUBREAPER, 1, 0, 0, 0)
     running = subprocess.Popen(command)  # noqa: S603 - to run what it is given is what it is for
     for number in PASSED_ON:
