@@ -89,7 +89,9 @@ class Watchdog:
             self.leases.folder, self.config.name, "watchdog_lost", run=self.leases.holder.run, pid=self.pid, why=why
         )
         if self._starts >= STARTS:
-            self.trouble = f"watchdog: {why}, {STARTS} consecutive times, a running one is needed; see its error output in {self.leases.folder / LOG}"
+            self.trouble = (
+                f"watchdog: {why}, {STARTS} consecutive times, a running one is needed; see {self.leases.folder / LOG}"
+            )
             self._watches.set()
             return
         self._anew = True
