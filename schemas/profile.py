@@ -100,7 +100,7 @@ class Register(Strict):
 
 
 class Command(Strict):
-    """One value of a device that is spoken to in lines of text.
+    """One value of a device with a text protocol.
 
     ``ask`` is the question whose answer's comma-separated part ``field`` is the value; ``tell`` is the line that sets it, with
     the value in braces. What has no ``tell`` is never written.

@@ -80,7 +80,7 @@ def serve(
     """Comes back when ``stop`` is set; until then the station's time goes on at ``speed`` times the wall's.
 
     Drives and reader have watchdogs of their own: ``silence_s`` after the last request they stop; 0 never.
-    ``ready`` is told host and port once they listen; a device that is spoken to in lines has the port behind. Nothing is sampled
+    ``ready`` gets host and port once they listen; a device with a text protocol has the next port. Nothing is sampled
     unless a client starts it.
     """
     if config.kind != "simulated":

@@ -188,7 +188,7 @@ def _refuse_inconsistent(job: Job, recorded: Sequence[str]) -> None:
 
 
 def _refuse_more_units_than_slots(job: Job) -> None:
-    """Refuse a lot that does not fit the fixture: between two fillings somebody must seat units, so each is a lot of its own."""
+    """Refuse a lot that does not fit the fixture: units must be seated between two fillings, so each filling is a lot."""
     serials, slots = [unit.serial for unit in job.lot.units], job.station.devices.slots.count
     if len(serials) > slots:
         found = fillings(serials, slots)

@@ -1,4 +1,4 @@
-"""The plant's devices that are spoken to in lines, over TCP on loopback."""
+"""The plant's devices with a text protocol, over TCP on loopback."""
 
 from __future__ import annotations
 
@@ -56,7 +56,7 @@ class LineServer:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        """Stops, and hangs up on whoever still talks."""
+        """Stops, and closes open connections."""
         self._server.shutdown()
         self._server.server_close()
         self._thread.join(END_S)

@@ -1,4 +1,4 @@
-"""The devices' own watchdogs: a drive and a reader that nobody asks anything any more stop by themselves.
+"""The devices' own watchdogs: a drive and a reader that receive no request for some time stop by themselves.
 
 Real drives have such a communication time-out (the AZ series calls it so, and stops with an alarm); controllers of
 chambers mostly have none and keep their set point. It lives in wall time, and so only in a station that is served.
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 
 class IdleStop:
-    """Stops what has not been asked for ``seconds``; a device that nobody has asked yet waits for its first question."""
+    """Stops devices without a request for ``seconds``; the time counts from a device's first request."""
 
     def __init__(self, plant: Plant, devices: Devices, seconds: float) -> None:
         self._plant, self._seconds = plant, seconds
