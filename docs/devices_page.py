@@ -6,6 +6,8 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from stations.devices.adapters import adapters
+from stations.devices.axis import TableAxis
 from stations.profile_files import load_profile, profile_names
 
 if TYPE_CHECKING:
@@ -21,16 +23,16 @@ HEAD = """\
 # Devices
 
 Written by `python -m docs.devices_page` from the profiles in `stations/profiles/`; change a profile, not this page. A
-station's file names a device by its profile (`profile = "…"`) and what carries it (`link = "…"`, the device's own way first
-below). None of the real ones has been held against hardware yet: **verified** says so, and **disputed** what the sources
-disagree about. Addresses are those on the wire, from 0.
+station's file names a device by its profile (`profile = "…"`) and its link (`link = "…"`, the usual link first
+below). No profile of a real device has been checked against hardware yet: see **verified**; **disputed** counts the
+values on which sources disagree. Addresses are those on the wire, from 0.
 """
 
 
 def page() -> str:
     """The whole page as Markdown."""
     found = sorted((load_profile(name) for name in profile_names()), key=lambda p: (list(KINDS).index(p.kind), p.name))
-    parts = [HEAD, _table(found), _disputes(found)]
+    parts = [HEAD, _table(found), _families(), _disputes(found)]
     for kind, title in KINDS.items():
         parts.append(f"## {title}\n")
         parts += [_section(profile) for profile in found if profile.kind == kind]
@@ -47,8 +49,23 @@ def _table(found: list[Profile]) -> str:
     return "\n".join([head, "|---|---|---|---|---|---|---|", *rows, ""])
 
 
+def _families() -> str:
+    """What a profile of each family must have."""
+    rows = [
+        f"| `{name}` | {'axis' if issubclass(adapter, TableAxis) else 'chamber'} | {', '.join(f'`{n}`' for n in adapter.needs)} |"
+        for name, adapter in sorted(adapters().items(), key=lambda item: (not issubclass(item[1], TableAxis), item[0]))
+    ]
+    head = [
+        "## Families\n",
+        "The `adapter` of a profile is the family of its controller. A profile must have these registers, commands or groups:\n",
+        "| family | kind | needs |",
+        "|---|---|---|",
+    ]
+    return "\n".join([*head, *rows, ""])
+
+
 def _disputes(found: list[Profile]) -> str:
-    """What to look at first when a device is there."""
+    """What to check first at the device."""
     rows = [
         f"| `{p.name}` | `{entry.name}` | {entry.manual} | {_cell(entry.disputed)} |"
         for p in found
@@ -79,9 +96,9 @@ def _section(profile: Profile) -> str:
 
 def _command(command: Command) -> str:
     field = f", part {command.field + 1}" if command.field else ""
-    told = f"`{command.tell}`" if command.tell else ""
+    setter = f"`{command.tell}`" if command.tell else ""
     limits = ", ".join(command.values) or _limits(command)
-    return f"| `{command.name}` | `{command.ask}`{field} | {told} | {command.unit} | {limits} |"
+    return f"| `{command.name}` | `{command.ask}`{field} | {setter} | {command.unit} | {limits} |"
 
 
 def _register(profile: Profile, register: Register) -> str:
@@ -121,7 +138,7 @@ def _entries(profile: Profile) -> Iterator[Register | Command]:
 
 
 def _cell(text: str) -> str:
-    """Text for a table, in which a stroke would end the cell."""
+    """Text for a table cell, with | escaped."""
     return text.replace("|", "\\|")
 
 

@@ -20,11 +20,7 @@ RegisterType = Literal["uint16", "int16", "uint32", "int32", "float32", "string"
 Space = Literal["holding", "input", "coil", "discrete"]
 Kind = Literal["axis", "chamber", "reader", "slot"]
 Carrier = Literal["tcp", "rtu", "tls", "ascii"]
-Adapter = Literal[
-    "oriental_az", "smc_lec", "iai_numeric",
-    "set_point", "watlow_f4t", "watlow_f4", "binder", "eurotherm_3200", "espec_p300",
-    "tumbleline_reader", "tumbleline_slot",
-]  # fmt: skip
+Adapter = Annotated[str, Field(pattern=r"^[a-z][a-z0-9_]*$")]  # the family, a module in stations/devices/families
 
 WORDS: dict[str, int] = {"uint16": 1, "int16": 1, "uint32": 2, "int32": 2, "float32": 2, "string": 1, "bit": 1}
 BITS: frozenset[str] = frozenset({"coil", "discrete"})
@@ -104,7 +100,7 @@ class Register(Strict):
 
 
 class Command(Strict):
-    """One value of a device that is spoken to in lines of text.
+    """One value of a device with a text protocol.
 
     ``ask`` is the question whose answer's comma-separated part ``field`` is the value; ``tell`` is the line that sets it, with
     the value in braces. What has no ``tell`` is never written.

@@ -96,7 +96,7 @@ def make_plant(
 
     plant = Plant(config, lot, hidden)
     if resume:
-        plant.journal.replay(resume, plant)
+        plant.resume(resume)
     return plant
 
 
@@ -119,8 +119,10 @@ def serve_devices(config: StationConfig, plant: Plant) -> Generator[Links]:
 
     with ExitStack() as stack:
         server = stack.enter_context(PlantServer(plant))
-        at: dict[Carrier, tuple[str, int]] = {"tcp": stack.enter_context(on_the_wire(plant, server.host, server.port))}
-        for device_id in plant.speakers:
+        at: dict[Carrier, tuple[str, int]] = {
+            "tcp": stack.enter_context(on_the_wire(plant, plant.faults, server.host, server.port))
+        }
+        for device_id in plant.line_devices:
             lines = stack.enter_context(LineServer(plant, device_id))
             at["ascii"] = (lines.host, lines.port)
         links = Links(config, at)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 from schemas.errors import StationError
 from stations.safety.folder import state_folder
 from stations.safety.leases import holders
-from stations.safety.standing import not_safe
+from stations.safety.safety_status import unsafe_reason
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Generator
@@ -136,7 +136,7 @@ def _occupied(station: Station) -> list[int]:
 def _leased(now: Overview, config: StationConfig) -> None:
     """Who drives the station; and where a run has left it without making it safe, that it is not safe."""
     now.lease = _lease(config)
-    if problem := not_safe(state_folder(), config):
+    if problem := unsafe_reason(state_folder(), config):
         now.faults["safe state"] = problem
 
 

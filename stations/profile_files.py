@@ -10,13 +10,19 @@ from schemas.errors import RecipeInvalid, did_you_mean
 from schemas.profile import Profile, parse_profile
 
 if TYPE_CHECKING:
+    from importlib.resources.abc import Traversable
+
     from schemas.carrier import Carried
+
+
+def profile_folder() -> Traversable:
+    """The folder of the profiles."""
+    return files("stations").joinpath("profiles")
 
 
 def profile_names() -> list[str]:
     """Names of the profiles, sorted."""
-    folder = files("stations").joinpath("profiles")
-    return sorted(item.name.removesuffix(".toml") for item in folder.iterdir() if item.name.endswith(".toml"))
+    return sorted(item.name.removesuffix(".toml") for item in profile_folder().iterdir() if item.name.endswith(".toml"))
 
 
 def profile_of(device: Carried) -> Profile:
@@ -35,8 +41,8 @@ def recorded_columns(reader: Carried) -> list[str]:
 
 @cache
 def load_profile(name: str) -> Profile:
-    """The profile of that name; an unknown one is refused with what looks like it."""
+    """The profile of that name; an unknown one is refused with the nearest names."""
     if name not in profile_names():
         raise RecipeInvalid(f"profile: no '{name}'; {did_you_mean(name, profile_names())}", key="profile")
     source = f"stations/profiles/{name}.toml"
-    return parse_profile(files("stations").joinpath("profiles", f"{name}.toml").read_text("utf-8"), source)
+    return parse_profile(profile_folder().joinpath(f"{name}.toml").read_text("utf-8"), source)

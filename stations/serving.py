@@ -80,7 +80,7 @@ def serve(
     """Comes back when ``stop`` is set; until then the station's time goes on at ``speed`` times the wall's.
 
     Drives and reader have watchdogs of their own: ``silence_s`` after the last request they stop; 0 never.
-    ``ready`` is told host and port once they listen; a device that is spoken to in lines has the port behind. Nothing is sampled
+    ``ready`` gets host and port once they listen; a device with a text protocol has the next port. Nothing is sampled
     unless a client starts it.
     """
     if config.kind != "simulated":
@@ -96,9 +96,9 @@ def serve(
     plant = make_plant(config, lot)
     silence = IdleStop(plant, config.devices, silence_s)
     with ExitStack() as stack:
-        begin = _with_room_behind(host) if plant.speakers and port == 0 else port
+        begin = _with_room_behind(host) if plant.line_devices and port == 0 else port
         server = stack.enter_context(PlantServer(plant, host, begin))
-        for number, device_id in enumerate(plant.speakers, server.port + 1):
+        for number, device_id in enumerate(plant.line_devices, server.port + 1):
             stack.enter_context(LineServer(plant, device_id, host, number))
         ready(server.host, server.port)
         clock, done = WallClock(), 0.0

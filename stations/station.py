@@ -36,7 +36,7 @@ def _no_state() -> bytes:
 
 
 def nobody_else() -> None:
-    """A station in this process: nobody else can drive it."""
+    """For a station in this process, which no other run can drive."""
 
 
 @dataclass(frozen=True)

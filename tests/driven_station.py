@@ -75,15 +75,15 @@ def safe_within(config, seconds):
         if (moving, set_point, sampling) == (False, 25.0, "stopped"):
             return time.monotonic() - begun
         time.sleep(0.1)
-    pytest.fail(f"not safe after {seconds} s: {look(config)}; {folder.log(folder.state_folder())}")
+    pytest.fail(f"not safe after {seconds} s: {look(config)}; {folder.read_log(folder.state_folder())}")
 
 
 def told(event, after=0):
     """The machine's log of one kind of event, once there are more than ``after``."""
     end = time.monotonic() + SOON_S
     while time.monotonic() < end:
-        found = [line for line in folder.log(folder.state_folder()) if line["event"] == event]
+        found = [line for line in folder.read_log(folder.state_folder()) if line["event"] == event]
         if len(found) > after:
             return found[-1]
         time.sleep(0.05)
-    return pytest.fail(f"no {event}: {folder.log(folder.state_folder())}")
+    return pytest.fail(f"no {event}: {folder.read_log(folder.state_folder())}")

@@ -196,7 +196,7 @@ CASES: tuple[Case, ...] = (
     # the devices under test and their reader
     Case(f"dead:at_s={WITHIN}:serial=U001", UNIT, "constant output"),
     Case("swapped_slots:serial=U001", RUN, "'U002' sits there, 'U001' is needed"),
-    Case(f"swapped_slots:at_s={WITHIN}:serial=U001", RUN, "'U001' does not sit there any more"),
+    Case(f"swapped_slots:at_s={WITHIN}:serial=U001", RUN, "'U001' is no longer there"),
     Case(f"fifo_overflow:at_s={WITHIN}:serial=U001", RECOVERED, spoilt=True),
     Case(f"dropped_samples:at_s={WITHIN}", RECOVERED, spoilt=True),
     Case(f"dropped_samples:at_s={WITHIN}:numbered=0", RECOVERED, spoilt=True),

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from pipelines.capture.acquisition import Acquisition
@@ -37,24 +37,23 @@ def capture(
 ) -> None:
     """Takes every record of a recipe that the sink does not have yet, in order.
 
-    Everything that the recipe asks for is held against the station's limits before anything moves. A unit that stops answering is
-    told so in its readings; the others go on. A condition that spoils data pauses the run, which goes back to its last
-    checkpoint, soak and pose, and measures again. What only a person can put right leaves the station safe and ends the run.
+    The recipe is checked against the station's limits before anything moves. A unit that stops answering is marked in its
+    readings; the others continue. A condition that spoils data pauses the run, which returns to its last checkpoint (soak and
+    pose) and measures again. A fault that only a person can correct ends the run and leaves the station in its safe state.
 
     Parameters
     ----------
-    events : where the reasons of all that are kept; forgotten where there is none
+    events : journal of pauses, repeats and their reasons; kept in memory only where there is none
     """
     plan = steps(recipe)
     check(station, recipe, plan)
-    guard = Supervisor(station, events if events is not None else MemoryLog())
+    supervisor = Supervisor(station, events if events is not None else MemoryLog())
     remaining = Remaining(plan, station.config, recipe)
-    work = CaptureRun(station, recipe, lot, sink, guard, remaining=remaining, progress=progress)
-    work.run(plan)
+    CaptureRun(Acquisition(station, recipe, lot, sink, supervisor), remaining, progress).run(plan)
 
 
 def check(station: Station, recipe: Recipe, plan: list[Step]) -> None:
-    """Refuses a recipe that the station may not do; nothing has moved then."""
+    """Refuses a recipe outside the station's limits, before anything moves."""
     for step in plan:
         if step.off_s > 0.0:
             station.reader.require_switch()
@@ -64,138 +63,157 @@ def check(station: Station, recipe: Recipe, plan: list[Step]) -> None:
 
 
 @dataclass
-class CaptureRun(Acquisition):
-    """The capture of one lot, record by record, each from its checkpoint."""
+class CaptureRun:
+    """The capture of one lot, record by record, each from its checkpoint; ``approach`` follows the soak under way."""
 
-    remaining: Remaining = field(kw_only=True)
-    progress: Progress = field(kw_only=True)
+    acquisition: Acquisition
+    remaining: Remaining
+    progress: Progress
     approach: Approach | None = None
 
+    @property
+    def station(self) -> Station:
+        """The station that is driven."""
+        return self.acquisition.station
+
+    @property
+    def supervisor(self) -> Supervisor:
+        """The conditions and the journal of this capture."""
+        return self.acquisition.supervisor
+
     def run(self, plan: list[Step]) -> None:
-        """Every step that is not done; whatever the station ends the run with is noted, and leaves it safe."""
-        done = self.sink.finished()
-        self.soundness.refuse_contradicted(self.guard.events.noted())
-        self.power.require_on()
-        self.identify()
+        """Measures every step that is not stored; an error of the station is journalled and leaves it in its safe state."""
+        acquisition, done = self.acquisition, self.acquisition.sink.finished()
+        acquisition.plausibility.refuse_contradicted(self.supervisor.events.noted())
+        acquisition.power.require_on()
+        acquisition.identify()
         try:
-            self.guard.begin(self.lot.units)
+            self.supervisor.begin(acquisition.lot.units)
             soak = max((step.soak for step in plan if step.record in done), default=-1) if self.station.exact else -1
             for number, step in enumerate(plan):
                 if step.record not in done:
-                    self.at = number
+                    acquisition.at = number
                     self.record(step, settled=step.soak <= soak)
                     soak = max(soak, step.soak)
         except (StationError, LeaseLost) as problem:
-            self.guard.stopped(self.at, problem)
+            self.supervisor.stop(acquisition.at, problem)
             raise
         self.progress(len(plan), len(plan), "captured")
 
     def record(self, step: Step, *, settled: bool) -> None:
-        """One record, begun anew from its checkpoint (the soak, then the pose) as often as it takes and is allowed."""
+        """Measures one record; after an interruption again from its checkpoint, as often as the station's file allows."""
         spoilt = unanswered = 0
-        shortest = self.recipe.soak_min_s
+        shortest = self.acquisition.recipe.soak_min_s
         while True:
             try:
                 if not settled:
                     self.soak(step, shortest)
                 settled = True
                 if step.off_s > 0.0:
-                    self.tell(step, f"{step.temperature:g} °C, devices off for {step.off_s / 60.0:g} min")
-                    self.power.cycle(step)
-                self.take(step)
+                    self.report(step, f"{step.temperature:g} °C, devices off for {step.off_s / 60.0:g} min")
+                    self.acquisition.power.cycle(step)
+                self.measure_and_store(step)
             except Suspended as why:
                 spoilt += 1
-                self.guard.suspended(step.record, why)
-                shortest = self.recipe.soak_min_s if any(r.condition in WARMING for r in why.reasons) else 0.0
+                self.supervisor.note_interruption(step.record, why)
+                warms = any(reason.condition in WARMING for reason in why.reasons)
+                shortest = self.acquisition.recipe.soak_min_s if warms else 0.0
                 spoilt = self.wait(step, why, spoilt)
                 settled = False
             except (StationTimeout, LinkLost) as problem:
                 unanswered += 1
                 if isinstance(problem, NotReached) or unanswered == LINK_ATTEMPTS:
                     raise
-                self.guard.note("suspended", step.record, str(problem), "back to the last checkpoint")
-                self.station.clock.sleep(self.guard.watched.rules.poll_s)
+                self.supervisor.note("suspended", step.record, str(problem), "back to the last checkpoint")
+                self.station.clock.sleep(self.supervisor.watched.rules.poll_s)
                 settled, shortest = False, 0.0
             else:
                 return
 
     def wait(self, step: Step, why: Suspended, spoilt: int) -> int:
-        """Waits for the end of what suspended a record, and gives how often it may still count as spoilt.
+        """Waits until the condition has ended, and returns how many times the record counts as spoilt.
 
-        What lasts and concerns some slots only costs their units; the others go on.
+        A condition that does not end and concerns some slots only gives up their units; the others continue.
         """
-        self.tell(step, f"paused: {why}")
+        acquisition = self.acquisition
+        self.report(step, f"paused: {why}")
         try:
-            self.guard.refuse_too_many(step, why, spoilt)
-            self.guard.wait(step.record, why, self.slots, self.noted)
+            self.supervisor.refuse_too_many(step, why, spoilt)
+            self.supervisor.wait(step.record, why, acquisition.slots, acquisition.read_instruments)
         except StillSuspended as problem:
             slots = {slot for reason in problem.reasons for slot in reason.slots}
-            if not all(reason.slots for reason in problem.reasons) or slots >= set(self.slots):
+            if not all(reason.slots for reason in problem.reasons) or slots >= set(acquisition.slots):
                 raise
             for reason in problem.reasons:
-                self.lose_slots(reason.slots, LOST_FOR.get(reason.condition, reason.condition))
+                acquisition.give_up_slots(reason.slots, LOST_FOR.get(reason.condition, reason.condition))
             return 0
         return spoilt
 
     def soak(self, step: Step, shortest: float) -> None:
-        """Settles the devices at the step's temperature; one that alone does not settle is given up."""
-        station, config = self.station, self.station.config
+        """Settles the devices at the step's temperature; a device that alone does not settle is given up."""
+        station, config, acquisition = self.station, self.station.config, self.acquisition
+        name = f"soak {step.soak} at {step.temperature:g} °C"
         if config.safety.chamber == "off":
             station.chamber.on()
         if not step.settled:
             station.chamber.set_temperature(step.temperature)
-            self.guard.note(
-                "soak", step.record, f"soak {step.soak} at {step.temperature:g} °C", "read on the way there"
-            )
+            self.supervisor.note("soak", step.record, name, "read on the way there")
             return
-        self.tell(step, f"soak at {step.temperature:g} °C")
+        self.report(step, f"soak at {step.temperature:g} °C")
         start = station.clock.now()
         self.approach = Approach(step.temperature)
         try:
-            station.soak(step.temperature, shortest, self.slots, lambda: self.settling(step))
+            station.soak(step.temperature, shortest, acquisition.slots, lambda: self.observe_soak(step))
         except Unsettled as problem:
-            if not problem.slots or set(problem.slots) >= set(self.slots):
+            if not problem.slots or set(problem.slots) >= set(acquisition.slots):
                 raise
-            self.lose_slots(problem.slots, f"does not settle at {step.temperature:g} °C")
+            acquisition.give_up_slots(problem.slots, f"does not settle at {step.temperature:g} °C")
         seconds = station.clock.now() - start
-        self.remaining.soaked(step, seconds, self.approach if shortest > 0.0 else None)
+        self.remaining.add_soak(step, seconds, self.approach if shortest > 0.0 else None)
         figures = {"target_C": step.temperature, "seconds": seconds, **self.approach.figures()}
-        self.guard.note("soak", step.record, f"soak {step.soak} at {step.temperature:g} °C", "settled", figures)
+        self.supervisor.note("soak", step.record, name, "settled", figures)
         self.approach = None
 
-    def settling(self, step: Step) -> list[float]:
-        """The temperatures by slot within a soak, noted; and how far it is."""
+    def observe_soak(self, step: Step) -> list[float]:
+        """The temperatures by slot during a soak, °C; logs them and reports the progress."""
+        acquisition = self.acquisition
         try:
-            instruments = self.noted()
-            self.guard.soaking(instruments)
+            instruments = acquisition.read_instruments()
+            self.supervisor.check_soak(instruments)
         except StationError as problem:
-            self.guard.named(problem)
+            self.supervisor.raise_operator_cause(problem)
             raise
+        temperatures = instruments.temperature_C
         if self.approach is not None:
-            now, devices = self.station.clock.now(), [instruments.temperature_C[slot] for slot in self.slots]
-            self.approach.look(now, self.history.air, devices)
-        worst = max((instruments.temperature_C[s] for s in self.slots), key=lambda t: abs(t - step.temperature))
-        self.tell(step, f"soak at {step.temperature:g} °C, device at {worst:.1f} °C")
-        return instruments.temperature_C
+            devices = [temperatures[slot] for slot in acquisition.slots]
+            self.approach.add(self.station.clock.now(), acquisition.history.air, devices)
+        farthest = max((temperatures[s] for s in acquisition.slots), key=lambda t: abs(t - step.temperature))
+        self.report(step, f"soak at {step.temperature:g} °C, device at {farthest:.1f} °C")
+        return temperatures
 
-    def tell(self, step: Step, note: str) -> None:
-        """Tells how far the capture is, with the station time that is left."""
+    def report(self, step: Step, note: str) -> None:
+        """Reports the progress with the remaining station time."""
         left = self.remaining.text(step, self.station.clock.now())
-        self.progress(self.at, self.remaining.total, f"{note}, {left}")
+        self.progress(self.acquisition.at, self.remaining.total, f"{note}, {left}")
 
-    def take(self, step: Step) -> None:
-        """Moves, settles, samples and stores one record; what spoiled it is told by :class:`Suspended`."""
-        begun = self.station.clock.now()
-        self.tell(step, f"{step.temperature:g} °C, {step.kind} {step.pose.name}")
+    def measure_and_store(self, step: Step) -> None:
+        """Measures one record and stores it.
+
+        Raises
+        ------
+        Suspended : a condition spoiled the record
+        """
+        acquisition, begun = self.acquisition, self.station.clock.now()
+        self.report(step, f"{step.temperature:g} °C, {step.kind} {step.pose.name}")
         try:
-            self.guard.before(self.slots)
-            record = self.measured(step)
+            self.supervisor.check_before(acquisition.slots)
+            record, samples, readings = acquisition.measure(step)
         except Suspended:
             self.station.reader.stop()
             raise
         except StationError as problem:
-            self.guard.named(problem)
+            self.supervisor.raise_operator_cause(problem)
             raise
-        samples, readings = self.tables(record)
-        self.sink.put(step.record, samples, readings, self.history.taken(), self.station.state(), record.pieces)
-        self.remaining.taken(step, self.station.clock.now() - begun)
+        history, state = acquisition.history.drain(), self.station.state()
+        acquisition.sink.put(step.record, samples, readings, history, state, record.pieces)
+        self.remaining.add_record(step, self.station.clock.now() - begun)

@@ -1,4 +1,4 @@
-"""What interrupted a run at its station: an opened door, pauses, dwells that were measured again, units that were given up."""
+"""Interruptions of a run at its station: open door, pauses, repeated dwells, units that were given up."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from pipelines.tables.frames import rows_of
 if TYPE_CHECKING:
     from pipelines.archive import Run
 
-TOLD = ("suspended", "spoilt", "resumed", "unit_lost", "power", "emergency_stop", "stopped")
+KINDS = ("suspended", "spoilt", "resumed", "unit_lost", "power", "emergency_stop", "stopped")
 PAUSES = ("suspended", "spoilt")
 DOOR = "door is open"
 
@@ -28,7 +28,7 @@ class Interruption(TypedDict):
 
 
 class RepeatedDwell(TypedDict):
-    """A dwell that was thrown away and measured again, so many times, and why."""
+    """A dwell that was discarded and measured again: how many times, and why."""
 
     record: int
     pose: str
@@ -37,7 +37,7 @@ class RepeatedDwell(TypedDict):
 
 
 class Interruptions(TypedDict):
-    """All of a run. ``paused_s`` is the time from each pause to where the run went on, of those that had to be waited for."""
+    """All interruptions of a run; ``paused_s`` is the sum of the times from a pause to the event that resumed the run, s."""
 
     door_opened: int
     pauses: int
@@ -47,11 +47,11 @@ class Interruptions(TypedDict):
 
 
 def interruptions(run: Run) -> Interruptions | None:
-    """What interrupted a run; None where its archive does not say (imported data, or a version that did not note it)."""
+    """The interruptions of a run; None where its archive has no events (imported data, or an older version)."""
     if "events" not in run.tables():
         return None
     poses = _poses(run)
-    events = [_event(row, poses) for row in rows_of(run.table("events")) if row["kind"] in TOLD]
+    events = [_event(row, poses) for row in rows_of(run.table("events")) if row["kind"] in KINDS]
     pauses = [event for event in events if event["kind"] in PAUSES]
     return {
         "door_opened": sum(DOOR in event["reason"] for event in pauses),
@@ -82,7 +82,7 @@ def _poses(run: Run) -> dict[int, str]:
 
 
 def _paused(events: list[Interruption]) -> float:
-    """Seconds from the first pause of each row of them to the event that tells of its end."""
+    """Seconds from the first of consecutive pauses to the event that resumed the run, summed."""
     total, since = 0.0, None
     for event in events:
         if event["kind"] in PAUSES and since is None:
@@ -95,11 +95,11 @@ def _paused(events: list[Interruption]) -> float:
 
 
 def _repeated(events: list[Interruption]) -> list[RepeatedDwell]:
-    found: dict[int, RepeatedDwell] = {}
+    dwells: dict[int, RepeatedDwell] = {}
     for event in events:
         if event["kind"] == "spoilt":
             new: RepeatedDwell = {"record": event["record"], "pose": event["pose"], "times": 0, "reasons": []}
-            dwell = found.setdefault(event["record"], new)
+            dwell = dwells.setdefault(event["record"], new)
             dwell["times"] += 1
             dwell["reasons"].append(event["reason"])
-    return list(found.values())
+    return list(dwells.values())

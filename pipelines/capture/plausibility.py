@@ -1,4 +1,8 @@
-"""Whether what a capture has just taken can be what the units did: before it is stored, while it can still be measured again."""
+"""Plausibility of a record before it is stored, while it can still be measured again.
+
+Means come from the summaries that validation and reduction use. Outliers are judged against percentiles of the samples, which
+no summary of several tables can give.
+"""
 
 from __future__ import annotations
 
@@ -6,11 +10,14 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 from inertial.pointing import TURNED_AWAY, Pointing, contradicts
+from pipelines.tables.summaries import MEANS, summarised
 from schemas.errors import OperatorNeeded, StationError
 from stations.safety.suspenders import Reason, Suspended
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
+
+    import pandas as pd
 
     from pipelines.capture.record import Record
     from schemas.event import Event
@@ -24,17 +31,19 @@ TURNED = f"{TABLE}{TURNED_AWAY}"
 
 
 @dataclass
-class Soundness:
-    """Judges records by the slots' identities, by their own samples, and by what the lot says of the table."""
+class Plausibility:
+    """Checks of a record: the slots' identities, outliers among its samples, and the table's angles against all units."""
 
     reader: Reader
     identities: Mapping[str, Identity]
     pointing: Pointing = field(default_factory=Pointing)
 
-    def others(self, units: Sequence[Unit]) -> Iterator[tuple[Unit, StationError]]:
-        """Units whose slots do not answer any more, with the problem.
+    def unreachable_units(self, units: Sequence[Unit]) -> Iterator[tuple[Unit, StationError]]:
+        """Units whose slots no longer answer, with the error.
 
-        Another unit than when the run began ends it: nobody knows whose samples these are.
+        Raises
+        ------
+        OperatorNeeded : another unit sits in a slot than at the start, so its samples have no known unit
         """
         for unit in units:
             try:
@@ -44,34 +53,42 @@ class Soundness:
                 continue
             if not same:
                 raise OperatorNeeded(
-                    f"slot {unit.slot}: '{unit.serial}' does not sit there any more; seat the units as they were, or measure "
+                    f"slot {unit.slot}: '{unit.serial}' is no longer there; seat the units as they were, or measure "
                     "the lot anew"
                 )
 
-    def refuse_strays(self, record: Record, units: Sequence[Unit]) -> None:
+    def refuse_outliers(self, record: Record, units: Sequence[Unit]) -> None:
         """Suspends a record with a sample that cannot be the unit's."""
-        found: dict[int, str] = {}
+        outliers: dict[int, str] = {}
         for unit in units:
             identity = self.identities[unit.serial]
-            text = record.stray(unit.serial, identity.lsb, identity.full_scale)
+            text = record.outlier(unit.serial, identity.lsb, identity.full_scale)
             if text:
-                found[unit.slot] = text
-        if found:
-            slot = min(found)
-            raise Suspended([Reason("samples", f"slot {slot}: {found[slot]}", tuple(found))], spoilt=True)
+                outliers[unit.slot] = text
+        if outliers:
+            slot = min(outliers)
+            raise Suspended([Reason("samples", f"slot {slot}: {outliers[slot]}", tuple(outliers))], spoilt=True)
 
     @staticmethod
     def refuse_contradicted(past: Sequence[Event]) -> None:
-        """Refuses to go on behind dwells that were stored before all units contradicted the table's encoders."""
+        """Refuses to resume a run that ended because all units contradicted the table's encoders."""
         for event in past:
             if event.kind == "stopped" and event.reason.startswith(TURNED):
                 raise OperatorNeeded(event.reason)
 
-    def refuse_contradiction(self, record: Record, units: Sequence[Unit]) -> None:
-        """Ends the run where all units say that the table does not stand where its encoders say."""
-        if not units:
+    def refuse_contradiction(self, soak: int, samples: pd.DataFrame, readings: pd.DataFrame) -> None:
+        """Ends the run where all units say that the table does not stand where its encoders say.
+
+        Parameters
+        ----------
+        soak : number of the soak; the table's error is judged over the dwells of one
+        samples, readings : the tables of one record
+        """
+        if samples.empty:  # all of a long record's samples are stored already
             return
-        seen = record.seen(units[0].slot)
-        text = contradicts(self.pointing.add(record.soak, (seen["outer_deg"], seen["inner_deg"]), record.means(units)))
+        summaries = summarised([samples], readings)
+        means = dict(zip(summaries["unit"], summaries[list(MEANS)].to_numpy(dtype=float), strict=True))
+        first = readings.iloc[0]
+        text = contradicts(self.pointing.add(soak, (float(first["outer_deg"]), float(first["inner_deg"])), means))
         if text:
             raise OperatorNeeded(f"{TABLE}{text}")

@@ -1,4 +1,4 @@
-"""What a capture gathers while it runs, and the tables it makes of it."""
+"""The data of one record during a capture, and the tables made from them."""
 
 from __future__ import annotations
 
@@ -23,10 +23,10 @@ if TYPE_CHECKING:
 
 POWER_OFF = BY_ATTRIBUTE["power_off"].column
 INSTRUMENTS = tuple(BY_ATTRIBUTE[name].column for name in ("chamber", "temperature", "supply", "vibration"))
-STRAY_SIGMA = 20.0
-STRAY_PART = 1e-3  # of the full scale: what is less moves a mean of a hundred samples by no more than a part in 100 000
-FEWEST_TO_STRAY = 20
-SHARED = 4  # numbers of a look that all slots share: two angles, air, vibration
+OUTLIER_SIGMA = 20.0
+OUTLIER_PART = 1e-3  # of the full scale: a smaller outlier changes a mean of a hundred samples by at most 1e-5 of it
+FEWEST_FOR_OUTLIERS = 20
+SHARED = 4  # values of an observation that all slots share: two angles, air, vibration
 
 
 @dataclass
@@ -42,12 +42,12 @@ class TemperatureLog:
         return self.last is None or now - self.last >= every - 1e-6
 
     def add(self, now: float, chamber: float, units: Sequence[Unit], by_slot: Sequence[float]) -> None:
-        """Notes the temperatures of air and devices."""
+        """Adds the temperatures of air and devices, °C, at ``now`` s."""
         self.last, self.air = now, chamber
         self.rows += [(now, chamber, unit.slot, unit.serial, by_slot[unit.slot]) for unit in units]
 
-    def taken(self) -> pd.DataFrame:
-        """The rows as a table; the next record starts with none, due at once, so that a resumed run notes the same."""
+    def drain(self) -> pd.DataFrame:
+        """The rows as a table; the log is empty afterwards and due at once, so that a resumed run logs the same rows."""
         frame = pd.DataFrame(self.rows, columns=["time_s", "chamber_C", "slot", "unit", "unit_C"])
         self.rows, self.last = [], None
         return frame
@@ -55,7 +55,7 @@ class TemperatureLog:
 
 @dataclass
 class Record:
-    """One record while it is taken: what was looked at, and the samples by unit."""
+    """One record while it is measured: the observations of the station, and the samples by unit."""
 
     number: int
     kind: str
@@ -67,23 +67,23 @@ class Record:
     since_move: float = 0.0
     since_power: float = 0.0
     power_off: float | None = None
-    looks: list[NDArray[np.float64]] = field(default_factory=list)
+    observations: list[NDArray[np.float64]] = field(default_factory=list)
     recorded: dict[str, list[float]] = field(default_factory=dict)
     parts: dict[str, list[Samples]] = field(default_factory=dict)
     stored: dict[str, int] = field(default_factory=dict)
     lossy: set[str] = field(default_factory=set)
     pieces: int = 0
 
-    def look(self, angles: tuple[float, float], chamber: float, instruments: Instruments) -> None:
-        """Notes encoders, air and instruments of one instant."""
+    def observe(self, angles: tuple[float, float], chamber: float, instruments: Instruments) -> None:
+        """Adds one observation: encoders in degrees, air in °C, instruments."""
         row = (*angles, chamber, instruments.vibration_g, *instruments.temperature_C, *instruments.supply_V)
-        self.looks.append(np.array(row))
+        self.observations.append(np.array(row))
         for column, value in instruments.recorded.items():
             self.recorded.setdefault(column, []).append(value)
 
-    def seen(self, slot: int) -> dict[str, float]:
-        """Means over the looks: what a unit's slot and the station showed."""
-        means = np.mean(self.looks, axis=0)
+    def observed(self, slot: int) -> dict[str, float]:
+        """Means over the observations, for the station and one slot, by column of the readings."""
+        means = np.mean(self.observations, axis=0)
         slots = (len(means) - SHARED) // 2
         return {
             "outer_deg": float(means[0]),
@@ -110,39 +110,34 @@ class Record:
         return serial in self.lossy
 
     def rows(self) -> int:
-        """Samples of all units that are held in memory."""
+        """Number of samples of all units in memory."""
         return sum(self._held(serial) for serial in self.parts)
 
     def piece(self, units: Sequence[Unit]) -> pd.DataFrame:
-        """The samples that are held, for the store; they are not held any longer."""
+        """The samples in memory as a table to be stored; the memory is empty afterwards."""
         frame = self.samples(units)
         self.stored = {serial: self.count(serial) for serial in self.parts}
         self.parts = {serial: [] for serial in self.parts}
         self.pieces += 1
         return frame
 
-    def means(self, units: Sequence[Unit]) -> dict[str, NDArray[np.float64]]:
-        """Mean outputs (3,) of these units, of the samples that are held."""
-        held = {unit.serial: self._outputs(unit.serial) for unit in units}
-        return {serial: output.mean(axis=0) for serial, output in held.items() if len(output)}
+    def outlier(self, serial: str, lsb: float, full_scale: float) -> str:
+        """The first outlier among the samples of a unit in memory, in words; empty where there is none.
 
-    def stray(self, serial: str, lsb: float, full_scale: float) -> str:
-        """The sample of a unit that stands far out of the others that are held; nothing where none does.
-
-        In a static dwell it was changed on its way, or the unit was knocked.
+        In a static dwell an outlier was changed in transmission, or the unit was knocked.
         """
         output = self._outputs(serial)
-        if len(output) < FEWEST_TO_STRAY:
+        if len(output) < FEWEST_FOR_OUTLIERS:
             return ""
         low, middle, high = np.percentile(output, (15.87, 50.0, 84.13), axis=0)
-        allowed = np.maximum(STRAY_SIGMA * np.maximum(0.5 * (high - low), lsb), STRAY_PART * full_scale)
+        allowed = np.maximum(OUTLIER_SIGMA * np.maximum(0.5 * (high - low), lsb), OUTLIER_PART * full_scale)
         far = np.argwhere(~(np.abs(output - middle) <= allowed))
         if not len(far):
             return ""
         row, axis = far[0].tolist()
-        found, usual = output[row, axis], middle[axis]
         return (
-            f"sample {self.stored.get(serial, 0) + row} says {found:g} on {AXES[axis]} where the others say {usual:g}"
+            f"sample {self.stored.get(serial, 0) + row} is {output[row, axis]:g} on {AXES[axis]}, the median of the dwell is "
+            f"{middle[axis]:g}"
         )
 
     def _outputs(self, serial: str) -> NDArray[np.float64]:
@@ -176,8 +171,8 @@ def _numbers(parts: Sequence[Samples]) -> NDArray[np.float64]:
 
 
 def readings_row(record: Record, unit: Unit, identity: Identity, status: str) -> dict[str, object]:
-    """What the station read beside a unit's samples: means over the looks of a record."""
-    seen = record.seen(unit.slot)
+    """A row of the readings: what the station measured for a unit, as means over the observations of a record."""
+    observed = record.observed(unit.slot)
     return {
         "unit": unit.serial,
         "slot": unit.slot,
@@ -185,11 +180,11 @@ def readings_row(record: Record, unit: Unit, identity: Identity, status: str) ->
         "kind": record.kind,
         "pose": record.pose.name,
         "soak": record.soak,
-        "outer_deg": seen["outer_deg"],
-        "inner_deg": seen["inner_deg"],
+        "outer_deg": observed["outer_deg"],
+        "inner_deg": observed["inner_deg"],
         "outer_command_deg": record.pose.outer_deg,
         "inner_command_deg": record.pose.inner_deg,
-        **{name: seen[name] for name in INSTRUMENTS},
+        **{name: observed[name] for name in INSTRUMENTS},
         "since_move_s": record.since_move,
         "since_power_s": record.since_power,
         **({} if record.power_off is None else {POWER_OFF: record.power_off}),
@@ -201,5 +196,5 @@ def readings_row(record: Record, unit: Unit, identity: Identity, status: str) ->
         "status": status,
         "out_unit": identity.out_unit,
         "full_scale": identity.full_scale,
-        **{column: seen[column] for column in record.recorded},
+        **{column: observed[column] for column in record.recorded},
     }

@@ -1,4 +1,4 @@
-"""The sink of a capture: where records go as they are taken."""
+"""The sink of a capture: it stores each record as soon as it is measured."""
 
 from __future__ import annotations
 
@@ -9,14 +9,14 @@ if TYPE_CHECKING:
 
 
 class CaptureSink(Protocol):
-    """Where records go: each is stored whole, or not at all."""
+    """Storage of records: each is stored completely, or not at all."""
 
     def finished(self) -> set[int]:
         """Numbers of the records that are stored."""
         ...
 
     def part(self, record: int, number: int, samples: pd.DataFrame) -> None:
-        """Stores a part of the samples of a long record ahead of the rest; part 0 begins anew."""
+        """Stores a part of the samples of a long record before the record is complete; part 0 discards earlier parts."""
         ...
 
     def put(
@@ -28,9 +28,9 @@ class CaptureSink(Protocol):
         station_state: bytes,
         parts: int = 0,
     ) -> None:
-        """Stores a record durably, with the station's state after it; ``parts`` of its samples are stored already."""
+        """Stores a record durably, with the station's state after it; ``parts`` parts of its samples are stored already."""
         ...
 
     def last_state(self) -> bytes | None:
-        """The station's state after the record that was stored last."""
+        """The station's state after the last stored record."""
         ...

@@ -1,4 +1,4 @@
-"""A soak as it went: how far air and devices went beyond the target, how fast the air ramps, how slowly the devices follow."""
+"""The measured response of a soak: overshoot of air and devices, ramp of the air, lag of the devices."""
 
 from __future__ import annotations
 
@@ -13,21 +13,21 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-LEAST_WAY_K = 1.5  # a shorter way of the air teaches nothing of lags
-RAMP_WAY_K = 5.0  # nor of the ramp
-FEWEST_LOOKS = 12
-QUIET_K = 0.3  # air and device closer than that differ by their places and their noise
+LAG_STEP_K = 1.5  # smallest temperature step that identifies a lag
+RAMP_STEP_K = 5.0  # smallest temperature step that identifies the ramp
+FEWEST_ROWS = 12
+QUIET_K = 0.3  # smaller differences between air and device are due to place and noise
 
 
 @dataclass
 class Approach:
-    """How air and devices come to a soak's target."""
+    """Temperatures of air and devices on the way to a soak's target, °C."""
 
     target: float
     rows: list[tuple[float, float, list[float]]] = field(default_factory=list["tuple[float, float, list[float]]"])
 
-    def look(self, time: float, air: float, devices: Sequence[float]) -> None:
-        """Notes the temperatures of one instant, s and °C."""
+    def add(self, time: float, air: float, devices: Sequence[float]) -> None:
+        """Adds the temperatures of one instant, s and °C."""
         self.rows.append((time, air, list(devices)))
 
     def figures(self) -> dict[str, float]:
@@ -42,7 +42,7 @@ class Approach:
         }
 
     def _beyond(self, values: Sequence[float]) -> float:
-        """How far values went beyond the target, seen from where they began; those that are not known do not count."""
+        """Overshoot of values over the target, from their first value on, K; values that are not finite are left out."""
         known = [value for value in values if math.isfinite(value)]
         if not known:
             return 0.0
@@ -50,28 +50,28 @@ class Approach:
         return max(0.0, *(direction * (value - self.target) for value in known))
 
     def air_ramp(self) -> float | None:
-        """The air's ramp over the middle of its way, K/min; None where the way was short."""
+        """Ramp of the air between 10 % and 80 % of the step, K/min; None where the step was too small."""
         air = self._air()
-        if len(air) < FEWEST_LOOKS or abs(self.target - air[0, 1]) < RAMP_WAY_K:
+        if len(air) < FEWEST_ROWS or abs(self.target - air[0, 1]) < RAMP_STEP_K:
             return None
-        way = (air[:, 1] - air[0, 1]) / (self.target - air[0, 1])
-        begin, end = int(np.argmax(way >= 0.1)), int(np.argmax(way >= 0.8))
+        part = (air[:, 1] - air[0, 1]) / (self.target - air[0, 1])
+        begin, end = int(np.argmax(part >= 0.1)), int(np.argmax(part >= 0.8))
         if end <= begin:
             return None
         return float(abs(air[end, 1] - air[begin, 1]) / (air[end, 0] - air[begin, 0]) * 60.0)
 
     def lag_s(self) -> float | None:
-        """Seconds by which the slowest device follows the air; None where the way was too short to tell.
+        """Lag of the slowest device behind the air, s; None where the step was too small.
 
-        Of first order: a device's slope is its distance from the air of its place, over its lag. Both follow from a straight line
-        through slopes against distances.
+        First order: the slope of a device is its difference to the air at its place, over its lag. A straight line through slopes
+        against differences gives both.
         """
         air = self._air()
-        if len(air) < FEWEST_LOOKS or abs(self.target - air[0, 1]) < LEAST_WAY_K:
+        if len(air) < FEWEST_ROWS or abs(self.target - air[0, 1]) < LAG_STEP_K:
             return None
         devices = np.array([row[2] for row in self.rows if math.isfinite(row[1])], dtype=np.float64)
-        found = [lag for column in devices.T if (lag := _lag(air, column)) is not None]
-        return max(found, default=None)
+        lags = [lag for column in devices.T if (lag := _lag(air, column)) is not None]
+        return max(lags, default=None)
 
     def _air(self) -> NDArray[np.float64]:
         """Time and temperature of the air, (n, 2)."""
@@ -86,7 +86,7 @@ def _lag(air: NDArray[np.float64], device: NDArray[np.float64]) -> float | None:
     distance = air[:, 1] - device
     between = (distance[1:] + distance[:-1]) / 2.0
     used = (step > 0.0) & np.isfinite(between) & (np.abs(between) > QUIET_K)
-    if used.sum() < FEWEST_LOOKS // 2:
+    if used.sum() < FEWEST_ROWS // 2:
         return None
     slope = np.diff(device)[used] / step[used]
     design = np.stack((between[used], np.ones(int(used.sum()))), axis=1)

@@ -1,4 +1,4 @@
-"""Station time that is left of a capture: what was planned, corrected by what soaks and records have really taken."""
+"""Remaining station time of a capture: the planned times, corrected by the measured times of soaks and records."""
 
 from __future__ import annotations
 
@@ -13,37 +13,39 @@ if TYPE_CHECKING:
     from schemas.recipe import Recipe
     from schemas.station import StationConfig
 
-MOST = 4.0  # a soak or record that took so much longer than planned was disturbed; the next need not be
+MOST = (
+    4.0  # bound of the correction: a soak or record that measured longer was disturbed, which says nothing of the next
+)
 HOUR_S, MINUTE_S = 3600.0, 60.0
 
 
 @dataclass
 class _Pace:
-    """What was planned of one kind of work so far, and what it took."""
+    """Planned and measured seconds of one kind of work so far."""
 
     planned: float = 0.0
-    took: float = 0.0
+    measured: float = 0.0
 
-    def add(self, planned: float, took: float) -> None:
+    def add(self, planned: float, measured: float) -> None:
         self.planned += planned
-        self.took += took
+        self.measured += measured
 
     @property
     def factor(self) -> float:
-        """By how much the work takes longer than planned."""
-        return min(MOST, max(1.0 / MOST, self.took / self.planned)) if self.planned > 0.0 else 1.0
+        """Measured over planned time."""
+        return min(MOST, max(1.0 / MOST, self.measured / self.planned)) if self.planned > 0.0 else 1.0
 
 
 @dataclass
 class Remaining:
-    """Seconds of station time that a capture's steps still need."""
+    """Seconds of station time that the remaining steps of a capture need."""
 
     plan: list[Step]
     config: StationConfig
     recipe: Recipe
     _soak: dict[int, float] = field(init=False, default_factory=dict[int, float])
     _record: dict[int, float] = field(init=False, default_factory=dict[int, float])
-    _behind: dict[int, tuple[float, float]] = field(init=False, default_factory=dict[int, "tuple[float, float]"])
+    _after: dict[int, tuple[float, float]] = field(init=False, default_factory=dict[int, "tuple[float, float]"])
     _done: set[int] = field(init=False, default_factory=set[int])
     _soaks: _Pace = field(init=False, default_factory=_Pace)
     _records: _Pace = field(init=False, default_factory=_Pace)
@@ -55,15 +57,15 @@ class Remaining:
         self._planned(self.config)
 
     def _planned(self, config: StationConfig) -> None:
-        """Plans soaks and records by a station's pace."""
+        """Sums the planned seconds of soaks and records, by record and of all later records."""
         self._soak, self._record = {}, {}
-        for stretch in schedule(self.plan, config, self.recipe):
-            record = stretch.step.record
-            kind = self._soak if stretch.kind == "soak" else self._record
-            kind[record] = kind.get(record, 0.0) + stretch.seconds
+        for activity in schedule(self.plan, config, self.recipe):
+            record = activity.step.record
+            kind = self._soak if activity.kind == "soak" else self._record
+            kind[record] = kind.get(record, 0.0) + activity.seconds
         soaks = records = 0.0
         for step in reversed(self.plan):
-            self._behind[step.record] = (soaks, records)
+            self._after[step.record] = (soaks, records)
             soaks += self._soak.get(step.record, 0.0)
             records += self._record[step.record]
 
@@ -72,8 +74,8 @@ class Remaining:
         """Records in all."""
         return len(self.plan)
 
-    def soaked(self, step: Step, seconds: float, approach: Approach | None) -> None:
-        """Learns from a soak; one that only made sure of its temperature, without an ``approach``, teaches nothing."""
+    def add_soak(self, step: Step, seconds: float, approach: Approach | None) -> None:
+        """Adds the measured seconds of a soak; without ``approach`` it only confirmed its temperature and is not counted."""
         if approach is not None and step.record in self._soak:
             self._learn(approach)
             self._soaks.add(self._soak[step.record], seconds)
@@ -81,9 +83,9 @@ class Remaining:
         self._since = None
 
     def _learn(self, approach: Approach) -> None:
-        """Plans anew with the ramp and the lag that a soak has shown, the first that showed them.
+        """Plans again with the first ramp and the first lag that a soak has shown.
 
-        A share that is right for one soak is wrong for the next, whose way is longer or shorter: ramp and lag are not.
+        A factor from one soak is wrong for the next, whose temperature step differs; ramp and lag hold for both.
         """
         known, ramp, lag = (self._ramp, self._lag), approach.air_ramp(), approach.lag_s()
         self._ramp, self._lag = self._ramp or ramp, self._lag or lag
@@ -98,33 +100,33 @@ class Remaining:
             changed["simulation"] = config.simulation.model_copy(update={"slot_lag_s": (self._lag, self._lag)})
         self._planned(config.model_copy(update=changed))
 
-    def taken(self, step: Step, seconds: float) -> None:
-        """Learns from a record."""
+    def add_record(self, step: Step, seconds: float) -> None:
+        """Adds the measured seconds of a record."""
         self._records.add(self._record[step.record], seconds)
         self._done.add(step.record)
         self._since = None
 
     def seconds(self, step: Step, now: float) -> float:
-        """Station time until the end of the capture, asked while ``step`` is under way at ``now`` s."""
+        """Station time until the end of the capture, s, while ``step`` is under way at ``now`` s."""
         key = step.record if -1 - step.record in self._done or step.record not in self._soak else -1 - step.record
         if self._since is None or self._since[0] != key:
             self._since = (key, now)
         under_way = (
             self._soaks.factor * self._soak[step.record] if key < 0 else self._records.factor * self._record[key]
         )
-        soaks, records = self._behind[step.record]
+        soaks, records = self._after[step.record]
         records += self._record[step.record] if key < 0 else 0.0
         left = self._soaks.factor * soaks + self._records.factor * records
         return left + max(0.0, under_way - (now - self._since[1]))
 
     def text(self, step: Step, now: float) -> str:
-        """The same for people; the time of a simulated station is not theirs."""
-        whose = " of the station's time" if self.config.kind == "simulated" else ""
-        return f"{duration_text(self.seconds(step, now))}{whose} left"
+        """The remaining time in words; for a simulated station it is named as the station's time."""
+        unit = " of the station's time" if self.config.kind == "simulated" else ""
+        return f"{duration_text(self.seconds(step, now))}{unit} left"
 
 
 def duration_text(seconds: float) -> str:
-    """A duration for people, in hours and minutes; seconds below two minutes."""
+    """A duration in hours and minutes; in seconds below two minutes."""
     if seconds < 2.0 * MINUTE_S:
         return f"{seconds:.0f} s"
     hours, minutes = divmod(round(seconds / MINUTE_S), 60)

@@ -189,7 +189,7 @@ def _refuse_inconsistent(job: Job, recorded: Sequence[str]) -> None:
 
 
 def _refuse_more_units_than_slots(job: Job) -> None:
-    """Refuse a lot that does not fit the fixture: between two fillings somebody must seat units, so each is a lot of its own."""
+    """Refuse a lot that does not fit the fixture: units must be seated between two fillings, so each filling is a lot."""
     serials, slots = [unit.serial for unit in job.lot.units], job.station.devices.slots.count
     if len(serials) > slots:
         found = fillings(serials, slots)
@@ -214,12 +214,12 @@ def fillings(serials: Sequence[str], slots: int) -> list[tuple[str, ...]]:
 def _refuse_unknown_device(job: Job) -> None:
     """Refuse devices and faults that a simulated station does not know; on hardware the slots tell what they hold."""
     if job.station.simulation is not None:
-        from stations.plant.faults.catalogue import trouble_of
+        from stations.plant.faults.catalogue import build_fault
         from stations.plant.preset import load_preset  # a station of hardware has no plant
 
         load_preset(job.lot.device, job.station.simulation.preset_overrides)
         for fault in job.station.simulation.faults:
-            trouble_of(fault, [unit.serial for unit in job.lot.units])
+            build_fault(fault, [unit.serial for unit in job.lot.units])
 
 
 def _refuse_beyond_station(job: Job) -> None:

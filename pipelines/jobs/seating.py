@@ -45,7 +45,7 @@ def read_seating(text: str) -> Seating:
 
 
 def scan(slots: int, read: Callable[[int], str], refuse: Callable[[str], None]) -> Seating:
-    """The seating as somebody scans it, slot by slot; an empty line leaves a slot empty.
+    """The seating as scanned at the station, slot by slot; an empty line leaves a slot empty.
 
     Parameters
     ----------

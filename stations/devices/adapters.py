@@ -1,57 +1,51 @@
-"""Adapters by the names that profiles give."""
+"""Adapters by the family that a profile names: each module in ``families`` has the adapter of the family of its name."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, TypeVar
+import pkgutil
+from functools import cache
+from importlib import import_module
+from inspect import isabstract
+from typing import TypeVar
 
 from schemas.errors import RecipeInvalid, did_you_mean
-from stations.devices.axis_az import DirectDataAxis
-from stations.devices.axis_iai import NumericAxis
-from stations.devices.axis_smc import StepDataAxis
-from stations.devices.chambers import (
-    BinderChamber,
-    EurothermChamber,
-    F4Chamber,
-    F4TChamber,
-    P300Chamber,
-    SetPointChamber,
-)
+from schemas.profile import Profile
+from stations.devices import families
+from stations.devices.axis import TableAxis
+from stations.devices.chamber import ThermalChamber
 
-if TYPE_CHECKING:
-    from collections.abc import Mapping
+Adapter = TypeVar("Adapter", bound="TableAxis | ThermalChamber")
 
-    from schemas.profile import Profile
-    from stations.devices.axis import TableAxis
-    from stations.devices.chamber import ThermalChamber
 
-Adapter = TypeVar("Adapter", "TableAxis", "ThermalChamber")
-
-AXES: dict[str, type[TableAxis]] = {
-    "oriental_az": DirectDataAxis,
-    "smc_lec": StepDataAxis,
-    "iai_numeric": NumericAxis,
-}
-CHAMBERS: dict[str, type[ThermalChamber]] = {
-    "set_point": SetPointChamber,
-    "watlow_f4t": F4TChamber,
-    "watlow_f4": F4Chamber,
-    "binder": BinderChamber,
-    "eurotherm_3200": EurothermChamber,
-    "espec_p300": P300Chamber,
-}
+@cache
+def adapters() -> dict[str, type[TableAxis | ThermalChamber]]:
+    """Every adapter by the name of its family, sorted; a module of ``families`` without exactly one is a defect."""
+    by_family: dict[str, type[TableAxis | ThermalChamber]] = {}
+    for module in pkgutil.iter_modules(families.__path__):
+        content = vars(import_module(f"{families.__name__}.{module.name}")).values()
+        own = [one for one in content if isinstance(one, type) and issubclass(one, (TableAxis, ThermalChamber))]
+        concrete = [one for one in own if not isabstract(one)]
+        if len(concrete) != 1:
+            raise LookupError(
+                f"stations/devices/families/{module.name}.py: {len(concrete)} adapters, 1 is needed; give it one complete "
+                "subclass of TableAxis or ThermalChamber"
+            )
+        by_family[module.name] = concrete[0]
+    return dict(sorted(by_family.items()))
 
 
 def axis_adapter(profile: Profile) -> type[TableAxis]:
     """The adapter that drives an axis by this profile."""
-    return _adapter(profile, "axis", AXES)
+    return _adapter(profile, "axis", TableAxis)
 
 
 def chamber_adapter(profile: Profile) -> type[ThermalChamber]:
     """The adapter that drives a chamber by this profile."""
-    return _adapter(profile, "chamber", CHAMBERS)
+    return _adapter(profile, "chamber", ThermalChamber)
 
 
-def _adapter(profile: Profile, kind: str, known: Mapping[str, type[Adapter]]) -> type[Adapter]:
+def _adapter(profile: Profile, kind: str, base: type[Adapter]) -> type[Adapter]:
+    known = {name: adapter for name, adapter in adapters().items() if issubclass(adapter, base)}
     adapter = known.get(profile.adapter)
     if adapter is None or profile.kind != kind:
         message = f"profile {profile.name}: adapter {profile.adapter} of kind {profile.kind} drives no {kind}"

@@ -9,13 +9,15 @@ import math
 from abc import ABC, abstractmethod
 from typing import TYPE_CHECKING, ClassVar
 
-from schemas.errors import LinkLost, StationRefused, StationTimeout
+from schemas.errors import LinkLost, OperatorNeeded, StationRefused, StationTimeout
 
 if TYPE_CHECKING:
     from stations.devices.values import Values
 
 READ_BACK_K = 1e-3
 AUTOMATIC = "automatic"
+CELSIUS = "celsius"
+RUNNING = {"runs", "paused", "program_runs", "program_holds", "holds", "start_timed"}
 PLAUSIBLE_C = (-100.0, 250.0)
 OWN_LIMITS = ("set_point_low", "set_point_high")
 
@@ -123,3 +125,11 @@ class ThermalChamber(ABC):
     def refuse(self, found: str, needed: str, remedy: str) -> None:
         """Raises that the controller is not as it must be; nothing has been set."""
         raise StationRefused(f"{self.name}: {found}, {needed} is needed; {remedy}")
+
+
+def refuse_program(name: str, state: str) -> None:
+    """Refuses a controller that runs a program of its own: it is not ended from here."""
+    if state in RUNNING:
+        raise OperatorNeeded(
+            f"{name}: the controller's own program is in state {state}, none is needed; end it at the panel"
+        )

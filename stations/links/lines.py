@@ -19,7 +19,7 @@ CHUNK = 256
 
 
 class LineLink:
-    """One device that is spoken to in lines; connected when it is first needed and again after it broke."""
+    """One device with a text protocol; connected at its first use and again after a lost connection."""
 
     def __init__(self, host: str, port: int, *, timeout_s: float, read_attempts: int) -> None:
         self._where = f"{host}:{port}"
@@ -41,7 +41,7 @@ class LineLink:
         )
 
     def tell(self, order: str, what: str, *, before: Callable[[], None] | None = None) -> str:
-        """The answer to an order, sent once: after a failure nobody knows whether it acted."""
+        """The answer to an order, sent once: after a failure it is unknown whether the device acted."""
         return self._exchange(order, what, before)
 
     def close(self) -> None:

@@ -1,6 +1,6 @@
 """Modbus on any wire: reads are tried again, which changes nothing in any device; writes never are.
 
-After a write that failed nobody knows whether it acted: the adapter reads back, and says so.
+After a failed write it is unknown whether the device acted: the adapter reads back and reports it.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""The register banks of the simulated station: which value of the plant stands behind which register."""
+"""The register banks of the simulated station: the value of the world behind each register."""
 
 from __future__ import annotations
 
@@ -6,41 +6,40 @@ from typing import TYPE_CHECKING
 
 from stations.codec import NotEncodable, Value
 from stations.plant.bank import Bank, Busy, number
-from stations.plant.bank_axes import axis_bank
-from stations.plant.bank_chambers import chamber_bank
-from stations.plant.bank_lines import P300
+from stations.plant.simulations import axis_bank, chamber_bank, chamber_line_device
 from stations.profile_files import profile_of
 
 if TYPE_CHECKING:
     from schemas.profile import Profile
     from schemas.station import Devices
-    from stations.plant.plant import Plant
+    from stations.plant.line_device import LineDevice
+    from stations.plant.world import World
 
 UNITS = {"V": "volt", "LSB": "lsb"}
 
 
-def build_banks(plant: Plant, devices: Devices) -> dict[int, Bank]:
+def build_banks(world: World, devices: Devices) -> dict[int, Bank]:
     """A bank for every device id of the station."""
     banks = {
-        devices.outer.device_id: axis_bank(plant, plant.outer, profile_of(devices.outer)),
-        devices.inner.device_id: axis_bank(plant, plant.inner, profile_of(devices.inner)),
-        devices.reader.device_id: _reader(plant, profile_of(devices.reader), devices.slots.count),
+        devices.outer.device_id: axis_bank(world, world.outer, profile_of(devices.outer)),
+        devices.inner.device_id: axis_bank(world, world.inner, profile_of(devices.inner)),
+        devices.reader.device_id: _reader(world, profile_of(devices.reader), devices.slots.count),
     }
     if (chamber := profile_of(devices.chamber)).registers:
-        banks[devices.chamber.device_id] = chamber_bank(plant, chamber)
-    for unit, slot in enumerate(plant.slots):
-        banks[devices.slots.device_id + slot] = _slot(plant, unit, profile_of(devices.slots))
+        banks[devices.chamber.device_id] = chamber_bank(world, chamber)
+    for unit, slot in enumerate(world.slots):
+        banks[devices.slots.device_id + slot] = _slot(world, unit, profile_of(devices.slots))
     return banks
 
 
-def build_speakers(plant: Plant, devices: Devices) -> dict[int, P300]:
-    """What answers in lines of text, by device id."""
+def build_line_devices(world: World, devices: Devices) -> dict[int, LineDevice]:
+    """Devices with a text protocol, by device id."""
     profile = profile_of(devices.chamber)
-    return {devices.chamber.device_id: P300(plant, profile)} if profile.commands else {}
+    return {devices.chamber.device_id: chamber_line_device(world, profile)} if profile.commands else {}
 
 
-def _reader(plant: Plant, profile: Profile, slots: int) -> Bank:
-    sampler = plant.sampler
+def _reader(world: World, profile: Profile, slots: int) -> Bank:
+    sampler = world.sampler
 
     def command(values: dict[str, Value]) -> None:
         if "rate" in values:
@@ -48,10 +47,10 @@ def _reader(plant: Plant, profile: Profile, slots: int) -> Bank:
                 raise Busy(profile.name)
             sampler.millihertz = round(1000.0 * number(values, "rate"))
         if "power" in values:
-            plant.switch(on=values["power"] == 1)
+            world.switch(on=values["power"] == 1)
         if "sampling" in values:
             if values["sampling"] == 1:
-                sampler.start(plant.now_us)
+                sampler.start(world.now_us)
             else:
                 sampler.stop()
 
@@ -59,21 +58,21 @@ def _reader(plant: Plant, profile: Profile, slots: int) -> Bank:
         "slots": lambda: slots,
         "sampling": lambda: int(sampler.running),
         "rate": lambda: sampler.rate,
-        "since_power": lambda: plant.since_power,
-        "power": lambda: int(plant.powered),
-        "door": lambda: int(plant.fixture.chamber.door_open),
-        "emergency_stop": lambda: int(plant.emergency_stop),
-        "vibration": plant.vibration_reading,
-        "occupied": lambda: sum(1 << slot for slot in plant.slots),
-        "temperature": plant.temperature_reading,
-        "supply": plant.supply_reading,
-        "humidity": plant.humidity_reading,
+        "since_power": lambda: world.since_power,
+        "power": lambda: int(world.powered),
+        "door": lambda: int(world.fixture.chamber.door_open),
+        "emergency_stop": lambda: int(world.emergency_stop),
+        "vibration": world.vibration_reading,
+        "occupied": lambda: sum(1 << slot for slot in world.slots),
+        "temperature": world.temperature_reading,
+        "supply": world.supply_reading,
+        "humidity": world.humidity_reading,
     }
     return Bank(profile, sources, command)
 
 
-def _slot(plant: Plant, unit: int, profile: Profile) -> Bank:
-    sampler, preset = plant.sampler, plant.preset
+def _slot(world: World, unit: int, profile: Profile) -> Bank:
+    sampler, preset = world.sampler, world.preset
     bits = profile.register("flags").bits
 
     def flags() -> Value:
@@ -86,7 +85,7 @@ def _slot(plant: Plant, unit: int, profile: Profile) -> Bank:
         sampler.tail[unit] = tail
 
     sources = {
-        "serial": lambda: plant.serials[plant.seats[unit]],
+        "serial": lambda: world.serials[world.seats[unit]],
         "packing": lambda: preset.packing,
         "output_unit": lambda: UNITS[preset.output_unit],
         "lsb": lambda: preset.lsb,
@@ -96,4 +95,4 @@ def _slot(plant: Plant, unit: int, profile: Profile) -> Bank:
         "tail": lambda: sampler.tail[unit],
         "flags": flags,
     }
-    return Bank(profile, sources, taken, lambda first, count: sampler.words(plant.seats[unit], first, count))
+    return Bank(profile, sources, taken, lambda first, count: sampler.words(world.seats[unit], first, count))

@@ -5,19 +5,19 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from stations.plant.plant import Plant
+    from stations.plant.world import World
 
 
 class PlantClock:
-    """Time of the plant, in whole microseconds, so that the way a sleep is chopped up leaves no trace."""
+    """Time of the world, in whole microseconds, so that the way a sleep is chopped up leaves no trace."""
 
-    def __init__(self, plant: Plant) -> None:
-        self._plant = plant
+    def __init__(self, world: World) -> None:
+        self._world = world
 
     def now(self) -> float:
         """Seconds since the plant's power-on."""
-        return self._plant.now + self._plant.clock_off_s
+        return self._world.now + self._world.clock_offset_s
 
     def sleep(self, seconds: float) -> None:
         """Lets the plant's time go on."""
-        self._plant.advance(max(0, round(seconds * 1e6)))
+        self._world.advance(max(0, round(seconds * 1e6)))

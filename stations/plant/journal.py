@@ -1,6 +1,6 @@
-"""The plant's journal: everything that was ever done to it, with the time.
+"""The plant's journal: every write, line and fault since its start, with its time.
 
-Played again on a fresh plant, it leads to the same place, bit for bit.
+Replayed on a fresh plant, it gives the same state, bit for bit.
 """
 
 from __future__ import annotations
@@ -21,11 +21,10 @@ from schemas.profile import Space
 if TYPE_CHECKING:
     from schemas.recipe import Lot
     from schemas.station import StationConfig
-    from stations.plant.plant import Plant
 
 VERSION = 1
 SPACES: tuple[Space, ...] = get_args(Space)
-HEAD = 5  # numbers before the words of a write
+HEAD = 5  # numbers in front of the words of a write
 
 
 @dataclass(frozen=True)
@@ -40,7 +39,7 @@ class Write:
 
 
 @dataclass(frozen=True)
-class Said:
+class LineOrder:
     """An order given to a device in a line of text, at a time of the plant."""
 
     at_us: int
@@ -56,11 +55,11 @@ class Injection:
     fault: FaultOrder
 
 
-Event = Write | Said | Injection
+Event = Write | LineOrder | Injection
 
 
 def fingerprint(config: StationConfig, lot: Lot) -> str:
-    """What a state may be put back into: the same station with the same lot."""
+    """Hash of station and lot: a state can be resumed only where it is the same."""
     text = config.model_dump_json(exclude={"suspenders", "safety", "self_test"}) + lot.model_dump_json()
     return hashlib.sha256(text.encode()).hexdigest()
 
@@ -72,10 +71,10 @@ class Journal:
         self._belongs_to = belongs_to
         self._writes = array("q")  # time, device, space, address, count, words; one after the other
         self._count = 0
-        self._others: list[tuple[int, Said | Injection]] = []  # with the number of writes before each
+        self._others: list[tuple[int, LineOrder | Injection]] = []  # with the number of writes before each
 
     def add(self, event: Event) -> None:
-        """Notes an event that has happened."""
+        """Appends an event."""
         if not isinstance(event, Write):
             self._others.append((self._count, event))
             return
@@ -85,10 +84,10 @@ class Journal:
 
     def events(self) -> Iterator[Event]:
         """Every event, in order."""
-        waiting, at = deque(self._others), 0
+        others, at = deque(self._others), 0
         for number in range(self._count + 1):
-            while waiting and waiting[0][0] == number:
-                yield waiting.popleft()[1]
+            while others and others[0][0] == number:
+                yield others.popleft()[1]
             if number < self._count:
                 time, device_id, space, address, words = self._writes[at : at + HEAD]
                 at += HEAD + words
@@ -104,8 +103,14 @@ class Journal:
         }
         return zlib.compress(json.dumps(content, separators=(",", ":")).encode(), 6)
 
-    def replay(self, state: bytes, plant: Plant) -> None:
-        """Takes a fresh plant through the events in ``state``, to its time; a state of another station or lot is refused."""
+    def recorded(self, state: bytes) -> tuple[list[Event], int]:
+        """The events in ``state`` and its time, µs; a state of another station or lot is refused.
+
+        Raises
+        ------
+        ArchiveUnusable : the bytes are not a state
+        DataRejected : the state belongs to another station or lot
+        """
         try:
             content: dict[str, Any] = json.loads(zlib.decompress(state))
         except (zlib.error, ValueError):
@@ -114,26 +119,27 @@ class Journal:
             ) from None
         if content.get("version") != VERSION or content.get("belongs_to") != self._belongs_to:
             raise DataRejected(
-                "station state: it was taken from another station or lot; resume with the same files and units"
+                "station state: it belongs to another station or lot; resume with the same files and the same units"
             )
-        for item in content["events"]:
-            plant.advance(int(item["at_us"]) - plant.now_us)
-            if "fault" in item:
-                plant.inject(FaultOrder.model_validate(item["fault"]))
-            elif "line" in item:
-                plant.say(item["device_id"], item["line"])
-            else:
-                plant.write(item["device_id"], item["address"], list(item["words"]), item.get("space", "holding"))
-        plant.advance(int(content["now_us"]) - plant.now_us)
+        return [_from_json(item) for item in content["events"]], int(content["now_us"])
 
 
 def _as_json(event: Event) -> dict[str, object]:
     if isinstance(event, Injection):
         return {"at_us": event.at_us, "fault": event.fault.model_dump()}
-    if isinstance(event, Said):
+    if isinstance(event, LineOrder):
         return {"at_us": event.at_us, "device_id": event.device_id, "line": event.line}
-    found: dict[str, object] = {"at_us": event.at_us, "device_id": event.device_id, "address": event.address}
-    found["words"] = list(event.words)
+    item: dict[str, object] = {"at_us": event.at_us, "device_id": event.device_id, "address": event.address}
+    item["words"] = list(event.words)
     if event.space != "holding":
-        found["space"] = event.space
-    return found
+        item["space"] = event.space
+    return item
+
+
+def _from_json(item: dict[str, Any]) -> Event:
+    at_us = int(item["at_us"])
+    if "fault" in item:
+        return Injection(at_us, FaultOrder.model_validate(item["fault"]))
+    if "line" in item:
+        return LineOrder(at_us, item["device_id"], item["line"])
+    return Write(at_us, item["device_id"], item["address"], tuple(item["words"]), item.get("space", "holding"))

@@ -1,4 +1,4 @@
-"""The plant's devices that are spoken to in lines, over TCP on loopback."""
+"""The plant's devices with a text protocol, over TCP on loopback."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ class LineServer:
                 """One answer for each line; none where the device is mute."""
                 with suppress(OSError):
                     while line := self.rfile.readline(LONGEST):
-                        answer = plant.say(device_id, line.rstrip(END).decode("ascii", errors="replace"))
+                        answer = plant.send_line(device_id, line.rstrip(END).decode("ascii", errors="replace"))
                         if answer is not None:
                             self.wfile.write(answer.encode("ascii", errors="replace") + END)
 
@@ -56,7 +56,7 @@ class LineServer:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        """Stops, and hangs up on whoever still talks."""
+        """Stops, and closes open connections."""
         self._server.shutdown()
         self._server.server_close()
         self._thread.join(END_S)

@@ -86,8 +86,8 @@ async def _answer(
         if fifo is None or space != "holding" or address < fifo.address:
             return ExcCodes.ILLEGAL_ADDRESS
     with plant.lock:
-        plant.heard.add(device_id)
-        code = plant.answer_of(device_id)
+        plant.requested.add(device_id)
+        code = plant.exception_of(device_id)
         if code == MUTE:
             raise NoSuchIdException  # the server, told to ignore missing devices, sends nothing
         try:

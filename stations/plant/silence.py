@@ -1,4 +1,4 @@
-"""The devices' own watchdogs: a drive and a reader that nobody asks anything any more stop by themselves.
+"""The devices' own watchdogs: a drive and a reader that receive no request for some time stop by themselves.
 
 Real drives have such a communication time-out (the AZ series calls it so, and stops with an alarm); controllers of
 chambers mostly have none and keep their set point. It lives in wall time, and so only in a station that is served.
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 
 class IdleStop:
-    """Stops what has not been asked for ``seconds``; a device that nobody has asked yet waits for its first question."""
+    """Stops devices without a request for ``seconds``; the time counts from a device's first request."""
 
     def __init__(self, plant: Plant, devices: Devices, seconds: float) -> None:
         self._plant, self._seconds = plant, seconds
@@ -32,8 +32,8 @@ class IdleStop:
         if self._seconds == 0.0:
             return
         with self._plant.lock:
-            self._asked.update(dict.fromkeys(self._plant.heard & self._stops.keys(), now))
-            self._plant.heard.clear()
+            self._asked.update(dict.fromkeys(self._plant.requested & self._stops.keys(), now))
+            self._plant.requested.clear()
             late = [device_id for device_id, asked in self._asked.items() if now - asked > self._seconds]
             for device_id in late:
                 self._stops[device_id]()

@@ -1,1 +1,1 @@
-"""What keeps a station safe and its data clean: conditions that pause a run, leases, the watchdog, the safe state."""
+"""Safety of a station and validity of its data: conditions that pause a run, leases, the watchdog's client, the safe state."""

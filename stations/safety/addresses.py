@@ -1,4 +1,4 @@
-"""One name for the place of a device, by whatever name its station's file calls it: two names of one device are one lease."""
+"""One canonical address for a device, however the station's file writes it: two names of one device are one lease."""
 
 from __future__ import annotations
 
@@ -17,18 +17,18 @@ KERNEL_NAMES = Path("/sys/dev/char")
 
 
 def address_of(device: Device | Slots) -> str:
-    """The host's number, port and device id of a device, or its serial line and device id."""
+    """IP address, port and device id of a device, or its serial line and device id."""
     if device.serial:
         return f"{_line(device.serial)}/{device.device_id}"
     return f"{_host(device.host)}:{device.port}/{device.device_id}"
 
 
 def _line(path: str) -> str:
-    """The kernel's name of a serial line: links and further nodes for it lead to the same."""
+    """The kernel's name of a serial line, the same for all links and device nodes."""
     found = os.path.realpath(path)
     try:
         node = os.stat(found)  # noqa: PTH116 - of a text, as the station's file has it
-    except OSError:  # pulled out now; its name is still the same
+    except OSError:  # unplugged now; its name stays the same
         return found
     if not stat.S_ISCHR(node.st_mode):
         return found
@@ -37,10 +37,10 @@ def _line(path: str) -> str:
 
 
 def _host(name: str) -> str:
-    """The number of a host; this machine under any of its numbers and names is one place."""
+    """The IP address of a host; all addresses and names of this machine give one address."""
     try:
         found = {str(entry[4][0]) for entry in socket.getaddrinfo(name, None, type=socket.SOCK_STREAM)}
-    except OSError:  # a name that nobody knows now is still the same name
+    except OSError:  # a name that cannot be resolved now stays the same name
         return name.lower()
     numbers = sorted((ipaddress.ip_address(one.partition("%")[0]) for one in found), key=lambda one: (one.version, one))
     if any(number.is_loopback or _is_own(str(number)) for number in numbers):
@@ -49,7 +49,7 @@ def _host(name: str) -> str:
 
 
 def _is_own(number: str) -> bool:
-    """Whether this machine has a number: only then can it be bound to."""
+    """Whether an IP address belongs to this machine: only then a socket can bind to it."""
     family = socket.AF_INET6 if ":" in number else socket.AF_INET
     with socket.socket(family, socket.SOCK_DGRAM) as probe:
         try:

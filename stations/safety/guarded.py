@@ -1,4 +1,4 @@
-"""A station of hardware while a run drives it: leased, its heart beating, a watchdog beside it."""
+"""Protection of a station of hardware during a run: leases, heartbeat and watchdog."""
 
 from __future__ import annotations
 
@@ -9,9 +9,9 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 from schemas.errors import LeaseLost, OperatorNeeded
-from stations.safety.folder import state_folder, told
+from stations.safety.folder import log_event, state_folder
 from stations.safety.leases import Leases, addresses, new_holder
-from stations.safety.watching import Watchdog
+from stations.safety.watchdog_client import Watchdog
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Generator
@@ -19,46 +19,48 @@ if TYPE_CHECKING:
     from schemas.station import StationConfig
     from stations.safety.safe_state import Reached
 
-PARTING_S = 10.0  # a run that ends tries so long to leave its station safe; after that its watchdog goes on
+SAFE_STATE_S = 10.0  # time in which a run that ends makes its station safe; its watchdog continues afterwards
 
 
 @dataclass
 class Protection:
-    """What a run has while it drives: its leases, its watchdog, and its word on how it left the station."""
+    """Leases and watchdog of a run; ``safe`` says whether it has left the station safe."""
 
     leases: Leases
     watchdog: Watchdog
     safe: bool = field(init=False, default=False)
 
     def alive(self) -> None:
-        """Refuses a reading where this run has lost its leases by its own silence."""
+        """Refuses a reading where this run has lost its leases by missed heartbeats."""
         self.leases.alive()
 
     def held(self) -> None:
-        """Refuses an order where the leases are not this run's any more."""
+        """Refuses a command where the leases are no longer this run's."""
         self.leases.require()
 
     def require(self) -> None:
-        """Refuses to go on without the leases, or without a watchdog."""
+        """Refuses to continue without the leases or without a watchdog."""
         self.leases.require()
         if self.watchdog.trouble:
             raise OperatorNeeded(self.watchdog.trouble)
 
     def leave(self, make_safe: Callable[[float], Reached]) -> None:
-        """Leaves the station in its safe state; where the run has lost it, it commands nothing and says so."""
+        """Puts the station into its safe state; a run that has lost its leases sends no command and logs that."""
         holder = self.leases.holder
         try:
-            reached = make_safe(PARTING_S)
+            reached = make_safe(SAFE_STATE_S)
         except LeaseLost as lost:
-            told(self.leases.folder, holder.station, "lease_lost", run=holder.run, why=str(lost))
+            log_event(self.leases.folder, holder.station, "lease_lost", run=holder.run, why=str(lost))
             return
         self.safe = reached.safe
-        told(self.leases.folder, holder.station, "left_safe" if reached.safe else "not_safe", what=reached.sentence())
+        log_event(
+            self.leases.folder, holder.station, "left_safe" if reached.safe else "not_safe", what=reached.sentence()
+        )
 
 
 @contextmanager
 def guarded(config: StationConfig, run: str) -> Generator[Protection]:
-    """A block in which nobody else drives the station, and after which it is safe, even if this process is killed."""
+    """A block in which no other run drives the station, and after which it is safe, even if this process is killed."""
     folder = state_folder()
     leases = Leases(folder, new_holder(config.name, run), addresses(config), config.safety.lapse_s)
     leases.take()
@@ -76,7 +78,7 @@ def guarded(config: StationConfig, run: str) -> Generator[Protection]:
         protection.watchdog.dismiss()  # nothing has moved
         leases.release()
         raise
-    told(folder, config.name, "driven", run=run, pid=os.getpid(), watchdog=protection.watchdog.pid)
+    log_event(folder, config.name, "driven", run=run, pid=os.getpid(), watchdog=protection.watchdog.pid)
     try:
         yield protection
     finally:
@@ -91,7 +93,7 @@ def guarded(config: StationConfig, run: str) -> Generator[Protection]:
 
 
 def _beat(protection: Protection, stop: threading.Event, every_s: float) -> None:
-    """Beats until it is told to stop, or the leases are lost: the watchdog is left alone then, it acts."""
+    """Sends heartbeats until ``stop`` is set or the leases are lost; without heartbeats the watchdog acts."""
     while not stop.wait(every_s):
         protection.leases.beat()
         try:

@@ -1,4 +1,4 @@
-"""The notes beside the locks of leases: who holds which part of a station, written whole or not at all."""
+"""The notes beside the locks of leases: the holder of each part of a station, written completely or not at all."""
 
 from __future__ import annotations
 
@@ -20,9 +20,9 @@ Role = Literal["run", "watchdog"]
 
 @dataclass(frozen=True)
 class Holder:
-    """Who holds a lease, since when, and where; ``token`` is the same for all leases of one run.
+    """Holder of a lease; ``token`` is the same for all leases of one run.
 
-    ``tripped``: the run stood still and its watchdog has made the station safe. ``trouble``: what a watchdog could not do so far.
+    ``tripped``: the run did not respond and its watchdog has made the station safe. ``trouble``: what failed so far.
     """
 
     token: str
@@ -37,25 +37,25 @@ class Holder:
     trouble: str = ""
 
     def lives(self, path: Path) -> bool:
-        """Whether the holder that ``path`` names still counts: heard of in time and, on this machine, with a process."""
+        """Whether the holder in ``path`` is alive: a recent heartbeat and, on this machine, a process."""
         if seconds_since_beat(path) > SAFE_WITHIN_S:
             return False
         return self.host != platform.node() or _is_process(self.pid)
 
 
 def new_holder(station: str, run: str, role: Role = "run", token: str = "") -> Holder:
-    """The holder of leases that this process is."""
+    """A holder of leases that names the present process."""
     since = datetime.now(UTC).isoformat(timespec="seconds")
     return Holder(token or uuid.uuid4().hex, os.getpid(), platform.node(), run, station, role, since)
 
 
 def lease_file(folder: Path, address: str) -> Path:
-    """Where the note of the lease on a place lies; its lock lies beside it."""
+    """The file of the note on an address; its lock is beside it."""
     return folder / "leases" / f"{re.sub(r'[^A-Za-z0-9.-]', '_', address)}.json"
 
 
 def read_holder(path: Path) -> Holder | None:
-    """Who a lease's note names; None where there is none, or none that can be read: the lock decides then."""
+    """The holder in a lease's note; None where it is missing or unreadable, and the lock decides."""
     known = {one.name for one in fields(Holder)}
     try:
         content = json.loads(path.read_text("utf-8"))
@@ -65,7 +65,7 @@ def read_holder(path: Path) -> Holder | None:
 
 
 def write_holder(path: Path, holder: Holder) -> None:
-    """Puts a lease's note in its place, whole and on the disk; :class:`OSError` where it cannot be."""
+    """Replaces a lease's note atomically and flushes it to disk; :class:`OSError` where that fails."""
     aside = path.with_suffix(f".{uuid.uuid4().hex[:8]}")
     try:
         with aside.open("w", encoding="utf-8") as file:
@@ -84,7 +84,7 @@ def write_holder(path: Path, holder: Holder) -> None:
 
 
 def seconds_since_beat(path: Path) -> float:
-    """Seconds since a lease's holder was heard of; infinite where there is no note of it."""
+    """Seconds since the last heartbeat of a lease's holder; infinite where it has no note."""
     try:
         return max(0.0, time.time() - path.stat().st_mtime)
     except OSError:
@@ -102,4 +102,4 @@ def _is_process(pid: int) -> bool:
         state = Path(f"/proc/{pid}/stat").read_text("utf-8", errors="replace").rpartition(")")[2].split()[0]
     except (OSError, IndexError):
         return True
-    return state != "Z"  # killed, and its parent has not asked for its status yet
+    return state != "Z"  # killed, and not yet reaped by its parent

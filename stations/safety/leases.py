@@ -1,7 +1,7 @@
-"""Leases: who drives which table and which chamber. Two runs never drive one, and a dead run's lease is free by itself.
+"""Leases on the table, chamber and reader of a station: two runs never drive one device, and a dead run's lease becomes free.
 
-A lease is a lock that the system takes back when its process ends, and beside it a note that says who holds it. The note's
-time is the heartbeat. Where locks do not reach (a folder shared by machines), the heartbeat alone decides.
+A lease is a file lock, which the system releases when its process ends, and a note that names the holder. The note's time of
+modification is the heartbeat. Where locks have no effect (a folder shared by machines), the heartbeat alone decides.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from schemas.errors import LeaseLost, OperatorNeeded, StationRefused
 from schemas.safety import SAFE_WITHIN_S
 from stations.clock import steady
 from stations.safety.addresses import address_of
-from stations.safety.folder import told
+from stations.safety.folder import log_event
 from stations.safety.lease_files import (
     Holder,
     lease_file,
@@ -38,24 +38,24 @@ __all__ = ["PARTS", "Holder", "Leases", "Part", "addresses", "holders", "new_hol
 Part = Literal["outer", "inner", "chamber", "reader"]
 PARTS: tuple[Part, ...] = ("outer", "inner", "chamber", "reader")
 POLL_S = 0.2
-PASSING_S = 5.0  # a lock without a living name is about to be taken or left, or looked at
+PASSING_S = 5.0  # a lock whose note names no live holder is being taken, released or tested
 HANDED_OVER = "the run has ended and left it to its watchdog"
 BOTH = "two runs must not command one device"
 
 
 def addresses(config: StationConfig, *, every: bool = False) -> dict[Part, str]:
-    """Where table, chamber and reader of a station are, one name for a place however the file writes it.
+    """Addresses of table, chamber and reader of a station, in one form however the file writes them.
 
     Parameters
     ----------
-    every : tell every part, also those that share a place; a lease is taken once for a place
+    every : include parts that share an address with another; a lease is taken once per address
     """
-    found: dict[Part, str] = {}
+    by_part: dict[Part, str] = {}
     for part in PARTS:
         address = address_of(getattr(config.devices, part))
-        if every or address not in found.values():
-            found[part] = address
-    return found
+        if every or address not in by_part.values():
+            by_part[part] = address
+    return by_part
 
 
 @dataclass
@@ -64,7 +64,7 @@ class Leases:
 
     folder: Path
     holder: Holder
-    wanted: dict[Part, str]
+    places: dict[Part, str]
     lapse_s: float
     _locks: dict[Part, TextIO] = field(default_factory=dict["Part", TextIO])
     _beaten: float = 0.0
@@ -72,10 +72,10 @@ class Leases:
     _alone: Any = field(default_factory=threading.RLock)  # heartbeat and gate are two threads
 
     def take(self) -> None:
-        """Takes every lease, or refuses with the name of who has one; waits for a watchdog that is still at work."""
+        """Takes all leases, or refuses and names the holder of one; waits for a watchdog that is still active."""
         begun = steady()
         try:
-            for part in sorted(self.wanted, key=lambda p: self.wanted[p]):
+            for part in sorted(self.places, key=lambda p: self.places[p]):
                 while not self.try_one(part):
                     other = read_holder(self._file(part))
                     if steady() - begun > self._patience(part, other):
@@ -92,14 +92,14 @@ class Leases:
         self._beaten = steady()
 
     def _patience(self, part: Part, other: Holder | None) -> float:
-        """Seconds to wait for a lease that another has: for a watchdog, and for a lock that nobody's name is on."""
+        """Seconds to wait for a lease of another holder: a watchdog, or a lock without a live holder's note."""
         if other is not None and other.role == "watchdog":
             return SAFE_WITHIN_S
         passing = other is None or other.tripped or bool(other.trouble) or not other.lives(self._file(part))
         return PASSING_S if passing else 0.0
 
     def try_one(self, part: Part) -> bool:
-        """Takes the lock of one part where nobody has it; whether it is held now. A note that cannot be read bars nobody."""
+        """Tries to take the lock of one part; returns whether it is held now. An unreadable note does not prevent it."""
         lock = self._locked(part)
         if lock is None:
             return False
@@ -108,19 +108,19 @@ class Leases:
             if other.lives(self._file(part)):
                 lock.close()
                 return False
-            told(self.folder, self.holder.station, "lease_taken_over", part=part, of=other.run, pid=other.pid)
+            log_event(self.folder, self.holder.station, "lease_taken_over", part=part, of=other.run, pid=other.pid)
         self._locks[part] = lock
         return True
 
     def note(self, **changes: Any) -> None:
-        """Writes who holds the leases that are held, as far as it can be written."""
+        """Updates the notes of the held leases, as far as they can be written."""
         self.holder = replace(self.holder, **changes)
         for part in self._locks:
             with suppress(OSError):
                 self._note(part)
 
     def hand_over(self) -> None:
-        """Lets go of the locks, and leaves the notes for the watchdog, which takes them over."""
+        """Releases the locks and leaves the notes, so that the watchdog takes the leases over."""
         with self._alone:
             self._mark(list(self._locks), trouble=HANDED_OVER)
             self._let_go()
@@ -130,7 +130,7 @@ class Leases:
         return list(self._locks)
 
     def beat(self) -> None:
-        """Tells that the holder lives, where its leases are still its own; one that was silent for too long has lost them."""
+        """Renews the heartbeat; a holder that was silent for longer than ``lapse_s`` has lost its leases."""
         with self._alone:
             now = steady()  # before anything is written: a process may stand still in between
             if self._gone():
@@ -142,31 +142,31 @@ class Leases:
             self._beaten = now
 
     def alive(self) -> None:
-        """Refuses to go on after a silence in which the watchdog may have taken the station over."""
+        """Refuses after a silence in which the watchdog may have taken over the station."""
         if self._gone():
             raise LeaseLost(self._lost)
 
     def require(self) -> None:
-        """Refuses to go on where the leases are not the holder's any more, by its heartbeat or by locks and notes."""
+        """Refuses where the leases are no longer the holder's, by its heartbeat or by locks and notes."""
         with self._alone:
             self.alive()
             for part in list(self._locks):
                 self._keep(part)
             self.alive()
 
-    def standing(self) -> list[Part]:
-        """Parts whose lock another process has, and nobody else's name is on: those of a run that lives and stands still."""
-        apart: list[Part] = [part for part in self.wanted if part not in self._locks]
-        names = [read_holder(self._file(part)) for part in apart]
+    def stalled(self) -> list[Part]:
+        """Parts whose lock the run's own process still holds: the run is alive and does not respond."""
+        others: list[Part] = [part for part in self.places if part not in self._locks]
+        names = [read_holder(self._file(part)) for part in others]
         mine = self.holder.token
-        return [part for part, name in zip(apart, names, strict=True) if name is None or name.token == mine]
+        return [part for part, name in zip(others, names, strict=True) if name is None or name.token == mine]
 
     def trip(self) -> None:
-        """Notes on the leases of a holder that stands still that its station was put into its safe state."""
-        self._mark(list(self.wanted), tripped=True)
+        """Marks the leases of a run that does not respond: its station was put into its safe state."""
+        self._mark(list(self.places), tripped=True)
 
     def release(self) -> None:
-        """Gives every lease back."""
+        """Releases all leases."""
         with self._alone:
             for part in self._locks:
                 other = read_holder(self._file(part))
@@ -180,13 +180,13 @@ class Leases:
         return self.folder / "leases"
 
     def _file(self, part: Part) -> Path:
-        return lease_file(self.folder, self.wanted[part])
+        return lease_file(self.folder, self.places[part])
 
     def _note(self, part: Part) -> None:
         write_holder(self._file(part), replace(self.holder, what=part))
 
     def _mark(self, parts: list[Part], **changes: Any) -> None:
-        """Changes the notes of these parts that are in this run's name, as far as they can be written."""
+        """Changes the notes of these parts that name this run, as far as they can be written."""
         for part in parts:
             other = read_holder(self._file(part))
             if other is not None and other.token == self.holder.token:
@@ -199,7 +199,7 @@ class Leases:
         self._locks.clear()
 
     def _locked(self, part: Part) -> TextIO | None:
-        """The lock of a part, taken, and the one that its name leads to; None where another has it."""
+        """The lock of a part, taken; None where another process holds it or its file was replaced meanwhile."""
         self._home.mkdir(parents=True, exist_ok=True)
         lock = self._file(part).with_suffix(".lock").open("a+", encoding="utf-8")
         try:
@@ -209,11 +209,11 @@ class Leases:
             return None
         if self._is_here(part, lock):
             return lock
-        lock.close()  # somebody has cleared the folder in between
+        lock.close()  # the folder was cleared meanwhile
         return None
 
     def _is_here(self, part: Part, lock: TextIO) -> bool:
-        """Whether the name of a part's lock leads to this one, and not to one that others would take."""
+        """Whether this lock is the file under the part's name, which others would lock."""
         try:
             found = self._file(part).with_suffix(".lock").stat()
         except OSError:
@@ -222,11 +222,11 @@ class Leases:
         return (found.st_dev, found.st_ino) == (own.st_dev, own.st_ino)
 
     def _keep(self, part: Part) -> None:
-        """Holds a lease that somebody cleared away, where nobody has taken it since; else the leases are lost."""
+        """Restores a lease whose file was removed, where no other process has taken it since; else the leases are lost."""
         if not self._is_here(part, self._locks[part]):
             try:
                 anew = self._locked(part)
-            except OSError:  # no such folder, and none can be made: nobody else can have a lease there either
+            except OSError:  # the folder cannot be created, so no other process can have a lease there either
                 return
             if anew is None:
                 self._lose(part, read_holder(self._file(part)))
@@ -240,44 +240,44 @@ class Leases:
         elif other.token != self.holder.token:
             self._lose(part, other)
         elif other.tripped and not self.holder.tripped:
-            self._lost = self._lost or self._stood_still()
+            self._lost = self._lost or self._no_response()
 
     def _lose(self, part: Part, other: Holder | None) -> None:
         who = "another run" if other is None else f"{other.run} (process {other.pid} on {other.host})"
         self._lost = self._lost or (
-            f"station {self.holder.station}: the lease on the {_name(part)} at {self.wanted[part]} has gone to {who} because the "
-            f"leases in {self._home} were cleared or replaced while this run drove; {BOTH}: this run has ended and sends nothing "
-            "more; wait for the other and give the command again: it goes on where it was"
+            f"station {self.holder.station}: the lease on the {_name(part)} at {self.places[part]} now belongs to {who} "
+            f"because the leases in {self._home} were removed or replaced during this run; {BOTH}: this run has ended and "
+            "sends no further commands; wait for the other run and give the command again: it resumes where it stopped"
         )
 
     def _gone(self) -> bool:
         if not self._lost and self._locks and steady() - self._beaten > self.lapse_s:
-            self._lost = self._stood_still()
+            self._lost = self._no_response()
         return bool(self._lost)
 
-    def _stood_still(self) -> str:
+    def _no_response(self) -> str:
         return (
-            f"station {self.holder.station}: this run stood still for more than {self.lapse_s:g} s and has lost its lease, its "
-            "watchdog puts the station into its safe state; this run has ended and sends nothing more; give the command again: "
-            "it goes on where it was"
+            f"station {self.holder.station}: this run did not respond for more than {self.lapse_s:g} s and has lost its "
+            "lease; its watchdog puts the station into its safe state; this run has ended and sends no further commands; "
+            "give the command again: it resumes where it stopped"
         )
 
     def _refuse(self, part: Part, other: Holder | None) -> None:
-        which = f"station {self.holder.station}: the {_name(part)} at {self.wanted[part]}"
+        which = f"station {self.holder.station}: the {_name(part)} at {self.places[part]}"
         if other is None:
             raise OperatorNeeded(f"{which} is being taken by another run; try again")
         if other.role == "watchdog":
             raise OperatorNeeded(
                 f"{which} is held by the watchdog of {other.run} (process "
-                f"{other.pid} on {other.host} since {other.since}), which could not make the station safe so far "
-                f"({other.trouble or 'no reason is noted'}); look at the station and put that right: "
-                "it is free as soon as it is safe"
+                f"{other.pid} on {other.host} since {other.since}), which has not made the station safe so far "
+                f"({other.trouble or 'no reason is known'}); check the station and correct the cause: "
+                "the lease is free as soon as the station is safe"
             )
         age = seconds_since_beat(self._file(part))
         raise OperatorNeeded(
             f"{which} is driven by {other.run} (process {other.pid} on "
-            f"{other.host} since {other.since}, heard of {age:.0f} s ago), one run at a time can drive it, whatever started "
-            f"them; wait for it or stop it: its lease is free at the latest {SAFE_WITHIN_S:g} s after its end"
+            f"{other.host} since {other.since}, last heartbeat {age:.0f} s ago), one run at a time can drive it; wait for its "
+            f"end or stop it: its lease is free at the latest {SAFE_WITHIN_S:g} s after its end"
         )
 
 
@@ -286,10 +286,10 @@ def _name(part: Part) -> str:
 
 
 def holders(folder: Path, config: StationConfig) -> dict[Part, tuple[Holder, float] | None]:
-    """Who drives the parts of a station, and the seconds since each was heard of."""
-    found: dict[Part, tuple[Holder, float] | None] = {}
+    """Holder of each part of a station and seconds since its last heartbeat; None where a part is free."""
+    by_part: dict[Part, tuple[Holder, float] | None] = {}
     for part, address in addresses(config).items():
         path = lease_file(folder, address)
         holder = read_holder(path)
-        found[part] = (holder, seconds_since_beat(path)) if holder is not None and holder.lives(path) else None
-    return found
+        by_part[part] = (holder, seconds_since_beat(path)) if holder is not None and holder.lives(path) else None
+    return by_part

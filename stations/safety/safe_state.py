@@ -22,7 +22,7 @@ AGAIN_S = 1.0
 
 @dataclass(frozen=True)
 class SafeStep:
-    """One command of the way to the safe state: which part of the station, what is reached, and how."""
+    """One command towards the safe state: the part of the station, the result in words, and the action."""
 
     part: str
     what: str
@@ -31,18 +31,18 @@ class SafeStep:
 
 @dataclass(frozen=True)
 class Reached:
-    """What was done for the safe state, and what could not be done, with the reason."""
+    """Completed and failed commands of the safe state, failed ones with the reason."""
 
     done: list[str] = field(default_factory=list[str])
     failed: dict[str, str] = field(default_factory=dict[str, str])
 
     @property
     def safe(self) -> bool:
-        """Whether everything was done."""
+        """Whether all commands succeeded."""
         return not self.failed
 
     def sentence(self) -> str:
-        """The same for people."""
+        """Both in one sentence."""
         failed = [f"{what} not done ({why})" for what, why in self.failed.items()]
         return "; ".join([*self.done, *failed])
 
@@ -50,7 +50,7 @@ class Reached:
 def safe_steps(
     safety: Safety, axes: Mapping[str, TableAxis], chamber: ThermalChamber, reader: Reader
 ) -> list[SafeStep]:
-    """The commands in order, what moves first; each sets an absolute state, so that it may be given twice."""
+    """The commands in order, moving parts first; each sets an absolute state, so it may be sent twice."""
     steps: list[SafeStep] = []
     if safety.axes == "stop":
         steps += [SafeStep(part, f"{part} axis stopped", axis.stop) for part, axis in axes.items()]
@@ -64,12 +64,12 @@ def safe_steps(
 
 
 def reach_safe_state(steps: list[SafeStep], *, patience_s: float = 0.0) -> Reached:
-    """What was done: every part is told, whatever became of the others.
+    """Sends every command, also after failures of others, and returns the result.
 
     Parameters
     ----------
-    steps : what is to be done, in order
-    patience_s : how long a part that does not answer is tried again; 0 tries each once
+    steps : the commands, in order
+    patience_s : time during which failed commands are repeated, s; 0 sends each once
     """
     left, done = list(steps), list[str]()
     end = time.monotonic() + patience_s

@@ -1,4 +1,4 @@
-"""Conditions that pause a run, judged from what the station reads; nothing here touches a device."""
+"""Conditions that pause a run, judged from readings of the station; nothing here accesses a device."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ Condition = Literal["door", "vibration", "supply", "chamber", "device", "table",
 
 @dataclass(frozen=True)
 class Reason:
-    """Why a run pauses: the condition, the sentence for people, and the slots that it is about; none means all."""
+    """Why a run pauses: the condition, its description, and the slots concerned; empty means all."""
 
     condition: Condition
     text: str
@@ -28,7 +28,7 @@ class Reason:
 
 
 class Suspended(Exception):
-    """A condition holds: the capture pauses and goes back to its last checkpoint. Never leaves the capture."""
+    """A condition holds: the capture pauses and returns to its last checkpoint. Never leaves the capture."""
 
     def __init__(self, reasons: Sequence[Reason], *, spoilt: bool) -> None:
         self.reasons = tuple(reasons)
@@ -37,31 +37,31 @@ class Suspended(Exception):
 
 
 class EmergencyStop(OperatorNeeded):
-    """Somebody has pressed the emergency stop: nothing waits for its release."""
+    """The emergency stop is pressed: the run ends and does not wait for its release."""
 
 
 def require_released(instruments: Instruments | Guarded) -> None:
     """Ends the run where the emergency stop is pressed."""
     if instruments.stop_pressed:
-        message = "station: the emergency stop is pressed, released is needed; make sure that nobody is in danger, release it "
-        raise EmergencyStop(message + "and give the command again: the run goes on where it was")
+        message = "station: the emergency stop is pressed, released is needed; make sure that no person is in danger, release it "
+        raise EmergencyStop(message + "and give the command again: the run resumes where it stopped")
 
 
 @dataclass(frozen=True)
 class Watched:
-    """The rules of a station's file for one run: ``reference`` is the supply by slot when it began, V."""
+    """The rules of a station's file for one run; ``reference`` is the supply by slot at the start, V."""
 
     rules: Suspenders
     soak: Soak
     reference: dict[int, float]
 
-    def around(self, instruments: Instruments, slots: Sequence[int]) -> list[Reason]:
-        """Conditions that only need the reader: door, vibration and the supply of these slots."""
-        found: list[Reason] = []
+    def instrument_reasons(self, instruments: Instruments, slots: Sequence[int]) -> list[Reason]:
+        """Reasons from the reader: door, vibration and the supply of these slots."""
+        reasons: list[Reason] = []
         if self.rules.door and instruments.door_open:
-            found.append(Reason("door", "the chamber's door is open, closed is needed"))
+            reasons.append(Reason("door", "the chamber's door is open, closed is needed"))
         if not instruments.vibration_g <= self.rules.vibration_g:
-            found.append(
+            reasons.append(
                 Reason(
                     "vibration", f"vibration {instruments.vibration_g:.3g} g rms, {self.rules.vibration_g:g} is allowed"
                 )
@@ -70,26 +70,30 @@ class Watched:
         if wrong:
             first = min(wrong)
             more = f" (and {len(wrong) - 1} more slots)" if len(wrong) > 1 else ""
-            found.append(Reason("supply", f"slot {first}: {wrong[first]}{more}", tuple(wrong)))
-        return found
+            reasons.append(Reason("supply", f"slot {first}: {wrong[first]}{more}", tuple(wrong)))
+        return reasons
 
-    def thermal(self, target: float, air: float, instruments: Instruments, slots: Sequence[int]) -> list[Reason]:
-        """Conditions of a record at ``target`` °C: the air, and the devices that must have stayed where they had settled."""
-        found: list[Reason] = []
+    def thermal_reasons(
+        self, target: float, air: float, instruments: Instruments, slots: Sequence[int]
+    ) -> list[Reason]:
+        """Reasons against a record at ``target`` °C: air or devices have left their band."""
+        reasons: list[Reason] = []
         band = max(self.rules.chamber_band_K, self.soak.band_K)
         if abs(air - target) > band:
-            found.append(Reason("chamber", f"the chamber's air is at {air:.2f} °C, {target:g} ± {band:g} °C is needed"))
+            reasons.append(
+                Reason("chamber", f"the chamber's air is at {air:.2f} °C, {target:g} ± {band:g} °C is needed")
+            )
         temperature = instruments.temperature_C
         left = tuple(
             s for s in slots if math.isfinite(temperature[s]) and abs(temperature[s] - target) > self.soak.band_K
         )
         if left:
             text = f"slot {left[0]}: device at {temperature[left[0]]:.2f} °C, {target:g} ± {self.soak.band_K:g} °C is needed"
-            found.append(Reason("device", text, left))
-        return found
+            reasons.append(Reason("device", text, left))
+        return reasons
 
     def _supply(self, slot: int, volt: float) -> str:
-        """What is wrong with a slot's supply; nothing where it is as it should be."""
+        """Why a slot's supply is out of tolerance; empty where it is not."""
         bounds, start = self.rules.supply_V, self.reference.get(slot)
         if bounds is not None and not bounds[0] <= volt <= bounds[1]:
             return f"supply {volt:.4g} V, {bounds[0]:g} to {bounds[1]:g} V is needed"

@@ -59,7 +59,7 @@ def mover(config, times):
 
 
 def counted(event):
-    return sum(line["event"] == event for line in folder.log(folder.state_folder()))
+    return sum(line["event"] == event for line in folder.read_log(folder.state_folder()))
 
 
 def stop_and_wake(process, plant, rng):
@@ -88,10 +88,10 @@ def stopped_many_times(times, seed):
     assert [orders for orders, _, _ in found] == [0] * times
     for _, kind, message in found:
         assert kind == "LeaseLost"
-        assert "stood still" in message
+        assert "did not respond" in message
         assert "lost its lease" in message
         assert "brake" not in message
-    kinds = [line["event"] for line in folder.log(folder.state_folder())]
+    kinds = [line["event"] for line in folder.read_log(folder.state_folder())]
     assert kinds.count("lease_lost") == times
     assert not {"left_safe", "not_safe"} & set(kinds)
 
@@ -133,7 +133,7 @@ def between_reading_and_order(axis, monkeypatch, happens):
 
 
 def test_a_lease_that_lapses_between_a_reading_and_the_order_leaves_it_unsent(monkeypatch):
-    with lost("stood still"), driven() as (station, plant, protection):
+    with lost("did not respond"), driven() as (station, plant, protection):
         before, axis = moves_ordered(plant), station.table.axes["inner"]
 
         def stands_still():
@@ -144,7 +144,7 @@ def test_a_lease_that_lapses_between_a_reading_and_the_order_leaves_it_unsent(mo
             axis.start(115.0)
         finally:
             assert moves_ordered(plant) == before
-    assert [line["event"] for line in folder.log(folder.state_folder())][:2] == ["driven", "lease_lost"]
+    assert [line["event"] for line in folder.read_log(folder.state_folder())][:2] == ["driven", "lease_lost"]
 
 
 def test_an_order_that_comes_long_after_its_reading_is_not_sent_and_may_be_tried_again(monkeypatch):
@@ -164,7 +164,7 @@ def test_an_order_that_comes_long_after_its_reading_is_not_sent_and_may_be_tried
 
 
 def test_what_a_run_finds_at_a_station_that_it_has_lost_is_not_why_it_ends():
-    with lost("stood still"), driven() as (_, _, protection):
+    with lost("did not respond"), driven() as (_, _, protection):
         protection.leases._beaten -= 60.0
         raise OperatorNeeded("inner axis: stands at 3 deg, 115 is needed; check load and brake of the table")
 
@@ -172,7 +172,7 @@ def test_what_a_run_finds_at_a_station_that_it_has_lost_is_not_why_it_ends():
 def test_a_run_whose_leases_were_cleared_away_and_taken_sends_nothing_more(state):
     from stations.safety.leases import Leases, addresses, new_holder
 
-    with lost("has gone to the other"), driven() as (station, plant, _):
+    with lost("now belongs to the other"), driven() as (station, plant, _):
         for path in (state / "leases").iterdir():
             path.unlink()
         other = Leases(state, new_holder("served", "the other"), addresses(station.config), 10.0)

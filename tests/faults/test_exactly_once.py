@@ -11,23 +11,23 @@ from stations.devices.registers import Registers
 from stations.devices.table import TiltTable
 from stations.links.making import Links
 from stations.plant.clock import PlantClock
-from stations.plant.faults.proxy import ChaosProxy, Meddling
+from stations.plant.faults.proxy import ChaosProxy, WireAction
 from stations.plant.server import PlantServer
 from stations.profile_files import load_profile
 
 TIMEOUT_S = 0.08
-TROUBLES = [
-    Meddling("drop"),
-    Meddling("drop"),
-    Meddling("delay", delay_s=2.0 * TIMEOUT_S),
-    Meddling("delay", delay_s=0.2 * TIMEOUT_S),
-    Meddling("duplicate"),
-    Meddling("late"),
-    Meddling("retag"),
-    Meddling("truncate", size=3),
-    Meddling("reset"),
-    Meddling("half_open"),
-    Meddling("drop", "request"),
+ACTIONS = [
+    WireAction("drop"),
+    WireAction("drop"),
+    WireAction("delay", delay_s=2.0 * TIMEOUT_S),
+    WireAction("delay", delay_s=0.2 * TIMEOUT_S),
+    WireAction("duplicate"),
+    WireAction("late"),
+    WireAction("retag"),
+    WireAction("truncate", size=3),
+    WireAction("reset"),
+    WireAction("half_open"),
+    WireAction("drop", "request"),
 ]
 WRITES = {5, 15, 16}
 DRIVES = {"oriental_az": 34, "smc_lecp6": 33, "iai_robo_cylinder": 33}  # share of the runs in percent
@@ -62,7 +62,7 @@ def trouble(rng):
 
     def script(way, frame):
         part = 0.5 if frame[7] & 0x7F in WRITES else 0.02
-        fitting = [meddling for meddling in TROUBLES if meddling.way == way]
+        fitting = [action for action in ACTIONS if action.way == way]
         return fitting[int(rng.integers(len(fitting)))] if rng.random() < part else None
 
     return script
@@ -84,7 +84,7 @@ def run_many(drive: str, runs: int, seed: int):
             assert (plant.outer._moves - before[0], plant.inner._moves - before[1]) == (1, 1), f"run {n}"
             assert (plant.outer.move.target, plant.inner.move.target) == pytest.approx((outer, inner), abs=1e-6)
         links.close()
-        spoilt = len(proxy.spoilt)
+        spoilt = len(proxy.applied)
     return tries, spoilt
 
 
@@ -113,7 +113,7 @@ def test_reading_back_does_not_overtake_a_write_that_is_slow_on_its_way():
         outer = table.axes["outer"]
 
         def slow(way, frame):
-            return Meddling("delay", "request", delay_s=0.45) if way == "request" and frame[7] == 16 else None
+            return WireAction("delay", "request", delay_s=0.45) if way == "request" and frame[7] == 16 else None
 
         outer.position()
         proxy.script = slow

@@ -4,6 +4,8 @@ import pytest
 from fault_matrix import CASES, PAGE, RECOVERED, RUN, UNIT, Case, page, row, tried
 
 from schemas.errors import STATION
+from stations.plant.faults.base import DEVICES
+from stations.plant.faults.base import UNIT as UNIT_TARGET
 from stations.plant.faults.catalogue import figures, kinds
 
 
@@ -40,8 +42,8 @@ def test_a_sound_station_is_true_to_the_last_dwell() -> None:
 
 
 @pytest.mark.parametrize("name", kinds())
-def test_every_kind_says_what_it_is_and_whom_it_may_mean(name: str) -> None:
+def test_every_kind_has_a_description_known_targets_and_figures_with_defaults(name: str) -> None:
     kind = kinds()[name]
-    assert kind.__module__.rpartition(".")[2] == name, "one kind, one file, of the same name"
+    assert set(kind.targets) <= {UNIT_TARGET, *DEVICES}
     assert (kind.__doc__ or "").strip().endswith(".")
     assert all(isinstance(value, float) for value in figures(kind).values())

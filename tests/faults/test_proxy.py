@@ -6,7 +6,7 @@ from contextlib import contextmanager, suppress
 
 import pytest
 
-from stations.plant.faults.proxy import ChaosProxy, Meddling, split
+from stations.plant.faults.proxy import ChaosProxy, WireAction, split
 
 REPLY = b"\x00\x2a\x00\x00\x00\x07\x01\x03\x04\x11\x11\x22\x22"
 
@@ -39,9 +39,9 @@ def echo():
 
 
 @contextmanager
-def through(*meddlings: Meddling):
+def through(*actions: WireAction):
     with echo() as address, ChaosProxy(*address) as proxy:
-        proxy.once(*meddlings)
+        proxy.once(*actions)
         with socket.create_connection((proxy.host, proxy.port), timeout=0.3) as client:
             yield proxy, client
 
@@ -63,35 +63,35 @@ def test_frames_pass_as_they_are():
 
 
 @pytest.mark.parametrize(
-    ("meddling", "arrives"),
+    ("action", "arrives"),
     [
-        (Meddling("drop"), b""),
-        (Meddling("drop", "request"), b""),
-        (Meddling("delay", delay_s=0.05), frame(1)),
-        (Meddling("duplicate"), frame(1) * 2),
-        (Meddling("truncate", size=3), frame(1)[:-3]),
-        (Meddling("half_open"), b""),
-        (Meddling("late"), b""),
-        (Meddling("retag"), frame(2)),
-        (Meddling("swap"), frame(1, b"\x01\x03\x04\x22\x22\x11\x11")),
+        (WireAction("drop"), b""),
+        (WireAction("drop", "request"), b""),
+        (WireAction("delay", delay_s=0.05), frame(1)),
+        (WireAction("duplicate"), frame(1) * 2),
+        (WireAction("truncate", size=3), frame(1)[:-3]),
+        (WireAction("half_open"), b""),
+        (WireAction("late"), b""),
+        (WireAction("retag"), frame(2)),
+        (WireAction("swap"), frame(1, b"\x01\x03\x04\x22\x22\x11\x11")),
     ],
 )
-def test_the_next_frame_is_spoilt_as_asked(meddling, arrives):
-    with through(meddling) as (proxy, client):
+def test_the_next_frame_is_spoilt_as_asked(action, arrives):
+    with through(action) as (proxy, client):
         client.sendall(frame(1))
         assert received(client, 26) == arrives
-    assert proxy.spoilt == [meddling]
+    assert proxy.applied == [action]
 
 
 def test_garbled_frames_differ_in_as_many_bytes_as_asked_at_most():
-    with through(Meddling("garble", size=2)) as (_, client):
+    with through(WireAction("garble", size=2)) as (_, client):
         client.sendall(frame(1))
         found = received(client, 13)
     assert 1 <= sum(a != b for a, b in zip(found, frame(1), strict=True)) <= 2
 
 
 def test_a_late_reply_comes_in_front_of_the_next_one_on_a_new_connection():
-    with through(Meddling("late")) as (proxy, client):
+    with through(WireAction("late")) as (proxy, client):
         client.sendall(frame(1))
         assert received(client, 13) == b""
         with socket.create_connection((proxy.host, proxy.port), timeout=2.0) as again:
@@ -100,14 +100,14 @@ def test_a_late_reply_comes_in_front_of_the_next_one_on_a_new_connection():
 
 
 def test_a_reset_breaks_the_connection_off():
-    with through(Meddling("reset")) as (_, client):
+    with through(WireAction("reset")) as (_, client):
         client.sendall(frame(1))
         with pytest.raises(ConnectionResetError):
             client.recv(64)
 
 
 def test_half_open_connections_stay_silent_and_new_ones_work():
-    with through(Meddling("half_open")) as (proxy, client):
+    with through(WireAction("half_open")) as (proxy, client):
         client.sendall(frame(1) + frame(2))
         assert received(client, 26) == b""
         with socket.create_connection((proxy.host, proxy.port), timeout=2.0) as again:

@@ -10,14 +10,14 @@ from schemas.fault import FaultOrder
 from schemas.station import load_station
 from stations.opening import make_plant, serve_plant
 from stations.plant.faults import wire
-from stations.plant.faults.proxy import HEADER, Meddling
+from stations.plant.faults.proxy import HEADER, WireAction
 
 WRITE, READ = 16, 3
 SLOT_1 = 12
 
 
 def captured(monkeypatch: pytest.MonkeyPatch, script) -> tuple[MemorySink, MemoryLog]:
-    monkeypatch.setattr(wire, "script_of", lambda _plant: script)
+    monkeypatch.setattr(wire, "script_of", lambda _world, _faults: script)
     config, lot = load_station(), lot_of()
     config = config.model_copy(update={"link": config.link.model_copy(update={"timeout_s": 0.2})})
     sink, events = MemorySink(), MemoryLog()
@@ -39,7 +39,7 @@ def test_a_slot_whose_answer_to_what_was_taken_is_lost_is_asked_and_keeps_its_un
     def script(way, frame):
         if way == "reply" and frame[HEADER - 1] == SLOT_1 and frame[HEADER] == WRITE and len(lost) < 3:
             lost.append(frame)
-            return Meddling("drop")
+            return WireAction("drop")
         return None
 
     sink, _ = captured(monkeypatch, script)
@@ -79,7 +79,7 @@ def changing(script):
     """A script that may raise what is to be delivered: a duplicate whose first copy is that."""
     from stations.plant.faults import proxy
 
-    usual = proxy.spoilt
+    usual = proxy.replaced
     instead: list[bytes] = []
 
     def asked(way, frame):
@@ -87,12 +87,12 @@ def changing(script):
             return script(way, frame)
         except Changed as one:
             instead.append(one.args[0])
-            return Meddling("duplicate")
+            return WireAction("duplicate")
 
-    def spoilt(frame, meddling, of):
-        return [instead.pop()] if instead else usual(frame, meddling, of)
+    def replaced(frame, action, of):
+        return [instead.pop()] if instead else usual(frame, action, of)
 
-    proxy.spoilt = spoilt
+    proxy.replaced = replaced
     return asked
 
 
@@ -100,9 +100,9 @@ def changing(script):
 def _as_it_was():
     from stations.plant.faults import proxy
 
-    usual = proxy.spoilt
+    usual = proxy.replaced
     yield
-    proxy.spoilt = usual
+    proxy.replaced = usual
 
 
 def test_a_slot_that_forgets_what_was_taken_is_refused() -> None:

@@ -48,7 +48,7 @@ def test_a_run_that_stands_still_is_taken_for_dead_and_may_not_go_on():
         with driver(config) as process:
             process.send_signal(signal.SIGSTOP)
             safe_within(config, SOON_S)
-            assert "not been heard of" in told("watchdog_acts")["why"]
+            assert "no heartbeat of the run" in told("watchdog_acts")["why"]
 
 
 def test_drives_and_reader_stop_by_themselves_when_run_and_watchdog_are_both_gone():
@@ -80,7 +80,7 @@ def test_a_holder_that_stood_still_is_refused_when_it_wakes(state):
     leases.require()
     time.sleep(0.1)
     leases.beat()  # too late
-    with pytest.raises(LeaseLost, match=r"stood still for more than 0\.05 s .* goes on where it was"):
+    with pytest.raises(LeaseLost, match=r"did not respond for more than 0\.05 s .* resumes where it stopped"):
         leases.require()
     leases.release()
 
@@ -92,7 +92,7 @@ def test_a_run_that_ends_in_peace_leaves_its_station_safe_too():
             assert process.wait(SOON_S) == 0
             _, moving, set_point, sampling = look(config)
             assert (moving, set_point, sampling) == (False, 25.0, "stopped")
-        assert [line["event"] for line in folder.log(folder.state_folder())] == ["driven", "left_safe"]
+        assert [line["event"] for line in folder.read_log(folder.state_folder())] == ["driven", "left_safe"]
 
 
 def test_a_station_that_is_driven_is_refused_with_who_drives_it():
@@ -148,7 +148,7 @@ def test_a_lease_of_a_dead_process_is_free_at_once(state):
     foreign(state, config, pid=process.pid)
     mine = Leases(state, new_holder("served", "mine"), addresses(config), 10.0)
     mine.take()
-    assert folder.log(state)[0]["event"] == "lease_taken_over"
+    assert folder.read_log(state)[0]["event"] == "lease_taken_over"
     mine.release()
 
 

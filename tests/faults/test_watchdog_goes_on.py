@@ -17,11 +17,12 @@ from typer.testing import CliRunner
 from pipelines.cli import app
 from schemas.errors import STATION, OperatorNeeded, StationRefused
 from schemas.safety import SAFE_WITHIN_S
+from stations import watchdog
 from stations.opening import open_station
-from stations.plant.faults.proxy import ChaosProxy, Meddling
-from stations.safety import folder, lease_files, leases, watchdog, watching
+from stations.plant.faults.proxy import ChaosProxy, WireAction
+from stations.safety import folder, lease_files, leases, watchdog_client
 from stations.safety.leases import Leases, addresses, holders, new_holder
-from stations.safety.standing import not_safe
+from stations.safety.safety_status import unsafe_reason
 
 
 @pytest.fixture(autouse=True)
@@ -87,15 +88,15 @@ def test_a_run_finds_its_watchdog_killed_starts_it_anew_and_is_watched():
 
 
 def test_a_run_that_cannot_have_a_watchdog_any_more_ends_and_leaves_its_station_safe(monkeypatch):
-    with served() as port, pytest.raises(OperatorNeeded, match="3 times one after another"):
+    with served() as port, pytest.raises(OperatorNeeded, match="3 consecutive times"):
         ends_without_watchdog(modbus_station(port, limits=SLOW), monkeypatch)
-    assert folder.log(folder.state_folder())[-1]["event"] == "left_safe"
+    assert folder.read_log(folder.state_folder())[-1]["event"] == "left_safe"
 
 
 def ends_without_watchdog(config, monkeypatch):
     with open_station(config, lot_of()) as station:
         station.require()
-        monkeypatch.setattr(watching.sys, "executable", "/bin/false")
+        monkeypatch.setattr(watchdog_client.sys, "executable", "/bin/false")
         os.kill(told("driven")["watchdog"], signal.SIGKILL)
         end = time.monotonic() + SOON_S
         while time.monotonic() < end:
@@ -111,7 +112,7 @@ def test_a_worker_stopped_with_its_whole_group_leaves_the_station_to_the_watchdo
             assert process.wait(SOON_S) == -signal.SIGTERM
             os.kill(told("driven")["watchdog"], signal.SIGTERM)
             assert safe_within(config, SOON_S) < SAFE_WITHIN_S
-            assert "left_safe" not in {line["event"] for line in folder.log(folder.state_folder())}
+            assert "left_safe" not in {line["event"] for line in folder.read_log(folder.state_folder())}
 
 
 def away_and_back(seconds):
@@ -119,7 +120,7 @@ def away_and_back(seconds):
     away = []
     with (
         served() as port,
-        ChaosProxy("127.0.0.1", port, lambda _way, _frame: Meddling("drop", "request") if away else None) as proxy,
+        ChaosProxy("127.0.0.1", port, lambda _way, _frame: WireAction("drop", "request") if away else None) as proxy,
     ):
         config = modbus_station(proxy.port, limits=SLOW)
         with driver(config) as process:
@@ -127,7 +128,7 @@ def away_and_back(seconds):
             killed(process)
             end, found = time.monotonic() + seconds, []
             while time.monotonic() < end or not found:
-                problem = not_safe(folder.state_folder(), config)
+                problem = unsafe_reason(folder.state_folder(), config)
                 found += [problem] if "the watchdog of the driver" in problem and "no answer" in problem else []
                 time.sleep(0.2)
             with pytest.raises(OperatorNeeded, match="is held by the watchdog of the driver"):
@@ -136,7 +137,7 @@ def away_and_back(seconds):
             away.clear()
             assert safe_within(config, SOON_S + watchdog.SLOWEST_S) < SAFE_WITHIN_S
             told("watchdog_safe")
-            while not_safe(folder.state_folder(), config):
+            while unsafe_reason(folder.state_folder(), config):
                 time.sleep(0.1)
 
 
@@ -183,7 +184,7 @@ def test_a_station_that_nobody_has_made_safe_is_told_by_status_with_exit_3(tmp_p
         assert result.exit_code == STATION
         document = json.loads(result.stdout)
         assert document["ok"] is False
-        assert "neither it nor its watchdog has told that the station is safe" in document["faults"]["safe state"]
+        assert "neither it nor its watchdog has reported the station safe" in document["faults"]["safe state"]
         with open_station(config, lot_of()):
             pass
         assert CliRunner().invoke(app, command).exit_code == 0
@@ -231,11 +232,11 @@ def test_an_unreadable_lease_whose_lock_is_free_is_free(state, monkeypatch):
     with pytest.raises(OperatorNeeded, match="being taken by another run"):
         second.take()
     first.hand_over()
-    assert "cannot be read and nobody holds it" in not_safe(state, config)
+    assert "cannot be read and is not held" in unsafe_reason(state, config)
     second.take()
     assert {holder.run for holder, _ in holders(state, config).values()} == {"mine"}
     second.release()
-    assert not not_safe(state, config)
+    assert not unsafe_reason(state, config)
 
 
 @pytest.mark.parametrize(("link", "ended"), [("rtu", True), ("tcp", False)])

@@ -20,7 +20,7 @@ def _value(tables: UnitTables) -> Value | None:
 def _of_axis(rows: UnitRows, axis: str) -> Value:
     """RMS error of one axis, with the uncertainty of the verification's covariance.
 
-    See :func:`pipelines.stages.rms_error.rms_uncertainty`; runs of earlier versions have the one of uncertainty is that of white noise.
+    See :func:`pipelines.stages.rms_error.rms_uncertainty`. Runs of earlier versions have the uncertainty of white noise alone.
     """
     name, plain = f"rms_uncertainty_{axis}_ug", rms(rows[f"error_{axis}_ug"])
     return plain._replace(uncertainty=float(rows[name][0])) if name in rows else plain

@@ -1,4 +1,4 @@
-"""A device answers everything with an exception."""
+"""Faults of a device's answers: exceptions, no answer, writes that are ignored or incomplete."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, ClassVar
 
 from stations.plant.faults.base import AXES, DEVICES, MUTE, UNIT, Fault
-from stations.plant.faults.proxy import Meddling
+from stations.plant.faults.proxy import WireAction
 from stations.plant.faults.wire import WireFault
 
 if TYPE_CHECKING:
@@ -15,10 +15,10 @@ if TYPE_CHECKING:
 
 @dataclass
 class ExceptionCode(Fault):
-    """A device answers everything with one exception: 4 for a failure, 6 for busy, 2 for a register that is not there."""
+    """A device answers every request with one exception: 4 for failure, 6 for busy, 2 for an unknown register."""
 
     kind: ClassVar[str] = "exception_code"
-    about: ClassVar[tuple[str, ...]] = (UNIT, *DEVICES)
+    targets: ClassVar[tuple[str, ...]] = (UNIT, *DEVICES)
 
     code: float = 4.0
 
@@ -29,26 +29,26 @@ class ExceptionCode(Fault):
 
 @dataclass
 class ExceptionsOff(Fault):
-    """A device refuses every write and answers as if it had taken it: its exception answers are switched off (AZ series)."""
+    """A device ignores every write and acknowledges it: its exception responses are switched off (AZ series)."""
 
     kind: ClassVar[str] = "exceptions_off"
-    about: ClassVar[tuple[str, ...]] = (UNIT, *DEVICES)
+    targets: ClassVar[tuple[str, ...]] = (UNIT, *DEVICES)
 
     def on_write(self, words: list[int], held: list[int] | None, write: Callable[[list[int]], None]) -> int:
-        """Nothing is done, and the answer is the usual one."""
+        """Writes nothing and acknowledges."""
         del words, held, write
         return 0
 
 
 @dataclass
 class Mute(Fault):
-    """Nothing at all comes back from a device, and every request runs into its time-out."""
+    """A device sends no answer; every request times out."""
 
     kind: ClassVar[str] = "mute"
-    about: ClassVar[tuple[str, ...]] = (UNIT, *DEVICES)
+    targets: ClassVar[tuple[str, ...]] = (UNIT, *DEVICES)
 
     def answers(self) -> int:
-        """None."""
+        """No answer."""
         return MUTE
 
 
@@ -57,10 +57,10 @@ NO_RESPONSE = 11  # gateway target device failed to respond (Modbus Application 
 
 @dataclass
 class Silent(Fault):
-    """The gateway says that a device does not answer: a plug pulled out, a supply gone."""
+    """The gateway reports that a device does not respond: unplugged, or without supply."""
 
     kind: ClassVar[str] = "silent"
-    about: ClassVar[tuple[str, ...]] = (UNIT, *DEVICES)
+    targets: ClassVar[tuple[str, ...]] = (UNIT, *DEVICES)
 
     def answers(self) -> int:
         """The gateway's exception."""
@@ -69,13 +69,13 @@ class Silent(Fault):
 
 @dataclass
 class TimeOut(WireFault):
-    """The answer to a request is lost on its way: the device has acted, and nobody knows."""
+    """The answer to a request is lost: the device has acted, and the client cannot know it."""
 
     kind: ClassVar[str] = "time_out"
 
-    def wire_action(self) -> Meddling:
-        """Lost."""
-        return Meddling("drop")
+    def wire_action(self) -> WireAction:
+        """Drops the answer."""
+        return WireAction("drop")
 
 
 FAILURE = 4
@@ -83,13 +83,13 @@ FAILURE = 4
 
 @dataclass
 class PartialWrite(Fault):
-    """A device takes the first registers of a write and fails at the rest; what was not written keeps its old value."""
+    """A device writes the first registers of a request and fails at the rest, which keep their old values."""
 
     kind: ClassVar[str] = "partial_write"
-    about: ClassVar[tuple[str, ...]] = (*AXES, "chamber", "reader")
+    targets: ClassVar[tuple[str, ...]] = (*AXES, "chamber", "reader")
 
     def on_write(self, words: list[int], held: list[int] | None, write: Callable[[list[int]], None]) -> int:
-        """The first half is new, the rest as it was; the trigger of a move comes last, so that nothing moves."""
+        """Writes the first half; the trigger of a move is the last register, so nothing moves."""
         if len(words) == 1:
             write(words)
             return 0

@@ -1,4 +1,4 @@
-"""What every kind of fault inherits: nothing happens, unless the kind says so."""
+"""The base class of the kinds of faults; each kind overrides what it changes."""
 
 from __future__ import annotations
 
@@ -9,60 +9,64 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
     from schemas.fault import FaultOrder
-    from stations.plant.faults.proxy import Meddling
-    from stations.plant.plant import Plant
+    from stations.plant.faults.proxy import WireAction
     from stations.plant.table import Axis
+    from stations.plant.world import World
 
 UNIT = "unit"
 AXES = ("outer", "inner")
 DEVICES = (*AXES, "chamber", "reader")
-MUTE = -1  # an answer of this code is none at all
+MUTE = -1  # in place of an exception code: the device sends no answer
 
 
 @dataclass
 class Fault:
-    """One fault of one plant, while it lasts. The fields of a kind are its figures.
+    """One fault of one plant. The fields of a kind are its figures.
 
-    ``about`` says who may be meant: ``unit`` (by its serial number), the station's devices by name; nobody where it is empty.
-    What a kind does must follow from the plant's time and from what is written, never from what is read: a resumed plant is
-    played through the writes alone.
+    ``targets`` lists what the fault can be given for: ``unit`` (by its serial number) or the station's devices by name; empty
+    where the fault has no target. The effect of a kind must depend on the plant's time and on writes only, never on reads: a
+    resumed plant replays the writes alone.
     """
 
     kind: ClassVar[str] = ""
-    about: ClassVar[tuple[str, ...]] = ()
+    targets: ClassVar[tuple[str, ...]] = ()
 
-    fault: FaultOrder = field(init=False, repr=False)
+    order: FaultOrder = field(init=False, repr=False)
     device_id: int = field(init=False, default=0, repr=False)
     unit: int = field(init=False, default=0, repr=False)
 
-    def begins(self, plant: Plant) -> None:
-        """What happens when it begins."""
+    def begins(self, world: World) -> None:
+        """Changes the world when the fault begins."""
 
-    def ends(self, plant: Plant) -> None:
-        """What happens when it is over."""
+    def ends(self, world: World) -> None:
+        """Changes the world when the fault ends."""
 
     def answers(self) -> int:
-        """The exception code with which the device answers everything; 0 where it answers as always."""
+        """The exception code with which the device answers every request; 0 where it answers normally."""
         return 0
 
     def on_read(self, now_us: int, address: int, words: list[int]) -> list[int]:
-        """The words that the device tells where it should tell ``words``."""
+        """The words that the device reports in place of ``words``."""
         del now_us, address
         return words
 
     def on_write(self, words: list[int], held: list[int] | None, write: Callable[[list[int]], None]) -> int:
-        """Does with the words of a write what the device then does, and gives the exception code of its answer.
+        """Carries out a write as the faulty device does, and returns the exception code of its answer.
 
-        ``held`` are the words that the registers hold now, None where they cannot be read.
+        Parameters
+        ----------
+        words : the words of the write
+        held : the words that the registers hold now; None where they cannot be read
+        write : writes words to the registers
         """
         del held
         write(words)
         return 0
 
-    def wire_action(self) -> Meddling | None:
-        """What happens to frames on the wire."""
+    def wire_action(self) -> WireAction | None:
+        """What happens to a frame on the wire; None where it passes unchanged."""
         return None
 
-    def axis(self, plant: Plant) -> Axis:
-        """The axis that is meant."""
-        return plant.outer if self.fault.device == "outer" else plant.inner
+    def axis(self, world: World) -> Axis:
+        """The axis that has the fault."""
+        return world.outer if self.order.device == "outer" else world.inner

@@ -1,4 +1,4 @@
-"""The kinds of faults: every class in a module of this folder, found by themselves."""
+"""The kinds of faults: every class with a kind in a module of this folder."""
 
 from __future__ import annotations
 
@@ -22,43 +22,48 @@ if TYPE_CHECKING:
 @cache
 def kinds() -> Mapping[str, type[Fault]]:
     """Every kind by its name, in order of the names."""
-    found: dict[str, type[Fault]] = {}
+    by_name: dict[str, type[Fault]] = {}
     for module in pkgutil.iter_modules(faults.__path__):
         content = vars(import_module(f"{faults.__name__}.{module.name}")).values()
-        found |= {one.kind: one for one in content if isinstance(one, type) and issubclass(one, Fault) and one.kind}
-    return MappingProxyType(dict(sorted(found.items())))
+        by_name |= {one.kind: one for one in content if isinstance(one, type) and issubclass(one, Fault) and one.kind}
+    return MappingProxyType(dict(sorted(by_name.items())))
 
 
 def figures(kind: type[Fault]) -> dict[str, float]:
-    """The figures of a kind with their usual values."""
+    """The figures of a kind with their defaults."""
     return {f.name: float(f.default) for f in fields(kind) if f.init and isinstance(f.default, int | float)}
 
 
-def trouble_of(fault: FaultOrder, serials: Sequence[str]) -> Fault:
-    """The trouble that a fault makes; a kind, figure or unit that is not there is refused, and one that means nobody."""
+def build_fault(order: FaultOrder, serials: Sequence[str]) -> Fault:
+    """The fault that an order describes, for a lot of these serial numbers.
+
+    Raises
+    ------
+    RecipeInvalid : the kind, a figure or the unit does not exist, or the kind needs another target
+    """
     known = kinds()
-    if fault.kind not in known:
-        raise RecipeInvalid(f"fault: no kind '{fault.kind}'; {did_you_mean(fault.kind, known)}", key="faults")
-    kind = known[fault.kind]
-    for name in fault.figures:
+    if order.kind not in known:
+        raise RecipeInvalid(f"fault: no kind '{order.kind}'; {did_you_mean(order.kind, known)}", key="faults")
+    kind = known[order.kind]
+    for name in order.figures:
         if name not in figures(kind):
             close = did_you_mean(name, figures(kind)) if figures(kind) else "it has none"
-            raise RecipeInvalid(f"fault {fault.kind}: no figure '{name}'; {close}", key="faults")
-    _refuse_nobody(fault, kind, serials)
-    made = kind(**fault.figures)
-    made.fault = fault
-    return made
+            raise RecipeInvalid(f"fault {order.kind}: no figure '{name}'; {close}", key="faults")
+    _check_target(order, kind, serials)
+    fault = kind(**order.figures)
+    fault.order = order
+    return fault
 
 
-def _refuse_nobody(fault: FaultOrder, kind: type[Fault], serials: Sequence[str]) -> None:
-    meant = UNIT if fault.serial else fault.device
-    if meant not in (kind.about or ("",)):
-        wanted = ", ".join("serial=…" if one == UNIT else f"device={one}" for one in kind.about) or "neither"
+def _check_target(order: FaultOrder, kind: type[Fault], serials: Sequence[str]) -> None:
+    target = UNIT if order.serial else order.device
+    if target not in (kind.targets or ("",)):
+        allowed = ", ".join("serial=…" if one == UNIT else f"device={one}" for one in kind.targets) or "neither"
         raise RecipeInvalid(
-            f"fault {fault.kind}: serial '{fault.serial}', device '{fault.device}'; {wanted} is needed; correct the fault",
+            f"fault {order.kind}: serial '{order.serial}', device '{order.device}'; {allowed} is needed; correct the fault",
             key="faults",
         )
-    if fault.serial and fault.serial not in serials:
+    if order.serial and order.serial not in serials:
         raise RecipeInvalid(
-            f"fault {fault.kind}: no unit '{fault.serial}'; {did_you_mean(fault.serial, serials)}", key="faults"
+            f"fault {order.kind}: no unit '{order.serial}'; {did_you_mean(order.serial, serials)}", key="faults"
         )

@@ -1,4 +1,4 @@
-"""A bad network: a TCP proxy between a client and a Modbus TCP server that spoils frames as it is told.
+"""A TCP proxy between a client and a Modbus TCP server that loses, delays or changes frames as a script orders.
 
 It works on real sockets and in wall time, frame by frame (MBAP header, Modbus Messaging on TCP/IP 1.0b, 3.1.3), so that the
 client under test is the production one.
@@ -20,63 +20,46 @@ from typing import TYPE_CHECKING, Literal, Self
 if TYPE_CHECKING:
     from types import TracebackType
 
-    import numpy as np
-
 Way = Literal["request", "reply"]
-Trouble = Literal["drop", "delay", "duplicate", "truncate", "garble", "half_open", "late", "retag", "swap", "reset"]
-TROUBLES: tuple[Trouble, ...] = (
-    "drop", "delay", "duplicate", "truncate", "garble", "half_open", "late", "retag", "swap", "reset",
-)  # fmt: skip
+ActionKind = Literal["drop", "delay", "duplicate", "truncate", "garble", "half_open", "late", "retag", "swap", "reset"]
 
 HEADER = 7  # MBAP: transaction, protocol, length, unit
 WORDS_AT = HEADER + 2  # where the registers of a reply to function 3 or 4 begin
 END_S = 5.0
-LOOK_S = 0.1  # how soon a way notices that the other one has broken the connection off
+LOOK_S = 0.1  # time in which one direction notices that the other has closed the connection
 CHUNK = 4096
 
 
 @dataclass(frozen=True)
-class Meddling:
-    """What happens to one frame on its way.
+class WireAction:
+    """What happens to one frame.
 
-    ``drop`` loses it. ``delay`` holds it, and what follows, for ``delay_s``. ``duplicate`` delivers it twice. ``truncate`` cuts
-    its last ``size`` bytes off and closes. ``garble`` changes ``size`` bytes. ``half_open``: from here on this connection
-    swallows everything and stays open. ``late`` holds it back and delivers it in front of the next frame of its way, on
-    whatever connection that comes. ``retag`` adds ``size`` to its transaction id. ``swap`` exchanges every two registers of
-    a reply. ``reset`` breaks the connection off in its stead.
+    ``drop`` loses it. ``delay`` delays it and all later frames by ``delay_s``. ``duplicate`` delivers it twice. ``truncate``
+    removes its last ``size`` bytes and closes. ``garble`` changes ``size`` bytes. ``half_open``: from here on the connection
+    stays open and passes nothing. ``late`` delivers it in front of the next frame of its direction, on any connection.
+    ``retag`` adds ``size`` to its transaction id. ``swap`` exchanges each two registers of a reply. ``reset`` resets the
+    connection in its place.
     """
 
-    trouble: Trouble
+    kind: ActionKind
     way: Way = "reply"
     delay_s: float = 0.0
     size: int = 1
 
 
-Script = Callable[[Way, bytes], Meddling | None]
+Script = Callable[[Way, bytes], WireAction | None]
 
 
-def untouched(_way: Way, _frame: bytes) -> Meddling | None:
-    """A script that lets everything pass."""
+def untouched(_way: Way, _frame: bytes) -> WireAction | None:
+    """A script that passes every frame."""
     return None
 
 
-def at_random(rng: np.random.Generator, meddlings: list[Meddling], part: float) -> Script:
-    """A script that spoils a part of the frames with one of ``meddlings`` each, by the generator."""
-
-    def script(way: Way, _frame: bytes) -> Meddling | None:
-        fitting = [meddling for meddling in meddlings if meddling.way == way]
-        if not fitting or rng.random() >= part:
-            return None
-        return fitting[int(rng.integers(len(fitting)))]
-
-    return script
-
-
 class ChaosProxy:
-    """A proxy to a server while the context is open; ``host`` and ``port`` are where clients connect.
+    """A proxy to a server while the context is open; clients connect to ``host`` and ``port``.
 
-    ``once`` queues meddlings, each spends itself on the next frame of its way; frames beyond them go through ``script``.
-    ``frames`` counts what arrived by way, ``spoilt`` what was done to it.
+    ``once`` queues actions, each for the next frame of its direction; other frames go through ``script``.
+    ``frames`` counts the frames by direction, ``applied`` lists the actions on them.
     """
 
     def __init__(self, host: str, port: int, script: Script = untouched, seed: int = 0) -> None:
@@ -84,9 +67,9 @@ class ChaosProxy:
         self.script = script
         self.host, self.port = "127.0.0.1", 0
         self.frames: dict[Way, int] = {"request": 0, "reply": 0}
-        self.spoilt: list[Meddling] = []
+        self.applied: list[WireAction] = []
         self._seed = seed
-        self._once: deque[Meddling] = deque()
+        self._once: deque[WireAction] = deque()
         self._late: dict[Way, deque[bytes]] = {"request": deque(), "reply": deque()}
         self._lock = threading.Lock()
         self._open: list[_Connection] = []
@@ -94,10 +77,10 @@ class ChaosProxy:
         self.port = int(self._listener.getsockname()[1])
         self._thread = threading.Thread(target=self._accept, name="chaos-proxy", daemon=True)
 
-    def once(self, *meddlings: Meddling) -> None:
-        """Spoils the next frame of its way with each of these, in order."""
+    def once(self, *actions: WireAction) -> None:
+        """Applies each of these to the next frame of its direction, in order."""
         with self._lock:
-            self._once.extend(meddlings)
+            self._once.extend(actions)
 
     def __enter__(self) -> Self:
         """Starts listening."""
@@ -129,19 +112,19 @@ class ChaosProxy:
             self._open = [old for old in self._open if not old.over()]
             self._open.append(_Connection(self, client, server))
 
-    def spoil(self, way: Way, frame: bytes) -> Meddling | None:
-        """What is to happen to a frame; noted."""
+    def action_on(self, way: Way, frame: bytes) -> WireAction | None:
+        """The action on a frame, which is recorded; None where the frame passes unchanged."""
         with self._lock:
             self.frames[way] += 1
-            meddling = self.script(way, frame)
+            action = self.script(way, frame)
             for queued in self._once:
                 if queued.way == way:
-                    meddling = queued
+                    action = queued
                     self._once.remove(queued)
                     break
-            if meddling is not None:
-                self.spoilt.append(meddling)
-            return meddling
+            if action is not None:
+                self.applied.append(action)
+            return action
 
     def held_back(self, way: Way) -> list[bytes]:
         """Late frames that are due now."""
@@ -151,12 +134,12 @@ class ChaosProxy:
             return frames
 
     def hold_back(self, way: Way, frame: bytes) -> None:
-        """Keeps a frame for the next one of its way."""
+        """Keeps a frame until the next one of its direction."""
         with self._lock:
             self._late[way].append(frame)
 
     def garbled(self, frame: bytes, size: int) -> bytes:
-        """A frame with ``size`` of its bytes changed; which ones follows from the seed and the count of frames."""
+        """A frame with ``size`` of its bytes changed; seed and frame count decide which."""
         out = bytearray(frame)
         for n in range(size):
             mix = (self._seed * 2654435761 + sum(self.frames.values()) * 40503 + n * 977) & 0xFFFFFFFF
@@ -165,12 +148,12 @@ class ChaosProxy:
 
 
 class _Connection:
-    """One client's connection: a thread each way, and one at the end of a slow way."""
+    """One client's connection: a thread for each direction."""
 
     def __init__(self, proxy: ChaosProxy, client: socket.socket, server: socket.socket) -> None:
         self._proxy = proxy
         self._sockets = (client, server)
-        self._dead = threading.Event()  # half open: swallows everything
+        self._dead = threading.Event()  # half open: passes nothing
         self._broken = False
         self._ways: list[threading.Thread] = []
         ways: tuple[tuple[Way, socket.socket, socket.socket], ...] = (
@@ -183,7 +166,7 @@ class _Connection:
             thread.start()
 
     def over(self) -> bool:
-        """Whether both ways have ended; the sockets are closed then."""
+        """Whether both directions have ended; the sockets are closed then."""
         if any(thread.is_alive() for thread in self._ways):
             return False
         for one in self._sockets:
@@ -201,7 +184,7 @@ class _Connection:
             one.close()
 
     def _pump(self, way: Way, source: socket.socket, sink: socket.socket) -> None:
-        """Frames of one way until either end closes."""
+        """Passes the frames of one direction until either end closes."""
         buffer = b""
         while True:
             try:
@@ -223,13 +206,13 @@ class _Connection:
 
     def _hang_up(self) -> None:
         if self._broken:
-            return  # with a reset: a polite end would come before it
+            return  # a reset is under way: an orderly end would arrive before it
         for one in self._sockets:
             with suppress(OSError):
                 one.shutdown(socket.SHUT_RDWR)
 
     def _break_off(self) -> None:
-        """Ends both connections with a reset; the reading side is woken first, without a word to the peer."""
+        """Resets both connections; the reading side is woken first, and the peer receives nothing else."""
         self._broken = True
         self._dead.set()
         for one in self._sockets:
@@ -239,38 +222,38 @@ class _Connection:
             one.close()
 
     def _deliver(self, way: Way, frame: bytes, sink: socket.socket) -> bool:
-        """Passes a frame on, spoilt or not; false ends the connection."""
-        meddling = self._proxy.spoil(way, frame)
+        """Delivers a frame, changed or not; false ends the connection."""
+        action = self._proxy.action_on(way, frame)
         late = self._proxy.held_back(way)
-        if meddling is None:
+        if action is None:
             return _send(sink, [*late, frame])
-        if meddling.trouble == "late":
+        if action.kind == "late":
             self._proxy.hold_back(way, frame)
             return _send(sink, late)
-        if meddling.trouble == "half_open":
+        if action.kind == "half_open":
             self._dead.set()
             return True
-        if meddling.trouble == "reset":
+        if action.kind == "reset":
             self._break_off()
             return True
-        if meddling.trouble == "delay":
-            time.sleep(meddling.delay_s)  # in wall time: networks know no other
-        passed = _send(sink, [*late, *spoilt(frame, meddling, self._proxy)])
-        return passed and meddling.trouble != "truncate"
+        if action.kind == "delay":
+            time.sleep(action.delay_s)  # wall time, as on a real network
+        passed = _send(sink, [*late, *replaced(frame, action, self._proxy)])
+        return passed and action.kind != "truncate"
 
 
-def spoilt(frame: bytes, meddling: Meddling, proxy: ChaosProxy) -> list[bytes]:
-    """What is delivered in a frame's stead."""
-    number = (int.from_bytes(frame[:2], "big") + meddling.size) % 65536
-    instead: dict[Trouble, Callable[[], list[bytes]]] = {
+def replaced(frame: bytes, action: WireAction, proxy: ChaosProxy) -> list[bytes]:
+    """The frames that are delivered in place of one."""
+    number = (int.from_bytes(frame[:2], "big") + action.size) % 65536
+    by_kind: dict[ActionKind, Callable[[], list[bytes]]] = {
         "drop": list,
         "duplicate": lambda: [frame, frame],
-        "truncate": lambda: [frame[: -min(meddling.size, len(frame))]],
-        "garble": lambda: [proxy.garbled(frame, meddling.size)],
+        "truncate": lambda: [frame[: -min(action.size, len(frame))]],
+        "garble": lambda: [proxy.garbled(frame, action.size)],
         "retag": lambda: [number.to_bytes(2, "big") + frame[2:]],
         "swap": lambda: [_swapped(frame)],
     }
-    return instead.get(meddling.trouble, lambda: [frame])()
+    return by_kind.get(action.kind, lambda: [frame])()
 
 
 def _swapped(frame: bytes) -> bytes:
@@ -284,7 +267,7 @@ def _swapped(frame: bytes) -> bytes:
 
 
 def split(buffer: bytes) -> tuple[list[bytes], bytes]:
-    """Whole frames at the head of a stream, and what is left."""
+    """Complete frames at the start of a stream, and the remaining bytes."""
     frames: list[bytes] = []
     while len(buffer) >= HEADER:
         end = 6 + int.from_bytes(buffer[4:6], "big")

@@ -1,4 +1,4 @@
-"""Play between encoder and shaft."""
+"""Faults of the tilt table's axes."""
 
 from __future__ import annotations
 
@@ -8,78 +8,78 @@ from typing import TYPE_CHECKING, ClassVar
 from stations.plant.faults.base import AXES, Fault
 
 if TYPE_CHECKING:
-    from stations.plant.plant import Plant
+    from stations.plant.world import World
 
 
 @dataclass
 class Backlash(Fault):
-    """A worn gear: the shaft stays ``play_deg`` behind the encoder, on the side that it comes from."""
+    """A worn gear: the shaft lags the encoder by a play of ``play_deg``, on the side from which it moved."""
 
     kind: ClassVar[str] = "backlash"
-    about: ClassVar[tuple[str, ...]] = AXES
+    targets: ClassVar[tuple[str, ...]] = AXES
 
     play_deg: float = 0.5
 
-    def begins(self, plant: Plant) -> None:
-        """The play is there."""
-        self.axis(plant).play_deg = self.play_deg
+    def begins(self, world: World) -> None:
+        """Sets the play."""
+        self.axis(world).play_deg = self.play_deg
 
-    def ends(self, plant: Plant) -> None:
-        """Mended."""
-        self.axis(plant).play_deg = 0.0
+    def ends(self, world: World) -> None:
+        """Removes the play."""
+        self.axis(world).play_deg = 0.0
 
 
 @dataclass
 class LostHome(Fault):
-    """A drive loses its reference: its angles are off by ``offset_deg``, and its home flag is down unless ``admitted`` is 0."""
+    """A drive loses its reference: its angles are wrong by ``offset_deg``; its home flag is 0 unless ``admitted`` is 0."""
 
     kind: ClassVar[str] = "lost_home"
-    about: ClassVar[tuple[str, ...]] = AXES
+    targets: ClassVar[tuple[str, ...]] = AXES
 
     offset_deg: float = 3.0
     admitted: float = 1.0
 
-    def begins(self, plant: Plant) -> None:
-        """The zero jumps."""
-        axis = self.axis(plant)
+    def begins(self, world: World) -> None:
+        """Shifts the zero."""
+        axis = self.axis(world)
         axis.lose_zero(self.offset_deg)
         axis.homed = self.admitted == 0.0
 
-    def ends(self, plant: Plant) -> None:
-        """It was homed again."""
-        axis = self.axis(plant)
+    def ends(self, world: World) -> None:
+        """Homes the axis again."""
+        axis = self.axis(world)
         axis.lose_zero(-self.offset_deg)
         axis.homed = True
 
 
 @dataclass
 class StuckEncoder(Fault):
-    """An encoder keeps saying the angle that it had; the shaft turns."""
+    """An encoder repeats its last angle while the shaft turns."""
 
     kind: ClassVar[str] = "stuck_encoder"
-    about: ClassVar[tuple[str, ...]] = AXES
+    targets: ClassVar[tuple[str, ...]] = AXES
 
-    def begins(self, plant: Plant) -> None:
-        """It sticks."""
-        axis = self.axis(plant)
-        axis.stuck_at = axis.encoder(plant.now)
+    def begins(self, world: World) -> None:
+        """Holds the reading."""
+        axis = self.axis(world)
+        axis.stuck_at = axis.encoder(world.now)
 
-    def ends(self, plant: Plant) -> None:
-        """It reads again."""
-        self.axis(plant).stuck_at = None
+    def ends(self, world: World) -> None:
+        """Releases the reading."""
+        self.axis(world).stuck_at = None
 
 
 @dataclass
 class TableStall(Fault):
-    """An axis is held up in its move; when it is free it goes on to its target."""
+    """An axis is blocked during its move; when it is released it continues to its target."""
 
     kind: ClassVar[str] = "table_stall"
-    about: ClassVar[tuple[str, ...]] = AXES
+    targets: ClassVar[tuple[str, ...]] = AXES
 
-    def begins(self, plant: Plant) -> None:
-        """It stands."""
-        self.axis(plant).stall(plant.now)
+    def begins(self, world: World) -> None:
+        """Blocks the axis."""
+        self.axis(world).stall(world.now)
 
-    def ends(self, plant: Plant) -> None:
-        """It is free."""
-        self.axis(plant).release(plant.now, resumes=True)
+    def ends(self, world: World) -> None:
+        """Releases the axis; its move continues."""
+        self.axis(world).release(world.now, resumes=True)

@@ -1,4 +1,4 @@
-"""A clock that jumps."""
+"""Faults of units, of the reader and its sensors, and of the computer's clock."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, ClassVar
 from stations.plant.faults.base import UNIT, Fault
 
 if TYPE_CHECKING:
-    from stations.plant.plant import Plant
+    from stations.plant.world import World
 
 
 @dataclass
@@ -19,9 +19,9 @@ class ClockJump(Fault):
 
     step_s: float = 30.0
 
-    def begins(self, plant: Plant) -> None:
-        """It jumps."""
-        plant.clock_off_s += self.step_s
+    def begins(self, world: World) -> None:
+        """Shifts the clock."""
+        world.clock_offset_s += self.step_s
 
 
 @dataclass
@@ -29,84 +29,84 @@ class Dead(Fault):
     """The outputs of a unit stay at their last count."""
 
     kind: ClassVar[str] = "dead"
-    about: ClassVar[tuple[str, ...]] = (UNIT,)
+    targets: ClassVar[tuple[str, ...]] = (UNIT,)
 
-    def begins(self, plant: Plant) -> None:
-        """They stay."""
-        plant.physics.dead_from[self.unit] = self.fault.at_s
+    def begins(self, world: World) -> None:
+        """Holds the outputs."""
+        world.physics.dead_from[self.unit] = self.order.at_s
 
-    def ends(self, plant: Plant) -> None:
-        """They live."""
-        plant.physics.dead_from[self.unit] = float("inf")
+    def ends(self, world: World) -> None:
+        """Releases the outputs."""
+        world.physics.dead_from[self.unit] = float("inf")
 
 
 @dataclass
 class DroppedSamples(Fault):
-    """The reader's clock loses ``samples``: in their numbers where ``numbered`` is not 0, else only in their count."""
+    """The reader loses ``samples``: the sample numbers show the gap unless ``numbered`` is 0; the count always does."""
 
     kind: ClassVar[str] = "dropped_samples"
 
     samples: float = 5.0
     numbered: float = 1.0
 
-    def begins(self, plant: Plant) -> None:
-        """They are lost."""
-        plant.sampler.lose(int(self.samples), numbered=self.numbered != 0.0)
+    def begins(self, world: World) -> None:
+        """Drops the next samples."""
+        world.sampler.lose(int(self.samples), numbered=self.numbered != 0.0)
 
 
 @dataclass
 class FifoOverflow(Fault):
-    """The memory of a unit overflows once: samples that nobody has taken are written over."""
+    """The memory of a unit overflows once: samples that were not read yet are overwritten."""
 
     kind: ClassVar[str] = "fifo_overflow"
-    about: ClassVar[tuple[str, ...]] = (UNIT,)
+    targets: ClassVar[tuple[str, ...]] = (UNIT,)
 
-    def begins(self, plant: Plant) -> None:
-        """The reader says so; the samples are gone."""
-        plant.sampler.overrun(self.unit)
+    def begins(self, world: World) -> None:
+        """Sets the overflow flag and clears the samples."""
+        world.sampler.overrun(self.unit)
 
 
 @dataclass
 class FrozenTemperature(Fault):
-    """A thermometer keeps saying what it said: that of a unit, of the chamber, or all of the reader's."""
+    """A thermometer repeats its last reading: that of a unit, of the chamber, or all of the reader's."""
 
     kind: ClassVar[str] = "frozen_temperature"
-    about: ClassVar[tuple[str, ...]] = (UNIT, "chamber", "reader")
+    targets: ClassVar[tuple[str, ...]] = (UNIT, "chamber", "reader")
 
-    def begins(self, plant: Plant) -> None:
-        """It freezes."""
-        if self.fault.device == "chamber":
-            plant.frozen_air = plant.air_reading()
+    def begins(self, world: World) -> None:
+        """Holds the reading."""
+        if self.order.device == "chamber":
+            world.frozen_air_C = world.air_reading()
             return
-        told = plant.temperature_reading()
-        meant = [plant.slots[self.unit]] if self.fault.serial else range(len(told))
-        plant.frozen |= {slot: told[slot] for slot in meant}
+        readings = world.temperature_reading()
+        slots = [world.slots[self.unit]] if self.order.serial else range(len(readings))
+        world.frozen_slots_C |= {slot: readings[slot] for slot in slots}
 
-    def ends(self, plant: Plant) -> None:
-        """It thaws."""
-        plant.frozen_air = None
-        plant.frozen.clear()
+    def ends(self, world: World) -> None:
+        """Releases the reading."""
+        world.frozen_air_C = None
+        world.frozen_slots_C.clear()
 
 
 @dataclass
 class SupplySag(Fault):
-    """The supply of a unit, or of all, falls by the part ``part``; outputs that follow it fall with it, others shift."""
+    """The supply of a unit, or of all, falls by the fraction ``part``; ratiometric outputs fall with it, others shift."""
 
     kind: ClassVar[str] = "supply_sag"
-    about: ClassVar[tuple[str, ...]] = (UNIT, "reader")
+    targets: ClassVar[tuple[str, ...]] = (UNIT, "reader")
 
     part: float = 0.1
 
-    def begins(self, plant: Plant) -> None:
-        """Down."""
-        plant.sag(self._meant(plant), 1.0 - self.part)
+    def begins(self, world: World) -> None:
+        """Lowers the supply."""
+        world.scale_supply(self._units(world), 1.0 - self.part)
 
-    def ends(self, plant: Plant) -> None:
-        """Up."""
-        plant.sag(self._meant(plant), 1.0)
+    def ends(self, world: World) -> None:
+        """Restores the supply."""
+        world.scale_supply(self._units(world), 1.0)
 
-    def _meant(self, plant: Plant) -> list[int]:
-        return [self.unit] if self.fault.serial else list(range(len(plant.slots)))
+    def _units(self, world: World) -> list[int]:
+        return [self.unit] if self.order.serial else list(range(len(world.slots)))
 
 
 @dataclass
@@ -114,13 +114,13 @@ class SwappedSlots(Fault):
     """A unit and the next one of the lot change places: each slot has the other's serial number and samples."""
 
     kind: ClassVar[str] = "swapped_slots"
-    about: ClassVar[tuple[str, ...]] = (UNIT,)
+    targets: ClassVar[tuple[str, ...]] = (UNIT,)
 
-    def begins(self, plant: Plant) -> None:
-        """They change places."""
-        other, seats = (self.unit + 1) % len(plant.serials), plant.seats
+    def begins(self, world: World) -> None:
+        """Exchanges the two units."""
+        other, seats = (self.unit + 1) % len(world.serials), world.seats
         seats[self.unit], seats[other] = seats[other], seats[self.unit]
 
-    def ends(self, plant: Plant) -> None:
-        """They change back."""
-        self.begins(plant)
+    def ends(self, world: World) -> None:
+        """Exchanges them again."""
+        self.begins(world)

@@ -1,9 +1,9 @@
-"""Faults of the wire: what they share, and the script by which the proxy in front of a plant's server carries them out."""
+"""Faults of the wire, and the script by which a proxy in front of the plant's server carries them out."""
 
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Generator
+from collections.abc import Generator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, ClassVar
@@ -11,24 +11,24 @@ from typing import TYPE_CHECKING, ClassVar
 import numpy as np
 
 from stations.plant.faults.base import DEVICES, UNIT, Fault
-from stations.plant.faults.proxy import ChaosProxy, Meddling
+from stations.plant.faults.proxy import ChaosProxy, WireAction
 
 if TYPE_CHECKING:
     from stations.plant.faults.proxy import Script, Way
-    from stations.plant.plant import Plant
+    from stations.plant.world import World
 
 
 @dataclass
 class WireFault(Fault):
-    """Fault with the next ``frames`` answers of the station, whoever gives them."""
+    """A fault of the next ``frames`` answers of the station, whichever device sends them."""
 
     frames: float = 1.0
 
 
 @contextmanager
-def on_the_wire(plant: Plant, host: str, port: int) -> Generator[tuple[str, int]]:
-    """Where clients of a plant's server connect: a proxy that spoils frames, or the server itself where its wire is sound."""
-    script = script_of(plant)
+def on_the_wire(world: World, faults: Sequence[Fault], host: str, port: int) -> Generator[tuple[str, int]]:
+    """Host and port for the clients of a plant's server: a proxy where ``faults`` has faults of the wire, else the server."""
+    script = script_of(world, faults)
     if script is None:
         yield host, port
         return
@@ -36,24 +36,24 @@ def on_the_wire(plant: Plant, host: str, port: int) -> Generator[tuple[str, int]
         yield proxy.host, proxy.port
 
 
-def script_of(plant: Plant) -> Script | None:
-    """What happens to the frames of a plant's server; None where its wire is sound.
+def script_of(world: World, faults: Sequence[Fault]) -> Script | None:
+    """The proxy's script for the faults of the wire; None where there are none.
 
-    What lies in the past of a plant that was resumed has happened already.
+    Faults that began before a resumed world's time are over: their frames were sent in the earlier session.
     """
-    begun = plant.now
-    wires = [one for one in plant.troubles if isinstance(one, WireFault) and (one.fault.at_s > begun or begun == 0.0)]
+    begun = world.now
+    wires = [f for f in faults if isinstance(f, WireFault) and (f.order.at_s > begun or begun == 0.0)]
     if not wires:
         return None
     spent: Counter[int] = Counter()
 
-    def script(way: Way, _frame: bytes) -> Meddling | None:
+    def script(way: Way, _frame: bytes) -> WireAction | None:
         for number, wire in enumerate(wires):
-            meddling = wire.wire_action()
-            due = wire.fault.at_s <= plant.now < wire.fault.until_s and spent[number] < wire.frames
-            if meddling is not None and due and meddling.way == way:
+            action = wire.wire_action()
+            due = wire.order.at_s <= world.now < wire.order.until_s and spent[number] < wire.frames
+            if action is not None and due and action.way == way:
                 spent[number] += 1
-                return meddling
+                return action
         return None
 
     return script
@@ -61,74 +61,74 @@ def script_of(plant: Plant) -> Script | None:
 
 @dataclass
 class ByteGarbage(WireFault):
-    """Some bytes of an answer change on their way; Modbus TCP has no checksum of its own."""
+    """Some bytes of an answer change in transit; Modbus TCP has no checksum of its own."""
 
     kind: ClassVar[str] = "byte_garbage"
 
     size: float = 2.0
 
-    def wire_action(self) -> Meddling:
-        """Changed."""
-        return Meddling("garble", size=int(self.size))
+    def wire_action(self) -> WireAction:
+        """Changes ``size`` bytes."""
+        return WireAction("garble", size=int(self.size))
 
 
 @dataclass
 class Delay(WireFault):
-    """An answer takes ``delay_s`` of wall time, with everything behind it."""
+    """An answer, and all that follow it, are delayed by ``delay_s`` of wall time."""
 
     kind: ClassVar[str] = "delay"
 
     delay_s: float = 0.2
 
-    def wire_action(self) -> Meddling:
-        """Held."""
-        return Meddling("delay", delay_s=self.delay_s)
+    def wire_action(self) -> WireAction:
+        """Delays the answer."""
+        return WireAction("delay", delay_s=self.delay_s)
 
 
 @dataclass
 class Garbage(Fault):
-    """A device tells random words in frames that are whole: a memory gone wrong behind a sound interface."""
+    """A device reports random words in valid frames: its memory is corrupt and its interface works."""
 
     kind: ClassVar[str] = "garbage"
-    about: ClassVar[tuple[str, ...]] = (UNIT, *DEVICES)
+    targets: ClassVar[tuple[str, ...]] = (UNIT, *DEVICES)
 
     def on_read(self, now_us: int, address: int, words: list[int]) -> list[int]:
-        """Words that depend on the time and the address."""
+        """Random words, seeded by time, address and device."""
         rng = np.random.default_rng([now_us, address, self.device_id])
         return rng.integers(0, 65536, len(words)).tolist()
 
 
 @dataclass
 class HalfOpen(WireFault):
-    """The connection stays open and swallows everything: the device lost its power without a word."""
+    """The connection stays open and passes nothing: the device lost its power and could not close it."""
 
     kind: ClassVar[str] = "half_open"
 
-    def wire_action(self) -> Meddling:
-        """Swallowed."""
-        return Meddling("half_open")
+    def wire_action(self) -> WireAction:
+        """Passes nothing from here on."""
+        return WireAction("half_open")
 
 
 @dataclass
 class LateReply(WireFault):
-    """An answer is held back until the next one comes, and arrives in front of it under its own, older transaction id."""
+    """An answer arrives late, in front of the next one, with its own older transaction id."""
 
     kind: ClassVar[str] = "late_reply"
 
-    def wire_action(self) -> Meddling:
-        """Held back."""
-        return Meddling("late")
+    def wire_action(self) -> WireAction:
+        """Delivers the answer in front of the next one."""
+        return WireAction("late")
 
 
 @dataclass
 class OtherTransaction(WireFault):
-    """An answer arrives under a transaction id that nobody asked with."""
+    """An answer arrives with a transaction id that no request had."""
 
     kind: ClassVar[str] = "other_transaction"
 
-    def wire_action(self) -> Meddling:
-        """Its number is another."""
-        return Meddling("retag", size=1)
+    def wire_action(self) -> WireAction:
+        """Changes the transaction id."""
+        return WireAction("retag", size=1)
 
 
 @dataclass
@@ -137,20 +137,20 @@ class Reset(WireFault):
 
     kind: ClassVar[str] = "reset"
 
-    def wire_action(self) -> Meddling:
-        """Reset."""
-        return Meddling("reset")
+    def wire_action(self) -> WireAction:
+        """Resets the connection."""
+        return WireAction("reset")
 
 
 @dataclass
 class SwappedWords(Fault):
-    """A device tells numbers of 32 bits with their words the other way round; its set-up was changed."""
+    """A device reports 32-bit numbers with their words exchanged: its word order was changed."""
 
     kind: ClassVar[str] = "swapped_words"
-    about: ClassVar[tuple[str, ...]] = (UNIT, *DEVICES)
+    targets: ClassVar[tuple[str, ...]] = (UNIT, *DEVICES)
 
     def on_read(self, now_us: int, address: int, words: list[int]) -> list[int]:
-        """Pairs of words exchanged."""
+        """Exchanges the words of each pair."""
         del now_us, address
         even = len(words) // 2 * 2
         return [word for i in range(0, even, 2) for word in (words[i + 1], words[i])] + words[even:]
@@ -158,12 +158,12 @@ class SwappedWords(Fault):
 
 @dataclass
 class Truncated(WireFault):
-    """An answer ends too early, and the connection with it."""
+    """An answer ends too early, and the connection is closed."""
 
     kind: ClassVar[str] = "truncated"
 
     size: float = 3.0
 
-    def wire_action(self) -> Meddling:
-        """Cut off."""
-        return Meddling("truncate", size=int(self.size))
+    def wire_action(self) -> WireAction:
+        """Removes the last ``size`` bytes and closes the connection."""
+        return WireAction("truncate", size=int(self.size))

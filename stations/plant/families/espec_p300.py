@@ -1,4 +1,4 @@
-"""A simulated chamber that is spoken to in lines: ESPEC's P300."""
+"""The simulated ESPEC P300, a controller with a text protocol."""
 
 from __future__ import annotations
 
@@ -7,49 +7,54 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from schemas.profile import Profile
-    from stations.plant.plant import Plant
+    from stations.plant.world import World
 
 SET = re.compile(r"TEMP, S(-?\d+(?:\.\d+)?)")
 MODES = {"CONSTANT": True, "STANDBY": False, "OFF": False}
 UNKNOWN, OUTSIDE, WRONG = "NA:CMD ERR", "NA:DATA OUT OF RANGE", "NA:PARA ERR"
 
 
-class P300:
-    """The controller in front of the plant's chamber; it begins in constant operation."""
+def simulated(world: World, profile: Profile) -> P300:
+    """A P300 in front of the world's chamber."""
+    return P300(world, profile)
 
-    def __init__(self, plant: Plant, profile: Profile) -> None:
-        self._plant = plant
+
+class P300:
+    """The controller in front of the world's chamber; it starts in constant operation."""
+
+    def __init__(self, world: World, profile: Profile) -> None:
+        self._world = world
         point = profile.command("set_point")
         self._low, self._high = point.minimum or 0.0, point.maximum or 0.0
         self._mode = "CONSTANT"
 
     def answer(self, line: str) -> tuple[str, bool]:
-        """The answer to a line, and whether the line has changed anything."""
+        """The answer to a line, and whether the line changed anything."""
         if line.endswith("?"):
-            return self._told(line), False
+            return self._report(line), False
         if line.startswith("TEMP,"):
             return self._set(line)
         if line.startswith("MODE,"):
             return self._switch(line)
         return UNKNOWN, False
 
-    def _told(self, question: str) -> str:
-        chamber = self._plant.fixture.chamber
+    def _report(self, question: str) -> str:
+        chamber = self._world.fixture.chamber
         answers = {
-            "TEMP?": f"{self._plant.air_reading():.1f},{chamber.set_point:.1f},{self._high:.1f},{self._low:.1f}",
+            "TEMP?": f"{self._world.air_reading():.1f},{chamber.set_point:.1f},{self._high:.1f},{self._low:.1f}",
             "MODE?": self._mode,
             "ALARM?": "0",
         }
         return answers.get(question, UNKNOWN)
 
     def _set(self, line: str) -> tuple[str, bool]:
-        found = SET.fullmatch(line)
-        if found is None:
+        match = SET.fullmatch(line)
+        if match is None:
             return WRONG, False
-        value = float(found[1])
+        value = float(match[1])
         if not self._low <= value <= self._high:
             return OUTSIDE, False
-        self._plant.fixture.chamber.set_point = value
+        self._world.fixture.chamber.set_point = value
         return f"OK:{line}", True
 
     def _switch(self, line: str) -> tuple[str, bool]:
@@ -57,5 +62,5 @@ class P300:
         if mode not in MODES:
             return WRONG, False
         self._mode = mode
-        self._plant.fixture.chamber.running = MODES[mode]
+        self._world.fixture.chamber.running = MODES[mode]
         return f"OK:{line}", True

@@ -1,4 +1,4 @@
-"""The run's side of its watchdog: started before anything moves, looked at with each heartbeat, started anew where it is gone."""
+"""The run's side of its watchdog: starts the process, checks it with each heartbeat, replaces it where it is gone."""
 
 from __future__ import annotations
 
@@ -13,8 +13,8 @@ from typing import IO, TYPE_CHECKING
 
 from schemas.errors import StationTimeout
 from stations.clock import steady
-from stations.safety.folder import told
-from stations.safety.words import BEAT, DONE, READY
+from stations.safety.folder import log_event
+from stations.safety.watchdog_protocol import BEAT, DONE, READY
 
 if TYPE_CHECKING:
     from schemas.station import StationConfig
@@ -22,14 +22,15 @@ if TYPE_CHECKING:
 
 START_S = 30.0
 LEAVE_S = 10.0
-STARTS = 3  # that fail one after another before the run gives up
+STARTS = 3  # consecutive failed starts after which the run ends
 CHUNK = 4096
 LOG = "watchdog.err"
+MODULE = "stations.watchdog"  # started as a process, never imported: it stands above this package
 
 
 @dataclass
 class Watchdog:
-    """The process that watches this run; ``trouble`` says why there is none and will be none."""
+    """The watchdog process of this run; ``trouble`` says why it has none and will have none."""
 
     config: StationConfig
     leases: Leases
@@ -37,19 +38,19 @@ class Watchdog:
     pid: int = 0
     _process: subprocess.Popen[bytes] | None = None
     _watches: threading.Event = field(default_factory=threading.Event)
-    _unanswered: int = 0  # heartbeats since it was heard of
+    _unanswered: int = 0  # heartbeats since its last answer
     _begun: float = 0.0
-    _starts: int = 0  # since it last watched
+    _starts: int = 0  # starts since it was last ready
     _anew: bool = False
 
     def start(self) -> None:
-        """Starts the process; it watches when it says so."""
+        """Starts the process and sends it the station; it watches once it is ready."""
         self._starts += 1
         self._begun, self._unanswered = steady(), 0
         self._watches.clear()
         with _errors(self.leases) as errors:
-            self._process = subprocess.Popen(
-                [sys.executable, "-m", "stations.safety.watchdog"],
+            self._process = subprocess.Popen(  # noqa: S603 - this interpreter and a module of the product
+                [sys.executable, "-m", MODULE],
                 stdin=subprocess.PIPE,
                 stdout=subprocess.PIPE,
                 stderr=errors,
@@ -62,33 +63,34 @@ class Watchdog:
             "folder": str(self.leases.folder),
             "token": self.leases.holder.token,
             "run": self.leases.holder.run,
-            "wanted": self.leases.wanted,
+            "wanted": self.leases.places,
         }
         if self._process.stdout is not None:
             os.set_blocking(self._process.stdout.fileno(), False)
-        self._say(json.dumps(order).encode() + b"\n")
+        self._send(json.dumps(order).encode() + b"\n")
 
     def require_watching(self) -> None:
-        """Comes back when it watches; refuses where it does not."""
+        """Waits until the watchdog is ready; refuses where it does not become so."""
         if not self._watches.wait(STARTS * START_S) or self.trouble:
-            raise StationTimeout(self.trouble or f"watchdog: it does not watch after {STARTS * START_S:g} s")
+            raise StationTimeout(self.trouble or f"watchdog: not ready after {STARTS * START_S:g} s")
 
     def beat(self) -> None:
-        """Tells it that the run lives, and looks whether it does itself; one that is gone or stands still is replaced."""
+        """Sends the heartbeat and checks the watchdog; one that has ended or does not answer is replaced."""
         if self.trouble or self._process is None:
             return
         self._listen()
         why = self._gone()
         if not why:
-            self._say(BEAT)
+            self._send(BEAT)
             self._unanswered += 1
             return
         self._end()
-        told(self.leases.folder, self.config.name, "watchdog_lost", run=self.leases.holder.run, pid=self.pid, why=why)
+        log_event(
+            self.leases.folder, self.config.name, "watchdog_lost", run=self.leases.holder.run, pid=self.pid, why=why
+        )
         if self._starts >= STARTS:
             self.trouble = (
-                f"watchdog: {why}, {STARTS} times one after another, a station is not driven without one; look into "
-                f"{self.leases.folder / LOG}"
+                f"watchdog: {why}, {STARTS} consecutive times, a running one is needed; see {self.leases.folder / LOG}"
             )
             self._watches.set()
             return
@@ -96,10 +98,10 @@ class Watchdog:
         self.start()
 
     def dismiss(self) -> None:
-        """Sends it away: the station is safe."""
+        """Ends the watchdog: the station is safe."""
         if self._process is None:
             return
-        self._say(DONE)
+        self._send(DONE)
         self._close()
         try:
             self._process.wait(LEAVE_S)
@@ -107,41 +109,43 @@ class Watchdog:
             self._end()
 
     def leave_to_it(self) -> None:
-        """Leaves the station to it: it makes it safe, and ends by itself."""
+        """Leaves the station to the watchdog, which makes it safe and then ends."""
         if self._process is not None:
             self._close()
             _running.append(self._process)
 
     def _listen(self) -> None:
-        """Takes what it has said since the last time."""
-        found = b""
+        """Reads the watchdog's messages since the last call."""
+        data = b""
         if self._process is not None and self._process.stdout is not None:
             with suppress(OSError):
-                found = os.read(self._process.stdout.fileno(), CHUNK)
-        if found:
+                data = os.read(self._process.stdout.fileno(), CHUNK)
+        if data:
             self._unanswered = 0
-        if READY in found:
+        if READY in data:
             self._starts = 0
             self._watches.set()
             if self._anew:
-                told(self.leases.folder, self.config.name, "watchdog_anew", run=self.leases.holder.run, pid=self.pid)
+                log_event(
+                    self.leases.folder, self.config.name, "watchdog_anew", run=self.leases.holder.run, pid=self.pid
+                )
 
     def _gone(self) -> str:
-        """Why it does not watch any more; empty where it does, or is about to."""
+        """Why the watchdog no longer watches; empty where it watches or is starting."""
         status = None if self._process is None else self._process.poll()
         safety = self.config.safety
         if status is not None:
             return f"it has ended with status {status}"
         if not self._watches.is_set():
-            return f"it does not watch after {START_S:g} s" if steady() - self._begun > START_S else ""
+            return f"not ready after {START_S:g} s" if steady() - self._begun > START_S else ""
         if self._unanswered > max(3.0, safety.lapse_s / safety.heartbeat_s):
             return f"it has not answered {self._unanswered} heartbeats"
         return ""
 
-    def _say(self, words: bytes) -> None:
+    def _send(self, message: bytes) -> None:
         if self._process is not None and self._process.stdin is not None:
-            with suppress(OSError):  # it is gone, which the next heartbeat finds
-                self._process.stdin.write(words)
+            with suppress(OSError):  # it has ended, which the next heartbeat detects
+                self._process.stdin.write(message)
                 self._process.stdin.flush()
 
     def _end(self) -> None:
@@ -159,11 +163,11 @@ class Watchdog:
 
 
 def _errors(leases: Leases) -> IO[bytes]:
-    """Where a watchdog that fails says why; nowhere where nothing can be written."""
+    """File for the error output of the watchdog; the null device where no file can be written."""
     try:
         return (leases.folder / LOG).open("ab")
     except OSError:
         return open(os.devnull, "ab")  # noqa: PTH123 - the system's own name
 
 
-_running: list[subprocess.Popen[bytes]] = []  # they end by themselves; kept so that the interpreter does not complain
+_running: list[subprocess.Popen[bytes]] = []  # they end by themselves; the reference avoids a ResourceWarning

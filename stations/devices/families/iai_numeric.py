@@ -26,7 +26,7 @@ class NumericAxis(TableAxis):
         return DriveState(ready, flags["home_end"], more["move"], flags["in_position"] and not more["move"], alarm)
 
     def prepare(self) -> None:
-        """Orders from this line instead of the plug, and the servo on."""
+        """Selects the serial line as the source of commands and switches the servo on."""
         for coil in ("serial_mode", "servo_on"):
             if self._registers.text(coil) != "on":
                 self._registers.set(coil, "on")
@@ -43,7 +43,7 @@ class NumericAxis(TableAxis):
         registers.write("target", target)
 
     def stop(self) -> None:
-        """A pause, and an alarm reset during it, which drops the rest of the move; then the pause ends."""
+        """A pause, and an alarm reset during it, which discards the rest of the move; then the pause ends."""
         for name in ("pause", "alarm_reset"):
             self._registers.write(name, "on")
         for name in ("alarm_reset", "pause"):

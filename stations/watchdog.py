@@ -1,10 +1,10 @@
 """The watchdog of a run: a process of its own that puts the station into its safe state when the run is gone.
 
-It is told on its standard input what to watch, then that the run lives, and at the end that all is well. The run is gone when
-that pipe ends without the word, when the run's process is no longer its parent, or when it has been silent for too long.
-Commands come first and notes of them afterwards, and nothing that goes wrong with a note ends it. It goes on, slower, for as
-long as the station is not safe. The same commands set the same absolute states, so nothing is harmed when a device gets
-one twice.
+Its standard input gives it the station, then a message with each heartbeat, and a last message when the station is safe. The run
+is gone when that pipe ends without the last message, when the run's process is no longer its parent, or after ``lapse_s`` without
+a message. It sends commands first and logs them afterwards; a failed log entry never ends it. It repeats failed commands, at
+growing intervals, until the station is safe. A command sets an absolute state, so a device may receive it twice. It is started
+by name (:mod:`stations.safety.watchdog_client`), because it stands above the safety modules: it opens devices.
 """
 
 from __future__ import annotations
@@ -25,23 +25,23 @@ from schemas.safety import SAFE_WITHIN_S
 from schemas.station import StationConfig
 from stations.clock import steady
 from stations.opening import open_devices
-from stations.safety.folder import told
+from stations.safety.folder import log_event
 from stations.safety.leases import Leases, Part, addresses, new_holder
 from stations.safety.safe_state import SafeStep, reach_safe_state
-from stations.safety.words import BEAT, DONE, READY
+from stations.safety.watchdog_protocol import BEAT, DONE, READY
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
 ENDED = "the run's process has ended"
 POLL_S = 0.25
-TAKE_S = 5.0  # the system may close a dead process' pipe a moment before it frees the locks
-SOON_S, SLOWEST_S, SLOWER = 1.0, 30.0, 1.5  # seconds between two tries: at first, at last, and the factor on the way
+TAKE_S = 5.0  # the system may close the pipe of a dead process before it releases its locks
+SOON_S, SLOWEST_S, SLOWER = 1.0, 30.0, 1.5  # seconds between attempts: first, longest, and growth factor
 CHUNK = 4096
 
 
 def pauses() -> Iterator[float]:
-    """Seconds between tries to make a station safe: short for the minute in which it should be, then longer, without end."""
+    """Seconds between attempts to make a station safe: short during the first minute, then growing, without end."""
     begun, pause = steady(), SOON_S
     while True:
         yield pause
@@ -51,7 +51,7 @@ def pauses() -> Iterator[float]:
 
 @dataclass
 class Watch:
-    """What is watched: the station's way to its safe state, its leases in the run's name, and the process that drives."""
+    """The watch over one run: the commands of the safe state, the leases in the run's name, and the run's process."""
 
     config: StationConfig
     leases: Leases
@@ -60,40 +60,40 @@ class Watch:
     _heard: float = field(default_factory=steady)
 
     def until_gone(self) -> str:
-        """Why the run counts as gone; empty when it said that all is well."""
+        """Why the run counts as gone; empty where it has reported the station safe."""
         while True:
-            word = self._word()
-            if word is not None:
-                return word
+            reason = self._message()
+            if reason is not None:
+                return reason
             silent = steady() - self._heard
             if silent > self.config.safety.lapse_s:
-                return f"the run has not been heard of for {silent:.0f} s"
+                return f"no heartbeat of the run for {silent:.0f} s"
 
     def until_ended(self) -> None:
-        """Comes back when a run that stood still has ended: what it might have sent as it woke is undone then."""
-        while self._word() is None:
+        """Waits for the end of a run that did not respond; commands that it may have sent meanwhile are undone afterwards."""
+        while self._message() is None:
             pass
 
-    def _word(self) -> str | None:
-        """Why watching ends, within a moment: empty where all is well; None where it goes on. A run that speaks is answered."""
+    def _message(self) -> str | None:
+        """Why watching ends; empty where the station is safe; None where it continues. Answers the run's heartbeat."""
         ready, _, _ = select.select([0], [], [], POLL_S)
         if not ready:
             return ENDED if os.getppid() != self.parent else None
-        words = os.read(0, CHUNK)
-        if DONE in words:
+        data = os.read(0, CHUNK)
+        if DONE in data:
             return ""
-        if not words:
+        if not data:
             return ENDED
         self._heard = steady()
-        _tell(BEAT)
+        _send(BEAT)
         return None
 
     def make_safe(self, why: str) -> None:
-        """Puts the parts that nobody else drives into their safe state, however long it takes, and tells the machine's log."""
-        left, done, begun, failed = self._mine(ended=why == ENDED), list[str](), steady(), False
-        tell = partial(told, self.leases.folder, self.config.name, run=self.leases.holder.run)
+        """Puts the parts that no other run drives into their safe state, without a time limit, and logs it."""
+        left, done, begun, failed = self._allowed_steps(ended=why == ENDED), list[str](), steady(), False
+        tell = partial(log_event, self.leases.folder, self.config.name, run=self.leases.holder.run)
         if not left:
-            self.leases.release()  # the next run was quicker: the station is its own
+            self.leases.release()  # the next run has taken the leases already
             return
         for number, pause in enumerate(pauses()):
             reached = reach_safe_state(left)
@@ -112,74 +112,74 @@ class Watch:
         tell("watchdog_safe", what="; ".join(done), seconds=round(steady() - begun, 1))
         self.leases.release() if why == ENDED else self.leases.trip()
 
-    def _mine(self, *, ended: bool) -> list[SafeStep]:
-        """The commands that this watchdog may give: for parts whose lease it gets, or of a run that stands still."""
+    def _allowed_steps(self, *, ended: bool) -> list[SafeStep]:
+        """The commands that this watchdog may send: for parts whose lease it gets, or whose run does not respond."""
         end = steady() + (TAKE_S if ended else 0.0)
         got: list[Part] = []
         while True:
-            got.extend(part for part in self.leases.wanted if part not in got and self._got(part))
-            if len(got) == len(self.leases.wanted) or steady() > end:
+            got.extend(part for part in self.leases.places if part not in got and self._take(part))
+            if len(got) == len(self.leases.places) or steady() > end:
                 break
             time.sleep(POLL_S)
         self.leases.note()
-        free = {self.leases.wanted[part] for part in got + self.leases.standing()}
+        free = {self.leases.places[part] for part in got + self.leases.stalled()}
         places: dict[str, str] = {**addresses(self.config, every=True)}
         return [step for step in self.steps if places[step.part] in free]
 
     def _free_lines(self) -> None:
-        """Ends a run that stands still on a serial line: one process at a time can open it, and the station comes first."""
+        """Ends a run that does not respond on a serial line: only one process can open the line, and safety has priority."""
         devices = self.config.devices
-        if any(getattr(devices, part).link == "rtu" for part in self.leases.wanted) and os.getppid() == self.parent:
+        if any(getattr(devices, part).link == "rtu" for part in self.leases.places) and os.getppid() == self.parent:
             os.kill(self.parent, signal.SIGKILL)
 
-    def _got(self, part: Part) -> bool:
-        """Whether nobody else has a part's lease; where none can be written, nobody can have one."""
+    def _take(self, part: Part) -> bool:
+        """Whether no other holder has a part's lease; where no lease can be written, none can exist."""
         try:
             return self.leases.try_one(part)
         except OSError:
             return True
 
 
-def _tell(word: bytes) -> None:
-    """A word to the run, where it still listens."""
+def _send(message: bytes) -> None:
+    """Sends a message to the run, where it still reads."""
     try:
-        os.write(1, word)
-    except OSError:  # it is gone, which its pipe tells, or it stands still and has not read the earlier ones
+        os.write(1, message)
+    except OSError:  # the run is gone, or does not respond and its pipe is full
         return
 
 
 def _sturdy(step: SafeStep) -> SafeStep:
-    """A command whose failure never ends this process, whatever it is: it is tried again as any other."""
+    """A command that turns every exception into a :class:`StationError`, so that it is tried again."""
 
     def act(command: Callable[[], None]) -> None:
         try:
             command()
         except StationError:
             raise
-        except Exception as problem:  # the last that stands between a defect and a hot chamber
+        except Exception as problem:  # the last protection between a defect and a hot chamber
             raise StationError(f"{type(problem).__name__}: {problem}") from problem
 
     return replace(step, act=partial(act, step.act))
 
 
 def main() -> None:
-    """Watches one run to its end."""
+    """Watches one run until its end."""
     for name in (signal.SIGINT, signal.SIGHUP, signal.SIGTERM):
-        signal.signal(name, signal.SIG_IGN)  # it ends when its run does
+        signal.signal(name, signal.SIG_IGN)  # it ends with its run
     line = b""
     while not line.endswith(b"\n"):
         part = os.read(0, 1)
         if not part:
-            sys.exit(0)  # the run ended before it had said what to watch: nothing has moved
+            sys.exit(0)  # the run ended before it had sent the station: nothing has moved
         line += part
     order: dict[str, Any] = json.loads(line)
     config = StationConfig.model_validate(order["config"])
     holder = new_holder(config.name, order["run"], "watchdog", order["token"])
     leases = Leases(Path(order["folder"]), holder, order["wanted"], config.safety.lapse_s)
     os.set_blocking(1, False)
-    with open_devices(config, ()) as station:  # nothing is connected yet, but all is loaded that will be needed
+    with open_devices(config, ()) as station:  # connects later, but all modules are loaded
         watch = Watch(config, leases, os.getppid(), [_sturdy(step) for step in station.safe_steps])
-        _tell(READY)
+        _send(READY)
         why = watch.until_gone()
         if why:
             watch.make_safe(why)

@@ -24,13 +24,13 @@ class StepDataAxis(TableAxis):
         return DriveState(found["servo_ready"] == "on", found["homed"] == "on", busy, there and not busy, alarm)
 
     def prepare(self) -> None:
-        """Orders from this line instead of the plug, and the servo on."""
+        """Selects the serial line as the source of commands and switches the servo on."""
         for coil in ("serial_mode", "servo_on"):
             if self._registers.text(coil) != "on":
                 self._registers.set(coil, "on")
 
     def order(self, target: float) -> None:
-        """The step data, which move nothing, read back; then the start."""
+        """Writes the step data, which start nothing, and reads them back; then writes the start register."""
         registers, limits = self._registers, self._limits
         values = {
             "operation_type": "absolute",
@@ -50,6 +50,6 @@ class StepDataAxis(TableAxis):
         registers.write("start", "go")
 
     def stop(self) -> None:
-        """RESET during a move: it slows down, holds, and the rest of the move is dropped."""
+        """RESET during a move: the drive decelerates, holds, and discards the rest of the move."""
         self._registers.write("reset", "on")
         self._registers.write("reset", "off")

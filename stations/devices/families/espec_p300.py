@@ -1,0 +1,34 @@
+"""ESPEC P300."""
+
+from __future__ import annotations
+
+from typing import ClassVar
+
+from schemas.errors import OperatorNeeded
+from stations.devices.chamber import ThermalChamber, refuse_program
+
+
+class P300Chamber(ThermalChamber):
+    """ESPEC P300: text protocol, constant operation."""
+
+    needs: ClassVar[tuple[str, ...]] = ("temperature", "set_point", "set_point_low", "set_point_high", "mode", "alarms")
+    running: ClassVar[str] = "CONSTANT"
+    standing: ClassVar[str] = "STANDBY"
+
+    def mode(self) -> str:
+        """OFF, STANDBY, CONSTANT, or RUN while a program runs."""
+        return self._values.text("mode")
+
+    def require_ready(self) -> None:
+        """Refuses an alarm and a program that runs."""
+        count = int(self._values.number("alarms"))
+        if count:
+            raise OperatorNeeded(f"{self.name}: {count} alarms, none is needed; clear their cause at the panel")
+        if self.mode().startswith(("RUN", "RMT")):
+            refuse_program(self.name, "runs")
+
+    def order(self, temperature: float) -> None:
+        """Writes the set point, then selects constant operation where the chamber is in standby."""
+        self._values.write("set_point", temperature)
+        if self.mode() != self.running:
+            self._values.write("mode", self.running)

@@ -1,0 +1,36 @@
+"""Watlow F4T."""
+
+from __future__ import annotations
+
+from typing import ClassVar
+
+from schemas.errors import OperatorNeeded
+from stations.devices.chamber import CELSIUS, RUNNING, ThermalChamber, refuse_program
+
+
+class F4TChamber(ThermalChamber):
+    """Watlow F4T: floats, a mode of its own, programs, alarms."""
+
+    needs: ClassVar[tuple[str, ...]] = (
+        "temperature", "set_point", "set_point_low", "set_point_high", "mode", "actual_mode", "alarm_1", "temperature_unit",
+        "program_state", "program_end",
+    )  # fmt: skip
+
+    def mode(self) -> str:
+        """The actual mode of the loop."""
+        return self._values.text("actual_mode")
+
+    def require_ready(self) -> None:
+        """Refuses other units than °C, an alarm and a program that runs."""
+        unit, alarm = self._values.text("temperature_unit"), self._values.text("alarm_1")
+        if unit != CELSIUS:
+            self.refuse(f"shows {unit}", CELSIUS, "set the controller's unit")
+        if not alarm.startswith("inactive"):
+            raise OperatorNeeded(f"{self.name}: alarm 1 in state {alarm}, none is needed; clear its cause at the panel")
+        refuse_program(self.name, self._values.text("program_state"))
+
+    def off(self) -> None:
+        """Ends a program that runs, then switches the loop off."""
+        if self._values.text("program_state") in RUNNING:
+            self._values.write("program_end", "act")
+        super().off()

@@ -1,0 +1,47 @@
+"""What the simulated chamber controllers share: the registers that most of them have, and the write of a set point."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import TYPE_CHECKING
+
+from stations.codec import Value
+from stations.plant.bank import Bank, Sink, Source, number
+
+if TYPE_CHECKING:
+    from schemas.profile import Profile
+    from stations.plant.chamber import Chamber
+    from stations.plant.world import World
+
+DEFAULT_LIMITS_C = (-100.0, 250.0)  # where a profile gives no limits
+HUMIDITY_PCT = 40.0
+
+
+def controller_bank(world: World, profile: Profile, own: Mapping[str, Source], command: Sink) -> Bank:
+    """A bank with the common registers of a chamber's controller and ``own``, which come first; ``command`` takes writes."""
+    chamber = world.fixture.chamber
+    point = profile.register("set_point")
+    sources: dict[str, Source] = {
+        "temperature": world.air_reading,
+        "set_point": lambda: chamber.set_point,
+        "working_set_point": lambda: chamber.working,
+        "set_point_low": lambda: DEFAULT_LIMITS_C[0] if point.minimum is None else point.minimum,
+        "set_point_high": lambda: DEFAULT_LIMITS_C[1] if point.maximum is None else point.maximum,
+        "temperature_unit": lambda: "celsius",
+        "power": lambda: 100.0 * chamber.power,
+        "ramp_rate": lambda: chamber.ramp_K_min,
+        "humidity": lambda: HUMIDITY_PCT,
+        "humidity_set_point": lambda: HUMIDITY_PCT,
+        **own,
+    }
+    return Bank(profile, sources, command)
+
+
+def set_by(chamber: Chamber, name: str) -> Callable[[dict[str, Value]], None]:
+    """What a write to the register that sets the chamber does."""
+
+    def command(values: dict[str, Value]) -> None:
+        if name in values:
+            chamber.set_point = number(values, name)
+
+    return command

@@ -1,0 +1,57 @@
+"""The simulated IAI ROBO Cylinder controller."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING
+
+from stations.codec import Value
+from stations.plant.bank import Bank, Busy
+from stations.plant.drive import start_move
+
+if TYPE_CHECKING:
+    from schemas.profile import Profile
+    from stations.plant.table import Axis
+    from stations.plant.world import World
+
+
+def simulated(world: World, axis: Axis, profile: Profile) -> Bank:
+    """IAI ROBO Cylinder: writing the target moves at once, with what band, speed and acceleration were before."""
+    status_bits, more_bits = profile.register("status").bits, profile.register("extended_status").bits
+    kept: dict[str, Value] = {"position_band": 0.1, "speed": 10.0, "acceleration": 9.80665}
+    coils: dict[str, Value] = dict.fromkeys(("servo_on", "alarm_reset", "pause", "home", "serial_mode"), 0)
+
+    def status() -> Value:
+        flags = {"ready": True, "servo_on": coils["servo_on"] == 1, "paused": coils["pause"] == 1}
+        flags |= {"home_end": axis.homed, "in_position": axis.in_position(world.now)}
+        flags["emergency_stop"] = world.emergency_stop
+        return sum(1 << status_bits[flag] for flag, up in flags.items() if up)
+
+    def more() -> Value:
+        flags = {"serial_mode": coils["serial_mode"] == 1, "move": axis.moving(world.now)}
+        return sum(1 << more_bits[flag] for flag, up in flags.items() if up)
+
+    def command(values: dict[str, Value]) -> None:
+        kept.update({name: value for name, value in values.items() if name in kept})
+        coils.update({name: value for name, value in values.items() if name in coils})
+        if values.get("alarm_reset") == 1 and coils["pause"] == 1:
+            axis.halt(world.now)
+        if "target" not in values:
+            return
+        if coils["servo_on"] != 1 or coils["serial_mode"] != 1 or coils["pause"] == 1 or not axis.homed:
+            raise Busy(profile.name)
+        start_move(world, axis, profile, {**kept, "target": values["target"]})
+
+    def own(held: dict[str, Value], name: str) -> Callable[[], Value]:
+        return lambda: held[name]
+
+    sources: dict[str, Callable[[], Value]] = {
+        **{name: own(kept, name) for name in kept},
+        **{name: own(coils, name) for name in coils},
+        "feedback_position": lambda: axis.encoder(world.now),
+        **{name: lambda: 0 for name in ("alarm", "inputs", "outputs")},
+        "status": status,
+        "status_2": lambda: 1 << profile.register("status_2").bits["enabled"],
+        "extended_status": more,
+    }
+    return Bank(profile, sources, command)

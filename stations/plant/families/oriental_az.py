@@ -1,0 +1,48 @@
+"""The simulated Oriental Motor AZ drive."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from stations.codec import NotEncodable, Value
+from stations.plant.bank import Bank, number
+from stations.plant.drive import ABSOLUTE, start_move
+
+if TYPE_CHECKING:
+    from schemas.profile import Profile
+    from stations.plant.table import Axis
+    from stations.plant.world import World
+
+
+def simulated(world: World, axis: Axis, profile: Profile) -> Bank:
+    """Oriental Motor AZ: the trigger inside the data starts the move; the STOP input ends it."""
+    bits = profile.register("status").bits
+    stop = 1 << profile.register("command").bits["stop"]
+    level = {"command": 0}
+
+    def status() -> Value:
+        moving = axis.moving(world.now)
+        flags = {"home_end": axis.homed, "ready": not moving, "busy": moving, "move": moving}
+        flags["in_position"] = axis.in_position(world.now)
+        return sum(1 << bits[flag] for flag, up in flags.items() if up)
+
+    def command(values: dict[str, Value]) -> None:
+        if "command" in values:
+            level["command"] = int(number(values, "command"))
+            if level["command"] & stop:
+                axis.halt(world.now)
+        if "target" not in values:
+            return
+        if values.get("trigger") != 1 or values.get("operation_type") != ABSOLUTE:
+            raise NotEncodable("direct data: only absolute moves, triggered at once, are simulated")
+        start_move(world, axis, profile, values)
+
+    sources = {
+        "command": lambda: level["command"],
+        "status": status,
+        "alarm": lambda: 0,
+        "command_position": lambda: axis.move.target,
+        "feedback_position": lambda: axis.encoder(world.now),
+        "motor_temperature": lambda: 30.0,
+    }
+    return Bank(profile, sources, command)

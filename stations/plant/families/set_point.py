@@ -1,0 +1,18 @@
+"""A simulated controller with a set point and nothing else."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from stations.plant.controller import controller_bank, set_by
+
+if TYPE_CHECKING:
+    from schemas.profile import Profile
+    from stations.plant.bank import Bank
+    from stations.plant.world import World
+
+
+def simulated(world: World, profile: Profile) -> Bank:
+    """A controller with a set point and nothing else."""
+    chamber = world.fixture.chamber
+    return controller_bank(world, profile, {}, set_by(chamber, "set_point"))

@@ -1,0 +1,56 @@
+"""The simulated SMC LEC controller."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING
+
+from stations.codec import NotEncodable, Value
+from stations.plant.bank import Bank
+from stations.plant.drive import ABSOLUTE, start_move
+
+if TYPE_CHECKING:
+    from schemas.profile import Profile
+    from stations.plant.table import Axis
+    from stations.plant.world import World
+
+GO = 0x0100
+
+
+def simulated(world: World, axis: Axis, profile: Profile) -> Bank:
+    """SMC LEC: step data are kept; the start register moves a drive in serial mode whose servo is on."""
+    names = [*profile.groups["step_data"], "serial_mode", "servo_on", "reset", "hold", "drive", "setup"]
+    kept: dict[str, Value] = dict.fromkeys(names, 0)
+
+    def command(values: dict[str, Value]) -> None:
+        kept.update({name: value for name, value in values.items() if name in kept})
+        if values.get("reset") == 1:
+            axis.halt(world.now)
+        ready = kept["serial_mode"] == 1 and kept["servo_on"] == 1 and axis.homed
+        if values.get("start") != GO or not ready:
+            return  # a drive that is not ready accepts the start register and does not move
+        if kept["operation_type"] != ABSOLUTE:
+            raise NotEncodable("step data: only absolute moves are simulated")
+        start_move(world, axis, profile, kept)
+
+    def own(name: str) -> Callable[[], Value]:
+        return lambda: kept[name]
+
+    sources: dict[str, Callable[[], Value]] = {
+        **{name: own(name) for name in names},
+        "step_inputs": lambda: [0.0] * 6,
+        "busy": lambda: int(axis.moving(world.now)),
+        "servo_ready": lambda: kept["servo_on"],
+        "homed": lambda: int(axis.homed),
+        "in_position": lambda: int(axis.in_position(world.now)),
+        "area": lambda: 0,
+        "work_area": lambda: 0,
+        "emergency_stop": lambda: int(not world.emergency_stop),
+        "alarm": lambda: 1,
+        "feedback_position": lambda: axis.encoder(world.now),
+        "feedback_speed": lambda: axis.move.speed if axis.moving(world.now) else 0.0,
+        "thrust": lambda: 0.0,
+        "command_position": lambda: axis.move.target,
+        "driving_data": lambda: 0,
+    }
+    return Bank(profile, sources, command)

@@ -1,0 +1,53 @@
+"""The simulated Watlow F4T."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from stations.codec import NotEncodable, named
+from stations.plant.bank import number
+from stations.plant.controller import controller_bank
+
+if TYPE_CHECKING:
+    from schemas.profile import Profile
+    from stations.codec import Value
+    from stations.plant.bank import Bank, Source
+    from stations.plant.world import World
+
+
+def simulated(world: World, profile: Profile) -> Bank:
+    """Watlow F4T: a loop that can be switched off, a ramp, no program."""
+    chamber = world.fixture.chamber
+    kept: dict[str, Value] = {
+        name: profile.register(name).enumeration[state]
+        for name, state in (("ramp_action", "set_point"), ("ramp_scale", "per_minute"))
+    }
+
+    def command(values: dict[str, Value]) -> None:
+        if "mode" in values:
+            chosen = named(profile.register("mode"), number(values, "mode"))
+            if chosen not in {"automatic", "off"}:
+                raise NotEncodable("mode: the simulated chamber knows automatic and off")
+            chamber.running = chosen == "automatic"
+        if "set_point" in values:
+            chamber.set_point = number(values, "set_point")
+        if "ramp_rate" in values:
+            chamber.ramp_K_min = number(values, "ramp_rate")
+        kept.update({name: value for name, value in values.items() if name in kept})
+
+    def mode() -> Value:
+        return "automatic" if chamber.running else "off"
+
+    sources: dict[str, Source] = {
+        "part_number": lambda: "TUMBLELINE-SIM",
+        "alarm_1": lambda: "inactive",
+        "mode": mode,
+        "actual_mode": mode,
+        "manual_power": lambda: 0.0,
+        "ramp_action": lambda: kept["ramp_action"],
+        "ramp_scale": lambda: kept["ramp_scale"],
+        "program_state": lambda: "off",
+        **{f"event_{n}": lambda: "off" for n in range(1, 5)},
+        **{name: lambda: 0 for name in ("program_number", "program_step", "current_program", "current_step")},
+    }
+    return controller_bank(world, profile, sources, command)

@@ -1,0 +1,200 @@
+"""The simulated world of a station: time, axes, chamber, fixture, devices under test, and what its sensors read.
+
+It knows no register, no fault and no journal: those act on it from outside.
+"""
+
+from __future__ import annotations
+
+import heapq
+import math
+import threading
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from schemas.errors import WrongUse
+from schemas.station import MOST_SLOTS, Simulation, StationConfig
+from stations.plant.device import Devices, Truth, draw_truth, rotation, stream
+from stations.plant.dynamics import Dynamics
+from stations.plant.fixture import Fixture
+from stations.plant.hidden import hidden_effect
+from stations.plant.keyed import keyed_normal
+from stations.plant.moisture import Moisture
+from stations.plant.noise import Noise
+from stations.plant.physics import Physics
+from stations.plant.preset import Preset, load_preset
+from stations.plant.sampler import Sampler
+from stations.plant.table import Axis
+from stations.profile_files import load_profile
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+
+    from schemas.recipe import Lot
+    from stations.plant.hidden import HiddenEffect
+
+Array = NDArray[np.float64]
+
+AIR, THERMOMETER, SUPPLY, VIBRATION, HUMIDITY, OUTER, INNER = 1, 2, 3, 4, 5, 10, 20  # channels of keyed noise
+STANDARD_G = 9.80665  # m/s², CGPM 1901
+AIR_NOISE_K = 0.01
+SUPPLY_NOISE = 2e-5
+VIBRATION_NOISE = 0.02
+HUMIDITY_NOISE_PCT = 0.1
+
+
+class World:
+    """The physics of a simulated station with a lot in it. Hold ``lock`` to read, to write or to advance the time."""
+
+    def __init__(self, config: StationConfig, lot: Lot, hidden: Sequence[HiddenEffect] = ()) -> None:
+        sim = config.simulation or Simulation()
+        _refuse_slots(lot, config.devices.slots.count)
+        self.lock = threading.RLock()
+        self.now_us = 0
+        self.emergency_stop = False
+        self.powered = True
+        self._switched_us = 0  # when the devices' supply was last switched
+        self.preset: Preset = load_preset(lot.device, sim.preset_overrides)
+        self.serials = [unit.serial for unit in lot.units]
+        self.slots = [unit.slot for unit in lot.units]
+        self.seats = list(range(len(lot.units)))  # index of the unit that really sits in the place of each unit
+        self._key = int(stream(sim.seed, lot.seed, lot.repeat).integers(2**62))
+        self.outer, self.inner = Axis(self._key, OUTER), Axis(self._key, INNER)
+        effects = [*hidden, *(hidden_effect(h.kind, h.figures) for h in sim.hidden)]
+        for number, effect in enumerate(effects):
+            effect.begin(len(self.slots), stream(lot.seed, "hidden", number))
+        air, water = (stream(sim.seed, lot.seed, lot.repeat, name) for name in ("air", "moisture"))
+        self.fixture = Fixture(sim, self.slots, air, effects, Moisture(water))
+        self._supply = 1.0 + sim.supply_spread * stream(sim.seed, "supply").standard_normal(64)[self.slots]
+        self._supply_factor = np.ones(len(self.slots))
+        self._truths = self._draw_truths(sim, lot)
+        noise = [stream(sim.seed, lot.seed, lot.repeat, serial, "noise") for serial in self.serials]
+        turn_on = [stream(sim.seed, lot.seed, lot.repeat, serial, "turn-on") for serial in self.serials]
+        self.physics = Physics(
+            (self.outer, self.inner),
+            self.fixture,
+            np.stack([t.slot_rotation for t in self._truths]),
+            Devices(self.preset, self._truths, turn_on),
+            Dynamics(self.preset),
+            Noise(self.preset, noise),
+            effects,
+            sim.local_gravity_m_s2 / STANDARD_G,
+        )
+        fifo = load_profile(config.devices.slots.profile).fifo
+        registers = fifo.registers if fifo is not None else 0
+        self.sampler = Sampler(self.physics, len(self.slots), self.preset.packing, registers)
+        self._due: list[tuple[int, int, Callable[[World], None]]] = []  # time in µs, order among equals, action
+        self.clock_offset_s = 0.0
+        self.frozen_slots_C: dict[int, float] = {}
+        self.frozen_air_C: float | None = None
+        self.fixture.step_to(1.0, self.physics.force_at)
+
+    def _draw_truths(self, sim: Simulation, lot: Lot) -> list[Truth]:
+        seats = 1e-3 * sim.slot_rotation_mrad * stream(sim.seed, "slots").standard_normal((64, 3))
+        return [
+            draw_truth(
+                self.preset,
+                unit.serial,
+                lot.seed,
+                slot_rotation=rotation(seats[unit.slot]),
+                supply_ratio=float(self._supply[i]),
+                output_scale=self.preset.scale,
+            )
+            for i, unit in enumerate(lot.units)
+        ]
+
+    @property
+    def now(self) -> float:
+        """Time since power-on, s."""
+        return self.now_us * 1e-6
+
+    def advance(self, microseconds: int) -> None:
+        """Advances the time; the result does not depend on the number of calls."""
+        with self.lock:
+            target = self.now_us + microseconds
+            while self._due and self._due[0][0] <= target:
+                at, _, action = heapq.heappop(self._due)
+                self._pass_until(max(self.now_us, at))
+                action(self)
+            self._pass_until(target)
+
+    def _pass_until(self, target_us: int) -> None:
+        self.fixture.step_to(target_us * 1e-6, self.physics.force_at)
+        self.now_us = target_us
+        self.sampler.advance(target_us)
+
+    def schedule(self, at_s: float, order: int, action: Callable[[World], None]) -> None:
+        """Calls ``action`` with this world at ``at_s`` s; among equal times the smaller ``order`` comes first."""
+        heapq.heappush(self._due, (round(at_s * 1e6), order, action))
+
+    def switch(self, *, on: bool) -> None:
+        """Switches the supply of all devices by the station's relay; a switch to the present state changes nothing."""
+        if on == self.powered:
+            return
+        self.powered, self._switched_us = on, self.now_us
+        self.physics.power(on=on, now=self.now)
+
+    @property
+    def since_power(self) -> float:
+        """Seconds since the devices were powered; 0 while they are off."""
+        return (self.now_us - self._switched_us) * 1e-6 if self.powered else 0.0
+
+    def scale_supply(self, units: Sequence[int], factor: float) -> None:
+        """Sets the supplies of some units to ``factor`` times their nominal voltage."""
+        self._supply_factor[list(units)] = factor
+        self.physics.devices.supply(self._supply_factor)
+
+    def truth(self, serial: str) -> Truth:
+        """The true parameters of a unit; for tests and benchmarks, never for a client."""
+        return self._truths[self.serials.index(serial)]
+
+    def air_reading(self) -> float:
+        """Reading of the chamber's thermometer, °C."""
+        if self.frozen_air_C is not None:
+            return self.frozen_air_C
+        noise = AIR_NOISE_K * float(self._noise(AIR, 1)[0])
+        return float(self.fixture.air.at(np.array([self.now]))[0]) + noise
+
+    def temperature_reading(self) -> list[float]:
+        """Readings of the slots' thermometers, °C; those of empty slots read the air."""
+        element = self.fixture.temperature.at(np.array([self.now]))[0]
+        raw = element + self.preset.thermometer_noise_K * self._noise(THERMOMETER, len(element))
+        step = self.preset.thermometer_resolution_K
+        readings = self._by_slot(np.round(raw / step) * step, float(self.fixture.air.at(np.array([self.now]))[0]))
+        if not self.powered:
+            readings = [math.nan if slot in self.slots else value for slot, value in enumerate(readings)]
+        return [self.frozen_slots_C.get(slot, value) for slot, value in enumerate(readings)]
+
+    def supply_reading(self) -> list[float]:
+        """Supply of the slots, V; 0 at empty slots."""
+        noise = SUPPLY_NOISE * self._noise(SUPPLY, len(self.slots))
+        volt = self.preset.supply_V * self._supply_factor * (self._supply + noise)
+        return self._by_slot(volt if self.powered else 0.0 * volt, 0.0)
+
+    def vibration_reading(self) -> float:
+        """Vibration of the fixture, g rms."""
+        noise = 1.0 + VIBRATION_NOISE * float(self._noise(VIBRATION, 1)[0])
+        return float(self.fixture.vibration.at(np.array([self.now]))[0]) * noise
+
+    def humidity_reading(self) -> float:
+        """Relative humidity beside the fixture, %."""
+        true = float(self.fixture.humidity(np.array([self.now]))[0])
+        return min(100.0, max(0.0, true + HUMIDITY_NOISE_PCT * float(self._noise(HUMIDITY, 1)[0])))
+
+    def _noise(self, channel: int, n: int) -> Array:
+        return keyed_normal(self._key, channel, int(self.now), n)
+
+    def _by_slot(self, values: Array, empty: float) -> list[float]:
+        out = [empty] * MOST_SLOTS
+        for slot, value in zip(self.slots, values, strict=True):
+            out[slot] = float(value)
+        return out
+
+
+def _refuse_slots(lot: Lot, count: int) -> None:
+    for unit in lot.units:
+        if unit.slot >= count:
+            raise WrongUse(
+                f"lot: unit {unit.serial} sits in slot {unit.slot}, the fixture has 0 to {count - 1}; move it"
+            )

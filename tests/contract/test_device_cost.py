@@ -1,0 +1,209 @@
+"""A device of a known family costs one profile, a new family two modules; nothing that is half there passes."""
+
+import shutil
+import sys
+from pathlib import Path
+
+import pytest
+from other_devices import station_with
+from small_station import lot_of
+
+from docs.devices_page import PAGE, page
+from schemas.errors import RecipeInvalid
+from stations import profile_files
+from stations.devices import families
+from stations.devices.adapters import adapters, axis_adapter, chamber_adapter
+from stations.opening import make_plant, open_station
+from stations.plant import families as simulated_families
+from stations.plant.simulations import family_names
+from stations.profile_files import load_profile, profile_names
+
+ROOT = Path(__file__).resolve().parents[2]
+OF_FAMILIES = [name for name in profile_names() if load_profile(name).kind in {"axis", "chamber"}]
+PROFILE = """\
+name = "{name}"
+kind = "chamber"
+adapter = "{family}"
+maker = "Acme"
+model = "C1"
+verified = false
+source = "manual C1-7, table 3"
+
+[[registers]]
+name = "temperature"
+address = 4100
+manual = "40 4101"
+type = "float32"
+unit = "degC"
+
+[[registers]]
+name = "set_point"
+address = 4200
+manual = "40 4201"
+type = "int16"
+scale = 0.1
+unit = "degC"
+minimum = -40.0
+maximum = 150.0
+access = "read_write"
+{more}
+"""
+ADAPTER = """\
+from stations.devices.chamber import AUTOMATIC, ThermalChamber
+
+class AcmeChamber(ThermalChamber):
+    needs = ("temperature", "set_point", "enable")
+
+    def mode(self):
+        return AUTOMATIC
+
+    def require_ready(self):
+        pass
+
+    def order(self, temperature):
+        self._values.write("set_point", temperature)
+        self._values.write("enable", 1.0)
+"""
+SIMULATION = """\
+from stations.plant.bank import number
+from stations.plant.controller import controller_bank
+
+def simulated(world, profile):
+    held = {"set_point": 23.0, "enable": 0.0}
+
+    def command(values):
+        held.update(values)
+        if held["enable"]:
+            world.fixture.chamber.set_point = number(held, "set_point")
+
+    own = {"set_point": lambda: held["set_point"], "enable": lambda: held["enable"]}
+    return controller_bank(world, profile, own, command)
+"""
+ENABLE = """
+[[registers]]
+name = "enable"
+address = 4300
+manual = "40 4301"
+type = "uint16"
+access = "read_write"
+"""
+
+
+@pytest.fixture
+def product(tmp_path, monkeypatch):
+    """Folders for profiles, adapters and simulations to which a test adds files; the product's own are in them."""
+    profiles = shutil.copytree(ROOT / "stations" / "profiles", tmp_path / "profiles")
+    monkeypatch.setattr(profile_files, "profile_folder", lambda: profiles)
+    folders = [profiles]
+    for package in (families, simulated_families):
+        folder = tmp_path / package.__name__
+        folder.mkdir()
+        monkeypatch.setattr(package, "__path__", [*package.__path__, str(folder)])
+        folders.append(folder)
+    yield folders
+    for package in (families, simulated_families):
+        for module in [name for name in sys.modules if name.startswith(f"{package.__name__}.acme")]:
+            del sys.modules[module]
+            delattr(package, module.rpartition(".")[2])
+    load_profile.cache_clear()
+    adapters.cache_clear()
+
+
+def refresh():
+    load_profile.cache_clear()
+    adapters.cache_clear()
+
+
+def chamber_reaches(profile: str, goal: float) -> float:
+    """The air's temperature after an hour at a set point, with the chamber of this profile."""
+    with open_station(station_with(chamber=profile), lot_of(1)) as station:
+        station.chamber.set_temperature(goal)
+        station.clock.sleep(3600.0)
+        return station.chamber.temperature()
+
+
+def test_every_family_has_an_adapter_a_simulation_and_a_profile():
+    of_profiles = {load_profile(name).adapter for name in OF_FAMILIES}
+    assert set(adapters()) == set(family_names()) == of_profiles
+
+
+@pytest.mark.parametrize("name", OF_FAMILIES)
+def test_every_profile_has_its_adapter_its_simulated_device_and_its_entry_in_the_reference(name):
+    profile = load_profile(name)
+    if profile.kind == "axis":
+        assert axis_adapter(profile)
+        config = station_with(axis=name)
+    else:
+        assert chamber_adapter(profile)
+        config = station_with(chamber=name)
+    plant = make_plant(config, lot_of(1))  # refuses a register without a value of the world behind it
+    served = [bank.profile.name for bank in plant.banks.values()]
+    assert name in served or (profile.commands and plant.line_devices)
+    assert f"\n### {name}\n" in PAGE.read_text(encoding="utf-8"), "write it again: python -m docs.devices_page"
+
+
+def test_no_other_module_names_a_family():
+    names = set(adapters()) - {"set_point"}  # also the name of a register
+    places = [
+        (path.relative_to(ROOT).as_posix(), name)
+        for folder in ("inertial", "schemas", "stations", "pipelines")
+        for path in (ROOT / folder).rglob("*.py")
+        for name in names
+        if f'"{name}"' in path.read_text(encoding="utf-8")
+    ]
+    assert places == []
+
+
+def test_a_device_of_a_known_family_is_one_profile(product):
+    profiles, *_ = product
+    (profiles / "acme_c1.toml").write_text(PROFILE.format(name="acme_c1", family="set_point", more=""), "utf-8")
+    refresh()
+    assert chamber_reaches("acme_c1", -12.3) == pytest.approx(-12.3, abs=0.2)
+    assert "### acme_c1" in page()
+    assert "### acme_c1" not in PAGE.read_text(
+        encoding="utf-8"
+    )  # the check of the reference would fail until it is written
+
+
+def test_a_new_family_is_two_modules_beside_its_profile(product):
+    profiles, devices, simulations = product
+    (profiles / "acme_c2.toml").write_text(PROFILE.format(name="acme_c2", family="acme", more=ENABLE), "utf-8")
+    (devices / "acme.py").write_text(ADAPTER, "utf-8")
+    (simulations / "acme.py").write_text(SIMULATION, "utf-8")
+    refresh()
+    assert chamber_reaches("acme_c2", 40.0) == pytest.approx(40.0, abs=0.2)
+    assert "| `acme` | chamber |" in page()
+
+
+def test_a_profile_of_an_unknown_family_is_refused_by_name(product):
+    profiles, *_ = product
+    (profiles / "acme_c2.toml").write_text(PROFILE.format(name="acme_c2", family="watlow_f4z", more=""), "utf-8")
+    refresh()
+    with pytest.raises(RecipeInvalid, match=r"adapter watlow_f4z of kind chamber drives no chamber.*watlow_f4"):
+        chamber_adapter(load_profile("acme_c2"))
+
+
+def test_a_family_without_its_simulation_is_named_with_the_file_that_is_missing(product):
+    profiles, devices, _ = product
+    (profiles / "acme_c2.toml").write_text(PROFILE.format(name="acme_c2", family="acme", more=ENABLE), "utf-8")
+    (devices / "acme.py").write_text(ADAPTER, "utf-8")
+    refresh()
+    assert set(adapters()) != set(family_names())  # what the contract above compares
+    with pytest.raises(LookupError, match=r"stations/plant/families/acme\.py"):
+        make_plant(station_with(chamber="acme_c2"), lot_of(1))
+
+
+def test_a_register_without_a_simulated_value_is_named(product):
+    profiles, *_ = product
+    (profiles / "acme_c1.toml").write_text(PROFILE.format(name="acme_c1", family="set_point", more=ENABLE), "utf-8")
+    refresh()
+    with pytest.raises(LookupError, match="acme_c1: the plant has nothing for enable"):
+        make_plant(station_with(chamber="acme_c1"), lot_of(1))
+
+
+def test_a_family_module_without_an_adapter_is_named(product):
+    _, devices, _ = product
+    (devices / "acme.py").write_text("from stations.devices.chamber import ThermalChamber\n", "utf-8")
+    refresh()
+    with pytest.raises(LookupError, match=r"stations/devices/families/acme\.py: 0 adapters, 1 is needed"):
+        adapters()

@@ -1,0 +1,65 @@
+"""The capture's check of the table goes by the same summaries as validation, and ends a run whose units all disagree."""
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from inertial.pointing import force_from_angles
+from pipelines.capture.plausibility import TURNED, Plausibility
+from pipelines.tables.summaries import MEANS, summarised
+from schemas.errors import OperatorNeeded
+
+ANGLES = [(outer, inner) for inner in (0.0, 40.0, -70.0) for outer in (-150.0, -90.0, -30.0, 30.0, 90.0, 150.0)]
+UNITS = ("A", "B", "C")
+
+
+def tables(angles: tuple[float, float], turned_deg: float = 0.0, record: int = 0) -> tuple[pd.DataFrame, pd.DataFrame]:
+    """Samples and readings of a dwell at ``angles``, with the table ``turned_deg`` away from its outer encoder."""
+    outer, inner = np.radians([angles[0] + turned_deg]), np.radians([angles[1]])
+    force = force_from_angles(outer, inner)[0]
+    rows = [
+        {"unit": unit, "record": record, "kind": "calibration", "x": 1e5 * x, "y": 1e5 * y, "z": 1e5 * z}
+        for unit in UNITS
+        for x, y, z in force + 1e-5 * np.random.default_rng(record).standard_normal((50, 3))
+    ]
+    readings = pd.DataFrame(
+        [
+            {
+                "unit": u, "record": record, "status": "ok", "full_scale": 1e6,
+                "outer_deg": angles[0], "inner_deg": angles[1],
+            }
+            for u in UNITS
+        ]
+    )  # fmt: skip
+    return pd.DataFrame(rows), readings
+
+
+def test_dwells_that_agree_with_the_encoders_pass():
+    checks = Plausibility(reader=None, identities={})
+    for record, angles in enumerate(ANGLES):
+        checks.refuse_contradiction(0, *tables(angles, record=record))
+    samples, readings = tables(ANGLES[-1], record=len(ANGLES) - 1)
+    expected = summarised([samples], readings).set_index("unit")[list(MEANS)]
+    for unit in UNITS:
+        assert np.array_equal(checks.pointing.means[-1][unit], expected.loc[unit].to_numpy())
+
+
+def test_a_table_whose_zero_jumps_during_a_soak_ends_the_run():
+    checks = Plausibility(reader=None, identities={})
+    dwells = [tables(angles, 5.0 if record >= 9 else 0.0, record) for record, angles in enumerate(ANGLES)]
+    for dwell in dwells[:9]:
+        checks.refuse_contradiction(0, *dwell)
+    with pytest.raises(OperatorNeeded, match=TURNED):
+        _all(checks, dwells[9:])
+
+
+def _all(checks, dwells):
+    for dwell in dwells:
+        checks.refuse_contradiction(0, *dwell)
+
+
+def test_a_record_whose_samples_are_all_stored_already_adds_no_dwell():
+    checks = Plausibility(reader=None, identities={})
+    samples, readings = tables(ANGLES[0])
+    checks.refuse_contradiction(0, samples.iloc[:0], readings)
+    assert checks.pointing.means == []
