@@ -20,12 +20,12 @@ if TYPE_CHECKING:
     from schemas.recipe import Recipe
     from schemas.station import StationConfig
 
-LACK = 1.1
+TOLERANCE = 1.1
 """Errors over the textbook plan's up to which the nearest recipe is offered where nobody said what errors are wanted."""
 
 
 def found(
-    base: Recipe, station: StationConfig, noise: DwellNoise, asked: OptimiseOptions
+    base: Recipe, station: StationConfig, noise: DwellNoise, options: OptimiseOptions
 ) -> tuple[Optimum, dict[str, Any]]:
     """The cheapest recipe, and the document about it."""
     from pipelines.planning.optimise import optimise
@@ -33,27 +33,29 @@ def found(
     from pipelines.planning.textbook import textbook
     from pipelines.planning.verification_poses import verified_in
 
-    levels = levels_of(base, asked.temperatures)
+    levels = levels_of(base, options.temperatures)
     against = plan_context(textbook(base, levels), station, noise)
-    wish = wish_of(asked, base, against, levels)
-    wish = replace(wish, verification=asked.verification or verified_in(base))
+    requirement = requirement_of(options, base, against, levels)
+    requirement = replace(requirement, verification=options.verification or verified_in(base))
     progress = error_console()
     with progress.status("looking for the cheapest recipe") as status:
-        lack = 1.0 if asked.errors_named else LACK
-        best = optimise(base, against, wish, lambda note: status.update(f"looking: {note}"), lack=lack)
+        tolerance = 1.0 if options.errors_named else TOLERANCE
+        best = optimise(base, against, requirement, lambda note: status.update(f"looking: {note}"), tolerance=tolerance)
     return best, document(best, plan(best.planned))
 
 
 def document(best: Optimum, plan: dict[str, Any]) -> dict[str, Any]:
     """What was found, for programs."""
-    from inertial.planning.visibility import sights
-    from pipelines.planning.discrimination import partings
+    from inertial.planning.visibility import visibilities
+    from pipelines.planning.discrimination import rival_separations
     from pipelines.schedule.timing import spent
 
     textbook = best.against
-    seen = {s.effect for s in sights(textbook.state, textbook.recipe.effects, 1.0) if s.seen}
-    there = {(row["true"], row["wrong"]): row["chi_square"] for row in partings(best.wish, textbook)}
-    rivals = [{**r, "textbook": there[r["true"], r["wrong"]]} for r in partings(best.wish, best.planned)]
+    seen = {s.effect for s in visibilities(textbook.state, textbook.recipe.effects, 1.0) if s.seen}
+    there = {(row["true"], row["wrong"]): row["chi_square"] for row in rival_separations(best.requirement, textbook)}
+    rivals = [
+        {**r, "textbook": there[r["true"], r["wrong"]]} for r in rival_separations(best.requirement, best.planned)
+    ]
     return {
         "recipe": plan["recipe"],
         "dwell_s": plan["dwell_s"]["planned"],
@@ -61,7 +63,7 @@ def document(best: Optimum, plan: dict[str, Any]) -> dict[str, Any]:
         "poses": plan["poses"],
         "dwells": plan["dwells"],
         "minutes": plan["minutes"],
-        "textbook_minutes": spent(textbook.stretches).document(),
+        "textbook_minutes": spent(textbook.activities).document(),
         "share": best.share,
         "verification_dwells": _verification(best.planned.recipe),
         "worst": best.worst,
@@ -81,7 +83,11 @@ def _wanted_rows(best: Optimum, plan: dict[str, Any]) -> list[dict[str, Any]]:
         if row["axis"] in place:
             column = columns.setdefault(row["axis"], 0)
             columns[row["axis"]] += 1
-            limit = MICRO * float(best.wish.wanted[place[row["axis"]], column]) if best.wish.parting is None else None
+            limit = (
+                MICRO * float(best.requirement.errors[place[row["axis"]], column])
+                if best.requirement.discrimination is None
+                else None
+            )
             rows.append({**row, "wanted_ug": limit})
     return rows
 
@@ -97,7 +103,7 @@ def written(best: Optimum, target: Path, home: Path) -> str:
 
     recipe = best.planned.recipe
     limits = limits_from(recipe.limits, home, target.parent)
-    minutes, textbook = (spent(p.stretches).total for p in (best.planned, best.against))
+    minutes, textbook = (spent(p.activities).total for p in (best.planned, best.against))
     remarks = [
         f"Found by 'tumbleline plan optimise': {minutes:.0f} min on station {best.planned.station.name}, where the textbook plan",
         f"needs {textbook:.0f} min; {_reached(best)}.",
@@ -106,10 +112,10 @@ def written(best: Optimum, target: Path, home: Path) -> str:
 
 
 def _reached(best: Optimum) -> str:
-    if best.wish.parting is None:
+    if best.requirement.discrimination is None:
         return f"no coefficient's error is above {best.worst:.2f} of what was wanted"
-    rivals = best.wish.effects[-len(best.wish.parting.rivals) :]
-    return f"it tells {', '.join(rivals)} apart, χ² {best.wish.parting.wanted / best.worst**2:.0f} at least"
+    rivals = best.requirement.effects[-len(best.requirement.discrimination.rivals) :]
+    return f"it tells {', '.join(rivals)} apart, χ² {best.requirement.discrimination.chi_square / best.worst**2:.0f} at least"
 
 
 def print_optimum(document: dict[str, Any]) -> None:
@@ -179,9 +185,15 @@ class OptimiseOptions:
         return bool(self.wanted) or self.factor != 1.0
 
 
-def wish_of(asked: OptimiseOptions, base: Recipe, against: PlanContext, levels: tuple[float, ...]) -> Requirement:
-    """The wish of what was asked: errors as wanted, or rivals told apart."""
-    return _parted(asked, against, levels) if _parts(asked) else _wish(asked, base, against, levels)
+def requirement_of(
+    options: OptimiseOptions, base: Recipe, against: PlanContext, levels: tuple[float, ...]
+) -> Requirement:
+    """The requirement of what was options: errors as wanted, or rivals told apart."""
+    return (
+        _discrimination(options, against, levels)
+        if _discriminates(options)
+        else _required_errors(options, base, against, levels)
+    )
 
 
 def levels_of(base: Recipe, temperatures: str) -> tuple[float, ...]:
@@ -197,40 +209,44 @@ def levels_of(base: Recipe, temperatures: str) -> tuple[float, ...]:
     return tuple(sorted(set(given)))
 
 
-def _parts(asked: OptimiseOptions) -> bool:
+def _discriminates(options: OptimiseOptions) -> bool:
     """Whether rivals are to be told apart; options of the one question beside the other are refused."""
-    parts = asked.criterion.upper() == "T"
+    parts = options.criterion.upper() == "T"
     other = (
-        {"--wanted": asked.wanted, "--factor": asked.factor != 1.0}
+        {"--wanted": options.wanted, "--factor": options.factor != 1.0}
         if parts
-        else {"--part": asked.part, "--size": asked.size is not None, "--separation": asked.separation is not None}
+        else {
+            "--part": options.part,
+            "--size": options.size is not None,
+            "--separation": options.separation is not None,
+        }
     )
     for option, given in other.items():
         if given:
             raise WrongUse(
-                f"plan: {option} does not go with --criterion {asked.criterion}; leave one of the two out"
+                f"plan: {option} does not go with --criterion {options.criterion}; leave one of the two out"
                 + ("" if parts else ", or write --criterion T")
             )
     return parts
 
 
-def _parted(asked: OptimiseOptions, against: PlanContext, levels: tuple[float, ...]) -> Requirement:
+def _discrimination(options: OptimiseOptions, against: PlanContext, levels: tuple[float, ...]) -> Requirement:
     from pipelines.jobs.model_files import refuse_unknown_effects
-    from pipelines.planning.discrimination import ENOUGH, SIZE_UG, parted
+    from pipelines.planning.discrimination import ENOUGH, SIZE_UG, discrimination_requirement
 
-    rivals, see = _names(asked.part), _names(asked.see)
+    rivals, see = _names(options.part), _names(options.see)
     if not rivals:
         raise WrongUse("plan: --criterion T needs the effects to tell apart; write --part third_order,odd_quadratic")
     refuse_unknown_effects(rivals, "plan: --part")
     refuse_unknown_effects(see, "plan: --see")
-    _refuse_unknown_plan(asked.poses)
-    return parted(
+    _refuse_unknown_plan(options.poses)
+    return discrimination_requirement(
         against,
         rivals,
         levels,
-        size_ug=asked.size or SIZE_UG,
-        enough=asked.separation or ENOUGH,
-        plan=asked.poses,
+        size_ug=options.size or SIZE_UG,
+        enough=options.separation or ENOUGH,
+        plan=options.poses,
         see=see,
     )
 
@@ -246,33 +262,35 @@ def _refuse_unknown_plan(name: str) -> None:
         raise WrongUse(f"plan: no plan of poses is called '{name}'; {did_you_mean(name, list(NAMED))}")
 
 
-def _wish(asked: OptimiseOptions, base: Recipe, against: PlanContext, levels: tuple[float, ...]) -> Requirement:
+def _required_errors(
+    options: OptimiseOptions, base: Recipe, against: PlanContext, levels: tuple[float, ...]
+) -> Requirement:
     from inertial.design import local_names, split
     from inertial.planning.pose_exchange import Criterion
     from pipelines.jobs.model_files import refuse_unknown_effects
-    from pipelines.planning.requirement import Requirement, between, candidates
+    from pipelines.planning.requirement import Requirement, candidates, temperature_choices
     from pipelines.planning.textbook import reference_errors, seen_by
 
     criteria = {name.lower(): name for name in get_args(Criterion)}
-    if asked.criterion.lower() not in criteria:
+    if options.criterion.lower() not in criteria:
         known = [*get_args(Criterion), "T"]
-        raise WrongUse(f"plan: no criterion '{asked.criterion}'; {did_you_mean(asked.criterion, known)}")
-    _refuse_unknown_plan(asked.poses)
-    see = _names(asked.see)
+        raise WrongUse(f"plan: no criterion '{options.criterion}'; {did_you_mean(options.criterion, known)}")
+    _refuse_unknown_plan(options.poses)
+    see = _names(options.see)
     refuse_unknown_effects(see, "plan: --see")
-    errors = asked.factor * reference_errors(against, base)
+    errors = options.factor * reference_errors(against, base)
     names = [name for name, _ in local_names(split(base.effects)[0], 0)]
-    for effect, limit in _limits(asked.wanted, names).items():
+    for effect, limit in _limits(options.wanted, names).items():
         for column, name in enumerate(names):
             if name == effect:
                 errors[:, column] = limit / MICRO
     return Requirement(
-        wanted=errors,
+        errors=errors,
         see=see or seen_by(against, levels),
-        levels=levels if asked.temperatures else (levels[0], levels[-1]),
-        legal=() if asked.temperatures else between(levels),
-        candidates=candidates(against.station, asked.poses),
-        criterion=criteria[asked.criterion.lower()],
+        levels=levels if options.temperatures else (levels[0], levels[-1]),
+        optional_levels=() if options.temperatures else temperature_choices(levels),
+        candidates=candidates(against.station, options.poses),
+        criterion=criteria[options.criterion.lower()],
     )
 
 

@@ -102,13 +102,13 @@ def command(
 
     config = load_station(station)
     found = with_model(recipe, effects, model, archive, config.name)
-    course = plan_context(found, config, noise_of(found, device or found.device, noise, wander))
-    document = plan(course)
+    context = plan_context(found, config, noise_of(found, device or found.device, noise, wander))
+    document = plan(context)
     if page is not None:
-        _write(page, document, course)
+        _write(page, document, context)
         document["page"] = str(page)
     if pictures is not None:
-        _draw(pictures, document, course)
+        _draw(pictures, document, context)
     if as_json:
         print_json(document)
     else:
@@ -204,10 +204,10 @@ def optimise(
 
     config = load_station(station)
     base = with_model(recipe, effects, model, archive, config.name)
-    asked = OptimiseOptions(
+    options = OptimiseOptions(
         see, tuple(wanted or ()), factor, temperatures, poses, criterion, verification, part, size, separation
     )
-    optimum, document = found(base, config, noise_of(base, device or base.device, noise, wander), asked)
+    optimum, document = found(base, config, noise_of(base, device or base.device, noise, wander), options)
     target = output or Path(f"{optimum.planned.recipe.name}.toml")
     document["file"] = str(target)
     _save(target, written(optimum, target, Path(recipe).parent))
@@ -233,7 +233,7 @@ def _save(path: Path, text: str) -> None:
 
 
 def with_model(recipe: str, effects: str, model: Path | None, archive: str | None, station: str) -> Recipe:
-    """The recipe, with another model where one is given; the line's is asked of the archive only where it is needed."""
+    """The recipe, with another model where one is given; the line's is options of the archive only where it is needed."""
     from pipelines.jobs.model_files import chosen_effects, use_formulas
     from pipelines.jobs.recipes import load_recipe
 
@@ -268,18 +268,18 @@ def noise_of(recipe: Recipe, device: str, density: float | None, wander: float |
     return DwellNoise(white * MICRO, preset.bias_instability_ug * MICRO, preset.rate_random_walk_ug * MICRO)
 
 
-def _write(page: Path, document: dict[str, Any], course: PlanContext) -> None:
+def _write(page: Path, document: dict[str, Any], context: PlanContext) -> None:
     """Writes the page."""
     from pipelines.report.plan import render_plan
 
-    _save(page, render_plan(document, course))
+    _save(page, render_plan(document, context))
 
 
-def _draw(folder: Path, document: dict[str, Any], course: PlanContext) -> None:
+def _draw(folder: Path, document: dict[str, Any], context: PlanContext) -> None:
     """Writes the pictures, each in a file of its own."""
     from pipelines.report.plan import pictures
 
-    for name, text in pictures(document, course).items():
+    for name, text in pictures(document, context).items():
         if text:
             _save(folder / f"{document['recipe']}-{name}.svg", text)
 

@@ -12,32 +12,32 @@ if TYPE_CHECKING:
     from pipelines.planning.plan import PlanContext
 
 
-def render_plan(document: dict[str, Any], course: PlanContext) -> str:
+def render_plan(document: dict[str, Any], context: PlanContext) -> str:
     """The page as one HTML text that needs no other file.
 
     Parameters
     ----------
     document : of :func:`pipelines.planning.plan.plan`
-    course : the recipe as the station will go through it
+    context : the recipe as the station will go through it
     """
     return template("plan.html").render(
         document=document,
-        recipe=course.recipe,
+        recipe=context.recipe,
         number=plain,
         coefficients=_coefficients(document["coefficients"]),
         seen=[row for row in document["effects"] if row["seen"]],
         unseen=[row for row in document["effects"] if not row["seen"]],
-        **pictures(document, course),
+        **pictures(document, context),
     )
 
 
-def pictures(document: dict[str, Any], course: PlanContext) -> dict[str, str]:
+def pictures(document: dict[str, Any], context: PlanContext) -> dict[str, str]:
     """The pictures of a plan by name, as SVG texts: the poses, the temperatures, what it sees, what it takes for what."""
     return {
-        "sphere": sphere_plot(course),
-        "temperature": temperature_plot(course),
+        "sphere": sphere_plot(context),
+        "temperature": temperature_plot(context),
         "sights": sight_plot(document["effects"]),
-        "aliases": alias_plot(course),
+        "aliases": alias_plot(context),
     }
 
 
