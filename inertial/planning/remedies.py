@@ -90,7 +90,7 @@ REMEDIES: tuple[Remedy, ...] = (
     ),
     Remedy(
         "temperature",
-        lambda s: f"the use of {features.distinct(s)} temperatures only" if 2 <= features.distinct(s) <= 4 else "",
+        lambda s: f"measurement at {features.distinct(s)} temperatures only" if 2 <= features.distinct(s) <= 4 else "",
         lambda s: additions.with_soaks(s, additions.more_levels(s)),
         lambda s: f"add soaks at {_degrees(additions.more_levels(s))} °C",
     ),

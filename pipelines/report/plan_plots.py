@@ -28,7 +28,7 @@ VIEWS = ((25.0, 20.0, "seen from +x, above"), (25.0, 200.0, "seen from −x, abo
 
 
 def sphere_plot(context: PlanContext) -> str:
-    """Where specific force points in the fixture in every pose: the sphere from three sides, with the way of the first soak."""
+    """Directions of specific force in the fixture for every pose, from three sides, with the path of the first soak."""
     fit, check = (_directions(context.activities, kind) for kind in ("dwell", "verification"))
     first = [s for s in context.activities if s.kind == "dwell" and s.step.soak == context.activities[0].step.soak]
     way = _directions(first, "dwell")
@@ -140,7 +140,7 @@ def _spans(activities: list[Activity], kind: str) -> list[tuple[float, float]]:
 
 
 def alias_plot(context: PlanContext) -> str:
-    """How far what one effect leaves lies within another's: the cosine of the row's effect with the column's."""
+    """Heat map of confounding: cosine of the row's effect with the span of the column's, after the model."""
     names, cosines = confounding(context.state, context.recipe.effects)
     if not names:
         return ""
@@ -180,7 +180,7 @@ def alias_plot(context: PlanContext) -> str:
 
 
 def _grouped(cosines: Array) -> list[int]:
-    """Rows in an order in which likes stand side by side: each next to the one it is most like."""
+    """Order of rows in which each follows the one it is most confounded with."""
     like = np.maximum(cosines, cosines.T)
     left = set(range(len(like)))
     order = [0]
@@ -193,7 +193,7 @@ def _grouped(cosines: Array) -> list[int]:
 
 
 def sight_plot(effects: list[dict[str, Any]]) -> str:
-    """Part v of every effect that the model leaves, axis by axis, as bars: the longer, the better the plan sees it."""
+    """Remaining fraction v of every effect by axis, as bars."""
     shown = sorted(effects, key=lambda row: row["left"])
     with mpl.rc_context(STYLE):
         figure = Figure(figsize=(WIDTH_IN, 1.0 + 0.24 * len(shown)), layout="constrained")
@@ -203,7 +203,11 @@ def sight_plot(effects: list[dict[str, Any]]) -> str:
             values = [row["left_by_axis"][k] for row in shown]
             place.barh(np.arange(len(shown)) + (1 - k) * height, values, height, color=COLOURS[letter], label=letter)
         place.set_yticks(np.arange(len(shown)), [row["effect"] for row in shown])
-        place.set(xlim=(0.0, 1.0), ylim=(-0.6, len(shown) - 0.4), xlabel="part v of the effect that the model leaves")
+        place.set(
+            xlim=(0.0, 1.0),
+            ylim=(-0.6, len(shown) - 0.4),
+            xlabel="v, fraction of the effect that remains after the model",
+        )
         place.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
         place.grid(visible=False, axis="y")
         place.legend(loc="lower right", ncols=3, frameon=False, title="sensor axis")

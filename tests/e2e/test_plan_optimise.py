@@ -11,6 +11,7 @@ from typer.testing import CliRunner
 from inertial.frames import force_from_angles
 from inertial.noise.dwells import DwellNoise
 from pipelines.cli import app
+from pipelines.cli.optimal import missing_limits
 from pipelines.jobs.recipe_text import limits_from, recipe_text
 from pipelines.jobs.recipes import load_recipe, sample_names
 from pipelines.planning.lower_bound import lower_bound
@@ -50,6 +51,31 @@ def test_the_recipe_that_is_written_is_what_was_told(found):
     assert recipe.temperatures_C == document["temperatures_C"]
     planned = minutes(steps(recipe), load_station(), recipe)
     assert planned.total == pytest.approx(document["minutes"]["total"], abs=0.05)
+
+
+def test_the_new_recipe_is_compared_with_the_own_one_and_the_textbook_plan(found):
+    document, target = found
+    own = json.loads(
+        CliRunner().invoke(app, ["plan", "production", "--device", "analogue", "--effects", THERMAL, "--json"]).stdout
+    )
+    assert document["from"] == "production"
+    assert document["own_minutes"] == own["minutes"]
+    assert document["textbook_minutes"]["total"] > document["own_minutes"]["total"]
+    expected = [row["uncertainty_ug"] for row in own["coefficients"]]
+    assert [row["own_ug"] for row in document["coefficients"]] == pytest.approx(expected, rel=0.05)
+    ratios = [row["own_ug"] / row["wanted_ug"] for row in document["coefficients"]]
+    assert document["own_worst"] == pytest.approx(max(ratios))
+    head = [line for line in target.read_text(encoding="utf-8").splitlines() if line.startswith("#")]
+    assert any(f"production: {own['minutes']['total']:.0f} min" in line for line in head)
+    assert not document["limits_missing"]
+
+
+def test_a_missing_limits_file_is_a_warning_that_names_the_file(tmp_path):
+    recipe = load_recipe().model_copy(update={"limits": "mine.limits.toml"})
+    warning = missing_limits(recipe, tmp_path)
+    assert "mine.limits.toml" in warning
+    assert "tumbleline run" in warning
+    assert not missing_limits(load_recipe(), tmp_path)
 
 
 def test_every_coefficient_is_as_good_as_wanted_in_less_time(found):
