@@ -23,7 +23,9 @@ def command(
         str,
         typer.Option("--effect", metavar="NAME|random", help="Hidden effect, by the name of its physics or its id."),
     ] = "random",
-    seed: Annotated[int | None, typer.Option("--seed", min=0, help="Seed of the simulation; the same seed gives the same data.")] = None,
+    seed: Annotated[
+        int | None, typer.Option("--seed", min=0, help="Seed of the simulation; the same seed gives the same data.")
+    ] = None,
     folder: Annotated[
         Path, typer.Option("--folder", metavar="DIR", help="Folder for measurements, model and report.")
     ] = Path("demo"),
