@@ -169,7 +169,7 @@ def job_of(scene: Scene, seed: int, units: int) -> Any:
 def one(task: tuple[str, int, int, float]) -> Outcome:
     """One inquiry in an archive of its own."""
     from pipelines.archive import Archive
-    from pipelines.inquiry.loop import Participants, Settings, play
+    from pipelines.inquiry.loop import Participants, Settings, run_inquiry
 
     name, seed, units, share = task
     scene = next(s for s in SCENES if s.name == name)
@@ -178,7 +178,7 @@ def one(task: tuple[str, int, int, float]) -> Outcome:
     with tempfile.TemporaryDirectory() as folder:
         job = job_of(scene, seed, units)
         terms = Settings(job.recipe.effects, None if share <= 0.0 else share, scene.unseen)
-        document = play(job, Archive(folder), terms, Participants(looked=looks.append, stage=quickly))
+        document = run_inquiry(job, Archive(folder), terms, Participants(diagnosed=looks.append, stage=quickly))
     return outcome(scene, seed, looks, document, time.perf_counter() - begin)
 
 
@@ -193,11 +193,11 @@ def quickly(name: str, runner: Any) -> Any:
 
 def outcome(scene: Scene, seed: int, looks: list[Any], document: dict[str, Any], seconds: float) -> Outcome:
     """What came of an inquiry."""
-    first = [group["effects"] for group in looks[0].told["classes"]]
+    first = [group["effects"] for group in looks[0].document["classes"]]
     last = [group["effects"] for group in document["classes"]]
     held = [group for group in first if set(group) & set(scene.truths)]
     kept = any(set(group) & set(scene.truths) for group in last)
-    unseen = bool(set(looks[0].told["unseen"]) & set(scene.truths))
+    unseen = bool(set(looks[0].document["unseen"]) & set(scene.truths))
     minutes = document["minutes"]
     return Outcome(
         scene=scene.name,

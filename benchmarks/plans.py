@@ -27,10 +27,10 @@ from inertial.noise.dwells import DwellNoise  # noqa: E402
 from inertial.state import State  # noqa: E402
 from pipelines.jobs.model_files import STARTING_MODEL  # noqa: E402
 from pipelines.jobs.recipes import load_recipe  # noqa: E402
-from pipelines.planning.lower_bound import least  # noqa: E402
+from pipelines.planning.lower_bound import lower_bound  # noqa: E402
 from pipelines.planning.optimise import optimise  # noqa: E402
 from pipelines.planning.plan import PlanContext, identified, plan_context  # noqa: E402
-from pipelines.planning.requirement import Requirement, between, candidates  # noqa: E402
+from pipelines.planning.requirement import Requirement, candidates, temperature_choices  # noqa: E402
 from pipelines.planning.textbook import seen_by, textbook  # noqa: E402
 from pipelines.schedule.timing import spent  # noqa: E402
 from schemas.errors import TumblelineError  # noqa: E402
@@ -58,7 +58,7 @@ class Course:
 
 def course_of(planned: PlanContext) -> Course:
     """The dwells of the fit among what a station does."""
-    dwells = [s for s in planned.stretches if s.kind == "dwell"]
+    dwells = [s for s in planned.activities if s.kind == "dwell"]
     return Course(
         outer=np.array([s.step.pose.outer_deg for s in dwells]),
         inner=np.array([s.step.pose.inner_deg for s in dwells]),
@@ -148,16 +148,16 @@ def compared(name: str, options: argparse.Namespace) -> None:
     if options.bias_factor != 1.0:
         wanted[:, 0] *= options.bias_factor
     begun = time.perf_counter()
-    wish = Requirement(
+    requirement = Requirement(
         wanted,
         seen_by(against, levels),
         (min(levels), max(levels)),
         candidates(station),
-        legal=between(levels),
+        optional_levels=temperature_choices(levels),
         verification=options.verification,
     )
     try:
-        best = optimise(base, against, wish, lambda _: None)
+        best = optimise(base, against, requirement, lambda _: None)
     except TumblelineError as refusal:
         print(f"{name}: {refusal}")
         return
@@ -169,10 +169,10 @@ def compared(name: str, options: argparse.Namespace) -> None:
         f"and {len(recipe.verification)} for verification; found in {took:.0f} s"
     )
     for title, course in (("textbook", against), ("optimal", best.planned)):
-        parts = spent(course.stretches).document()
+        parts = spent(course.activities).document()
         spread = ", ".join(f"{part} {parts[part]:.0f}" for part in ("soaks", "moves", "dwells"))
         print(f"  {title:<9}{parts['total']:6.0f} min: {spread}")
-    bound = least(base, against, wish)
+    bound = lower_bound(base, against, requirement)
     if bound is not None:
         print(f"  dwells without end would take {100.0 * bound.share:.0f} %, for {bound.effect}")
     print(f"  station time {100.0 * best.share:.1f} %; errors expected at most {best.worst:.3f} of those wanted")

@@ -25,7 +25,7 @@ HEAD = """\
 # Effects
 
 Written by `python -m docs.effects_page` from the catalogue; change an effect's file, not this page. Ids are the names in model
-files, on the command line and in JSON. i is the output's axis, j and k the next two in the order x → y → z → x; f is specific
+files, on the command line and in JSON. i is the output axis, j and k the next two in the order x → y → z → x; f is specific
 force in g, θ the temperature above 25 °C, t the time, u the time since power-on, s the time since the last move.
 """
 
@@ -56,18 +56,18 @@ def _section(effect: AnyEffect) -> str:
         f"### {effect.id}\n",
         f"{first_line(effect)}\n",
         f"- term: {effect.equation} ({effect.symbol})",
-        f"- usual size: {low:g} to {high:g} µg",
+        f"- typical size: {low:g} to {high:g} µg",
         f"- source: {effect.source}",
     ]
     lines += [
-        f"- {p.name}: found between {p.low:g} and {p.high:g} {p.unit}".rstrip()
+        f"- {p.name}: between {p.low:g} and {p.high:g} {p.unit}".rstrip()
         if not p.choices
         else f"- {p.name}: one of {', '.join(f'{c:g}' for c in p.choices)}"
         for p in effect.nonlinear
     ]
     if effect.hides_behind:
-        lines.append(f"- hides behind: {', '.join(f'`{name}`' for name in effect.hides_behind)}")
-    lines.append(f"- shows with: {effect.breaker}\n")
+        lines.append(f"- confounded under poor plans with: {', '.join(f'`{name}`' for name in effect.hides_behind)}")
+    lines.append(f"- becomes visible with: {effect.breaker}\n")
     return "\n".join(lines)
 
 
@@ -82,7 +82,7 @@ def _covariates() -> str:
         f"{_summary(Covariate)}\n",
         "Any numeric column of the dwells without a meaning of its own is one.\n",
         f"- term: {Covariate.equation}",
-        f"- shows with: {Covariate.breaker}\n",
+        f"- becomes visible with: {Covariate.breaker}\n",
     ]
     return "\n".join(lines)
 

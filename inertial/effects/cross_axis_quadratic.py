@@ -15,7 +15,7 @@ class CrossAxisQuadratic(SensorEffect):
     source: ClassVar[str] = "IEEE Std 1293-1998, model equation"
     typical_ug: ClassVar[tuple[float, float]] = (5.0, 500.0)
     hides_behind: ClassVar[tuple[str, ...]] = ("bias", "second_order")
-    breaker: ClassVar[str] = "general directions; K2 + Kpp + Koo is one with the bias as a sum"
+    breaker: ClassVar[str] = "general directions; K2 + Kpp + Koo as a sum is identical with the bias"
     simplicity: ClassVar[int] = 18
     vanishing: ClassVar[float] = 1e-3
 

@@ -12,7 +12,7 @@ class GravityValue(StationEffect):
     id: ClassVar[str] = "gravity_value"
     symbol: ClassVar[str] = "ε"
     equation: ClassVar[str] = "f·(1 + ε)"
-    source: ClassVar[str] = "pole to equator 5300 ppm; one with the scale factor, exactly"
+    source: ClassVar[str] = "pole to equator 5300 ppm; identical with the scale factor"
     typical_ug: ClassVar[tuple[float, float]] = (1.0, 5300.0)
     hides_behind: ClassVar[tuple[str, ...]] = ("scale",)
     breaker: ClassVar[str] = "a surveyed value of gravity"

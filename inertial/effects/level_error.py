@@ -18,7 +18,9 @@ class LevelError(StationEffect):
     source: ClassVar[str] = "geometry of a two-axis table"
     typical_ug: ClassVar[tuple[float, float]] = (5.0, 5000.0)
     hides_behind: ClassVar[tuple[str, ...]] = ("outer_encoder_offset", "magnetic")
-    breaker: ClassVar[str] = "a level on the table; the tilt along the outer axis is one with the offset of its encoder"
+    breaker: ClassVar[str] = (
+        "a level on the table; the tilt along the outer axis is identical with the offset of its encoder"
+    )
     simplicity: ClassVar[int] = 40
 
     def force_change(self, state: State, **nonlinear: float) -> Array:

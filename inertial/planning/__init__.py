@@ -1,1 +1,1 @@
-"""What a plan of poses and temperatures can see, what it costs, and which measurement is the best."""
+"""Planning: visibility of effects, expected errors, exchange of poses, discrimination between effects, sequences of dwells."""

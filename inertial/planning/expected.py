@@ -1,4 +1,4 @@
-"""The error to be expected of every coefficient, from the plan and the noise alone, before anything is measured."""
+"""Expected standard error of every coefficient, from the plan and the noise model, before the measurement."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -14,15 +14,15 @@ from inertial.state import State
 Array = NDArray[np.float64]
 
 _SINGULAR = 1e-11
-"""Smallest eigenvalue of the scaled normal matrix: below, a coefficient is not determined (as in a fit)."""
+"""Smallest eigenvalue of the scaled normal matrix; below it a coefficient is not determined, as in a fit."""
 
 
 @dataclass(frozen=True)
 class Expected:
-    """Standard errors that a fit will have.
+    """Expected standard errors of a fit.
 
     names : per axis, (effect id, coefficient) of the p columns; errors : (3, p), g per unit of the column
-    shared_names : likewise of the station's parameters; shared_errors : (q,)
+    shared_names : (effect id, parameter) of the q parameters of the station; shared_errors : (q,), g per unit of the column
     """
 
     names: tuple[tuple[tuple[str, str], ...], ...]
@@ -34,15 +34,15 @@ class Expected:
 def expected_errors(effects: Sequence[str], state: State, covariance: Array, *, units: int = 1) -> Expected:
     """Standard errors of a generalised least-squares fit of a model to planned dwells.
 
-    (Hᵀ·C⁻¹·H)⁻¹ per axis; parameters of the station, which all units share, after projecting the units' own columns out.
-    Nonlinear parameters stand in the middle of their bounds.
+    (Hᵀ·C⁻¹·H)⁻¹ per axis; parameters of the station, which all units share, after projection onto the complement of
+    the units' own columns. Nonlinear parameters are set to the middle of their bounds.
 
     Parameters
     ----------
     effects : ids of the model
     state : the planned dwells of one unit, (n,)
     covariance : (n, n), of the dwell means of one axis, g²
-    units : how many units share the station's parameters
+    units : number of units that share the station's parameters
 
     Raises
     ------
@@ -72,7 +72,7 @@ def expected_errors(effects: Sequence[str], state: State, covariance: Array, *, 
 
 
 def inverted(columns: Array, names: Sequence[tuple[str, str]]) -> Array:
-    """(XᵀX)⁻¹ of whitened columns (n, p), scaled while it is inverted; refuses what they do not determine."""
+    """(XᵀX)⁻¹ of whitened columns (n, p), inverted with scaled columns; raises NotIdentified where it is singular."""
     size = np.linalg.norm(columns, axis=0)
     if np.any(size <= 0.0):
         effect, name = names[int(np.argmin(size))]
@@ -82,5 +82,7 @@ def inverted(columns: Array, names: Sequence[tuple[str, str]]) -> Array:
     if float(np.linalg.eigvalsh(gram)[0]) < _SINGULAR:
         share = np.abs(np.linalg.eigh(gram)[1][:, 0])
         listed = ", ".join(f"{names[i][0]} ({names[i][1]})" for i in np.argsort(-share) if share[i] > 0.1)
-        raise NotIdentified(f"plan: these cannot be told apart: {listed}; add poses or temperatures that separate them")
+        raise NotIdentified(
+            f"plan: these coefficients are confounded: {listed}; add poses or temperatures that separate them"
+        )
     return np.asarray(np.linalg.inv(gram), dtype=np.float64) / np.outer(size, size)

@@ -1,4 +1,4 @@
-"""Features of a plan that hide effects: what it has one value of, one direction of, one order of."""
+"""Features of a plan that make effects invisible: a single value, direction or order of a quantity."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,30 +21,30 @@ def in_steps(angle: Array | None, step_deg: float) -> bool:
 
 
 def levels(state: State) -> list[float]:
-    """Temperatures of the soaks in order of time, °C: levels that stay within two kelvin."""
+    """Soak temperatures in order of time, °C; dwells within 2 K of one another belong to one soak."""
     if state.temperature is None:
         return []
-    found: list[float] = []
+    soaks: list[float] = []
     for value in np.ravel(state.temperature):
-        if not found or abs(float(value) - found[-1]) > _FLAT_K:
-            found.append(float(value))
-    return found
+        if not soaks or abs(float(value) - soaks[-1]) > _FLAT_K:
+            soaks.append(float(value))
+    return soaks
 
 
 def distinct(state: State) -> int:
-    """How many temperatures a plan has that differ by more than two kelvin."""
+    """Number of temperatures of a plan that differ by more than 2 K."""
     ordered = np.sort(levels(state))
     return 0 if ordered.size == 0 else 1 + int(np.count_nonzero(np.diff(ordered) > _FLAT_K))
 
 
 def one_way(state: State) -> bool:
-    """Whether the temperature goes from soak to soak in one direction."""
+    """Whether the soak temperatures only rise or only fall."""
     steps = np.diff(levels(state))
     return steps.size > 0 and (bool(np.all(steps > 0)) or bool(np.all(steps < 0)))
 
 
 def soaked_only(state: State) -> bool:
-    """Whether no dwell was taken while the temperature moved."""
+    """Whether every dwell was measured at a settled temperature."""
     if state.temperature is None:
         return False
     rate = state.temperature_rate
@@ -54,17 +54,17 @@ def soaked_only(state: State) -> bool:
 
 
 def powered_once(state: State) -> bool:
-    """Whether the devices are switched on once, at the beginning."""
+    """Whether the devices are powered on only once, at the start."""
     return state.since_power is not None and bool(np.all(np.diff(state.since_power) >= 0.0))
 
 
 def constant(values: Array | None, share: float) -> bool:
-    """Whether values span no more than a share of the largest."""
+    """Whether the range of values is at most a share of the largest."""
     return values is not None and float(np.ptp(values)) <= share * max(float(np.max(np.abs(values))), 1e-12)
 
 
 def approached_alike(state: State) -> bool:
-    """Whether every pose that comes again comes from the same side; poses that come once come from one side."""
+    """Whether every pose is always approached from the same side."""
     if state.outer is None or state.inner is None:
         return False
     sides: dict[tuple[float, float], set[tuple[float, ...]]] = {}
@@ -76,13 +76,13 @@ def approached_alike(state: State) -> bool:
 
 
 def one_wait(state: State) -> bool:
-    """Whether the waits after a move differ by less than half."""
+    """Whether the range of waits after a move is less than half their median."""
     since = state.since_move
     return since is None or float(np.ptp(since)) < 0.5 * float(np.median(since))
 
 
 def never_again(state: State) -> bool:
-    """Whether no pose comes twice within a soak."""
+    """Whether no pose is repeated at the same temperature."""
     place = np.round(state.force, 3)
     if state.temperature is not None:
         place = np.concatenate([place, np.round(state.temperature[:, None] / _FLAT_K)], axis=1)
@@ -90,12 +90,12 @@ def never_again(state: State) -> bool:
 
 
 def far_from_zero(state: State) -> bool:
-    """Whether some axis has no pose within a tenth of a g of zero on one of the sides."""
+    """Whether an axis has no pose within 0.1 g of zero on the positive or the negative side."""
     near = (np.abs(state.force) < 0.1) & (np.abs(state.force) > 1e-6)
     return not bool(np.all(np.any(near & (state.force > 0), axis=0) & np.any(near & (state.force < 0), axis=0)))
 
 
 def few_levels_of_force(state: State) -> str:
-    """What |f| an axis sees, where it sees a handful of values only."""
-    seen = np.unique(np.round(np.abs(state.force), 2))
-    return f"|f| of {', '.join(f'{v:g}' for v in seen)} g only" if seen.size <= 5 else ""
+    """The values of |f| on the axes where there are five or fewer, else empty."""
+    values = np.unique(np.round(np.abs(state.force), 2))
+    return f"|f| of {', '.join(f'{v:g}' for v in values)} g only" if values.size <= 5 else ""

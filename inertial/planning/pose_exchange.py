@@ -1,8 +1,8 @@
-"""Exchange of poses until a plan determines a model best for the time it takes: D-, A- and worst-coefficient criteria.
+"""Exchange of poses that maximises the information of a plan per station time: D-, A- and worst-coefficient criteria.
 
-A plan is a row of slots in time, each filled by one of some candidates (poses). The dwells' noise is correlated in time, so
-what a pose is worth depends on when it is measured. With the weight W = C⁻¹ of the means, g = (W·H)ᵢ and δ the change of row i,
-the normal matrix M = HᵀWH becomes M + δgᵀ + gδᵀ + Wᵢᵢ·δδᵀ, so that all candidates of a slot are tried at once.
+A plan is a sequence of slots in time, each with one candidate pose. The noise of the dwells is correlated in time, so the
+information of a pose depends on when it is measured. With the weight W = C⁻¹ of the means, g = (W·H)ᵢ and δ the change of row i,
+the normal matrix M = HᵀWH becomes M + δgᵀ + gδᵀ + Wᵢᵢ·δδᵀ, so that all candidates of a slot are evaluated at once.
 
 Source: V. V. Fedorov, Theory of Optimal Experiments (1972), ch. 3 (exchange); R. K. Meyer and C. J. Nachtsheim, "The
 coordinate-exchange algorithm", Technometrics 37 (1995) 60; correlated errors: U. N. Brimkulov, G. K. Krug and V. L. Savanov
@@ -21,33 +21,33 @@ Choice = NDArray[np.intp]
 Criterion = Literal["D", "A", "worst"]
 
 _SHARPNESS = 12.0
-"""Power of the mean that stands for the worst coefficient: high enough for the worst to rule, smooth enough to go downhill."""
+"""Exponent of the power mean that approximates the worst coefficient: dominated by it, yet smooth."""
 
 _OTHERS = 0.1
-"""Share of the other coefficients beside the worst."""
+"""Weight of the other coefficients beside the worst."""
 
 _RIDGE = 1e-9
-"""Share of its mean eigenvalue added to a normal matrix, so that a poor plan has a value too."""
+"""Ridge as a share of the mean eigenvalue, so that the objective is finite for a singular plan."""
 
 _GAIN = 1e-4
-"""Relative gain below which an exchange is not worth it."""
+"""Relative gain below which an exchange is not made."""
 
 _PASS_GAIN = 1e-3
-"""Gain of a whole pass below which the plan stays as it is."""
+"""Gain of a complete pass below which the search ends."""
 
 _PASSES = 12
 
 
 @dataclass(frozen=True)
 class PlanSlots:
-    """Slots of a plan, and what may stand in them.
+    """Slots of a plan and the candidates for them.
 
-    rows : (n, c, 3, p), design rows of every candidate in every slot, in units of the errors wanted: error · column
+    rows : (n, c, 3, p), design rows of every candidate in every slot, in units of the required errors: error · column
     weight : (n, n), inverse of the covariance of the dwell means, 1/g²
-    travel : (c, c), s from one candidate to another
-    seconds : of station time without travel
-    group : (n,), number of the soak: poses change places within one
-    fixed : (n,), slots that stay as they are
+    travel : (c, c), s, move from one candidate to another
+    seconds : s, station time without moves
+    group : (n,), number of the soak; poses are swapped within one soak only
+    fixed : (n,), slots that are not changed
     """
 
     rows: Array
@@ -58,7 +58,7 @@ class PlanSlots:
     fixed: NDArray[np.bool_]
 
     def matrix(self, choice: Choice) -> Array:
-        """Normal matrices (3, p, p) of a plan; the inverse's diagonal are variances over those wanted."""
+        """Normal matrices (3, p, p) of a plan; the diagonal of the inverse is variance over required variance."""
         h = np.swapaxes(self.rows[np.arange(choice.size), choice], 0, 1)
         return np.swapaxes(h, -1, -2) @ (self.weight @ h)
 
@@ -68,7 +68,7 @@ class PlanSlots:
 
 
 def ratios(matrix: Array) -> Array:
-    """Errors over those wanted, (..., 3, p), of normal matrices (..., 3, p, p)."""
+    """Standard errors over the required errors, (..., 3, p), of normal matrices (..., 3, p, p)."""
     return np.sqrt(np.diagonal(_inverse(matrix), axis1=-2, axis2=-1))
 
 
@@ -79,18 +79,18 @@ def _inverse(matrix: Array) -> Array:
 
 
 def _d(matrix: Array) -> Array:
-    """Log of the geometric mean of the variances, over the ellipsoid's axes."""
+    """Log of the geometric mean of the variances over the axes of the confidence ellipsoid."""
     p = matrix.shape[-1]
     return -np.linalg.slogdet(matrix)[1].sum(axis=-1) / (3.0 * p)
 
 
 def _a(matrix: Array) -> Array:
-    """Log of the mean variance over that wanted."""
+    """Log of the mean ratio of variance to required variance."""
     return np.log(np.mean(ratios(matrix) ** 2, axis=(-2, -1)))
 
 
 def _worst(matrix: Array) -> Array:
-    """Log of the largest variance over that wanted, smoothed; and a little of the others', which may gain beside it."""
+    """Log of the largest ratio of variance to required variance, smoothed, plus a small weight of the others."""
     square = np.log(np.maximum(ratios(matrix) ** 2, 1e-300))
     top = square.max(axis=(-2, -1))
     smooth = np.log(np.mean(np.exp(_SHARPNESS * (square - top[..., None, None])), axis=(-2, -1))) / _SHARPNESS
@@ -101,13 +101,13 @@ CRITERIA: dict[Criterion, Callable[[Array], Array]] = {"D": _d, "A": _a, "worst"
 
 
 def exchanged(slots: PlanSlots, choice: Choice, criterion: Criterion | Callable[[Array], Array] = "worst") -> Choice:
-    """A plan (n,) from which no exchange of one pose, and no swap of two within a soak, gains information per station time.
+    """A plan (n,) that no exchange of one pose and no swap of two within a soak improves in information per station time.
 
     Parameters
     ----------
-    choice : (n,), the plan to begin with
-    criterion : what is to become small: "D" the volume of the errors' ellipsoid, "A" their mean square over those wanted,
-        "worst" the largest of them; or a function of normal matrices (..., 3, p, p) like theirs, log of a variance
+    choice : (n,), the starting plan
+    criterion : objective to minimise: "D" the volume of the confidence ellipsoid, "A" the mean square ratio to the required
+        errors, "worst" the largest ratio; or a function of normal matrices (..., 3, p, p) that returns the log of a variance
     """
     value = criterion if callable(criterion) else CRITERIA[criterion]
     best = choice.copy()
@@ -123,7 +123,7 @@ def exchanged(slots: PlanSlots, choice: Choice, criterion: Criterion | Callable[
 
 
 def _cost(slots: PlanSlots, choice: Choice, value: Callable[[Array], Array]) -> float:
-    """Log of variance times station time: halving either is worth the same."""
+    """Log of variance times station time: halving either has the same effect."""
     return float(value(slots.matrix(choice))) + float(np.log(slots.duration(choice)))
 
 
@@ -145,7 +145,7 @@ def _replaced(slots: PlanSlots, choice: Choice, slot: int, value: Callable[[Arra
 
 
 def _detours(slots: PlanSlots, choice: Choice, slot: int) -> Array:
-    """Change of travel (c,) in s for every candidate in a slot."""
+    """Change of travel time (c,), s, for every candidate in a slot."""
     total = np.zeros(len(slots.travel))
     if slot > 0:
         total += slots.travel[choice[slot - 1]]
@@ -155,7 +155,7 @@ def _detours(slots: PlanSlots, choice: Choice, slot: int) -> Array:
 
 
 def _swapped(slots: PlanSlots, choice: Choice, slot: int, value: Callable[[Array], Array]) -> Choice:
-    """The plan with one slot's pose in the best place of its soak, for that one's pose."""
+    """The plan with one slot's pose swapped with the best other slot of its soak."""
     others = np.flatnonzero((slots.group == slots.group[slot]) & ~slots.fixed & (choice != choice[slot]))
     if not others.size:
         return choice

@@ -1,4 +1,4 @@
-"""Dwells that could be measured next: steps of a station, and the state of a lot with them appended."""
+"""Sequences of further dwells: steps of a station, their times and temperatures, and the state of a lot with them appended."""
 
 import math
 from collections.abc import Sequence
@@ -14,21 +14,21 @@ from inertial.timing import Air, Drive, SoakRule, followed, settling_s, soaked
 Array = NDArray[np.float64]
 
 _GRAIN_S = 15.0
-"""Steps in which air and devices are followed between dwells."""
+"""Time step of the air and device temperatures between dwells, s."""
 
 _STILL_K, _LONG_S = 0.02, 120.0
-"""Difference below which nothing moves any more, and the steps then."""
+"""Temperature difference below which the temperatures count as constant, K, and the time step then, s."""
 
 
 @dataclass(frozen=True)
 class SequenceStep:
-    """One dwell to take.
+    """One dwell to measure.
 
     outer, inner : rad
     temperature : °C, of the chamber
-    wait : s, from the end of the move to the begin of the dwell
-    soaked : whether the devices settle at the temperature first; else the dwell is taken while they still follow the air
-    off : s without power before it, so that the devices warm up anew
+    wait : s, from the end of the move to the start of the dwell
+    soaked : whether the devices settle at the temperature first; else the dwell is measured during the temperature change
+    off : s without power before the dwell
     """
 
     outer: float
@@ -41,15 +41,15 @@ class SequenceStep:
 
 @dataclass(frozen=True)
 class StationPace:
-    """How long a station takes, and where it goes on from.
+    """Durations of a station's actions, and its starting point.
 
-    move_s : s of a move of 90°, where the drive is not known; dwell_s : s of a dwell; overhead_s : s beside each, for commands
-    ramp : K/s of the air; lag : s by which the devices follow it
-    soak_s : s of the shortest soak; settled : K within which a device counts as settled, where the station's rule is not known
-    rule, drive : the station's rule for soaks, and how its table moves; None where they are not known
-    last_dwell_s : s of the dwells so far; 0 where as long as the next ones
-    start : where table and chamber stand; after the last dwell where None
-    rest : s that have passed since the last dwell
+    move_s : s, move of 90°, where the drive is not known; dwell_s : s; overhead_s : s, commands of each dwell
+    ramp : K/s, of the air; lag : s, time constant of the devices behind the air
+    soak_s : s, shortest soak; settled : K, tolerance of a settled device, where the station's rule is not known
+    rule, drive : the station's soak rule and table drive; None where not known
+    last_dwell_s : s, length of the dwells so far; 0 where equal to ``dwell_s``
+    start : pose and chamber temperature of the station; those of the last dwell where None
+    rest : s, time since the last dwell
     """
 
     move_s: float = 5.0
@@ -67,11 +67,11 @@ class StationPace:
 
     @property
     def temperatures(self) -> Air:
-        """Air and devices."""
+        """Ramp and lag as the parameters of the temperature model."""
         return Air(self.ramp, self.lag)
 
     def turning_s(self, turn: float) -> float:
-        """Seconds of a move over so many rad."""
+        """Duration of a move over an angle in rad, s."""
         if self.drive is not None:
             return self.drive.seconds(math.degrees(turn))
         return self.move_s * math.sqrt(turn / (0.5 * math.pi))
@@ -79,13 +79,13 @@ class StationPace:
 
 @dataclass(frozen=True)
 class Timeline:
-    """When steps are taken, and what the devices are at then; times from the end of the dwells before.
+    """Times and temperatures of steps; times from the end of the dwells before.
 
-    time : (k,), s, middle of each dwell; since_move : (k,), s, likewise
-    since_on : (k,), s since the devices were switched on again among the steps; infinite where they were not
+    time : (k,), s, middle of each dwell; since_move : (k,), s, from the end of the move to it
+    since_on : (k,), s, since the power-on among the steps; infinite where there was none
     device, air : (k,), °C
-    grid, grid_device : (m,), s and °C, all the way through
-    end : s
+    grid, grid_device : (m,), s and °C, continuous history
+    end : s, end of the last dwell
     """
 
     time: Array
@@ -99,12 +99,12 @@ class Timeline:
 
 
 def timeline(steps: Sequence[SequenceStep], pace: StationPace, start: SequenceStep | None, device: float) -> Timeline:
-    """When each of some steps is taken.
+    """Times and temperatures of steps.
 
     Parameters
     ----------
-    start : where table and chamber stand before the first; at its pose and settled where None
-    device : temperature of the devices before the first, °C
+    start : pose and chamber temperature before the first step; the first step's pose, settled, where None
+    device : °C, temperature of the devices before the first step
     """
     there = start or replace(steps[0], temperature=device)
     follow = _Follow(there.temperature, device)
@@ -128,14 +128,14 @@ def timeline(steps: Sequence[SequenceStep], pace: StationPace, start: SequenceSt
 
 
 class _Follow:
-    """Air that ramps to its target, and devices a first-order lag behind it."""
+    """Air temperature that ramps to its target, and devices that follow with a first-order lag."""
 
     def __init__(self, air: float, device: float) -> None:
         self.air, self.device, self.target, self.now = air, device, air, 0.0
         self.times, self.devices = [0.0], [device]
 
     def go_on(self, seconds: float, pace: StationPace) -> None:
-        """Lets some seconds pass."""
+        """Advances the time."""
         end = self.now + max(seconds, 0.0)
         while self.now < end - 1e-9:
             moving = abs(self.target - self.air) + abs(self.air - self.device) > _STILL_K
@@ -146,7 +146,7 @@ class _Follow:
             self.devices.append(self.device)
 
     def soak(self, target: float, pace: StationPace) -> None:
-        """Goes to a temperature and stays until the devices have settled, the shortest soak at least."""
+        """Goes to a temperature and waits until the devices are settled, at least the shortest soak."""
         self.target = target
         if pace.rule is not None:
             waited, _ = soaked(self.air, self.device, target, pace.soak_s, pace.temperatures, pace.rule)
@@ -158,16 +158,16 @@ class _Follow:
 def extended(
     state: State, steps: Sequence[SequenceStep], pace: StationPace | None = None, *, response: Array | None = None
 ) -> State:
-    """A state with steps taken after its last dwell.
+    """A state with steps appended after its last dwell.
 
-    What the steps do not set (supply, vibration, other columns) is as it was, dwell for dwell from the beginning. Where the pace
-    says where the station stands, the steps begin when the history ends: what came after the last dwell took its time. Else they
-    come in between, and the history ends with the last dwell.
+    Quantities that the steps do not set (supply, vibration, other columns) repeat their values from the first dwell on. Where the
+    pace has a start, the steps begin at the end of the history, which includes the time after the last dwell. Otherwise they
+    begin after the last dwell, and the history is cut there.
 
     Parameters
     ----------
     state : of one unit or a lot, (..., n)
-    response : (..., 3, 3), how the force shows on each axis; for states that carry the force felt
+    response : (..., 3, 3), g/g, response matrix of the sensors; for states with the force along the sensor axes (``felt``)
     """
     pace = pace or StationPace()
     count = len(steps)
@@ -198,8 +198,8 @@ def extended(
         since_power=_joined_if(state.since_power, powered),
         power_off=_power_off(state, off, wide),
         since_move=_joined_if(state.since_move, np.broadcast_to(ran.since_move, wide)),
-        supply=_again(state.supply, count),
-        vibration=_again(state.vibration, count),
+        supply=_repeated(state.supply, count),
+        vibration=_repeated(state.vibration, count),
         outer=_joined_if(state.outer, np.broadcast_to(outer, wide)),
         inner=_joined_if(state.inner, np.broadcast_to(inner, wide)),
         covariates={name: _joined(values, _next(values, count)) for name, values in state.covariates.items()},
@@ -209,7 +209,7 @@ def extended(
 
 
 def standing(state: State) -> SequenceStep | None:
-    """Where table and chamber stand after the last dwell of a state; None where its angles are not known."""
+    """Pose and chamber temperature after the last dwell of a state; None where its angles are not known."""
     if state.outer is None or state.inner is None:
         return None
     air = state.chamber if state.chamber is not None else state.temperature
@@ -231,7 +231,7 @@ def _felt(state: State, force: Array, response: Array | None) -> Array | None:
 
 
 def _power_off(state: State, off: Array, wide: tuple[int, ...]) -> Array | None:
-    """Seconds without power before each dwell; None where the devices were never switched."""
+    """Time without power before each dwell, s; None where the power was never switched."""
     if state.power_off is None and not np.any(off > 0.0):
         return None
     before = np.zeros(state.time.shape) if state.power_off is None else state.power_off
@@ -251,7 +251,7 @@ def _history(history: History | None, time: Array, temperature: Array) -> Histor
 
 
 def _until(history: History | None, end: float) -> History | None:
-    """What a history says until some time, or the first two readings of it."""
+    """A history up to a time, with at least two readings."""
     if history is None or history.time[-1] <= end:
         return history
     count = max(int(np.searchsorted(history.time, end, side="right")), 2)
@@ -268,10 +268,10 @@ def _joined_if(values: Array | None, more: Array | None) -> Array | None:
     return None if values is None or more is None else _joined(values, more)
 
 
-def _again(values: Array | None, count: int) -> Array | None:
+def _repeated(values: Array | None, count: int) -> Array | None:
     return None if values is None else _joined(values, _next(values, count))
 
 
 def _next(values: Array, count: int) -> Array:
-    """The first values of a series once more, (..., count): what nobody sets goes on as it did."""
+    """The first values of a series repeated, (..., count): quantities that the steps do not set."""
     return np.take(values, np.arange(count) % values.shape[-1], axis=-1)

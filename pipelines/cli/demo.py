@@ -25,16 +25,18 @@ SUMMARY = "Hide an effect in the simulated station, find it, add it and see the 
 def command(
     effect: Annotated[
         str,
-        typer.Option("--effect", metavar="NAME|random", help="What to hide, by the name of its physics or its effect."),
+        typer.Option("--effect", metavar="NAME|random", help="Hidden effect, by the name of its physics or its id."),
     ] = "random",
-    seed: Annotated[int | None, typer.Option("--seed", min=0, help="Makes the game repeatable.")] = None,
+    seed: Annotated[
+        int | None, typer.Option("--seed", min=0, help="Seed of the simulation; the same seed gives the same data.")
+    ] = None,
     folder: Annotated[
-        Path, typer.Option("--folder", metavar="DIR", help="Where measurements, model and report are written.")
+        Path, typer.Option("--folder", metavar="DIR", help="Folder for measurements, model and report.")
     ] = Path("demo"),
     *,
-    auto: Annotated[bool, typer.Option("--auto", help="Run through without asking.")] = False,
+    auto: Annotated[bool, typer.Option("--auto", help="Run without questions.")] = False,
     by_hand: Annotated[
-        bool, typer.Option("--by-hand", help="Only measure and write the files; you play with the commands yourself.")
+        bool, typer.Option("--by-hand", help="Only measure and write the files; continue with the commands yourself.")
     ] = False,
     as_json: JsonOption = False,
 ) -> None:
@@ -196,15 +198,15 @@ class _Game:
         if document["found"]:
             out.print(f"The diagnosis named {named}. Found.", style="bold green", markup=False, soft_wrap=True)
         elif self.hidden.effect in document["unseen"]:
-            text = f"The diagnosis named {named}, and listed {self.hidden.effect} among what this plan could not have seen."
+            text = f"The diagnosis named {named}, and listed {self.hidden.effect} as not visible under this plan."
             out.print(text, style="bold yellow", markup=False, soft_wrap=True)
         else:
             out.print(f"The diagnosis named {named}. Not found.", style="bold red", markup=False, soft_wrap=True)
         lines = [
             [when, *(short(document[key][f]) for f in ("rms_ug", "fresh_rms_ug"))]
-            for when, key in (("before", "before"), ("after", "after"))
+            for when, key in (("before", "before"), ("extended", "after"))
         ]
-        print_table(["error, rms", "this run\nµg", "fresh run\nµg"], lines)
+        print_table(["model", "residual, µg", "fresh run, µg"], lines)
         out.print(f"Everything is in {self.folder}: dwells, model.toml and report.html.", markup=False, soft_wrap=True)
 
     def _step(self, title: str, line: str) -> None:

@@ -1,4 +1,4 @@
-"""``tumbleline investigate``: run, diagnose, propose, measure only that, diagnose again, until one effect a class stands."""
+"""``tumbleline investigate``: run, diagnose, measure follow-ups, until every class of the diagnosis contains one effect."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from contextlib import AbstractContextManager
 
     from pipelines.inquiry.inquiry import FollowUp, Inquiry, JointDiagnosis
-    from pipelines.inquiry.loop import Approval, Consent, Participants, Settings
+    from pipelines.inquiry.loop import Approval, Consent, Settings
     from pipelines.jobs.job import Request
 
 PART = "Measure"
@@ -49,7 +49,8 @@ def command(
     seed: SeedOption = None,
     repeat: RepeatOption = 0,
     effects: Annotated[
-        str, typer.Option("--effects", metavar="a,b,c", help="The model to judge; the recipe's by default.")
+        str,
+        typer.Option("--effects", metavar="a,b,c", help="Effects of the model to diagnose; the recipe's by default."),
     ] = "",
     budget: Annotated[
         float | None,
@@ -57,7 +58,7 @@ def command(
             "--budget",
             min=0.0,
             metavar="MIN",
-            help="Station minutes for follow-ups; 30 % of the first run's by default.",
+            help="Station time for follow-ups, min; 30 % of the first run by default.",
         ),
     ] = None,
     *,
@@ -65,19 +66,21 @@ def command(
         bool | None,
         typer.Option(
             "--yes/--ask",
-            help="Spend the budget without asking; or ask, at the terminal or through a paused flow run.",
+            help="Approval of extra station time: automatic, or ask, at the terminal or through a paused flow run.",
         ),
     ] = None,
     unseen: Annotated[
-        bool, typer.Option("--unseen", help="Measure for effects, too, that the plan could not see.")
+        bool,
+        typer.Option("--unseen", help="Also measure follow-ups for effects that are not visible in the first run."),
     ] = False,
-    direct: Annotated[bool, typer.Option("--direct", help="Work without the orchestrator.")] = False,
+    direct: Annotated[bool, typer.Option("--direct", help="Run without the orchestrator.")] = False,
     as_json: JsonOption = False,
 ) -> None:
-    """Measure a lot, diagnose it, and let the station measure only what tells apart the effects that may be missing.
+    """Measure a lot, diagnose it, and measure follow-ups that discriminate between the effects that may be missing.
 
-    It ends when one effect a class stands, when the model leaves nothing but noise, or when the budget is spent. The same
-    command, given again after it was stopped, goes on where it was. Exit status 0: that is so; 1: rivals are left.
+    It ends when every class of the diagnosis contains one effect, when the residuals are at the noise floor, or when the budget
+    is spent. An interrupted inquiry continues when the same command is given again. Exit status 0: the model is adequate or the
+    effects are identified; 1: neither.
     """
     from pipelines.archive import Archive
     from pipelines.cli.terminal import attended
@@ -88,11 +91,13 @@ def command(
 
     seating = read_seating(units)
     request = Request(recipe, station, seating.units, seating.slots, seed, repeat)
-    terms = Settings(tuple(chosen_effects(effects, None, "investigate") or ()), budget, unseen)
-    here = attended() and not as_json
-    paused = yes is False and not here and not direct
-    document = _inquired(request, Archive(archive), terms, _consent(yes=yes, here=here), direct=direct, paused=paused)
-    document["command"] = _again(document) if document["ended"] in {"asked", "declined"} else None
+    settings = Settings(tuple(chosen_effects(effects, None, "investigate") or ()), budget, unseen)
+    at_terminal = attended() and not as_json
+    paused = yes is False and not at_terminal and not direct
+    document = _run(
+        request, Archive(archive), settings, _approval(yes=yes, at_terminal=at_terminal), direct=direct, paused=paused
+    )
+    document["command"] = _continue_command() if document["ended"] in {"asked", "declined"} else None
     if as_json:
         print_json(document)
     else:
@@ -100,79 +105,80 @@ def command(
     raise typer.Exit(DONE if document["ended"] in SETTLED else PART_FAILED)
 
 
-def _consent(*, yes: bool | None, here: bool) -> Callable[[Callable[[], AbstractContextManager[None]]], Approval]:
-    """Who approves the extra minutes: nobody has to, whoever sits at the terminal, or nobody is there."""
+def _approval(
+    *, yes: bool | None, at_terminal: bool
+) -> Callable[[Callable[[], AbstractContextManager[None]]], Approval]:
+    """Approval of extra station time: automatic, ask at the terminal, or none (stop and report)."""
     from pipelines.inquiry.loop import always
 
-    def asked(quiet: Callable[[], AbstractContextManager[None]]) -> Approval:
-        def ask(inquiry: Inquiry, finding: JointDiagnosis, move: FollowUp) -> Consent:
+    def at_the_terminal(quiet: Callable[[], AbstractContextManager[None]]) -> Approval:
+        def ask(inquiry: Inquiry, joint: JointDiagnosis, follow_up: FollowUp) -> Consent:
+            del joint
             with quiet():
-                return _question(inquiry, finding, move)
+                return _question(inquiry, follow_up)
 
         return ask
 
-    def nobody(inquiry: Inquiry, finding: JointDiagnosis, move: FollowUp) -> Consent:
-        del inquiry, finding, move
+    def nobody(inquiry: Inquiry, joint: JointDiagnosis, follow_up: FollowUp) -> Consent:
+        del inquiry, joint, follow_up
         return "nobody"
 
     if yes:
         return lambda _quiet: always
-    return asked if here else lambda _quiet: nobody
+    return at_the_terminal if at_terminal else lambda _quiet: nobody
 
 
-def _question(inquiry: Inquiry, finding: JointDiagnosis, move: FollowUp) -> Consent:
-    """What the person at the terminal says to a proposal."""
+def _question(inquiry: Inquiry, follow_up: FollowUp) -> Consent:
+    """The answer at the terminal to a proposed follow-up."""
     from pipelines.cli.diagnosis_text import measurements_table
     from pipelines.cli.terminal import agreed
 
     out = error_console()
-    for sentence in move.why:
+    for sentence in follow_up.why:
         out.print(f"\n{sentence}.", markup=False, soft_wrap=True)
-    measurements_table(list(move.rows), out)
-    del finding
+    measurements_table(list(follow_up.rows), out)
     left = inquiry.budget - inquiry.spent
-    text = f"Measure for {move.minutes:.1f} min more ({left:.1f} of {inquiry.budget:.1f} min are left)?"
+    text = f"Measure this follow-up ({follow_up.minutes:.1f} min; {left:.1f} of {inquiry.budget:.1f} min budget left)?"
     return "go" if agreed(text) else "stop"
 
 
-def _inquired(
+def _run(
     request: Request,
     archive: Any,
-    terms: Settings,
-    consent: Callable[[Callable[[], AbstractContextManager[None]]], Approval],
+    settings: Settings,
+    approval: Callable[[Callable[[], AbstractContextManager[None]]], Approval],
     *,
     direct: bool,
     paused: bool,
 ) -> dict[str, Any]:
     """The document of the inquiry."""
-    from pipelines.inquiry.loop import Participants, directly, play
+    from pipelines.inquiry.loop import Participants, directly, run_inquiry
 
-    with shown() as (progress, told, quiet):
+    with shown() as (progress, stage_done, quiet):
 
-        def looked(finding: JointDiagnosis) -> None:
+        def diagnosed(joint: JointDiagnosis) -> None:
             with quiet():
-                _tell(finding)
+                _print_diagnosis(joint)
 
-        table: Participants = Participants(directly, consent(quiet), progress, told, looked)
+        participants = Participants(directly, approval(quiet), progress, stage_done, diagnosed)
         if direct:
-            return play(request.job(archive), archive, terms, table)
+            return run_inquiry(request.job(archive), archive, settings, participants)
         from pipelines.flows.investigate import investigate_locally
 
-        return investigate_locally(request, archive, terms, table, ask=paused)
+        return investigate_locally(request, archive, settings, participants, ask=paused)
 
 
-def _tell(finding: JointDiagnosis) -> None:
-    """A line for each diagnosis on the way."""
+def _print_diagnosis(joint: JointDiagnosis) -> None:
+    """Print one line about a joint diagnosis."""
     from pipelines.cli.diagnosis_text import verdict
 
-    error_console().print(
-        f"diagnosis of {len(finding.lineage.runs)}: {verdict(finding.document)}", markup=False, soft_wrap=True
-    )
+    runs = len(joint.lineage.runs)
+    text = f"diagnosis of {runs} run{'s' if runs > 1 else ''}: {verdict(joint.document)}"
+    error_console().print(text, markup=False, soft_wrap=True)
 
 
-def _again(document: dict[str, Any]) -> str:
-    """The command that goes on with what was proposed."""
-    del document
+def _continue_command() -> str:
+    """The command that measures the proposed follow-up."""
     given = [a for a in sys.argv[1:] if a not in {"--ask", "--json"}]
     return shlex.join(["tumbleline", *given, "--yes"])
 
@@ -203,10 +209,10 @@ def _rounds(document: dict[str, Any]) -> None:
     minutes = document["minutes"]
     first, further = short(minutes["first_run"]), short(minutes["follow_ups"]) or "0"
     text = (
-        f"Station time: {first} min for the first run ({document['run']}), {further} min for follow-ups "
-        f"({100.0 * minutes['share']:.0f} %), {short(minutes['budget'])} min were allowed."
+        f"Station time: {first} min first run ({document['run']}), {further} min follow-ups "
+        f"({100.0 * minutes['share']:.0f} %), {short(minutes['budget'])} min budget."
     )
     console().print(text, markup=False, soft_wrap=True)
     if document["rounds"]:
         lines = [[r["run"], short(r["minutes"]), "\n".join(r["why"])] for r in document["rounds"]]
-        print_table(["follow-up", "min", "why"], lines, title="What the station measured besides")
+        print_table(["run", "station time, min", "reason"], lines, title="Follow-ups")

@@ -1,4 +1,4 @@
-"""What ``tumbleline plan optimise`` finds, writes and prints."""
+"""``tumbleline plan optimise``: the requirement from its options, the recipe file, and the printed result."""
 
 from __future__ import annotations
 
@@ -7,151 +7,256 @@ from typing import TYPE_CHECKING, Any, get_args
 
 from pipelines.cli.options import console, error_console, print_table, short
 from schemas.bounds import COLDEST_C, HOTTEST_C
-from schemas.errors import WrongUse, did_you_mean
+from schemas.errors import TumblelineError, WrongUse, did_you_mean
 from schemas.units import MICRO
 
 if TYPE_CHECKING:
     from pathlib import Path
 
     from inertial.noise.dwells import DwellNoise
+    from inertial.planning.expected import Expected
     from pipelines.planning.optimise import Optimum
     from pipelines.planning.plan import PlanContext
     from pipelines.planning.requirement import Requirement
     from schemas.recipe import Recipe
     from schemas.station import StationConfig
 
-LACK = 1.1
-"""Errors over the textbook plan's up to which the nearest recipe is offered where nobody said what errors are wanted."""
+TOLERANCE = 1.1
+"""Ratio to the textbook plan's errors up to which the nearest recipe is written, where no errors are required by options."""
 
 
-def found(
-    base: Recipe, station: StationConfig, noise: DwellNoise, asked: OptimiseOptions
+@dataclass(frozen=True)
+class OwnRecipe:
+    """The recipe that the search starts from, for comparison.
+
+    name : as given on the command line
+    context : the recipe on the station
+    expected : expected standard errors of its model; None where it cannot identify the model
+    """
+
+    name: str
+    context: PlanContext
+    expected: Expected | None
+
+
+def cheapest_recipe(
+    base: Recipe, name: str, station: StationConfig, noise: DwellNoise, options: OptimiseOptions
 ) -> tuple[Optimum, dict[str, Any]]:
-    """The cheapest recipe, and the document about it."""
+    """The recipe with the least station time for the required errors, and the document about it.
+
+    Parameters
+    ----------
+    base : the recipe to start from; ``name`` : its name on the command line
+    """
     from pipelines.planning.optimise import optimise
     from pipelines.planning.plan import plan, plan_context
     from pipelines.planning.textbook import textbook
     from pipelines.planning.verification_poses import verified_in
 
-    levels = levels_of(base, asked.temperatures)
+    levels = levels_of(base, options.temperatures)
     against = plan_context(textbook(base, levels), station, noise)
-    wish = wish_of(asked, base, against, levels)
-    wish = replace(wish, verification=asked.verification or verified_in(base))
-    progress = error_console()
-    with progress.status("looking for the cheapest recipe") as status:
-        lack = 1.0 if asked.errors_named else LACK
-        best = optimise(base, against, wish, lambda note: status.update(f"looking: {note}"), lack=lack)
-    return best, document(best, plan(best.planned))
+    requirement = requirement_of(options, base, against, levels)
+    requirement = replace(requirement, verification=options.verification or verified_in(base))
+    with error_console().status("searching for the recipe with the least station time") as status:
+        tolerance = 1.0 if options.errors_named else TOLERANCE
+        best = optimise(
+            base, against, requirement, lambda note: status.update(f"searching: {note}"), tolerance=tolerance
+        )
+    own = _own_recipe(base, name, best)
+    return best, document(best, plan(best.planned), own)
 
 
-def document(best: Optimum, plan: dict[str, Any]) -> dict[str, Any]:
-    """What was found, for programs."""
-    from inertial.planning.visibility import sights
-    from pipelines.planning.discrimination import partings
+def _own_recipe(base: Recipe, name: str, best: Optimum) -> OwnRecipe:
+    """The recipe of the command line on the same station, with the same flicker model as the new recipe."""
+    from inertial.errors import NotIdentified
+    from pipelines.planning.plan import identified, plan_context
+
+    slowest = float(best.against.state.time[-1])
+    context = plan_context(base, best.against.station, best.against.noise, slowest=slowest)
+    try:
+        expected = identified(context)
+    except NotIdentified:
+        expected = None
+    return OwnRecipe(name, context, expected)
+
+
+def document(best: Optimum, plan: dict[str, Any], own: OwnRecipe) -> dict[str, Any]:
+    """The result as a document for programs."""
+    from inertial.planning.visibility import visibilities
+    from pipelines.planning.discrimination import rival_separations
     from pipelines.schedule.timing import spent
 
     textbook = best.against
-    seen = {s.effect for s in sights(textbook.state, textbook.recipe.effects, 1.0) if s.seen}
-    there = {(row["true"], row["wrong"]): row["chi_square"] for row in partings(best.wish, textbook)}
-    rivals = [{**r, "textbook": there[r["true"], r["wrong"]]} for r in partings(best.wish, best.planned)]
+    seen = {s.effect for s in visibilities(textbook.state, textbook.recipe.effects, 1.0) if s.seen}
+    reference = {
+        (row["true"], row["wrong"]): row["chi_square"] for row in rival_separations(best.requirement, textbook)
+    }
+    rivals = [
+        {**r, "textbook": reference[r["true"], r["wrong"]]} for r in rival_separations(best.requirement, best.planned)
+    ]
+    own_minutes = spent(own.context.activities).document()
     return {
         "recipe": plan["recipe"],
+        "from": own.name,
         "dwell_s": plan["dwell_s"]["planned"],
         "temperatures_C": plan["temperatures_C"],
         "poses": plan["poses"],
         "dwells": plan["dwells"],
         "minutes": plan["minutes"],
-        "textbook_minutes": spent(textbook.stretches).document(),
+        "own_minutes": own_minutes,
+        "own_worst": _own_worst(best, own),
+        "textbook_minutes": spent(textbook.activities).document(),
         "share": best.share,
         "verification_dwells": _verification(best.planned.recipe),
         "worst": best.worst,
-        "coefficients": _wanted_rows(best, plan),
+        "coefficients": _coefficient_rows(best, plan, own),
         "rivals": rivals,
         "seen_besides": sorted({row["effect"] for row in plan["effects"] if row["seen"]} - seen),
         "plan": plan,
     }
 
 
-def _wanted_rows(best: Optimum, plan: dict[str, Any]) -> list[dict[str, Any]]:
-    """The coefficients with what was wanted of them; nothing was, where rivals were to be told apart."""
-    place = {"x": 0, "y": 1, "z": 2}
+def _own_worst(best: Optimum, own: OwnRecipe) -> float | None:
+    """Largest ratio of the own recipe's errors to the required ones; None for rivals, or where it has no errors."""
+    if own.expected is None or best.requirement.discrimination is not None:
+        return None
+    return float((own.expected.errors / best.requirement.errors).max())
+
+
+def _coefficient_rows(best: Optimum, plan: dict[str, Any], own: OwnRecipe) -> list[dict[str, Any]]:
+    """Coefficients with the required error (None where rivals are discriminated) and the own recipe's error."""
+    axis_number = {"x": 0, "y": 1, "z": 2}
     columns: dict[str, int] = {}
     rows: list[dict[str, Any]] = []
     for row in plan["coefficients"]:
-        if row["axis"] in place:
-            column = columns.setdefault(row["axis"], 0)
+        if row["axis"] in axis_number:
+            axis, column = axis_number[row["axis"]], columns.setdefault(row["axis"], 0)
             columns[row["axis"]] += 1
-            limit = MICRO * float(best.wish.wanted[place[row["axis"]], column]) if best.wish.parting is None else None
-            rows.append({**row, "wanted_ug": limit})
+            required = (
+                MICRO * float(best.requirement.errors[axis, column]) if not best.requirement.discrimination else None
+            )
+            own_error = None if own.expected is None else MICRO * float(own.expected.errors[axis, column])
+            rows.append({**row, "wanted_ug": required, "own_ug": own_error})
     return rows
 
 
 def _verification(recipe: Recipe) -> int:
+    """Number of verification dwells of a recipe."""
     return sum(len(recipe.verification_at(k)) for k in range(len(recipe.temperatures_C)))
 
 
-def written(best: Optimum, target: Path, home: Path) -> str:
-    """The text of the recipe's file at ``target``; ``home`` is the folder of the recipe that it began from."""
+def written(best: Optimum, target: Path, home: Path, own: dict[str, Any]) -> str:
+    """The text of the recipe file at ``target``.
+
+    Parameters
+    ----------
+    home : folder of the recipe that the search started from
+    own : the document of the search
+    """
     from pipelines.jobs.recipe_text import limits_from, recipe_text
-    from pipelines.schedule.timing import spent
 
     recipe = best.planned.recipe
     limits = limits_from(recipe.limits, home, target.parent)
-    minutes, textbook = (spent(p.stretches).total for p in (best.planned, best.against))
     remarks = [
-        f"Found by 'tumbleline plan optimise': {minutes:.0f} min on station {best.planned.station.name}, where the textbook plan",
-        f"needs {textbook:.0f} min; {_reached(best)}.",
+        f"Written by 'tumbleline plan optimise' for station {best.planned.station.name}.",
+        (
+            f"Station time: {own['minutes']['total']:.0f} min; {own['from']}: {own['own_minutes']['total']:.0f} min; "
+            f"textbook plan: {own['textbook_minutes']['total']:.0f} min."
+        ),
+        f"{_reached(best)}.",
     ]
     return recipe_text(recipe.model_copy(update={"limits": limits}), remarks)
 
 
+def missing_limits(recipe: Recipe, home: Path) -> str:
+    """What is missing where the limits of a recipe cannot be read from its folder; empty where they can."""
+    from pipelines.jobs.recipes import load_limits
+
+    try:
+        load_limits(recipe, home)
+    except TumblelineError as problem:
+        return f"{problem}; 'tumbleline run' refuses the new recipe until its limits exist"
+    return ""
+
+
 def _reached(best: Optimum) -> str:
-    if best.wish.parting is None:
-        return f"no coefficient's error is above {best.worst:.2f} of what was wanted"
-    rivals = best.wish.effects[-len(best.wish.parting.rivals) :]
-    return f"it tells {', '.join(rivals)} apart, χ² {best.wish.parting.wanted / best.worst**2:.0f} at least"
+    if best.requirement.discrimination is None:
+        return f"Expected errors: at most {best.worst:.2f} of the required ones"
+    rivals = best.requirement.effects[-len(best.requirement.discrimination.rivals) :]
+    chi_square = best.requirement.discrimination.chi_square / best.worst**2
+    return f"Discrimination between {', '.join(rivals)}: χ² at least {chi_square:.0f}"
 
 
 def print_optimum(document: dict[str, Any]) -> None:
-    """The recipe found, for people."""
-    out, minutes, textbook = console(), document["minutes"], document["textbook_minutes"]
-    heat = ", ".join(f"{t:g}" for t in document["temperatures_C"])
+    """Print the recipe found."""
+    out = console()
+    temperatures = ", ".join(f"{t:g}" for t in document["temperatures_C"])
     out.print(
         f"{document['recipe']}: {document['dwells']} dwells of {document['dwell_s']:g} s "
-        f"in {document['poses']} poses, soaks at {heat} °C"
+        f"in {document['poses']} poses, soaks at {temperatures} °C"
     )
-    parts = [[name.replace("_", " "), f"{minutes[name]:.0f}", f"{textbook[name]:.0f}"] for name in minutes]
-    print_table(["station time, min", "this recipe", "textbook plan"], parts)
-    out.print(
-        f"{100.0 * document['share']:.0f} % of the textbook plan's time, the static record apart; "
-        f"{document['verification_dwells']} dwells are for verification, of which the textbook plan has none",
-        soft_wrap=True,
-    )
-    if document["worst"] > 1.0:
-        out.print(
-            "No recipe was found that reaches the textbook plan's errors everywhere; this one comes nearest, with "
-            f"{document['worst']:.3f} of them at most. --factor asks for larger errors, --verification for fewer dwells.",
-            soft_wrap=True,
-        )
+    minutes, own, textbook = document["minutes"], document["own_minutes"], document["textbook_minutes"]
+    parts = [
+        [name.replace("_", " "), f"{minutes[name]:.0f}", f"{own[name]:.0f}", f"{textbook[name]:.0f}"]
+        for name in minutes
+    ]
+    print_table(["station time, min", "new recipe", document["from"], "textbook plan"], parts)
+    for line in _comparison(document):
+        out.print(line, soft_wrap=True)
     if document["rivals"]:
         lines = [[r["true"], r["wrong"], short(r["chi_square"]), short(r["textbook"])] for r in document["rivals"]]
-        print_table(["if true", "taken for", "χ² in the lot", "textbook plan"], lines, whole=2)
+        print_table(["true effect", "fitted effect", "χ², new recipe", "χ², textbook plan"], lines, whole=2)
     else:
-        print_table(["coefficient", "error 1σ", "wanted", "over", "unit"], _error_lines(document["coefficients"]))
+        heads = ["coefficient", "axis", "error, 1σ", "required", "ratio", f"{document['from']}, 1σ", "unit"]
+        print_table(heads, _error_lines(document["coefficients"]))
     if document["seen_besides"]:
-        out.print(f"Sees besides, for nothing: {', '.join(document['seen_besides'])}")
-    out.print(f"Written to {document['file']}; measure with 'tumbleline run {document['file']}'")
+        out.print(
+            f"Also visible, unlike under the textbook plan: {', '.join(document['seen_besides'])}", soft_wrap=True
+        )
+    out.print(f"Recipe file: {document['file']}; measure with 'tumbleline run {document['file']}'", soft_wrap=True)
+    if document["limits_missing"]:
+        error_console().print(f"warning: {document['limits_missing']}", markup=False, soft_wrap=True, style="yellow")
     if "page" in document:
-        out.print(f"page: {document['page']}")
+        out.print(f"Page: {document['page']}")
+
+
+def _comparison(document: dict[str, Any]) -> list[str]:
+    """Sentences that compare the new recipe with the own one and the textbook plan."""
+    name, more = document["from"], document["minutes"]["total"] - document["own_minutes"]["total"]
+    difference = (
+        f"{abs(more):.0f} min {'more' if more > 0.0 else 'less'} than {name}" if abs(more) >= 0.5 else f"as {name}"
+    )
+    lines = [
+        (
+            f"The new recipe takes {difference}, and {100.0 * document['share']:.0f} % of the textbook plan's time without the "
+            f"static record; {document['verification_dwells']} dwells are for verification (textbook plan: none)."
+        ),
+    ]
+    worst = document["own_worst"]
+    if worst is not None:
+        meets = "meets the required errors" if worst <= 1.0 else f"has up to {worst:.2f} times the required errors"
+        lines.append(
+            f"{name} {meets}." + (f" For errors as in {name}, give --factor {worst:.2f}." if worst > 1.0 else "")
+        )
+        if worst <= 1.0 and more > 0.0:
+            lines.append(f"{name} is quicker and meets the requirement: keep it.")
+    if document["worst"] > 1.0:
+        lines.append(
+            "No recipe was found that reaches the textbook plan's errors for every coefficient; the nearest has up to "
+            f"{document['worst']:.3f} times these errors. Allow larger errors with --factor, or fewer dwells with --verification."
+        )
+    return lines
 
 
 def _error_lines(rows: list[dict[str, Any]]) -> list[list[str]]:
     return [
         [
             f"{r['effect']} {r['name']}",
+            r["axis"],
             short(r["uncertainty_ug"]),
             short(r["wanted_ug"]),
             f"{r['uncertainty_ug'] / r['wanted_ug']:.2f}",
+            short(r["own_ug"]) or "–",
             r["unit"],
         ]
         for r in rows
@@ -160,7 +265,7 @@ def _error_lines(rows: list[dict[str, Any]]) -> list[list[str]]:
 
 @dataclass(frozen=True)
 class OptimiseOptions:
-    """The options of the command, as they were given."""
+    """The options of the command."""
 
     see: str
     wanted: tuple[str, ...]
@@ -175,17 +280,23 @@ class OptimiseOptions:
 
     @property
     def errors_named(self) -> bool:
-        """Whether the errors wanted were given, rather than left at the textbook plan's."""
+        """Whether required errors were given, in place of the textbook plan's."""
         return bool(self.wanted) or self.factor != 1.0
 
 
-def wish_of(asked: OptimiseOptions, base: Recipe, against: PlanContext, levels: tuple[float, ...]) -> Requirement:
-    """The wish of what was asked: errors as wanted, or rivals told apart."""
-    return _parted(asked, against, levels) if _parts(asked) else _wish(asked, base, against, levels)
+def requirement_of(
+    options: OptimiseOptions, base: Recipe, against: PlanContext, levels: tuple[float, ...]
+) -> Requirement:
+    """The requirement of the options: errors, or discrimination between rivals."""
+    return (
+        _discrimination(options, against, levels)
+        if _discriminates(options)
+        else _required_errors(options, base, against, levels)
+    )
 
 
 def levels_of(base: Recipe, temperatures: str) -> tuple[float, ...]:
-    """Temperatures to meet, from the lowest."""
+    """Required temperatures, °C, in rising order."""
     try:
         given = [float(part) for part in temperatures.split(",")] if temperatures else base.temperatures_C
     except ValueError:
@@ -197,40 +308,46 @@ def levels_of(base: Recipe, temperatures: str) -> tuple[float, ...]:
     return tuple(sorted(set(given)))
 
 
-def _parts(asked: OptimiseOptions) -> bool:
-    """Whether rivals are to be told apart; options of the one question beside the other are refused."""
-    parts = asked.criterion.upper() == "T"
+def _discriminates(options: OptimiseOptions) -> bool:
+    """Whether the options require discrimination; options that do not go together are refused."""
+    parts = options.criterion.upper() == "T"
     other = (
-        {"--wanted": asked.wanted, "--factor": asked.factor != 1.0}
+        {"--wanted": options.wanted, "--factor": options.factor != 1.0}
         if parts
-        else {"--part": asked.part, "--size": asked.size is not None, "--separation": asked.separation is not None}
+        else {
+            "--part": options.part,
+            "--size": options.size is not None,
+            "--separation": options.separation is not None,
+        }
     )
     for option, given in other.items():
         if given:
             raise WrongUse(
-                f"plan: {option} does not go with --criterion {asked.criterion}; leave one of the two out"
+                f"plan: {option} does not go with --criterion {options.criterion}; leave one of the two out"
                 + ("" if parts else ", or write --criterion T")
             )
     return parts
 
 
-def _parted(asked: OptimiseOptions, against: PlanContext, levels: tuple[float, ...]) -> Requirement:
+def _discrimination(options: OptimiseOptions, against: PlanContext, levels: tuple[float, ...]) -> Requirement:
     from pipelines.jobs.model_files import refuse_unknown_effects
-    from pipelines.planning.discrimination import ENOUGH, SIZE_UG, parted
+    from pipelines.planning.discrimination import ENOUGH, SIZE_UG, discrimination_requirement
 
-    rivals, see = _names(asked.part), _names(asked.see)
+    rivals, see = _names(options.part), _names(options.see)
     if not rivals:
-        raise WrongUse("plan: --criterion T needs the effects to tell apart; write --part third_order,odd_quadratic")
+        raise WrongUse(
+            "plan: --criterion T needs the effects to discriminate between; write --part third_order,odd_quadratic"
+        )
     refuse_unknown_effects(rivals, "plan: --part")
     refuse_unknown_effects(see, "plan: --see")
-    _refuse_unknown_plan(asked.poses)
-    return parted(
+    _refuse_unknown_plan(options.poses)
+    return discrimination_requirement(
         against,
         rivals,
         levels,
-        size_ug=asked.size or SIZE_UG,
-        enough=asked.separation or ENOUGH,
-        plan=asked.poses,
+        size_ug=options.size or SIZE_UG,
+        enough=options.separation or ENOUGH,
+        plan=options.poses,
         see=see,
     )
 
@@ -246,38 +363,40 @@ def _refuse_unknown_plan(name: str) -> None:
         raise WrongUse(f"plan: no plan of poses is called '{name}'; {did_you_mean(name, list(NAMED))}")
 
 
-def _wish(asked: OptimiseOptions, base: Recipe, against: PlanContext, levels: tuple[float, ...]) -> Requirement:
+def _required_errors(
+    options: OptimiseOptions, base: Recipe, against: PlanContext, levels: tuple[float, ...]
+) -> Requirement:
     from inertial.design import local_names, split
     from inertial.planning.pose_exchange import Criterion
     from pipelines.jobs.model_files import refuse_unknown_effects
-    from pipelines.planning.requirement import Requirement, between, candidates
+    from pipelines.planning.requirement import Requirement, candidates, temperature_choices
     from pipelines.planning.textbook import reference_errors, seen_by
 
     criteria = {name.lower(): name for name in get_args(Criterion)}
-    if asked.criterion.lower() not in criteria:
+    if options.criterion.lower() not in criteria:
         known = [*get_args(Criterion), "T"]
-        raise WrongUse(f"plan: no criterion '{asked.criterion}'; {did_you_mean(asked.criterion, known)}")
-    _refuse_unknown_plan(asked.poses)
-    see = _names(asked.see)
+        raise WrongUse(f"plan: no criterion '{options.criterion}'; {did_you_mean(options.criterion, known)}")
+    _refuse_unknown_plan(options.poses)
+    see = _names(options.see)
     refuse_unknown_effects(see, "plan: --see")
-    errors = asked.factor * reference_errors(against, base)
+    errors = options.factor * reference_errors(against, base)
     names = [name for name, _ in local_names(split(base.effects)[0], 0)]
-    for effect, limit in _limits(asked.wanted, names).items():
+    for effect, limit in _limits(options.wanted, names).items():
         for column, name in enumerate(names):
             if name == effect:
                 errors[:, column] = limit / MICRO
     return Requirement(
-        wanted=errors,
+        errors=errors,
         see=see or seen_by(against, levels),
-        levels=levels if asked.temperatures else (levels[0], levels[-1]),
-        legal=() if asked.temperatures else between(levels),
-        candidates=candidates(against.station, asked.poses),
-        criterion=criteria[asked.criterion.lower()],
+        levels=levels if options.temperatures else (levels[0], levels[-1]),
+        optional_levels=() if options.temperatures else temperature_choices(levels),
+        candidates=candidates(against.station, options.poses),
+        criterion=criteria[options.criterion.lower()],
     )
 
 
 def _limits(wanted: tuple[str, ...], model: list[str]) -> dict[str, float]:
-    """Largest errors by effect, µg per unit of the column."""
+    """Required errors by effect, µg per unit of the column."""
     limits: dict[str, float] = {}
     for text in wanted:
         effect, _, number = text.partition("=")

@@ -1,4 +1,4 @@
-"""``tumbleline plan``: what a recipe can and cannot see and what it costs, before it is measured; and cheaper recipes."""
+"""``tumbleline plan``: visible effects, expected errors and station time of a recipe; ``plan optimise``: a quicker recipe."""
 
 from __future__ import annotations
 
@@ -36,13 +36,13 @@ MICRO = 1e-6
 
 
 class _RecipeFirst(TyperGroup):
-    """Subcommands by name; anything else that comes first is a recipe."""
+    """A group whose first argument may be a recipe instead of a subcommand."""
 
     usual = RECIPE
 
     def parse_args(self, ctx: Context, args: list[str]) -> list[str]:
-        """The arguments, with the name of the command that is meant where none is given."""
-        args = ["optimise", *args[1:]] if args[:1] == ["optimize"] else args  # as it is spelled elsewhere
+        """The arguments, with the default subcommand added where none is given."""
+        args = ["optimise", *args[1:]] if args[:1] == ["optimize"] else args  # American spelling
         if not args or args[0] not in {*self.commands, "--help", "-h"}:
             args = [self.usual, *args]
         return super().parse_args(ctx, args)
@@ -50,32 +50,35 @@ class _RecipeFirst(TyperGroup):
 
 app = typer.Typer(
     cls=_RecipeFirst,
-    help="Say what a recipe can and cannot see and what it costs ('plan RECIPE'), or write a cheaper one ('plan optimise').",
+    help="Show visible effects, expected errors and station time of a recipe, or write a quicker one ('plan optimise').",
     add_completion=False,
     pretty_exceptions_enable=False,
     context_settings={"help_option_names": ["-h", "--help"]},
 )
 
 DeviceOption = Annotated[
-    str, typer.Option("--device", metavar="PRESET", help="Preset whose noise is meant; the recipe's device by default.")
+    str,
+    typer.Option(
+        "--device", metavar="PRESET", help="Preset with the noise of the device; the recipe's device by default."
+    ),
 ]
 NoiseOption = Annotated[
     float | None,
-    typer.Option("--noise", min=0.0, help="White noise of the device, µg/√Hz; its preset's by default."),
+    typer.Option("--noise", min=0.0, help="White noise density of the device, µg/√Hz; the preset's by default."),
 ]
 WanderOption = Annotated[
     float | None,
     typer.Option(
         "--wander",
         min=0.0,
-        help="Flicker: flat part of the Allan deviation, µg, without random walk; the preset's flicker and walk by default.",
+        help="Flicker floor of the Allan deviation, µg, without random walk; flicker and random walk of the preset by default.",
     ),
 ]
 EffectsOption = Annotated[
-    str, typer.Option("--effects", metavar="a,b,c", help="The model as a list of effects; the recipe's by default.")
+    str, typer.Option("--effects", metavar="a,b,c", help="Effects of the model; the recipe's by default.")
 ]
 PageOption = Annotated[
-    Path | None, typer.Option("--page", metavar="FILE.html", help="Also write a page with pictures there.")
+    Path | None, typer.Option("--page", metavar="FILE.html", help="Also write an HTML page with pictures to this file.")
 ]
 
 
@@ -92,27 +95,27 @@ def command(
     archive: ArchiveOption = None,
     pictures: Annotated[
         Path | None,
-        typer.Option("--pictures", metavar="DIR", help="Also write the page's pictures there, as RECIPE-NAME.svg."),
+        typer.Option("--pictures", metavar="DIR", help="Also write the pictures to this folder, as RECIPE-NAME.svg."),
     ] = None,
     *,
     as_json: JsonOption = False,
 ) -> None:
-    """Say for every effect whether a recipe can see it, how well, what it is mistaken for, and what to add.
+    """Show station time, expected errors, and for every effect its visibility, detection floor and confounded effects.
 
-    With the minutes of station time and the error to be expected of every coefficient of the recipe's model.
+    For effects that are not visible: the reason, and what to add to the recipe.
     """
     from pipelines.planning.plan import plan, plan_context
     from schemas.station import load_station
 
     config = load_station(station)
     found = with_model(recipe, effects, model, archive, config.name)
-    course = plan_context(found, config, noise_of(found, device or found.device, noise, wander))
-    document = plan(course)
+    context = plan_context(found, config, noise_of(found, device or found.device, noise, wander))
+    document = plan(context)
     if page is not None:
-        _write(page, document, course)
+        _write(page, document, context)
         document["page"] = str(page)
     if pictures is not None:
-        _draw(pictures, document, course)
+        _draw(pictures, document, context)
     if as_json:
         print_json(document)
     else:
@@ -123,11 +126,15 @@ def command(
 def optimise(
     recipe: Annotated[
         str,
-        typer.Argument(metavar="[RECIPE]", help="What the new recipe begins from: device, rate, soak, range, limits."),
+        typer.Argument(
+            metavar="[RECIPE]", help="Recipe to start from: device, sample rate, soak, temperature range, limits."
+        ),
     ] = "production",
     output: Annotated[
         Path | None,
-        typer.Option("--output", "-o", metavar="FILE.toml", help="Where to write it; NAME-optimal.toml here."),
+        typer.Option(
+            "--output", "-o", metavar="FILE.toml", help="File of the new recipe; NAME-optimal.toml by default."
+        ),
     ] = None,
     device: DeviceOption = "",
     station: StationOption = None,
@@ -136,44 +143,50 @@ def optimise(
     see: Annotated[
         str,
         typer.Option(
-            "--see", metavar="a,b,c", help="Effects that must be seen besides; those of the textbook plan by default."
+            "--see",
+            metavar="a,b,c",
+            help="Further effects that must be visible; those of the textbook plan by default.",
         ),
     ] = "",
     wanted: Annotated[
         list[str] | None,
         typer.Option(
-            "--wanted", metavar="EFFECT=µg", help="Largest error (1σ) of an effect's coefficients; may be repeated."
+            "--wanted", metavar="EFFECT=µg", help="Required error (1σ) of an effect's coefficients; may be repeated."
         ),
     ] = None,
     factor: Annotated[
-        float, typer.Option("--factor", min=0.01, help="Errors wanted over those of the textbook plan.")
+        float, typer.Option("--factor", min=0.01, help="Required errors as a multiple of the textbook plan's.")
     ] = 1.0,
     temperatures: Annotated[
         str,
         typer.Option(
             "--temperatures",
             metavar="a,b,c",
-            help="Temperatures to meet, °C; by default the ends of the recipe's range, and any between where it pays.",
+            help="Required temperatures, °C; by default the ends of the recipe's range, and others between as needed.",
         ),
     ] = "",
     poses: Annotated[
         str,
-        typer.Option("--poses", metavar="PLAN", help="Named plan to choose poses from; spread directions by default."),
+        typer.Option(
+            "--poses",
+            metavar="PLAN",
+            help="Named plan of candidate poses; a Fibonacci lattice of directions by default.",
+        ),
     ] = "",
     criterion: Annotated[
         str,
         typer.Option(
             "--criterion",
-            help="worst (coefficient), A (mean variance), D (volume), or T (rivals told apart, see --part).",
+            help="worst (coefficient), A (mean variance), D (volume), or T (discrimination between effects, see --part).",
         ),
     ] = "worst",
     part: Annotated[
-        str, typer.Option("--part", metavar="a,b", help="With --criterion T: effects that are to be told apart.")
+        str, typer.Option("--part", metavar="a,b", help="With --criterion T: effects to discriminate between.")
     ] = "",
     size: Annotated[
         float | None,
         typer.Option(
-            "--size", min=1e-3, help="With --criterion T: what each of them adds at most, µg; 100 by default."
+            "--size", min=1e-3, help="With --criterion T: largest contribution of each effect, µg; 100 by default."
         ),
     ] = None,
     separation: Annotated[
@@ -181,13 +194,13 @@ def optimise(
         typer.Option(
             "--separation",
             min=1.0,
-            help="With --criterion T: χ² that the wrong one must leave in the lot; 50 by default.",
+            help="With --criterion T: required χ² of the wrong effect over the lot; 50 by default.",
         ),
     ] = None,
     verification: Annotated[
         int | None,
         typer.Option(
-            "--verification", min=1, help="How often each verification pose is measured; as in the recipe by default."
+            "--verification", min=1, help="Repetitions of each verification pose; as in the recipe by default."
         ),
     ] = None,
     noise: NoiseOption = None,
@@ -197,24 +210,28 @@ def optimise(
     *,
     as_json: JsonOption = False,
 ) -> None:
-    """Write the cheapest recipe that knows every coefficient as well as is wanted.
+    """Write the recipe with the least station time that reaches the required errors.
 
-    By default: as well as the textbook plan does (24 orthogonal poses at nine soaks up and down, 15 min each, dwells of 10 s)
-    over the same temperatures, and blind to no effect that it sees. With --criterion T --part a,b: the cheapest that tells these
-    effects apart.
+    By default these are the errors of the textbook plan (24 orthogonal poses at nine soaks up and down, 15 min each, dwells of
+    10 s) over the same temperatures, and every effect that is visible under it stays visible. With --criterion T --part a,b: the
+    recipe with the least station time that discriminates between these effects.
     """
-    from pipelines.cli.optimal import OptimiseOptions, found, print_optimum, written
+    from pipelines.cli.optimal import OptimiseOptions, cheapest_recipe, missing_limits, print_optimum, written
     from schemas.station import load_station
 
     config = load_station(station)
     base = with_model(recipe, effects, model, archive, config.name)
-    asked = OptimiseOptions(
+    options = OptimiseOptions(
         see, tuple(wanted or ()), factor, temperatures, poses, criterion, verification, part, size, separation
     )
-    optimum, document = found(base, config, noise_of(base, device or base.device, noise, wander), asked)
+    optimum, document = cheapest_recipe(
+        base, Path(recipe).name, config, noise_of(base, device or base.device, noise, wander), options
+    )
     target = output or Path(f"{optimum.planned.recipe.name}.toml")
     document["file"] = str(target)
-    _save(target, written(optimum, target, Path(recipe).parent))
+    home = Path(recipe).parent
+    document["limits_missing"] = missing_limits(base, home)
+    _save(target, written(optimum, target, home, document))
     if page is not None:
         _write(page, document["plan"], optimum.planned)
         document["page"] = str(page)
@@ -225,19 +242,19 @@ def optimise(
 
 
 def _save(path: Path, text: str) -> None:
-    """Writes a file; a folder that is not there, or may not be written to, is wrong use."""
+    """Write a file; a folder that does not exist or cannot be written to is wrong use."""
     from schemas.errors import WrongUse
 
     try:
         path.write_text(text, encoding="utf-8")
     except OSError as problem:
         raise WrongUse(
-            f"plan: {path} cannot be written ({problem.strerror}); give a file in a folder that is there"
+            f"plan: {path} cannot be written ({problem.strerror}); give a file in a folder that exists and is writable"
         ) from None
 
 
 def with_model(recipe: str, effects: str, model: Path | None, archive: str | None, station: str) -> Recipe:
-    """The recipe, with another model where one is given; the line's is asked of the archive only where it is needed."""
+    """The recipe, with another model where one is given; the archive is read only for a recipe with the line's model."""
     from pipelines.jobs.model_files import chosen_effects, use_formulas
     from pipelines.jobs.recipes import load_recipe
 
@@ -258,7 +275,7 @@ def with_model(recipe: str, effects: str, model: Path | None, archive: str | Non
 
 
 def noise_of(recipe: Recipe, device: str, density: float | None, wander: float | None) -> DwellNoise:
-    """Noise of a preset, with the figures that are given in place of its own."""
+    """Noise of a preset, with given values in place of the preset's."""
     from inertial.noise.dwells import DwellNoise
     from inertial.noise.terms import FLICKER_FLOOR
     from stations.plant.preset import load_preset
@@ -272,18 +289,18 @@ def noise_of(recipe: Recipe, device: str, density: float | None, wander: float |
     return DwellNoise(white * MICRO, preset.bias_instability_ug * MICRO, preset.rate_random_walk_ug * MICRO)
 
 
-def _write(page: Path, document: dict[str, Any], course: PlanContext) -> None:
-    """Writes the page."""
+def _write(page: Path, document: dict[str, Any], context: PlanContext) -> None:
+    """Write the page."""
     from pipelines.report.plan import render_plan
 
-    _save(page, render_plan(document, course))
+    _save(page, render_plan(document, context))
 
 
-def _draw(folder: Path, document: dict[str, Any], course: PlanContext) -> None:
-    """Writes the pictures, each in a file of its own."""
+def _draw(folder: Path, document: dict[str, Any], context: PlanContext) -> None:
+    """Write each picture to a file."""
     from pipelines.report.plan import pictures
 
-    for name, text in pictures(document, course).items():
+    for name, text in pictures(document, context).items():
         if text:
             _save(folder / f"{document['recipe']}-{name}.svg", text)
 
@@ -298,10 +315,10 @@ def _print(document: dict[str, Any]) -> None:
     parts = " + ".join(f"{name.replace('_', ' ')} {minutes[name]:.0f}" for name in minutes if name != "total")
     out.print(f"{minutes['total']:.0f} min of station time: {parts}")
     out.print(
-        f"error of a dwell {short(error['together'])} µg: white {short(error['white'])}, wander {short(error['wander'])}"
+        f"error of a dwell (1σ): {short(error['together'])} µg; white {short(error['white'])}, wander {short(error['wander'])}"
         f"{_longer(document['dwell_s'])}"
     )
-    print_table(["coefficient", "error 1σ: x", "y", "z", "unit"], _coefficient_lines(document["coefficients"]))
+    print_table(["coefficient", "error x, 1σ", "y", "z", "unit"], _coefficient_lines(document["coefficients"]))
     if document["bias"] is not None:
         bias = document["bias"]
         out.print(
@@ -310,17 +327,24 @@ def _print(document: dict[str, Any]) -> None:
         )
     seen = [row for row in document["effects"] if row["seen"]]
     print_table(
-        ["seen", "left v", "1/v²", "floor 3σ", "unit", "it adds, µg", "not told from (= exactly)"],
-        [_sight_line(row) for row in seen],
+        ["visible effect", "v", "1/v²", "floor, µg", "coefficient", "unit", "confounded with"],
+        [_visible_line(row) for row in seen],
     )
     faint = [row["effect"] for row in seen if row["faint"]]
     if faint:
         names = ", ".join(faint)
-        out.print(f"* to be found here, it must add more than such effects do: {names}")
-    blind = [row for row in document["effects"] if not row["seen"]]
-    print_table(["not seen", "why, and what to add"], [[r["effect"], r["why"] or r["breaker"]] for r in blind])
+        out.print(f"* floor above the typical size: {names}")
+    out.print(
+        "v: fraction of the effect's column that remains after the model; 1/v²: variance inflation; floor: smallest detectable "
+        "contribution to a dwell (3σ, RMS), and its coefficient; =: identical under this plan",
+        style="dim",
+    )
+    invisible = [row for row in document["effects"] if not row["seen"]]
+    print_table(
+        ["effect not visible", "reason; what to add"], [[r["effect"], r["why"] or r["breaker"]] for r in invisible]
+    )
     if "page" in document:
-        out.print(f"page: {document['page']}")
+        out.print(f"Page: {document['page']}")
 
 
 def _soaks(count: int) -> str:
@@ -328,19 +352,19 @@ def _soaks(count: int) -> str:
 
 
 def _longer(dwell: dict[str, float]) -> str:
-    """What longer dwells would bring, in words; nothing where there is no wander."""
+    """The effect of longer dwells on the error, as a clause; empty without wander."""
     import math
 
     balanced = dwell["white_as_large_as_wander"]
     if not math.isfinite(balanced):
         return ""
     if balanced < dwell["planned"]:
-        return "; longer dwells would gain little"
-    return f"; longer dwells would gain, up to {short(balanced, 2)} s"
+        return "; longer dwells hardly reduce it"
+    return f"; longer dwells reduce it, up to {short(balanced, 2)} s"
 
 
 def _coefficient_lines(rows: list[dict[str, Any]]) -> list[list[str]]:
-    """One line per coefficient, its three axes side by side; of the station's parameters there is one value."""
+    """One line per coefficient with its three axes; one value for parameters of the station."""
     lines: dict[tuple[str, int], list[str]] = {}
     count: dict[tuple[str, str], int] = {}
     for row in rows:
@@ -352,12 +376,22 @@ def _coefficient_lines(rows: list[dict[str, Any]]) -> list[list[str]]:
     return list(lines.values())
 
 
-def _sight_line(row: dict[str, Any]) -> list[str]:
+def _visible_line(row: dict[str, Any]) -> list[str]:
     size = short(row["floor_size_ug"]) + (" *" if row["faint"] else "")
-    figures = [short(row[key]) for key in ("left", "variance_inflation", "floor_ug")]
-    return [row["effect"], *figures, row["floor_unit"], size, _aliases(row)]
+    v, inflation = short(row["left"]), short(row["variance_inflation"])
+    return [row["effect"], v, inflation, size, scientific(row["floor_ug"]), row["floor_unit"], _aliases(row)]
+
+
+def scientific(value: float) -> str:
+    """A number for people, from a million on as a power of ten."""
+    import math
+
+    if abs(value) < 1e6:
+        return short(value)
+    exponent = math.floor(math.log10(abs(value)))
+    return f"{value / 10.0**exponent:.2f}·10{str(exponent).translate(str.maketrans('0123456789', '⁰¹²³⁴⁵⁶⁷⁸⁹'))}"
 
 
 def _aliases(row: dict[str, Any]) -> str:
     exact = set(row["alias_exact"])
-    return ", ".join(f"= {name}" if name in exact else name for name in row["alias"]) or "–"
+    return ", ".join(f"={name}" if name in exact else name for name in row["alias"]) or "–"

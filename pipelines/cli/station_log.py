@@ -85,7 +85,7 @@ def _of_runs(store: Archive, run: str) -> list[dict[str, Any]]:
 
 def _of_machine() -> list[dict[str, Any]]:
     """What happened to stations on this machine: driven, left safe, made safe by a watchdog."""
-    from stations.safety.folder import log as machine_log
+    from stations.safety.folder import read_log as machine_log
     from stations.safety.folder import state_folder
 
     known = {"when", "station", "event", "why", "what"}

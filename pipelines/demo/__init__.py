@@ -1,1 +1,1 @@
-"""The demonstration: an effect is hidden, found from the measurements alone, added, and revealed."""
+"""The demonstration: a hidden effect in the simulated station, found from the measurements, added to the model, and shown."""

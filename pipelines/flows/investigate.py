@@ -18,7 +18,7 @@ from pipelines.flows.calibrate import requested, stage
 from pipelines.flows.local import reached
 from pipelines.flows.operator import Paused
 from pipelines.flows.places import archive_of
-from pipelines.inquiry.loop import Consent, Participants, Settings, always, play
+from pipelines.inquiry.loop import Consent, Participants, Settings, always, run_inquiry
 
 if TYPE_CHECKING:
     from collections.abc import Generator
@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from pipelines.inquiry.inquiry import FollowUp, Inquiry, JointDiagnosis
     from pipelines.jobs.job import Request
 
-_tables: list[Participants] = []
+_participants: list[Participants] = []
 
 
 @dataclass(frozen=True)
@@ -37,11 +37,13 @@ class PausedApproval:
 
     paused: Paused
 
-    def __call__(self, inquiry: Inquiry, finding: JointDiagnosis, move: FollowUp) -> Consent:
+    def __call__(self, inquiry: Inquiry, joint: JointDiagnosis, follow_up: FollowUp) -> Consent:
         """The answer, however long it takes."""
-        del finding
-        why = "; ".join(move.why)
-        text = f"measure for {move.minutes:.1f} min more ({inquiry.budget - inquiry.spent:.1f} min are left): {why}"
+        del joint
+        why = "; ".join(follow_up.why)
+        text = (
+            f"measure for {follow_up.minutes:.1f} min more ({inquiry.budget - inquiry.spent:.1f} min are left): {why}"
+        )
         return self.paused.ask(Prompt("approve", inquiry.lineage.ids[0], text))
 
 
@@ -51,13 +53,13 @@ def _stage(name: str, runner: Runner) -> Done:
 
 
 @contextmanager
-def seated(table: Participants) -> Generator[None]:
+def seated(participants: Participants) -> Generator[None]:
     """A block in which inquiries of this process tell, and ask, those at the table."""
-    _tables.append(table)
+    _participants.append(participants)
     try:
         yield
     finally:
-        _tables.pop()
+        _participants.pop()
 
 
 @flow(name="investigate", persist_result=False, log_prints=False)
@@ -83,14 +85,14 @@ def investigate(  # noqa: PLR0913 - a flow's parameters are its form on the serv
     """
     store = archive_of(archive)
     job = requested(recipe, station, units, slots, seed, repeat, faults).job(store)
-    table = _tables[-1] if _tables else Participants()
-    approve = PausedApproval(Paused()) if ask else (table.approve if _tables else always)
-    at = Participants(_stage, approve, table.progress, table.told, table.looked)
-    return play(job, store, Settings(tuple(effects or ()), budget_min, unseen), at)
+    participants = _participants[-1] if _participants else Participants()
+    approve = PausedApproval(Paused()) if ask else (participants.approve if _participants else always)
+    at = Participants(_stage, approve, participants.progress, participants.stage_done, participants.diagnosed)
+    return run_inquiry(job, store, Settings(tuple(effects or ()), budget_min, unseen), at)
 
 
 def investigate_locally(
-    request: Request, archive: Archive, terms: Settings, table: Participants, *, ask: bool
+    request: Request, archive: Archive, settings: Settings, participants: Participants, *, ask: bool
 ) -> dict[str, Any]:
     """The document of the inquiry that the flow makes, on the server named by PREFECT_API_URL or on one of our own."""
     archive.prepare()
@@ -102,14 +104,14 @@ def investigate_locally(
         from pipelines.flows.places import named
 
         close_dead_runs(name)
-        with seated(table), named(archive) as address:
+        with seated(participants), named(archive) as address:
             flow = investigate.with_options(flow_run_name=name)
             found: Any = flow(
                 **request.parameters(),
                 archive=address,
-                effects=list(terms.effects),
-                budget_min=terms.budget,
-                unseen=terms.unseen,
+                effects=list(settings.effects),
+                budget_min=settings.budget,
+                unseen=settings.unseen,
                 ask=ask,
             )
         settle_history(name, len(ORDER))

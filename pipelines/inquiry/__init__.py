@@ -1,1 +1,1 @@
-"""The inquiry: after an ambiguous diagnosis the station measures what parts the rivals, and all is diagnosed together."""
+"""The inquiry: diagnose a run, measure what discriminates between the rival effects, and diagnose all runs together."""

@@ -1,4 +1,4 @@
-"""Why a measurement is proposed, in the user's terms."""
+"""Sentences that explain a proposed measurement."""
 
 from __future__ import annotations
 
@@ -8,8 +8,8 @@ import numpy as np
 
 from inertial import frames
 from inertial.criticism.menus import Kind
-from inertial.planning.changes import Driver
-from inertial.planning.reasons import begins_again, hiding, likeness, reason
+from inertial.planning.reasons import begins_again, confounding_feature, constant_feature, reason
+from inertial.planning.remedies import Driver
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -29,53 +29,55 @@ VARIED: dict[Kind, tuple[Driver, ...]] = {
     "later": ("time", "since_power"),
     "power": ("since_power",),
 }
-"""What the steps of a kind vary: features of the plan that keep that as it is have hidden the difference."""
+"""Quantities that the steps of each kind vary; features of the plan that keep them constant explain the confounding."""
 
 
-def why(state: State, base: Sequence[str], found: Proposal) -> str:
-    """One sentence: what hides the difference of the rivals, what is measured, and what it brings.
+def why(state: State, base: Sequence[str], proposal: Proposal) -> str:
+    """Why a measurement is proposed, in one sentence: the confounded rivals, the cause, the measurement, and the gain.
 
     Parameters
     ----------
     state : the dwells so far
     base : ids of the model beside the rivals
     """
-    first, second = found.pair
-    rivals = " and ".join([", ".join(found.ids[:-1]), found.ids[-1]])
-    hidden = _hidden(state, base, found.kinds, first, second)
-    parted = f"χ² between {first} and its nearest rival goes from {found.before:.1f} to {found.after:.0f}"
-    return f"{rivals} fit alike: {hidden}. {what(state, found)} parts them ({parted}; {found.minutes:.1f} min)"
+    first, second = proposal.pair
+    rivals = " and ".join([", ".join(proposal.ids[:-1]), proposal.ids[-1]])
+    hidden = _hidden(state, base, proposal.kinds, first, second)
+    gain = f"χ² between {first} and its nearest rival rises from {proposal.before:.1f} to {proposal.after:.0f}"
+    steps = f"{what(state, proposal)} discriminates between them"
+    return f"{rivals} fit equally well: {hidden}. {steps} ({gain}; {proposal.minutes:.1f} min)"
 
 
-def shows(state: State, base: Sequence[str], found: Proposal) -> str:
-    """One sentence: why effects were not seen so far, and what is measured to see them."""
-    hidden = dict.fromkeys(r.split("; ")[0] for name in found.ids if (r := reason(state, name, base)))
-    least = f"χ² of a coefficient of typical size: {found.before:.1f}, then {found.after:.0f} at least"
-    return f"{'; '.join(hidden)}. {what(state, found)} shows {', '.join(found.ids)} ({least}; {found.minutes:.1f} min)"
+def shows(state: State, base: Sequence[str], proposal: Proposal) -> str:
+    """Why a measurement is proposed for effects that are not visible, in one sentence."""
+    hidden = dict.fromkeys(r.split("; ")[0] for name in proposal.ids if (r := reason(state, name, base)))
+    gain = f"χ² of a coefficient of typical size rises from {proposal.before:.1f} to at least {proposal.after:.0f}"
+    shown = f"{what(state, proposal)} makes {', '.join(proposal.ids)} visible"
+    return f"{'; '.join(hidden)}. {shown} ({gain}; {proposal.minutes:.1f} min)"
 
 
 def _hidden(state: State, base: Sequence[str], kinds: Sequence[Kind], first: str, second: str) -> str:
-    """What in the plan makes one rival look like the other."""
-    told = likeness(state, first, second, base)
-    if told:
-        return told
-    feature = hiding(state, {d for kind in kinds for d in VARIED[kind]})
-    return f"with {feature or 'what was measured'} {first} and {second} differ by less than the noise"
+    """The feature of the plan that makes the rivals similar."""
+    confounding = confounding_feature(state, first, second, base)
+    if confounding:
+        return confounding
+    feature = constant_feature(state, {d for kind in kinds for d in VARIED[kind]})
+    return f"with {feature or 'the dwells so far'} {first} and {second} differ by less than the noise"
 
 
-def what(state: State, found: Proposal) -> str:
-    """The steps in words."""
-    words = {
-        "poses": lambda: f"measuring {_directions(found.steps)}",
-        "soaks": lambda: f"measuring at {_temperatures(found.steps)}",
-        "waits": lambda: f"waiting {_waits(found.steps)} after a move",
-        "approach": lambda: "coming to the same poses from both sides",
-        "excursion": lambda: f"going to {_temperatures(found.steps)} in this order",
-        "ramp": lambda: f"reading while the temperature moves to {_temperatures(found.steps)}",
-        "later": lambda: f"measuring the same poses again after {_waits(found.steps)}",
-        "power": lambda: f"switching the units off for {_off(found.steps)}: {_power(state, found.ids)}",
+def what(state: State, proposal: Proposal) -> str:
+    """The steps of a proposal as text."""
+    phrases = {
+        "poses": lambda: f"measuring {_directions(proposal.steps)}",
+        "soaks": lambda: f"measuring at {_temperatures(proposal.steps)}",
+        "waits": lambda: f"waiting {_waits(proposal.steps)} after a move",
+        "approach": lambda: "approaching the same poses from both sides",
+        "excursion": lambda: f"going to {_temperatures(proposal.steps)} in this order",
+        "ramp": lambda: f"measuring while the temperature changes to {_temperatures(proposal.steps)}",
+        "later": lambda: f"repeating the same poses after {_waits(proposal.steps)}",
+        "power": lambda: f"switching the units off for {_off(proposal.steps)}: {_power(state, proposal.ids)}",
     }
-    text = ", and ".join(words[kind]() for kind in found.kinds)
+    text = ", and ".join(phrases[kind]() for kind in proposal.kinds)
     return text[:1].upper() + text[1:]
 
 
@@ -104,8 +106,8 @@ def _off(steps: Sequence[SequenceStep]) -> str:
 
 
 def _power(state: State, ids: Sequence[str]) -> str:
-    """Which of some effects begin again with the power, and which go on without it."""
+    """Which effects restart at power-on, and which continue."""
     again = [name for name in ids if begins_again(state, name)]
     on = [name for name in ids if name not in again]
-    parts = [(again, "begins again", "begin again"), (on, "goes on", "go on")]
+    parts = [(again, "restarts", "restart"), (on, "continues", "continue")]
     return ", ".join(f"{' and '.join(names)} {one if len(names) == 1 else many}" for names, one, many in parts if names)

@@ -1,4 +1,4 @@
-"""A follow-up: proposed steps as a recipe that the station can measure, and what they cost there."""
+"""A follow-up: proposed steps as a recipe for the station, and their station time."""
 
 from __future__ import annotations
 
@@ -9,8 +9,7 @@ import numpy as np
 
 from inertial.criticism.menus import Reach
 from inertial.criticism.proposals import Circumstances
-from inertial.planning.sequences import SequenceStep as Wanted
-from inertial.planning.sequences import StationPace
+from inertial.planning.sequences import SequenceStep, StationPace
 from pipelines.jobs.job import Job
 from pipelines.schedule.steps import Step, steps
 from pipelines.schedule.timing import StationPose, drive_of, lag_of, minutes, rule_of
@@ -25,23 +24,24 @@ VARIED_K = 5.0
 
 @dataclass(frozen=True)
 class StationState:
-    """Where a station goes on from, after a run.
+    """State of a station after a run.
 
-    pose, temperature : of its last record; at_once : whether it still stands there: hardware is left in its safe state
+    pose, temperature : of the last record, °C
+    at_once : whether the station is still there; hardware returns to its safe state
     """
 
     pose: Pose
     temperature: float
     at_once: bool
 
-    def step(self) -> Wanted:
-        """The same for the science."""
+    def step(self) -> SequenceStep:
+        """The state as a step of a sequence."""
         outer, inner = np.radians([self.pose.outer_deg, self.pose.inner_deg])
-        return Wanted(float(outer), float(inner), self.temperature)
+        return SequenceStep(float(outer), float(inner), self.temperature)
 
 
-def place_after(job: Job) -> StationState:
-    """Where the station stands when the last record of a job is taken."""
+def state_after(job: Job) -> StationState:
+    """State of the station after the last record of a job."""
     last = steps(job.recipe)[-1]
     safe = job.station.safety
     simulated = job.station.kind == "simulated"
@@ -50,15 +50,15 @@ def place_after(job: Job) -> StationState:
 
 
 def circumstances(base: Job, last: Job, budget: float) -> Circumstances:
-    """What a follow-up may use: the station's reach and pace, its time for steps, and the minutes that are left.
+    """Limits of a follow-up: reach and pace of the station, station time of steps, and the remaining budget.
 
     Parameters
     ----------
-    base : the first job of the lineage, for the temperatures that the device is calibrated at
-    last : the newest one; the station stands where it ended
+    base : the first job of the lineage, for the calibration temperatures
+    last : the newest job; the station continues from its end
     budget : min
     """
-    station, recipe, place = base.station, base.recipe, place_after(last)
+    station, recipe, station_state = base.station, base.recipe, state_after(last)
     limits = station.limits
     low, high = min(recipe.temperatures_C), max(recipe.temperatures_C)
     reach = Reach(
@@ -76,35 +76,37 @@ def circumstances(base: Job, last: Job, budget: float) -> Circumstances:
         soak_s=recipe.soak_min_s,
         rule=rule_of(station),
         drive=drive_of(station),
-        start=place.step(),
+        start=station_state.step(),
     )
-    return Circumstances(reach, pace, lambda wanted: station_minutes(wanted, base, place), budget)
+    return Circumstances(reach, pace, lambda sequence: station_minutes(sequence, base, station_state), budget)
 
 
-def station_minutes(wanted: Sequence[Wanted], base: Job, place: StationState) -> float:
-    """Station time of steps from where the station stands, min."""
-    if not wanted:
+def station_minutes(sequence: Sequence[SequenceStep], base: Job, station_state: StationState) -> float:
+    """Station time of steps from a state of the station, min."""
+    if not sequence:
         return 0.0
-    parts = _parts(wanted, place)
+    parts = _parts(sequence)
     plan: list[Step] = []
     for soak, part in enumerate(parts):
-        settled = _settled(soak, part, place)
+        settled = _settled(soak, part, station_state)
         plan += [
             Step(len(plan) + k, "dwell", soak, s.temperature, pose_of(s), s.wait, settled, s.off)
             for k, s in enumerate(part)
         ]
-    start = StationPose(place.pose.outer_deg, place.pose.inner_deg, place.temperature, place.temperature)
+    start = StationPose(
+        station_state.pose.outer_deg, station_state.pose.inner_deg, station_state.temperature, station_state.temperature
+    )
     return minutes(plan, base.station, base.recipe, start).total
 
 
-def follow_up(wanted: Sequence[Wanted], base: Job, last: Job, parents: Sequence[str], why: str) -> Job:
-    """The job that measures steps only, on the same station and lot, from where the newest run ended."""
-    place = place_after(last)
+def follow_up(sequence: Sequence[SequenceStep], base: Job, last: Job, parents: Sequence[str], why: str) -> Job:
+    """The job that measures only these steps, on the same station and lot, from the end of the newest run."""
+    station_state = state_after(last)
     poses: dict[tuple[float, float], Pose] = {}
-    for step in wanted:
-        plain = pose_of(step)
-        key = (plain.outer_deg, plain.inner_deg)
-        poses.setdefault(key, plain.model_copy(update={"name": f"n{len(poses) + 1:03d}"}))
+    for step in sequence:
+        pose = pose_of(step)
+        key = (pose.outer_deg, pose.inner_deg)
+        poses.setdefault(key, pose.model_copy(update={"name": f"n{len(poses) + 1:03d}"}))
     numbers = {key: k for k, key in enumerate(poses, start=1)}
     soaks = [
         SoakPart(
@@ -113,9 +115,9 @@ def follow_up(wanted: Sequence[Wanted], base: Job, last: Job, parents: Sequence[
             verification=[],
             waits_s=[round(s.wait, 1) for s in part],
             off_s=[round(s.off, 1) for s in part] if any(s.off > 0.0 for s in part) else None,
-            settled=_settled(k, part, place),
+            settled=_settled(k, part, station_state),
         )
-        for k, part in enumerate(_parts(wanted, place))
+        for k, part in enumerate(_parts(sequence))
     ]
     changes = {
         "name": f"{base.recipe.name}-next{len(parents)}",
@@ -132,21 +134,20 @@ def follow_up(wanted: Sequence[Wanted], base: Job, last: Job, parents: Sequence[
 
 
 def _dumped(changes: Mapping[str, object]) -> dict[str, object]:
-    """Models among the changes as plain values: what goes through validation is what a file would hold."""
-    return {key: _plain(value) for key, value in changes.items()}
+    """Changes with models as plain values, so that validation sees what a recipe file contains."""
+    return {key: _dumped_value(value) for key, value in changes.items()}
 
 
-def _plain(value: object) -> object:
+def _dumped_value(value: object) -> object:
     if isinstance(value, list):
-        return [_plain(item) for item in cast("list[object]", value)]
+        return [_dumped_value(item) for item in cast("list[object]", value)]
     return value.model_dump() if isinstance(value, Pose | SoakPart) else value
 
 
-def _parts(wanted: Sequence[Wanted], place: StationState) -> list[list[Wanted]]:
-    """Steps by soak: a new one where the temperature changes."""
-    del place
-    parts: list[list[Wanted]] = []
-    for step in wanted:
+def _parts(sequence: Sequence[SequenceStep]) -> list[list[SequenceStep]]:
+    """Steps by soak: a change of temperature starts a new soak."""
+    parts: list[list[SequenceStep]] = []
+    for step in sequence:
         if parts and parts[-1][0].temperature == step.temperature:
             parts[-1].append(step)
         else:
@@ -154,19 +155,21 @@ def _parts(wanted: Sequence[Wanted], place: StationState) -> list[list[Wanted]]:
     return parts
 
 
-def _settled(number: int, part: Sequence[Wanted], place: StationState) -> bool:
-    """Whether the devices must settle first: not where they stand settled there already, nor where they are read on the way."""
-    there = number == 0 and place.at_once and abs(part[0].temperature - place.temperature) < 0.5
-    return part[0].soaked and not there
+def _settled(number: int, part: Sequence[SequenceStep], station_state: StationState) -> bool:
+    """Whether the devices must settle first: not where they are already settled, nor for dwells during a temperature change."""
+    already_settled = (
+        number == 0 and station_state.at_once and abs(part[0].temperature - station_state.temperature) < 0.5
+    )
+    return part[0].soaked and not already_settled
 
 
-def pose_of(step: Wanted) -> Pose:
-    """The pose of a step, without a name worth having."""
+def pose_of(step: SequenceStep) -> Pose:
+    """The pose of a step, with a placeholder name."""
     outer, inner = _key(step)
     return Pose(name="next", outer_deg=outer, inner_deg=inner)
 
 
-def _key(step: Wanted) -> tuple[float, float]:
+def _key(step: SequenceStep) -> tuple[float, float]:
     return round(float(np.degrees(step.outer)), 4) + 0.0, round(float(np.degrees(step.inner)), 4) + 0.0
 
 

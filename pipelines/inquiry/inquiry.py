@@ -1,4 +1,4 @@
-"""The inquiry of one lot: what is known from all measurements so far, and what is to be measured next, or why nothing is."""
+"""The inquiry of one lot: joint diagnosis of all runs so far, and the next follow-up or the reason for the end."""
 
 from __future__ import annotations
 
@@ -31,28 +31,28 @@ if TYPE_CHECKING:
 End = Literal["adequate", "told_apart", "nothing_parts", "budget", "declined", "asked", "blocked", "unexplained"]
 
 EXTRA = 0.3
-"""Share of the first run's station time that follow-ups may take where no budget is given."""
+"""Default budget of follow-ups, as a share of the first run's station time."""
 
 MOST_ROUNDS = 6
 FOLLOW_UP = ("capture", "validate", "reduce")
-TABLE_OF_CODE = ("inertial", "pipelines.diagnosis.diagnose", "pipelines.tables.dwells")
+SOURCES = ("inertial", "pipelines.diagnosis.diagnose", "pipelines.tables.dwells")
 FILE = "inquiry.json"
 
 
 @dataclass(frozen=True)
 class JointDiagnosis:
-    """The diagnosis of all measurements of a lineage together."""
+    """The diagnosis of all runs of a lineage together."""
 
     lineage: RunSequence
     effects: tuple[str, ...]
     document: dict[str, Any]
-    found: Measured
+    measured: Measured
     diagnosis: Diagnosis | None
     following: Proposed
 
     @property
     def state(self) -> State:
-        """The dwells that physics was looked for in."""
+        """The dwells of the diagnosis."""
         if self.diagnosis is None:
             raise LookupError("an inquiry in which every unit has a data fault has no state")
         return self.diagnosis.problem.lot.state
@@ -65,9 +65,12 @@ class JointDiagnosis:
 
 @dataclass(frozen=True)
 class FollowUp:
-    """A measurement that is proposed, or was begun already.
+    """A proposed measurement.
 
-    rows : of the proposal, as in the document; why : a sentence per class
+    rows : rows of the proposal, as in the document
+    why : one sentence per class
+    minutes : station time, min
+    begun : whether its capture was started before
     """
 
     job: Job
@@ -79,7 +82,7 @@ class FollowUp:
 
 @dataclass(frozen=True)
 class Ending:
-    """Why nothing more is measured."""
+    """Why the inquiry ends."""
 
     end: End
     text: str
@@ -87,11 +90,11 @@ class Ending:
 
 @dataclass
 class Inquiry:
-    """An inquiry that stands at some point of its way.
+    """An inquiry between two steps.
 
-    effects : the model that is judged; the recipe's where empty
-    budget : station minutes for follow-ups
-    unseen : whether effects that the plan could not see are measured for, too, once nothing is ambiguous
+    effects : ids of the model to diagnose; the recipe's where empty
+    budget : min, station time for follow-ups
+    unseen : whether to measure follow-ups for effects that are not visible, too, once no class is ambiguous
     """
 
     archive: Archive
@@ -109,105 +112,107 @@ class Inquiry:
 
     @property
     def spent(self) -> float:
-        """Station minutes of the follow-ups so far."""
+        """Station time of the follow-ups so far, min."""
         return sum(self.lineage.minutes()[1:])
 
-    def look(self) -> JointDiagnosis:
-        """The diagnosis of everything that was measured so far, with what the station could measure next."""
+    def diagnose(self) -> JointDiagnosis:
+        """The diagnosis of all runs so far, with proposals for the next measurement."""
         dwells, history = self.lineage.dwells(), self.lineage.history()
         around = circumstances(self.base, self.jobs[-1], self.budget - self.spent)
         with threadpool_limits(1):
-            found, faults, diagnosis = examined(dwells, history, self.effects)
+            measured, faults, diagnosis = examined(dwells, history, self.effects)
             following = Proposed() if diagnosis is None else proposed(diagnosis, around)
-            told = document(found, faults, diagnosis, following)
-        told.update(_named(found, self.effects, diagnosis))
-        return JointDiagnosis(self.lineage, self.effects, told, found, diagnosis, following)
+            content = document(measured, faults, diagnosis, following)
+        content.update(_report_fields(measured, self.effects, diagnosis))
+        return JointDiagnosis(self.lineage, self.effects, content, measured, diagnosis, following)
 
-    def next(self, finding: JointDiagnosis) -> FollowUp | Ending:
-        """What to measure next, or why nothing."""
+    def next_step(self, joint: JointDiagnosis) -> FollowUp | Ending:
+        """The next follow-up, or why the inquiry ends."""
         begun = self._begun()
         if begun is not None:
             return begun
-        ended = _ended(finding)
-        showing = finding.following.showing
+        ended = _ended(joint)
+        showing = joint.following.showing
         if ended is not None:
             if self.unseen and showing is not None and ended.end != "blocked" and len(self.lineage.runs) <= MOST_ROUNDS:
-                return self._move((showing,), (shows(finding.state, self.effects, showing),))
+                return self._follow_up((showing,), (shows(joint.state, self.effects, showing),))
             return ended
         if len(self.lineage.runs) > MOST_ROUNDS:
-            return Ending("nothing_parts", f"{MOST_ROUNDS} follow-ups have not told {_classes(finding)} apart")
-        return self._proposed(finding)
+            return Ending("nothing_parts", f"{MOST_ROUNDS} follow-ups have not discriminated between {_classes(joint)}")
+        return self._proposed(joint)
 
-    def _proposed(self, finding: JointDiagnosis) -> FollowUp | Ending:
-        diagnosis = finding.diagnosis
+    def _proposed(self, joint: JointDiagnosis) -> FollowUp | Ending:
+        diagnosis = joint.diagnosis
         if diagnosis is None:
             return Ending("blocked", "every unit has a data fault")
         left = self.budget - self.spent
-        free = finding.following.found
-        if not free:
-            wanted = proposed(diagnosis, circumstances(self.base, self.jobs[-1], float("inf"))).found
-            if not wanted:
-                return Ending("nothing_parts", f"nothing that this station does parts {_classes(finding)}")
-            needed = sum(p.minutes for p in wanted)
+        affordable = joint.following.found
+        if not affordable:
+            proposals = proposed(diagnosis, circumstances(self.base, self.jobs[-1], float("inf"))).found
+            if not proposals:
+                return Ending(
+                    "nothing_parts", f"no measurement on this station discriminates between {_classes(joint)}"
+                )
+            needed = sum(p.minutes for p in proposals)
             text = (
-                f"telling {_classes(finding)} apart takes {needed:.0f} min more, {max(left, 0.0):.0f} of {self.budget:.0f} min "
-                f"are left; give --budget {self.spent + needed:.0f}"
+                f"discriminating between {_classes(joint)} needs {needed:.0f} min more station time, {max(left, 0.0):.0f} of "
+                f"{self.budget:.0f} min are left; give --budget {self.spent + needed:.0f}"
             )
             return Ending("budget", text)
-        return self._move(free, tuple(why(finding.state, self.effects, p) for p in free))
+        return self._follow_up(affordable, tuple(why(joint.state, self.effects, p) for p in affordable))
 
-    def _move(self, wanted: Sequence[Proposal], reasons: tuple[str, ...]) -> FollowUp:
-        """Proposals as a measurement of the station."""
-        steps: list[SequenceStep] = [s for p in wanted for s in p.steps]
+    def _follow_up(self, proposals: Sequence[Proposal], reasons: tuple[str, ...]) -> FollowUp:
+        """The follow-up that measures the proposals."""
+        steps: list[SequenceStep] = [s for p in proposals for s in p.steps]
         job = follow_up(steps, self.base, self.jobs[-1], self.lineage.ids, "; ".join(reasons))
         recipe = job.recipe.model_copy(update={"effects": list(self.effects)})
         job = Job(recipe, job.limits, job.lot, job.station, parents=job.parents)
-        rows = tuple(row for p in wanted for row in rows_of(p))
-        return FollowUp(job, rows, reasons, sum(p.minutes for p in wanted))
+        rows = tuple(row for p in proposals for row in rows_of(p))
+        return FollowUp(job, rows, reasons, sum(p.minutes for p in proposals))
 
     def _begun(self) -> FollowUp | None:
-        """A follow-up of this lineage that was begun before: it was approved then, and goes on."""
+        """The follow-up of this lineage whose capture was started before; it was approved then. None where there is none."""
         for info in reversed(self.archive.runs()):
             run = self.archive.run(info.id)
             about = run.about
-            mine = about.get("parents") == list(self.lineage.ids)
-            if mine and about["recipe"]["effects"] == list(self.effects):
-                told = files.read_json(run.path / FILE)["round"] if (run.path / FILE).is_file() else {}
-                rows, reasons = told.get("next_measurements", ()), told.get("why", [about["recipe"]["description"]])
+            same_lineage = about.get("parents") == list(self.lineage.ids)
+            if same_lineage and about["recipe"]["effects"] == list(self.effects):
+                saved = files.read_json(run.path / FILE)["round"] if (run.path / FILE).is_file() else {}
+                rows, reasons = saved.get("next_measurements", ()), saved.get("why", [about["recipe"]["description"]])
                 return FollowUp(
-                    self._again(about), tuple(rows), tuple(reasons), told.get("planned_minutes", 0.0), begun=True
+                    self._job_of(about), tuple(rows), tuple(reasons), saved.get("planned_minutes", 0.0), begun=True
                 )
         return None
 
-    def _again(self, about: dict[str, Any]) -> Job:
-        """The job of a follow-up that was begun: the station and lot are the first run's, as they are here."""
+    def _job_of(self, about: dict[str, Any]) -> Job:
+        """The job of a follow-up that was started before, with the station and lot of the first run."""
         recipe = Recipe.model_validate(about["recipe"])
         base = self.base
         return Job(recipe, base.limits, base.lot, base.station, about["capture"], tuple(about["parents"]))
 
-    def runner(self, move: FollowUp, progress: Progress) -> Runner:
-        """The runner of a follow-up: its station goes on from where the newest run left it."""
+    def runner(self, follow_up: FollowUp, progress: Progress) -> Runner:
+        """The runner of a follow-up: the station continues from the state at the end of the newest run."""
         before = self.archive.capture(self.jobs[-1].capture_id)
-        return Runner(move.job, self.archive, progress, measure=_going_on(before))
+        return Runner(follow_up.job, self.archive, progress, measure=_continued(before))
 
-    def measured(self, move: FollowUp, run: Run) -> None:
-        """Takes a follow-up that was measured into the lineage."""
-        self.jobs.append(move.job)
+    def add_run(self, follow_up: FollowUp, run: Run) -> None:
+        """Adds the run of a measured follow-up to the lineage."""
+        self.jobs.append(follow_up.job)
         self.lineage = self.lineage.with_run(run)
         minutes = self.lineage.minutes()[-1]
         self.rounds.append(
             {
                 "run": run.id,
-                "why": list(move.why),
-                "next_measurements": list(move.rows),
-                "planned_minutes": round(move.minutes, 2),
+                "why": list(follow_up.why),
+                "next_measurements": list(follow_up.rows),
+                "planned_minutes": round(follow_up.minutes, 2),
                 "minutes": round(minutes, 2),
-                "begun_before": move.begun,
+                "begun_before": follow_up.begun,
             }
         )
 
-    def keep(self, finding: JointDiagnosis) -> None:
-        """Keeps what the newest follow-up has told, with the report of the diagnosis of all runs together."""
+    def save(self, joint: JointDiagnosis) -> None:
+        """Saves the joint diagnosis and its report with the newest follow-up."""
         run = self.lineage.runs[-1]
         if len(self.lineage.runs) < 2:
             return
@@ -215,7 +220,7 @@ class Inquiry:
         for parent in self.lineage.runs[:-1]:
             inputs[f"dwells of {parent.id}"] = parent.manifest("dwells")["sha256"]
         parameters = {"effects": list(self.effects), "parents": list(self.lineage.ids[:-1])}
-        code = code_hash(TABLE_OF_CODE)
+        code = code_hash(SOURCES)
         key = stage_key("inquiry", inputs, parameters, code)
         if run.has_report(key):
             return
@@ -224,20 +229,20 @@ class Inquiry:
         content = {
             "runs": list(self.lineage.ids),
             "effects": list(self.effects),
-            "diagnosis": plain_rows(finding.document),
+            "diagnosis": without_report_fields(joint.document),
         }
         files.publish(run.path / FILE, files.json_bytes({**content, "round": self.rounds[-1]}))
-        html = render_diagnosis(finding.document, finding.found, finding.diagnosis, " + ".join(self.lineage.ids))
+        html = render_diagnosis(joint.document, joint.measured, joint.diagnosis, " + ".join(self.lineage.ids))
         run.save_report(key, html, {"inputs": inputs, "parameters": parameters, "code": code})
 
-    def document(self, finding: JointDiagnosis, verdict: Ending) -> dict[str, Any]:
+    def document(self, joint: JointDiagnosis, ending: Ending) -> dict[str, Any]:
         """The whole inquiry as one document."""
         minutes = self.lineage.minutes()
         return {
             "run": self.lineage.ids[0],
             "runs": list(self.lineage.ids),
-            "ended": verdict.end,
-            "text": verdict.text,
+            "ended": ending.end,
+            "text": ending.text,
             "minutes": {
                 "first_run": round(minutes[0], 2),
                 "follow_ups": round(sum(minutes[1:]), 2),
@@ -245,21 +250,21 @@ class Inquiry:
                 "share": round(sum(minutes[1:]) / minutes[0], 4),
             },
             "rounds": self.rounds,
-            **finding.document,
+            **joint.document,
         }
 
 
 def begin(
     archive: Archive, job: Job, run: Run, effects: Sequence[str], budget: float | None, *, unseen: bool = False
 ) -> Inquiry:
-    """The inquiry of a run that was measured: with the budget given, or a share of the station time that it took."""
+    """The inquiry of a finished run, with a budget in min, or a share of the run's station time where None."""
     lineage = RunSequence((run,))
     allowed = EXTRA * lineage.minutes()[0] if budget is None else budget
     return Inquiry(archive, [job], lineage, tuple(effects or job.recipe.effects), allowed, unseen)
 
 
-def _going_on(before: Records) -> Any:
-    """A measurement that begins with the station as another capture left it."""
+def _continued(before: Records) -> Any:
+    """The capture of a station that continues from the state at the end of another capture."""
 
     def measure(job: Job, records: Records, progress: Progress) -> None:
         from pipelines.capture.capture import capture
@@ -273,25 +278,25 @@ def _going_on(before: Records) -> Any:
     return measure
 
 
-def _ended(finding: JointDiagnosis) -> Ending | None:
-    told = finding.document
-    if finding.diagnosis is None:
-        return Ending("blocked", "every unit has a data fault; no physics is diagnosed until it is mended")
-    if told["adequate"]:
-        return Ending("adequate", "the model leaves nothing but the noise that is there")
-    if finding.ambiguous:
+def _ended(joint: JointDiagnosis) -> Ending | None:
+    document = joint.document
+    if joint.diagnosis is None:
+        return Ending("blocked", "every unit has a data fault; correct it, then diagnose again")
+    if document["adequate"]:
+        return Ending("adequate", "the model is adequate: the residuals are at the noise floor")
+    if joint.ambiguous:
         return None
-    if not told["classes"]:
-        return Ending("unexplained", "the model is not adequate, and no effect of the catalogue explains the rest")
-    return Ending("told_apart", f"one effect a class stands: {', '.join(told['recommended'])}")
+    if not document["classes"]:
+        return Ending("unexplained", "the model is not adequate, and no effect of the catalogue explains the residuals")
+    return Ending("told_apart", f"every class contains one effect: {', '.join(document['recommended'])}")
 
 
-def _classes(finding: JointDiagnosis) -> str:
-    return ", and ".join(" | ".join(group) for group in finding.ambiguous)
+def _classes(joint: JointDiagnosis) -> str:
+    return ", and ".join(" | ".join(group) for group in joint.ambiguous)
 
 
-def _named(found: Measured, effects: Sequence[str], diagnosis: Diagnosis | None) -> dict[str, Any]:
-    """What reports and people need beside the fixed keys."""
+def _report_fields(measured: Measured, effects: Sequence[str], diagnosis: Diagnosis | None) -> dict[str, Any]:
+    """Fields of the document for reports, beside the fixed keys."""
     from inertial import effects as catalogue
     from inertial.planning.reasons import reason
 
@@ -300,13 +305,13 @@ def _named(found: Measured, effects: Sequence[str], diagnosis: Diagnosis | None)
     reasons = {} if diagnosis is None else {n: reason(diagnosis.problem.lot.state, n, effects) for n in unseen}
     return {
         "effects": list(effects),
-        "units": list(found.units),
+        "units": list(measured.units),
         "breakers": breakers,
         "reasons": reasons,
         "offer": None,
     }
 
 
-def plain_rows(told: dict[str, Any]) -> dict[str, Any]:
-    """A document without what only pictures need."""
-    return {key: value for key, value in told.items() if key not in {"breakers", "offer"}}
+def without_report_fields(document: dict[str, Any]) -> dict[str, Any]:
+    """A document without the fields that only reports use."""
+    return {key: value for key, value in document.items() if key not in {"breakers", "offer"}}

@@ -1,4 +1,4 @@
-"""Runs that go on with one another's measurements, as one set of dwells: one station, one lot, one clock."""
+"""A run and its follow-ups as one set of dwells: one station, one lot, one clock."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ NUMBERED = ("dwell", "record")
 
 @dataclass(frozen=True)
 class RunSequence:
-    """A first run and those that went on from it, in order."""
+    """A first run and its follow-ups, in order."""
 
     runs: tuple[Run, ...]
 
@@ -29,7 +29,7 @@ class RunSequence:
         return tuple(run.id for run in self.runs)
 
     def dwells(self) -> pd.DataFrame:
-        """Dwells of all runs, numbered through; units that one of them refused are left out."""
+        """Dwells of all runs, numbered consecutively, without units that a run refused."""
         tables = [run.table("dwells") for run in self.runs]
         accepted = set.intersection(*(set(table["unit"].astype(str)) for table in tables))
         if not accepted:
@@ -37,13 +37,13 @@ class RunSequence:
         return _numbered_through([table[table["unit"].isin(accepted)] for table in tables])
 
     def _refused(self) -> str:
-        """Which run left no unit to be judged, and why."""
+        """Message for a lineage without a unit that all runs accepted."""
         verdicts = self.runs[-1].table("verdicts")
         reasons = verdicts.loc[verdicts["refused"], "reason"].astype(str).unique().tolist()
         why = f" ({reasons[0]})" if reasons else ""
         return (
             f"investigate: no unit was accepted by all of {', '.join(self.ids)}, at least one is needed; the last refused "
-            f"{int(verdicts['refused'].sum())} of {len(verdicts)}{why}; mend that, and investigate a run measured after it"
+            f"{int(verdicts['refused'].sum())} of {len(verdicts)}{why}; correct the cause and investigate a new run"
         )
 
     def history(self) -> pd.DataFrame:
@@ -56,23 +56,23 @@ class RunSequence:
         return [(end - begin) / 60.0 for begin, end in zip([0.0, *ends], ends, strict=False)]
 
     def with_run(self, run: Run) -> RunSequence:
-        """The lineage with one more run."""
+        """The sequence with one more run."""
         return RunSequence((*self.runs, run))
 
 
 def _numbered_through(tables: Sequence[pd.DataFrame]) -> pd.DataFrame:
-    """Tables below one another, the numbers of dwells and soaks of each beginning after those before it."""
-    found: list[pd.DataFrame] = []
+    """Concatenated tables; the numbers of dwells and soaks continue from table to table."""
+    numbered: list[pd.DataFrame] = []
     for table in tables:
         shifted = table.copy()
         for column in (*NUMBERED, "soak"):
-            if found and column in table.columns:
-                shifted[column] = table[column] + 1 + max(int(before[column].max()) for before in found)
-        found.append(shifted)
-    return pd.concat(found, ignore_index=True)
+            if numbered and column in table.columns:
+                shifted[column] = table[column] + 1 + max(int(before[column].max()) for before in numbered)
+        numbered.append(shifted)
+    return pd.concat(numbered, ignore_index=True)
 
 
 def _end(run: Run) -> float:
-    """When the last record of a run ended, s of the station's clock."""
+    """End of the last record of a run, s on the station's clock."""
     readings = run.table("readings")
     return float((readings["start_s"] + readings["duration_s"]).max())

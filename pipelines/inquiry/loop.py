@@ -1,6 +1,6 @@
-"""An inquiry from beginning to end: run, diagnose, propose, measure only that, diagnose again.
+"""The inquiry as a loop: run, diagnose, propose, measure the follow-up, diagnose again.
 
-Who does the stages (a plain call, or a task of the orchestrator) and who approves the extra minutes is another's business.
+The stages run as plain calls or as tasks of the orchestrator; approval of extra station time is supplied by the caller.
 """
 
 from __future__ import annotations
@@ -25,24 +25,24 @@ Consent = Literal["go", "stop", "nobody"]
 
 
 class Stages(Protocol):
-    """Whoever does a stage."""
+    """Runs a stage."""
 
     def __call__(self, name: str, runner: Runner) -> Done:
-        """One stage of a runner."""
+        """Run one stage of a runner."""
         ...
 
 
 class Approval(Protocol):
-    """Whoever approves the extra minutes."""
+    """Approval of extra station time."""
 
-    def __call__(self, inquiry: Inquiry, finding: JointDiagnosis, move: FollowUp) -> Consent:
-        """``go`` to measure it, ``stop`` to leave it, ``nobody`` where there is nobody to be asked."""
+    def __call__(self, inquiry: Inquiry, joint: JointDiagnosis, follow_up: FollowUp) -> Consent:
+        """``go`` measures the follow-up, ``stop`` declines it, ``nobody`` reports that nobody is available to approve it."""
         ...
 
 
-def always(inquiry: Inquiry, finding: JointDiagnosis, move: FollowUp) -> Consent:
-    """Everything within the budget is approved."""
-    del inquiry, finding, move
+def always(inquiry: Inquiry, joint: JointDiagnosis, follow_up: FollowUp) -> Consent:
+    """Approval of every follow-up within the budget."""
+    del inquiry, joint, follow_up
     return "go"
 
 
@@ -53,9 +53,11 @@ def directly(name: str, runner: Runner) -> Done:
 
 @dataclass(frozen=True)
 class Settings:
-    """What an inquiry is given: the model to judge (the recipe's where empty), and station minutes for follow-ups.
+    """Settings of an inquiry.
 
-    ``unseen``: effects that the plan could not see are measured for, too.
+    effects : ids of the model to diagnose; the recipe's where empty
+    budget : min, station time for follow-ups; a share of the first run where None
+    unseen : whether to measure follow-ups for effects that are not visible under the plan, too
     """
 
     effects: Sequence[str] = ()
@@ -65,44 +67,51 @@ class Settings:
 
 @dataclass(frozen=True)
 class Participants:
-    """Who takes part: who does the stages, who approves, and who is told."""
+    """Callbacks of an inquiry.
+
+    stage : runs a stage
+    approve : approves extra station time
+    progress : progress of the stages
+    stage_done : called after every stage
+    diagnosed : called after every joint diagnosis
+    """
 
     stage: Stages = directly
     approve: Approval = always
     progress: Progress = silent
-    told: Callable[[Done], None] = lambda _done: None
-    looked: Callable[[JointDiagnosis], None] = lambda _finding: None
+    stage_done: Callable[[Done], None] = lambda _done: None
+    diagnosed: Callable[[JointDiagnosis], None] = lambda _joint: None
 
 
-def play(job: Job, archive: Archive, terms: Settings, table: Participants) -> dict[str, Any]:
-    """The document of an inquiry that went as far as it could.
+def run_inquiry(job: Job, archive: Archive, settings: Settings, participants: Participants) -> dict[str, Any]:
+    """The document of an inquiry, run until it ends.
 
-    Given again after it was stopped it goes on where it was: what was measured is not measured again, and a follow-up that was
-    begun is finished first.
+    An inquiry that was interrupted continues: completed stages are not repeated, and a follow-up that was started is completed
+    first.
     """
-    runner = Runner(job, archive, table.progress)
+    runner = Runner(job, archive, participants.progress)
     for name in ORDER:
-        table.told(table.stage(name, runner))
-    inquiry = begin(archive, job, runner.run, terms.effects, terms.budget, unseen=terms.unseen)
+        participants.stage_done(participants.stage(name, runner))
+    inquiry = begin(archive, job, runner.run, settings.effects, settings.budget, unseen=settings.unseen)
     while True:
-        finding = inquiry.look()
-        inquiry.keep(finding)
-        table.looked(finding)
-        move = inquiry.next(finding)
-        if isinstance(move, Ending):
-            return inquiry.document(finding, move)
-        consent = "go" if move.begun else table.approve(inquiry, finding, move)
+        joint = inquiry.diagnose()
+        inquiry.save(joint)
+        participants.diagnosed(joint)
+        follow_up = inquiry.next_step(joint)
+        if isinstance(follow_up, Ending):
+            return inquiry.document(joint, follow_up)
+        consent = "go" if follow_up.begun else participants.approve(inquiry, joint, follow_up)
         if consent != "go":
-            return inquiry.document(finding, _left(consent, move))
-        follower = inquiry.runner(move, table.progress)
+            return inquiry.document(joint, _not_approved(consent, follow_up))
+        runner = inquiry.runner(follow_up, participants.progress)
         for name in FOLLOW_UP:
-            table.told(table.stage(name, follower))
-        inquiry.measured(move, follower.run)
+            participants.stage_done(participants.stage(name, runner))
+        inquiry.add_run(follow_up, runner.run)
 
 
-def _left(consent: Consent, move: FollowUp) -> Ending:
-    """Why a proposal was not measured."""
-    told = "; ".join(move.why)
+def _not_approved(consent: Consent, follow_up: FollowUp) -> Ending:
+    """The ending of an inquiry whose follow-up was declined, or waits for approval."""
+    why = "; ".join(follow_up.why)
     if consent == "stop":
-        return Ending("declined", f"not approved: {move.minutes:.1f} min for: {told}")
-    return Ending("asked", f"{move.minutes:.1f} min of the station's time wait for approval: {told}")
+        return Ending("declined", f"a follow-up of {follow_up.minutes:.1f} min was declined: {why}")
+    return Ending("asked", f"a follow-up of {follow_up.minutes:.1f} min station time waits for approval: {why}")

@@ -1,1 +1,1 @@
-"""Plans: what a recipe can see and costs, and the cheapest recipe for errors that are required."""
+"""Plans: visibility of effects, expected errors and station time of a recipe; search for a quicker recipe."""

@@ -1,4 +1,4 @@
-"""Rival effects that a recipe is to tell apart, as a wish; and how far a recipe does."""
+"""Discrimination between rival effects as a requirement, and the separation that a recipe reaches."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 
 from inertial import design
 from inertial.planning.discrimination import Discrimination
-from pipelines.planning.requirement import Requirement, between, candidates
+from pipelines.planning.requirement import Requirement, candidates, temperature_choices
 from schemas.errors import WrongUse
 from schemas.units import MICRO
 
@@ -23,15 +23,16 @@ if TYPE_CHECKING:
     Array = NDArray[np.float64]
 
 ENOUGH = 50.0
-"""Chi-square of the wrong effect in a lot from which the two are told apart."""
+"""χ² of the wrong effect over a lot from which two effects count as discriminated."""
 
 SIZE_UG = 100.0
+"""Default size of each rival where it is largest, µg."""
 
 CANDIDATES = 48
-"""Directions to choose from: rivals part where their curves are farthest apart, and that lies between the usual ones."""
+"""Number of candidate directions: rivals differ most between the faces and edges, so more directions are offered."""
 
 
-def parted(
+def discrimination_requirement(
     against: PlanContext,
     rivals: Sequence[str],
     levels: Sequence[float],
@@ -40,47 +41,49 @@ def parted(
     enough: float = ENOUGH,
     plan: str = "",
     see: Sequence[str] = (),
-    verification: int = 1,
 ) -> Requirement:
-    """The wish that a recipe tells rivals apart; the model of ``against`` is fitted anyway.
+    """The requirement that a recipe discriminates between rivals; the model of ``against`` is fitted beside them.
 
     Parameters
     ----------
-    against : the textbook plan, whose poses say how large a column is
-    levels : °C, the range of temperatures
-    size_ug : what each rival adds where it is largest, µg
-    enough : chi-square that the wrong one must leave in the recipe's lot, as a diagnosis counts it
+    against : the textbook plan; its poses scale the columns
+    levels : °C, the temperature range
+    size_ug : contribution of each rival where it is largest, µg
+    enough : χ² of the wrong rival over the recipe's lot, as a diagnosis computes it
     plan : named plan of poses to choose from
+
+    Raises
+    ------
+    WrongUse
+        Fewer than two rivals, or an effect of the station among them.
     """
     model = [e for e in against.recipe.effects if e not in rivals]
-    effects = (*design_names(model), *rivals)
+    effects = (*unit_effects(model), *rivals)
     _refuse(rivals, effects)
-    rows = _columns(effects, against)
-    rms = np.sqrt(np.mean(rows**2, axis=1))
+    columns = _columns(effects, against)
+    rms = np.sqrt(np.mean(columns**2, axis=1))
     scale = 1.0 / np.where(rms > 0.0, rms, 1.0)
     names = [name for name, _ in design.local_names(design.split(effects)[0], 0)]
-    columns = [tuple(k for k, name in enumerate(names) if name == rival) for rival in rivals]
-    largest = np.max(np.abs(rows), axis=1)
+    places = [tuple(k for k, name in enumerate(names) if name == rival) for rival in rivals]
+    largest = np.max(np.abs(columns), axis=1)
     sizes = [
-        size_ug / MICRO / np.where(largest > 0.0, largest, 1.0)[:, list(own)] / scale[:, list(own)] for own in columns
+        size_ug / MICRO / np.where(largest > 0.0, largest, 1.0)[:, list(own)] / scale[:, list(own)] for own in places
     ]
     base = tuple(k for k, name in enumerate(names) if name not in rivals)
     units = max(1, len(against.recipe.units))
-    parting = Discrimination(base, tuple(columns), tuple(sizes), enough, units)
     return Requirement(
-        wanted=scale,
+        errors=scale,
         see=tuple(see),
         levels=(),
         candidates=candidates(against.station, plan, CANDIDATES),
-        legal=between(levels),
-        verification=verification,
+        optional_levels=temperature_choices(levels),
         effects=effects,
-        parting=parting,
+        discrimination=Discrimination(base, tuple(places), tuple(sizes), enough, units),
     )
 
 
-def design_names(model: Sequence[str]) -> tuple[str, ...]:
-    """The effects of a model that each unit has for itself."""
+def unit_effects(model: Sequence[str]) -> tuple[str, ...]:
+    """The effects of a model whose coefficients belong to each unit, not to the station."""
     return tuple(effect.id for effect in design.split(model)[0])
 
 
@@ -92,24 +95,25 @@ def _refuse(rivals: Sequence[str], effects: Sequence[str]) -> None:
     station = [effect.id for effect in design.split(effects)[1]]
     if station:
         raise WrongUse(
-            f"plan: --part {station[0]}: an effect of the station, effects of the device are needed; 'tumbleline investigate' "
-            "parts those of the station"
+            f"plan: --part {station[0]}: found an effect of the station, effects of the device are needed; "
+            "'tumbleline investigate' discriminates between effects of the station"
         )
 
 
-def _columns(effects: Sequence[str], course: PlanContext) -> Array:
+def _columns(effects: Sequence[str], context: PlanContext) -> Array:
     sensor, _ = design.split(effects)
-    return design.local_columns(sensor, course.state, design.starting_values(sensor, course.state))
+    return design.local_columns(sensor, context.state, design.starting_values(sensor, context.state))
 
 
-def partings(wish: Requirement, course: PlanContext) -> list[dict[str, Any]]:
-    """Chi-square that each rival leaves of each other in a recipe's lot; none where there are no rivals."""
-    if wish.parting is None:
+def rival_separations(requirement: Requirement, context: PlanContext) -> list[dict[str, Any]]:
+    """χ² of every wrong rival over a recipe's lot, one row per ordered pair; empty where no rivals are named."""
+    if requirement.discrimination is None:
         return []
-    rows = _columns(wish.effects, course) * wish.wanted[:, None, :]
-    found = wish.parting.separations(np.swapaxes(rows, -1, -2) @ np.linalg.solve(course.covariance, rows))
-    rivals = wish.effects[-len(wish.parting.rivals) :]
+    columns = _columns(requirement.effects, context) * requirement.errors[:, None, :]
+    matrix = np.swapaxes(columns, -1, -2) @ np.linalg.solve(context.covariance, columns)
+    separations = requirement.discrimination.separations(matrix)
+    rivals = requirement.effects[-len(requirement.discrimination.rivals) :]
     return [
         {"true": true, "wrong": wrong, "chi_square": float(value)}
-        for (true, wrong), value in zip(permutations(rivals, 2), found, strict=True)
+        for (true, wrong), value in zip(permutations(rivals, 2), separations, strict=True)
     ]

@@ -1,4 +1,4 @@
-"""How many dwells each soak of a design needs: as few as fulfil a wish, more where they bring more."""
+"""Number of dwells per soak of a plan design: the fewest that meet a requirement."""
 
 from __future__ import annotations
 
@@ -13,72 +13,80 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from pipelines.planning.layout import PlanDesign, TimedDesign
+    from pipelines.planning.timed_design import PlanDesign, TimedDesign
 
     Array = NDArray[np.float64]
 
 FEWEST = 4
-"""Dwells of a soak: the reference pose at both ends, and others between."""
+"""Minimum number of dwells of a soak: the reference pose at both ends, and two other poses between."""
 
 MOST = 420
-"""Dwells in all: more take longer to arrange than they gain."""
+"""Maximum number of dwells of a recipe: above it the search time grows faster than the gain."""
 
 _FIRST = 3
-"""Part of a soak's dwells that is taken away at first."""
+"""The first reduction removes one part in this many of a soak's dwells."""
 
 
-def fewest_dwells(layout: TimedDesign, made: PlanDesign, allowed: Array) -> PlanDesign | None:
-    """The design with the fewest dwells whose plain arrangement lacks no more of the wish than is allowed.
+def fewest_dwells(timed: TimedDesign, design: PlanDesign, allowed: Array) -> PlanDesign | None:
+    """The design with the fewest dwells whose starting arrangement stays within the allowed ratios; None where there is none.
 
     Parameters
     ----------
-    made : its soaks and the length of its dwells; the counts are found
-    allowed : as :meth:`Layout.shortfall`'s, what an exchange of poses will mend
+    design : soaks and dwell length; its counts are replaced
+    allowed : (3, p) or (pairs,), largest ratio to the required errors, as returned by :meth:`TimedDesign.ratio_and_seconds`;
+        above 1 where an exchange of poses is expected to improve it
     """
 
-    def lack(counts: tuple[int, ...]) -> float:
-        return float(np.max(layout.shortfall(replace(made, counts=counts))[0] / allowed))
+    def worst_ratio(counts: tuple[int, ...]) -> float:
+        return float(np.max(timed.ratio_and_seconds(replace(design, counts=counts))[0] / allowed))
 
-    soaks = len(made.order)
-    alike = least(lambda n: lack((n,) * soaks) <= 1.0, FEWEST, MOST // soaks)
-    if alike is None:
+    soaks = len(design.order)
+    uniform = smallest_passing(lambda n: worst_ratio((n,) * soaks) <= 1.0, FEWEST, MOST // soaks)
+    if uniform is None:
         return None
-    counts, step = (alike,) * soaks, max(1, alike // _FIRST)
+    counts, step = (uniform,) * soaks, max(1, uniform // _FIRST)
     while step >= 1:
-        fewer = _fewer(counts, step, lack)
+        fewer = _fewer(counts, step, worst_ratio)
         counts, step = (counts, step // 2) if fewer is None else (fewer, step)
-    return replace(made, counts=counts)
+    return replace(design, counts=counts)
 
 
-def _fewer(counts: tuple[int, ...], step: int, lack: Callable[[tuple[int, ...]], float]) -> tuple[int, ...] | None:
-    """Fewer dwells that still do: of one soak, or twice as many fewer of one as there are more of another."""
-    for tried in (_taken(counts, step), _moved(counts, step)):
-        found = [(value, new) for new in tried if (value := lack(new)) <= 1.0]
-        if found:
-            return min(found)[1]
+def _fewer(
+    counts: tuple[int, ...], step: int, worst_ratio: Callable[[tuple[int, ...]], float]
+) -> tuple[int, ...] | None:
+    """Counts with a smaller sum that still meet the ratios; None where neither a reduction nor a shift does."""
+    for variants in (_reduced(counts, step), _shifted(counts, step)):
+        passing = [(ratio, variant) for variant in variants if (ratio := worst_ratio(variant)) <= 1.0]
+        if passing:
+            return min(passing)[1]
     return None
 
 
-def _taken(counts: tuple[int, ...], step: int) -> Iterator[tuple[int, ...]]:
+def _reduced(counts: tuple[int, ...], step: int) -> Iterator[tuple[int, ...]]:
+    """Counts with ``step`` dwells removed from one soak."""
     for k, n in enumerate(counts):
         if n - step >= FEWEST:
             yield (*counts[:k], n - step, *counts[k + 1 :])
 
 
-def _moved(counts: tuple[int, ...], step: int) -> Iterator[tuple[int, ...]]:
-    for here, there in permutations(range(len(counts)), 2):
-        if counts[here] - 2 * step >= FEWEST:
-            new = list(counts)
-            new[here] -= 2 * step
-            new[there] += step
-            yield tuple(new)
+def _shifted(counts: tuple[int, ...], step: int) -> Iterator[tuple[int, ...]]:
+    """Counts with ``2·step`` dwells removed from one soak and ``step`` added to another."""
+    for source, target in permutations(range(len(counts)), 2):
+        if counts[source] - 2 * step >= FEWEST:
+            variant = list(counts)
+            variant[source] -= 2 * step
+            variant[target] += step
+            yield tuple(variant)
 
 
-def least(good: Callable[[int], bool], low: int, high: int) -> int | None:
-    """The least number from low to high that is good, where all above a good one are; None where none is."""
-    if not good(high):
+def smallest_passing(passes: Callable[[int], bool], low: int, high: int) -> int | None:
+    """The smallest number from low to high that passes, by bisection; None where ``high`` fails.
+
+    Every number above one that passes must pass, too.
+    """
+    if not passes(high):
         return None
     while low < high:
         middle = (low + high) // 2
-        low, high = (low, middle) if good(middle) else (middle + 1, high)
+        low, high = (low, middle) if passes(middle) else (middle + 1, high)
     return high

@@ -1,8 +1,8 @@
-"""The least station time that any recipe needs for the coefficients that no pose changes: a bound, not a recipe.
+"""Lower bound of the station time for the coefficients that do not depend on the pose.
 
-Bias, and what it does over temperature and time, look alike in every pose; their errors are what the device wanders over the run.
-So let every minute that is no soak be one dwell that ends never, let the rest of the model be known, and ask how short a run
-may be. What no recipe of that length can reach, none with moves, settling and other coefficients will.
+The bias and its dependence on temperature and time have the same column in every pose; their errors follow from the wander of the
+device over the run. The bound assumes uninterrupted measurement between soaks, and that all other coefficients are known. A real
+recipe also needs moves, settling and the other coefficients, so its station time cannot be shorter.
 """
 
 from __future__ import annotations
@@ -16,8 +16,8 @@ import numpy as np
 from inertial import design
 from inertial.noise.dwells import dwell_covariance
 from inertial.state import State
-from pipelines.planning.layout import soak_waits
 from pipelines.planning.soak_orders import orders
+from pipelines.planning.timed_design import soak_waits
 from pipelines.schedule.timing import spent
 
 if TYPE_CHECKING:
@@ -32,35 +32,35 @@ if TYPE_CHECKING:
     Array = NDArray[np.float64]
 
 PIECE_S = 120.0
-"""Length of the dwells that the time between soaks is filled with."""
+"""Length of the dwells that fill the time between soaks, s."""
 
 LOWEST, STEP = 0.3, 0.01
-"""Share of the textbook plan's time from which lengths are tried, and between them."""
+"""Smallest share of the textbook plan's station time to try, and the step."""
 
 LIKELY = 20
-"""Orders of soaks whose time is divided at best, of those that come nearest when it is divided equally."""
+"""Number of orders of soaks whose division of time is optimised, the best ones under equal division."""
 
 
 @dataclass(frozen=True)
 class LowerBound:
-    """The shortest run: its part of the textbook plan's station time, its soaks in °C, and the effect that asks for most."""
+    """The shortest run: share of the textbook plan's station time, soaks in °C, and the effect that determines it."""
 
     share: float
     order: tuple[float, ...]
     effect: str
 
 
-def least(recipe: Recipe, against: PlanContext, wish: Requirement) -> LowerBound | None:
-    """The shortest run in which coefficients that no pose changes can be known as well as is wanted.
+def lower_bound(recipe: Recipe, against: PlanContext, requirement: Requirement) -> LowerBound | None:
+    """The shortest run that reaches the required errors of the pose-independent coefficients.
 
-    None where even a run as long as the textbook plan's is too short, or no coefficient is of that kind.
+    None where a run as long as the textbook plan is too short, or the model has no pose-independent coefficient.
     """
-    bound = _Bound(recipe, against, wish)
-    found = orders(wish.levels, against.station, recipe.soak_min_s, legal=wish.legal)
+    search = _BoundSearch(recipe, against, requirement)
+    soak_orders = orders(requirement.levels, against.station, recipe.soak_min_s, optional=requirement.optional_levels)
     low, high, best = round(LOWEST / STEP), round(1.0 / STEP), None
-    while low <= high and bound.columns.size:
+    while low <= high and search.columns.size:
         middle = (low + high) // 2
-        reached = bound.reached(found, middle * STEP)
+        reached = search.reached(soak_orders, middle * STEP)
         if reached is None:
             low = middle + 1
         else:
@@ -68,22 +68,22 @@ def least(recipe: Recipe, against: PlanContext, wish: Requirement) -> LowerBound
     return best
 
 
-class _Bound:
-    """Errors of the coefficients that no pose changes, for soaks in order and the time after each."""
+class _BoundSearch:
+    """Errors of the pose-independent coefficients, for soaks in order and the time after each."""
 
-    def __init__(self, recipe: Recipe, against: PlanContext, wish: Requirement) -> None:
-        self.recipe, self.against, self.wish = recipe, against, wish
-        self.total = 60.0 * (spent(against.stretches).total - spent(against.stretches).static_record)
+    def __init__(self, recipe: Recipe, against: PlanContext, requirement: Requirement) -> None:
+        self.recipe, self.against, self.requirement = recipe, against, requirement
+        self.total = 60.0 * (spent(against.activities).total - spent(against.activities).static_record)
         self.slowest = float(against.state.time[-1])
         self.sensor, _ = design.split(recipe.effects)
         self.names = [name for name, _ in design.local_names(self.sensor, 0)]
-        heat = np.asarray(sorted({*wish.levels, *wish.legal}))
+        heat = np.asarray(sorted({*requirement.levels, *requirement.optional_levels}))
         self.columns = np.flatnonzero(np.any(self._rows(1000.0 * np.arange(1.0, heat.size + 1.0), heat), axis=(0, 1)))
 
-    def reached(self, found: Sequence[tuple[float, ...]], share: float) -> tuple[tuple[float, ...], str] | None:
-        """An order of soaks in which the errors wanted are reached in a part of the time, and what is nearest to its limit."""
+    def reached(self, soak_orders: Sequence[tuple[float, ...]], share: float) -> tuple[tuple[float, ...], str] | None:
+        """An order of soaks that reaches the required errors in a share of the time, and the effect nearest to its limit."""
         rated: list[tuple[float, tuple[float, ...], tuple[int, ...]]] = []
-        for order in found:
+        for order in soak_orders:
             pieces = int((share * self.total - sum(self._waits(order))) // PIECE_S)
             counts = tuple(np.diff(np.linspace(0, pieces, len(order) + 1).astype(int)).tolist())
             if min(counts) > 0:
@@ -95,7 +95,7 @@ class _Bound:
         return None
 
     def _divided(self, order: tuple[float, ...], counts: tuple[int, ...]) -> tuple[float, str]:
-        """The least error over that wanted, the time divided at best among the soaks."""
+        """The smallest worst ratio to the required errors over divisions of the time among the soaks, and the effect."""
         best = self._worst(order, counts)
         step = max(1, sum(counts) // len(counts) // 2)
         while step >= 1 and best[0] > 1.0:
@@ -113,7 +113,7 @@ class _Bound:
         return best
 
     def _worst(self, order: tuple[float, ...], counts: tuple[int, ...]) -> tuple[float, str]:
-        """The largest error over that wanted, and whose it is."""
+        """The worst ratio to the required errors, and its effect."""
         time: list[Array] = []
         heat, clock = np.repeat(np.asarray(order), counts), 0.0
         for waited, count in zip(self._waits(order), counts, strict=True):
@@ -124,11 +124,11 @@ class _Bound:
         covariance = dwell_covariance(when, PIECE_S, self.against.noise, slowest=self.slowest)
         flat = np.moveaxis(rows, 0, 1).reshape(when.size, -1)
         solved = np.moveaxis(np.linalg.solve(covariance, flat).reshape(when.size, 3, -1), 1, 0)
-        errors = self.wish.shortfall(np.swapaxes(rows, -1, -2) @ solved)
+        errors = self.requirement.ratio_to_required(np.swapaxes(rows, -1, -2) @ solved)
         return float(errors.max()), self.names[self.columns[int(np.argmax(errors.max(axis=0)))]]
 
     def _rows(self, time: Array, heat: Array) -> Array:
-        """Columns (3, n, p) over those wanted, without any force."""
+        """Columns (3, n, p) at zero force, in units of the required errors."""
         angle = np.zeros(time.size)
         state = State(
             force=np.zeros((time.size, 3)),
@@ -141,7 +141,7 @@ class _Bound:
             inner=angle,
         )
         columns = design.local_columns(self.sensor, state, design.starting_values(self.sensor, state))
-        return columns * self.wish.wanted[:, None, :]
+        return columns * self.requirement.errors[:, None, :]
 
     def _waits(self, order: tuple[float, ...]) -> list[float]:
         return soak_waits(order, self.against.station, self.recipe.soak_min_s)

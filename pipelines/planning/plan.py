@@ -1,4 +1,4 @@
-"""What a recipe can see, how well, and what it costs, before any chamber time is spent."""
+"""Visibility of effects, expected errors and station time of a recipe, before it is measured."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from inertial.noise.dwells import dwell_covariance
 from inertial.noise.measurands import DAY_S, between_means
 from inertial.planning.expected import expected_errors
 from inertial.planning.reasons import reason
-from inertial.planning.visibility import SEEN, sights
+from inertial.planning.visibility import SEEN, visibilities
 from pipelines.schedule.planned_state import state_of
 from pipelines.schedule.steps import steps
 from pipelines.schedule.timing import schedule, spent
@@ -37,60 +37,65 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class PlanContext:
-    """A recipe as a station will go through it: what is done when, the dwells of the fit, the covariance of their means in g²."""
+    """A recipe on a station.
+
+    activities : what the station does and when
+    state : the planned dwells of the fit, (n,)
+    covariance : (n, n), of the dwell means, g²
+    """
 
     recipe: Recipe
     station: StationConfig
     noise: DwellNoise
-    stretches: list[Activity]
+    activities: list[Activity]
     state: State
     covariance: NDArray[np.float64]
 
 
 def plan_context(recipe: Recipe, station: StationConfig, noise: DwellNoise, *, slowest: float = 0.0) -> PlanContext:
-    """A recipe on a station, with devices of this noise; ``slowest`` as in :func:`inertial.noise.dwells.dwell_covariance`."""
+    """A recipe on a station with devices of this noise; ``slowest`` as in :func:`inertial.noise.dwells.dwell_covariance`."""
     whole = schedule(steps(recipe), station, recipe)
     state = state_of(whole, station, recipe, history=True)
     covariance = dwell_covariance(state.time, recipe.dwell_s, noise, slowest=slowest)
     return PlanContext(recipe, station, noise, whole, state, covariance)
 
 
-def plan(plan: PlanContext) -> dict[str, Any]:
-    """How a recipe sees every effect of the catalogue, as a document with the keys that other programs read.
+def plan(context: PlanContext) -> dict[str, Any]:
+    """Document of a recipe: visibility of every effect of the catalogue, expected errors, station time; keys for other programs.
 
     Raises
     ------
     NotIdentified
         The recipe cannot identify its own model; the message says what is missing.
     """
-    recipe, noise = plan.recipe, plan.noise
-    expected = identified(replace(plan, covariance=_of_record(plan)))
-    found = sights(plan.state, recipe.effects, noise.error(recipe.dwell_s), covariance=plan.covariance)
+    recipe, noise = context.recipe, context.noise
+    expected = identified(replace(context, covariance=_of_record(context)))
+    found = visibilities(context.state, recipe.effects, noise.error(recipe.dwell_s), covariance=context.covariance)
     white, wander, together = (MICRO * f(recipe.dwell_s) for f in (noise.white, noise.wander, noise.error))
     return {
         "recipe": recipe.name,
         "device": recipe.device,
-        "station": plan.station.name,
+        "station": context.station.name,
         "model": list(recipe.effects),
         "poses": len(recipe.poses),
-        "dwells": int(plan.state.time.size),
+        "dwells": int(context.state.time.size),
         "temperatures_C": list(recipe.temperatures_C),
         "dwell_error_ug": {"white": white, "wander": wander, "together": together},
         "dwell_s": {"planned": recipe.dwell_s, "white_as_large_as_wander": noise.balanced()},
-        "minutes": spent(plan.stretches).document(),
+        "minutes": spent(context.activities).document(),
         "coefficients": _coefficient_rows(expected),
-        "bias": _bias(plan, expected),
-        "effects": [_row(s, plan.state, recipe.effects) for s in found],
+        "bias": _bias(context, expected),
+        "effects": [_row(s, context.state, recipe.effects) for s in found],
     }
 
 
-def _of_record(plan: PlanContext) -> NDArray[np.float64]:
+def _of_record(context: PlanContext) -> NDArray[np.float64]:
     """Covariance of the dwells as a fit sees it: what changes more slowly than the record is, for the record, the bias itself."""
-    time, length = plan.state.time, plan.recipe.dwell_s
-    return dwell_covariance(time, length, plan.noise, since=float(time.min()) - 0.5 * length)
+    time, length = context.state.time, context.recipe.dwell_s
+    return dwell_covariance(time, length, context.noise, since=float(time.min()) - 0.5 * length)
 
 
-def _bias(plan: PlanContext, expected: Expected) -> dict[str, float | None] | None:
+def _bias(context: PlanContext, expected: Expected) -> dict[str, float | None] | None:
     """Standard uncertainty of the bias by measurand, of the worst axis, as the fit will state it; None for a model without one.
 
     See :func:`pipelines.stages.bias_measurands.bias_measurands`.
@@ -103,8 +108,8 @@ def _bias(plan: PlanContext, expected: Expected) -> dict[str, float | None] | No
     ]
     if not own:
         return None
-    span = float(np.ptp(plan.state.time))
-    apart = plan.noise.instability * np.sqrt(between_means(span, DAY_S)) if span > 0.0 else 0.0
+    span = float(np.ptp(context.state.time))
+    apart = context.noise.instability * np.sqrt(between_means(span, DAY_S)) if span > 0.0 else 0.0
     return {
         "record_u_ug": MICRO * max(own),
         "long_u_ug": MICRO * float(np.hypot(max(own), apart)),
@@ -113,35 +118,43 @@ def _bias(plan: PlanContext, expected: Expected) -> dict[str, float | None] | No
     }
 
 
-def identified(plan: PlanContext) -> Expected:
-    """The errors expected of a recipe's model; refused, in the user's words, where the recipe cannot identify it."""
-    units = max(1, len(plan.recipe.units))
+def identified(context: PlanContext) -> Expected:
+    """The expected standard errors of a recipe's model.
+
+    Raises
+    ------
+    NotIdentified
+        The recipe cannot identify it; the message names the feature of the plan and what to add.
+    """
+    units = max(1, len(context.recipe.units))
     try:
-        return expected_errors(plan.recipe.effects, plan.state, plan.covariance, units=units)
+        return expected_errors(context.recipe.effects, context.state, context.covariance, units=units)
     except NotIdentified as problem:
-        raise NotIdentified(f"plan {plan.recipe.name}: {missing(plan.state, plan.recipe.effects) or problem}") from None
+        raise NotIdentified(
+            f"plan {context.recipe.name}: {missing(context.state, context.recipe.effects) or problem}"
+        ) from None
 
 
 def missing(state: State, effects: Sequence[str]) -> str:
-    """Which effects of a model its plan cannot identify beside the others, and what is to be added; empty where it can all."""
-    poor: dict[str, str] = {}
+    """The effects of a model that its plan cannot identify beside the others, and what to add; empty where it identifies all."""
+    reasons: dict[str, str] = {}
     for effect in effects:
         rest = [e for e in effects if e != effect]
-        sight = sights(state, rest, 1.0, [effect])
-        if sight and sight[0].left <= SEEN:
-            poor[effect] = reason(state, effect, rest)
-    # of effects that hide behind one another the last is the one too many
-    chosen = list(poor)[-1:] if len(poor) > 1 and not _alone(state, poor) else list(poor)
-    return "; ".join(f"{effect} cannot be identified: {poor[effect]}" for effect in chosen)
+        visibility = visibilities(state, rest, 1.0, [effect])
+        if visibility and visibility[0].remaining_fraction <= SEEN:
+            reasons[effect] = reason(state, effect, rest)
+    # of mutually confounded effects only the last one is reported: without it the others are identified
+    chosen = list(reasons)[-1:] if len(reasons) > 1 and not _alone(state, reasons) else list(reasons)
+    return "; ".join(f"{effect} cannot be identified: {reasons[effect]}" for effect in chosen)
 
 
-def _alone(state: State, poor: dict[str, str]) -> bool:
-    """Whether every one of the effects is invisible by itself, not only beside the others."""
-    return all(not sights(state, ("bias",), 1.0, [effect])[0].seen for effect in poor)
+def _alone(state: State, reasons: dict[str, str]) -> bool:
+    """Whether each of the effects is invisible by itself, not only beside the others."""
+    return all(not visibilities(state, ("bias",), 1.0, [effect])[0].seen for effect in reasons)
 
 
 def _coefficient_rows(expected: Expected) -> list[dict[str, Any]]:
-    """One row per coefficient and axis; what all units share has axis ``*``."""
+    """One row per coefficient and axis; parameters of the station have axis ``*``."""
     rows: list[dict[str, Any]] = []
     for axis, letter in enumerate(AXES):
         place: dict[str, int] = {}
@@ -169,21 +182,21 @@ def _unit(effect: str, place: int) -> str:
     return unit_texts(known, "µg")[place] if isinstance(known, SensorEffect) else "µrad"
 
 
-def _row(sight: Visibility, state: State, model: Sequence[str]) -> dict[str, Any]:
-    finite = bool(np.isfinite(sight.floor))
+def _row(visibility: Visibility, state: State, model: Sequence[str]) -> dict[str, Any]:
+    finite = bool(np.isfinite(visibility.floor))
     return {
-        "effect": sight.effect,
-        "seen": sight.seen,
-        "left": sight.left,
-        "left_by_axis": list(sight.by_axis),
-        "variance_inflation": sight.variance_inflation if sight.left > 0.0 else None,
-        "floor_ug": MICRO * sight.floor if finite else None,
-        "floor_unit": _unit(sight.effect, sight.column) if finite else None,
-        "floor_size_ug": MICRO * sight.size if finite else None,
-        "typical_ug": list(catalogue.get(sight.effect).typical_ug),
-        "faint": finite and MICRO * sight.size > catalogue.get(sight.effect).typical_ug[1],
-        "alias": list(sight.alias),
-        "alias_exact": list(sight.exact),
-        "breaker": sight.breaker,
-        "why": "" if sight.seen else reason(state, sight.effect, model),
+        "effect": visibility.effect,
+        "seen": visibility.seen,
+        "left": visibility.remaining_fraction,
+        "left_by_axis": list(visibility.by_axis),
+        "variance_inflation": visibility.variance_inflation if visibility.remaining_fraction > 0.0 else None,
+        "floor_ug": MICRO * visibility.floor if finite else None,
+        "floor_unit": _unit(visibility.effect, visibility.column) if finite else None,
+        "floor_size_ug": MICRO * visibility.size if finite else None,
+        "typical_ug": list(catalogue.get(visibility.effect).typical_ug),
+        "faint": finite and MICRO * visibility.size > catalogue.get(visibility.effect).typical_ug[1],
+        "alias": list(visibility.alias),
+        "alias_exact": list(visibility.exact),
+        "breaker": visibility.breaker,
+        "why": "" if visibility.seen else reason(state, visibility.effect, model),
     }

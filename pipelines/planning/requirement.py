@@ -1,4 +1,4 @@
-"""What a recipe is wanted to do, and what it may be made of."""
+"""The requirement of a recipe search: required errors or discrimination, temperatures, and candidate poses."""
 
 from __future__ import annotations
 
@@ -29,55 +29,56 @@ QUARTERS = 4
 
 @dataclass(frozen=True)
 class Requirement:
-    """What a recipe is wanted to do.
+    """What a recipe must achieve, and what it may consist of.
 
-    wanted : (3, p), g per unit of the column, largest error of each coefficient of the model
-    see : effects that must be seen beside the model
-    levels : °C, temperatures that it must meet
-    candidates : angles (c, 2) in degrees that its poses are chosen from
-    legal : °C, temperatures that it may be measured at besides
+    errors : (3, p), g per unit of the column, largest standard error of each coefficient; with ``discrimination`` the scale of
+        each column
+    see : ids of effects that must be visible beside the model
+    levels : °C, temperatures that every recipe includes
+    candidates : (c, 2), degrees, outer and inner angle of the poses to choose from
+    optional_levels : °C, further temperatures that a recipe may include
     criterion : see :mod:`inertial.planning.pose_exchange`
-    verification : how often each pose for verification is measured in the whole run, spread over the soaks
-    effects : ids whose columns the ``wanted`` are for; the recipe's where empty
-    parting : rivals that it must tell apart, in place of the errors wanted
+    verification : repetitions of each verification pose in the whole run, distributed over the soaks
+    effects : ids of the effects to which the columns of ``errors`` belong; the recipe's model where empty
+    discrimination : rivals to discriminate between, in place of required errors
     """
 
-    wanted: Array
+    errors: Array
     see: tuple[str, ...]
     levels: tuple[float, ...]
     candidates: Array
-    legal: tuple[float, ...] = ()
+    optional_levels: tuple[float, ...] = ()
     criterion: Criterion = "worst"
     verification: int = 1
     effects: tuple[str, ...] = ()
-    parting: Discrimination | None = None
+    discrimination: Discrimination | None = None
 
-    def shortfall(self, matrix: Array) -> Array:
-        """What is above one where normal matrices (..., 3, p, p) do not fulfil the wish yet: errors over those wanted."""
-        return ratios(matrix) if self.parting is None else self.parting.shortfall(matrix)
+    def ratio_to_required(self, matrix: Array) -> Array:
+        """Errors over the required ones, (..., 3, p), or per pair of rivals, of normal matrices (..., 3, p, p); met at ≤ 1."""
+        return ratios(matrix) if self.discrimination is None else self.discrimination.ratio_to_required(matrix)
 
     @property
-    def value(self) -> Callable[[Array], Array]:
-        """What an exchange of poses makes small."""
-        return CRITERIA[self.criterion] if self.parting is None else self.parting.value
+    def objective(self) -> Callable[[Array], Array]:
+        """The function of normal matrices that an exchange of poses minimises."""
+        return CRITERIA[self.criterion] if self.discrimination is None else self.discrimination.objective
 
 
 def candidates(station: StationConfig, plan: str = "", count: int = CANDIDATES) -> Array:
-    """Angles (c, 2) in degrees of poses to choose from: ``count`` directions over the sphere, both ways of turning there.
+    """Angles (c, 2) in degrees of candidate poses within the station's limits, each direction with both axis settings.
 
-    A named plan takes their place where one is given. Faces alone would serve a straight line as well; directions between
-    them show the rest of the physics for nothing.
+    Directions are those of a Fibonacci lattice of ``count`` points on the sphere, or of a named plan. Faces alone are enough for
+    a linear model; directions between them make further effects visible at no extra cost.
     """
     angles = poses.plan(plan) if plan else WHOLE_DEG * np.round(poses.fibonacci(count) / WHOLE_DEG)
     other = np.stack([-angles[:, 0], np.where(angles[:, 1] > 0.0, angles[:, 1] - 180.0, angles[:, 1] + 180.0)], axis=1)
     both = np.unique(np.concatenate([angles, other]) + 0.0, axis=0)
     outer, inner = station.limits.outer_deg, station.limits.inner_deg
-    legal = (both[:, 0] >= outer[0]) & (both[:, 0] <= outer[1]) & (both[:, 1] >= inner[0]) & (both[:, 1] <= inner[1])
-    return both[legal]
+    allowed = (both[:, 0] >= outer[0]) & (both[:, 0] <= outer[1]) & (both[:, 1] >= inner[0]) & (both[:, 1] <= inner[1])
+    return both[allowed]
 
 
-def between(levels: Sequence[float]) -> tuple[float, ...]:
-    """Temperatures in °C that a recipe may be measured at beside its own: quarters of the range, and the reference in it."""
+def temperature_choices(levels: Sequence[float]) -> tuple[float, ...]:
+    """Temperatures in °C that a recipe may include: the given ones, quarters of their range, and the reference inside it."""
     low, high = min(levels), max(levels)
     quarters = np.round(np.linspace(low, high, QUARTERS + 1), 1).tolist()
     return tuple(sorted({*levels, *quarters, *([T_REFERENCE] if low < T_REFERENCE < high else [])}))

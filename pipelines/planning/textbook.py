@@ -1,4 +1,4 @@
-"""The textbook plan: 24 orthogonal poses at nine soaks up and down, 15 min soak, 10 s dwells; and what it sees."""
+"""The textbook plan, 24 orthogonal poses at nine soaks up and down, 15 min each, 10 s dwells: its errors and visible effects."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 from inertial import poses
 from inertial.errors import NotIdentified
 from inertial.planning.expected import expected_errors
-from inertial.planning.visibility import sights
+from inertial.planning.visibility import visibilities
 from pipelines.planning.plan import identified, plan_context
 from pipelines.planning.verification_poses import numbered
 from pipelines.schedule.planned_state import planned_state
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
 LEVELS = 5
 PART_SEEN = 0.05
-"""Part v that a recipe must see of an effect that is asked for; of what the textbook plan sees by twice that."""
+"""Remaining fraction v from which a required effect counts as visible; the textbook plan's effects are required from twice it."""
 
 
 def textbook(recipe: Recipe, levels: Sequence[float]) -> Recipe:
@@ -53,9 +53,9 @@ def _up_and_down(levels: Sequence[float]) -> list[float]:
 
 
 def reference_errors(against: PlanContext, recipe: Recipe) -> Array:
-    """Errors (3, p) in g per unit of the column that the textbook plan lets expect of a recipe's model.
+    """Expected standard errors (3, p), g per unit of the column, of a recipe's model under the textbook plan.
 
-    Coefficients of effects that it cannot identify at all, as faces cannot a cubic, have the errors of the recipe itself.
+    Coefficients of effects that the textbook plan cannot identify (third_order on faces) have the errors of the recipe itself.
     """
     try:
         return identified(against).errors
@@ -72,18 +72,21 @@ def reference_errors(against: PlanContext, recipe: Recipe) -> Array:
 
 
 def _hidden(state: State, model: Sequence[str]) -> list[str]:
-    """Effects of a model that a plan cannot identify beside those before them."""
+    """Effects of a model that a plan cannot identify beside the effects before them."""
     kept: list[str] = []
     for effect in model:
-        sight = sights(state, kept, 1.0, [effect])
-        if effect in ("bias", "scale", "misalignment") or (sight and sight[0].seen):
+        visibility = visibilities(state, kept, 1.0, [effect])
+        if effect in ("bias", "scale", "misalignment") or (visibility and visibility[0].seen):
             kept.append(effect)
     return [effect for effect in model if effect not in kept]
 
 
 def seen_by(against: PlanContext, levels: Sequence[float]) -> tuple[str, ...]:
-    """Effects that the textbook plan sees beside its model, as far as these temperatures allow it, ageing and hysteresis too."""
+    """Effects beside the model that are visible under the textbook plan, at its own temperatures and at these."""
     there = against.recipe.model_copy(update={"temperatures_C": _up_and_down(sorted(levels))})
     states = (against.state, planned_state(there, against.station, history=True))
-    seen = [{s.effect for s in sights(state, there.effects, 1.0) if s.left >= 2.0 * PART_SEEN} for state in states]
+    seen = [
+        {s.effect for s in visibilities(state, there.effects, 1.0) if s.remaining_fraction >= 2.0 * PART_SEEN}
+        for state in states
+    ]
     return tuple(sorted(seen[0] & seen[1]))

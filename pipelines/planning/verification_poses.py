@@ -1,4 +1,4 @@
-"""Poses for verification of a new recipe: which, how often, and at which soaks."""
+"""Verification poses of a recipe: selection, repetitions, and distribution over the soaks."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ WHOLE_DEG = 5.0
 
 
 def numbered(letter: str, angles: Array) -> list[Pose]:
-    """Poses named by a letter and their number, of angles (n, 2) in degrees."""
+    """Poses at angles (n, 2) in degrees, named by a letter and a number."""
     width = len(str(len(angles)))
     return [
         Pose(name=f"{letter}{k:0{width}d}", outer_deg=float(outer), inner_deg=float(inner))
@@ -32,25 +32,25 @@ def numbered(letter: str, angles: Array) -> list[Pose]:
 
 
 def apart(chosen: Array, given: Sequence[Pose]) -> list[Pose]:
-    """As many poses for verification as are given, farthest from the fit's poses and from one another."""
+    """As many verification poses as ``given`` has, each with the largest angle to the fit's poses and to one another."""
     count = len({(p.outer_deg, p.inner_deg) for p in given})
     grid = WHOLE_DEG * np.round(poses.fibonacci(400) / WHOLE_DEG)
-    force, taken = force_from_angles(*np.radians(grid).T), force_from_angles(*np.radians(chosen).T)
+    force, used = force_from_angles(*np.radians(grid).T), force_from_angles(*np.radians(chosen).T)
     found: list[Array] = []
     for _ in range(count):
-        near = np.max(force @ taken.T, axis=1)
+        near = np.max(force @ used.T, axis=1)
         best = int(np.argmin(near))
         found.append(grid[best])
-        taken = np.concatenate([taken, force[best : best + 1]])
+        used = np.concatenate([used, force[best : best + 1]])
     return numbered("v", np.array(found).reshape(-1, 2))
 
 
 def turns(count: int, repeats: int, soak: int, soaks: int) -> list[int]:
-    """Numbers, from 1, of the poses for verification that are measured at a soak: each goes on from soak to soak."""
+    """Numbers, from 1, of the verification poses measured at a soak; the sequence continues from soak to soak."""
     return [k for turn in range(repeats) for k in range(1, count + 1) if (k + turn) % soaks == soak]
 
 
 def verified_in(recipe: Recipe) -> int:
-    """How often a recipe measures each of its poses for verification in the whole run, rounded up."""
+    """Repetitions of each verification pose in the whole run, rounded up."""
     taken = [(p.outer_deg, p.inner_deg) for k in range(len(recipe.temperatures_C)) for p in recipe.verification_at(k)]
     return -(-len(taken) // len(set(taken))) if taken else 1

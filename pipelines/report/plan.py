@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING, Any
 
 from pipelines.report.numbers import plain
@@ -12,33 +13,42 @@ if TYPE_CHECKING:
     from pipelines.planning.plan import PlanContext
 
 
-def render_plan(document: dict[str, Any], course: PlanContext) -> str:
+def render_plan(document: dict[str, Any], context: PlanContext) -> str:
     """The page as one HTML text that needs no other file.
 
     Parameters
     ----------
     document : of :func:`pipelines.planning.plan.plan`
-    course : the recipe as the station will go through it
+    context : the recipe on the station
     """
     return template("plan.html").render(
         document=document,
-        recipe=course.recipe,
+        recipe=context.recipe,
         number=plain,
+        scientific=scientific,
         coefficients=_coefficients(document["coefficients"]),
         seen=[row for row in document["effects"] if row["seen"]],
         unseen=[row for row in document["effects"] if not row["seen"]],
-        **pictures(document, course),
+        **pictures(document, context),
     )
 
 
-def pictures(document: dict[str, Any], course: PlanContext) -> dict[str, str]:
-    """The pictures of a plan by name, as SVG texts: the poses, the temperatures, what it sees, what it takes for what."""
+def pictures(document: dict[str, Any], context: PlanContext) -> dict[str, str]:
+    """The pictures of a plan by name, as SVG: poses, temperatures, remaining fractions, confounded effects."""
     return {
-        "sphere": sphere_plot(course),
-        "temperature": temperature_plot(course),
+        "sphere": sphere_plot(context),
+        "temperature": temperature_plot(context),
         "sights": sight_plot(document["effects"]),
-        "aliases": alias_plot(course),
+        "aliases": alias_plot(context),
     }
+
+
+def scientific(value: float) -> str:
+    """A number for people, from a million on as a power of ten."""
+    if abs(value) < 1e6:
+        return plain(value)
+    exponent = math.floor(math.log10(abs(value)))
+    return f"{value / 10.0**exponent:.2f}·10{str(exponent).translate(str.maketrans('0123456789', '⁰¹²³⁴⁵⁶⁷⁸⁹'))}"
 
 
 def _coefficients(rows: list[dict[str, Any]]) -> list[dict[str, Any]]:

@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter
 
 from inertial.frames import force_from_angles
-from inertial.planning.visibility import likeness
+from inertial.planning.visibility import confounding
 from pipelines.report.plots import COLOURS, STYLE, WIDTH_IN, svg
 from pipelines.schedule.timing import temperatures
 
@@ -27,10 +27,10 @@ FIT, CHECK, WAY = "#0072b2", "#d55e00", "#9aa7b5"
 VIEWS = ((25.0, 20.0, "seen from +x, above"), (25.0, 200.0, "seen from −x, above"), (-90.0, 0.0, "seen from −z"))
 
 
-def sphere_plot(course: PlanContext) -> str:
-    """Where specific force points in the fixture in every pose: the sphere from three sides, with the way of the first soak."""
-    fit, check = (_directions(course.stretches, kind) for kind in ("dwell", "verification"))
-    first = [s for s in course.stretches if s.kind == "dwell" and s.step.soak == course.stretches[0].step.soak]
+def sphere_plot(context: PlanContext) -> str:
+    """Directions of specific force in the fixture for every pose, from three sides, with the path of the first soak."""
+    fit, check = (_directions(context.activities, kind) for kind in ("dwell", "verification"))
+    first = [s for s in context.activities if s.kind == "dwell" and s.step.soak == context.activities[0].step.soak]
     way = _directions(first, "dwell")
     with mpl.rc_context({**STYLE, "axes.grid": False}):
         figure = Figure(figsize=(WIDTH_IN, 4.0), layout="constrained")
@@ -47,9 +47,9 @@ def sphere_plot(course: PlanContext) -> str:
         return svg(figure)
 
 
-def _directions(stretches: list[Activity], kind: str) -> Array:
+def _directions(activities: list[Activity], kind: str) -> Array:
     """Directions (n, 3) of specific force in the fixture."""
-    angles = [(s.step.pose.outer_deg, s.step.pose.inner_deg) for s in stretches if s.kind == kind]
+    angles = [(s.step.pose.outer_deg, s.step.pose.inner_deg) for s in activities if s.kind == kind]
     if not angles:
         return np.zeros((0, 3))
     outer, inner = np.radians(np.array(angles)).T
@@ -108,9 +108,9 @@ def _dots(place: Axes, way: Array, fit: Array, check: Array, view: Array) -> Non
         )
 
 
-def temperature_plot(course: PlanContext) -> str:
+def temperature_plot(context: PlanContext) -> str:
     """Chamber and slowest device over the station's time, with what is measured when."""
-    time, air, device = np.array(temperatures(course.stretches, course.station)).T / np.array([[60.0], [1.0], [1.0]])
+    time, air, device = np.array(temperatures(context.activities, context.station)).T / np.array([[60.0], [1.0], [1.0]])
     with mpl.rc_context(STYLE):
         figure = Figure(figsize=(WIDTH_IN, 3.3), layout="constrained")
         place = figure.subplots()
@@ -121,7 +121,7 @@ def temperature_plot(course: PlanContext) -> str:
             ("verification", CHECK, "verification"),
             ("allan", "#009e73", "static record"),
         ):
-            for k, (begin, end) in enumerate(_spans(course.stretches, kind)):
+            for k, (begin, end) in enumerate(_spans(context.activities, kind)):
                 place.axvspan(begin, end, ymax=0.06, color=colour, linewidth=0, label="" if k else label)
         place.set(xlabel="station time / min", ylabel="temperature / °C", xlim=(0.0, float(time[-1])))
         low, high = place.get_ylim()
@@ -130,18 +130,18 @@ def temperature_plot(course: PlanContext) -> str:
         return svg(figure)
 
 
-def _spans(stretches: list[Activity], kind: str) -> list[tuple[float, float]]:
+def _spans(activities: list[Activity], kind: str) -> list[tuple[float, float]]:
     """From the first to the last record of a kind at every soak, min."""
     soaks: dict[int, list[Activity]] = {}
-    for stretch in stretches:
+    for stretch in activities:
         if stretch.kind == kind:
             soaks.setdefault(stretch.step.soak, []).append(stretch)
     return [(own[0].start / 60.0, (own[-1].start + own[-1].seconds) / 60.0) for own in soaks.values()]
 
 
-def alias_plot(course: PlanContext) -> str:
-    """How far what one effect leaves lies within another's: the cosine of the row's effect with the column's."""
-    names, cosines = likeness(course.state, course.recipe.effects)
+def alias_plot(context: PlanContext) -> str:
+    """Heat map of confounding: cosine of the row's effect with the span of the column's, after the model."""
+    names, cosines = confounding(context.state, context.recipe.effects)
     if not names:
         return ""
     order = _grouped(cosines)
@@ -180,7 +180,7 @@ def alias_plot(course: PlanContext) -> str:
 
 
 def _grouped(cosines: Array) -> list[int]:
-    """Rows in an order in which likes stand side by side: each next to the one it is most like."""
+    """Order of rows in which each follows the one it is most confounded with."""
     like = np.maximum(cosines, cosines.T)
     left = set(range(len(like)))
     order = [0]
@@ -193,7 +193,7 @@ def _grouped(cosines: Array) -> list[int]:
 
 
 def sight_plot(effects: list[dict[str, Any]]) -> str:
-    """Part v of every effect that the model leaves, axis by axis, as bars: the longer, the better the plan sees it."""
+    """Remaining fraction v of every effect by axis, as bars."""
     shown = sorted(effects, key=lambda row: row["left"])
     with mpl.rc_context(STYLE):
         figure = Figure(figsize=(WIDTH_IN, 1.0 + 0.24 * len(shown)), layout="constrained")
@@ -203,7 +203,11 @@ def sight_plot(effects: list[dict[str, Any]]) -> str:
             values = [row["left_by_axis"][k] for row in shown]
             place.barh(np.arange(len(shown)) + (1 - k) * height, values, height, color=COLOURS[letter], label=letter)
         place.set_yticks(np.arange(len(shown)), [row["effect"] for row in shown])
-        place.set(xlim=(0.0, 1.0), ylim=(-0.6, len(shown) - 0.4), xlabel="part v of the effect that the model leaves")
+        place.set(
+            xlim=(0.0, 1.0),
+            ylim=(-0.6, len(shown) - 0.4),
+            xlabel="v, fraction of the effect that remains after the model",
+        )
         place.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
         place.grid(visible=False, axis="y")
         place.legend(loc="lower right", ncols=3, frameon=False, title="sensor axis")

@@ -170,8 +170,27 @@ def test_a_document_says_what_it_is(name: str) -> None:
     assert effect.breaker
     low, high = effect.typical_ug
     assert 0.0 <= low <= high
+    assert high > 0.0
+    assert effect.source.strip()
+    assert effect.breaker.strip()
     assert {other for other in effect.hides_behind if not other.startswith("covariate:")} <= set(EVERY)
     assert f"### {name}\n" in page()
+
+
+@pytest.mark.parametrize("name", EVERY)
+@pytest.mark.parametrize("missing", ["symbol", "equation", "source", "typical_ug", "breaker"])
+def test_an_effect_declares_every_attribute_in_its_own_file(name: str, missing: str) -> None:
+    kind = type(effects.get(name))
+    assert missing in vars(kind), f"{kind.__module__}: {kind.__name__} has no {missing}; declare it in the class"
+
+
+def test_every_module_of_the_package_holds_an_effect_or_is_a_base() -> None:
+    """A file without a class with an id would be skipped silently."""
+    import pkgutil
+
+    bases = {"base", "covariate", "formula"}
+    modules = {info.name for info in pkgutil.iter_modules(effects.__path__)} - bases
+    assert modules == {type(effects.get(name)).__module__.rpartition(".")[2] for name in EVERY}
 
 
 def test_the_reference_is_up_to_date() -> None:

@@ -15,7 +15,7 @@ from typer.testing import CliRunner
 from pipelines.archive import Archive
 from pipelines.cli import app
 from pipelines.inquiry.inquiry import FollowUp, Inquiry, JointDiagnosis
-from pipelines.inquiry.loop import Consent, Participants, Settings, play
+from pipelines.inquiry.loop import Consent, Participants, Settings, run_inquiry
 from pipelines.rerun.selection import selected
 from schemas.errors import WrongUse
 
@@ -23,10 +23,15 @@ ROOT = Path(__file__).resolve().parents[2]
 CUBIC = {"hardening": 150e-6}
 
 
-def played(folder: Path, table: Participants | None = None, terms: Settings | None = None, **job: object) -> dict:
+def played(
+    folder: Path, participants: Participants | None = None, settings: Settings | None = None, **job: object
+) -> dict:
     wanted = job or CUBIC
-    return play(
-        inquiries.job_of(folder, **wanted), Archive(folder / "archive"), terms or Settings(), table or Participants()
+    return run_inquiry(
+        inquiries.job_of(folder, **wanted),
+        Archive(folder / "archive"),
+        settings or Settings(),
+        participants or Participants(),
     )
 
 
@@ -97,7 +102,7 @@ def test_a_follow_up_is_no_model_of_its_own(told_apart: tuple[Path, dict]) -> No
 def test_the_same_inquiry_again_measures_nothing(told_apart: tuple[Path, dict]) -> None:
     folder, before = told_apart
     done = []
-    again = played(folder, Participants(told=done.append))
+    again = played(folder, Participants(stage_done=done.append))
     assert all(one.reused for one in done)
     assert again["runs"] == before["runs"]
     assert again["classes"] == before["classes"]
@@ -131,8 +136,8 @@ def test_an_inquiry_that_was_killed_goes_on_and_no_finished_dwell_is_measured_tw
 def test_without_consent_nothing_more_is_measured(tmp_path: Path) -> None:
     seen: list[FollowUp] = []
 
-    def no(inquiry: Inquiry, finding: JointDiagnosis, move: FollowUp) -> Consent:
-        seen.append(move)
+    def no(inquiry: Inquiry, joint: JointDiagnosis, follow_up: FollowUp) -> Consent:
+        seen.append(follow_up)
         return "stop"
 
     document = played(tmp_path, Participants(approve=no))
@@ -144,7 +149,7 @@ def test_without_consent_nothing_more_is_measured(tmp_path: Path) -> None:
 
 @pytest.mark.slow
 def test_a_budget_that_is_too_small_says_what_it_takes(tmp_path: Path) -> None:
-    document = played(tmp_path, terms=Settings(budget=0.1))
+    document = played(tmp_path, settings=Settings(budget=0.1))
     assert document["ended"] == "budget"
     assert "give --budget" in document["text"]
     assert len(document["runs"]) == 1
@@ -153,7 +158,7 @@ def test_a_budget_that_is_too_small_says_what_it_takes(tmp_path: Path) -> None:
 @pytest.mark.slow
 def test_what_faces_cannot_see_is_measured_where_it_is_asked_for(tmp_path: Path) -> None:
     hidden = {"kind": "pendulous_mass", "plan": "orthogonal24", "compliance": 80e-6}
-    document = played(tmp_path, terms=Settings(unseen=True, budget=5.0), **hidden)
+    document = played(tmp_path, settings=Settings(unseen=True, budget=5.0), **hidden)
     assert document["recommended"] == ["cross_coupling"]
     assert "β in 90° steps makes fx·fy zero: Kip is invisible" in document["rounds"][0]["why"][0]
 
@@ -164,7 +169,7 @@ def test_at_no_terminal_the_proposal_is_printed_with_the_command_that_goes_on(tm
     given = ["investigate", str(recipe), "--station", str(station), "--archive", str(tmp_path / "archive"), "--direct"]
     waiting = CliRunner().invoke(app, given)
     assert waiting.exit_code == 1, waiting.output
-    assert "wait for approval" in " ".join(waiting.output.split())
+    assert "waits for approval" in " ".join(waiting.output.split())
     assert "--yes" in waiting.output
     done = CliRunner().invoke(app, [*given, "--yes", "--json"])
     assert done.exit_code == 0, done.output

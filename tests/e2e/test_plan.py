@@ -64,7 +64,7 @@ def test_plan_marks_what_would_have_to_be_larger_than_it_ever_is():
     }
     told = " ".join(CliRunner().invoke(app, ["plan", "production"]).stdout.split())
     assert "scale_aging" in faint
-    assert f"more than such effects do: {', '.join(sorted(faint))}" in told
+    assert f"floor above the typical size: {', '.join(sorted(faint))}" in told
 
 
 def test_plan_of_the_built_in_recipe_adds_up_its_minutes():

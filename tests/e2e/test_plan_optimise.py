@@ -11,9 +11,10 @@ from typer.testing import CliRunner
 from inertial.frames import force_from_angles
 from inertial.noise.dwells import DwellNoise
 from pipelines.cli import app
+from pipelines.cli.optimal import missing_limits
 from pipelines.jobs.recipe_text import limits_from, recipe_text
 from pipelines.jobs.recipes import load_recipe, sample_names
-from pipelines.planning.lower_bound import least
+from pipelines.planning.lower_bound import lower_bound
 from pipelines.planning.plan import plan_context
 from pipelines.planning.requirement import Requirement, candidates
 from pipelines.planning.soak_orders import orders, soak_seconds
@@ -27,7 +28,7 @@ from schemas.station import load_station
 THERMAL = "bias,scale,misalignment,bias_temperature,scale_temperature"
 
 
-def asked(folder, *options):
+def optimised(folder, *options):
     target = folder / "found.toml"
     base = ["plan", "optimise", "--device", "analogue", "--effects", THERMAL, "-o", str(target), "--json"]
     return CliRunner().invoke(app, [*base, *options]), target
@@ -36,7 +37,7 @@ def asked(folder, *options):
 @pytest.fixture(scope="module")
 def found(tmp_path_factory):
     """The cheapest recipe with errors up to four times the textbook plan's: little to search."""
-    done, target = asked(tmp_path_factory.mktemp("optimal"), "--factor", "4")
+    done, target = optimised(tmp_path_factory.mktemp("optimal"), "--factor", "4")
     assert done.exit_code == 0, done.exception
     return json.loads(done.stdout), target
 
@@ -50,6 +51,31 @@ def test_the_recipe_that_is_written_is_what_was_told(found):
     assert recipe.temperatures_C == document["temperatures_C"]
     planned = minutes(steps(recipe), load_station(), recipe)
     assert planned.total == pytest.approx(document["minutes"]["total"], abs=0.05)
+
+
+def test_the_new_recipe_is_compared_with_the_own_one_and_the_textbook_plan(found):
+    document, target = found
+    own = json.loads(
+        CliRunner().invoke(app, ["plan", "production", "--device", "analogue", "--effects", THERMAL, "--json"]).stdout
+    )
+    assert document["from"] == "production"
+    assert document["own_minutes"] == own["minutes"]
+    assert document["textbook_minutes"]["total"] > document["own_minutes"]["total"]
+    expected = [row["uncertainty_ug"] for row in own["coefficients"]]
+    assert [row["own_ug"] for row in document["coefficients"]] == pytest.approx(expected, rel=0.05)
+    ratios = [row["own_ug"] / row["wanted_ug"] for row in document["coefficients"]]
+    assert document["own_worst"] == pytest.approx(max(ratios))
+    head = [line for line in target.read_text(encoding="utf-8").splitlines() if line.startswith("#")]
+    assert any(f"production: {own['minutes']['total']:.0f} min" in line for line in head)
+    assert not document["limits_missing"]
+
+
+def test_a_missing_limits_file_is_a_warning_that_names_the_file(tmp_path):
+    recipe = load_recipe().model_copy(update={"limits": "mine.limits.toml"})
+    warning = missing_limits(recipe, tmp_path)
+    assert "mine.limits.toml" in warning
+    assert "tumbleline run" in warning
+    assert not missing_limits(load_recipe(), tmp_path)
 
 
 def test_every_coefficient_is_as_good_as_wanted_in_less_time(found):
@@ -152,7 +178,7 @@ def test_limits_beside_the_first_recipe_are_found_from_the_new_ones_folder(tmp_p
     ],
 )
 def test_what_cannot_be_asked_is_told_in_one_message(options, kind, said, tmp_path):
-    done, target = asked(tmp_path, *options)
+    done, target = optimised(tmp_path, *options)
     assert isinstance(done.exception, kind)
     assert said in str(done.exception)
     assert not target.exists()
@@ -160,7 +186,7 @@ def test_what_cannot_be_asked_is_told_in_one_message(options, kind, said, tmp_pa
 
 def test_effects_that_may_be_mistaken_are_told_apart_by_the_cheapest_recipe(tmp_path):
     rivals = ("--criterion", "t", "--part", "third_order,odd_quadratic", "--effects", "bias,scale,misalignment")
-    done, target = asked(tmp_path, *rivals, "--size", "400", "--verification", "1")
+    done, target = optimised(tmp_path, *rivals, "--size", "400", "--verification", "1")
     assert done.exit_code == 0, done.exception
     document = json.loads(done.stdout)
     assert [(r["true"], r["wrong"]) for r in document["rivals"]] == [
@@ -187,28 +213,28 @@ def test_no_recipe_is_quicker_than_the_bound_of_dwells_without_end():
     shares: dict[float, float] = {}
     for bias in (30.0, 150.0):
         against = plan_context(textbook(base, (-10.0, 60.0)), load_station(), DwellNoise(1e-7, bias * 1e-6))
-        wish = Requirement(
-            reference_errors(against, base), (), (-10.0, 60.0), candidates(against.station), legal=(25.0,)
+        requirement = Requirement(
+            reference_errors(against, base), (), (-10.0, 60.0), candidates(against.station), optional_levels=(25.0,)
         )
-        shares[bias] = least(base, against, wish).share
+        shares[bias] = lower_bound(base, against, requirement).share
     # the errors wanted grow with the flicker: the same part of the time
     assert shares[30.0] == pytest.approx(shares[150.0], abs=0.011)
     assert 0.7 < shares[30.0] < 0.95
-    half = replace(wish, wanted=2.0 * wish.wanted)
-    assert least(base, against, half).share < 0.5
+    half = replace(requirement, errors=2.0 * requirement.errors)
+    assert lower_bound(base, against, half).share < 0.5
 
 
 @pytest.mark.slow
 def test_errors_that_no_recipe_reaches_are_refused_with_the_nearest(tmp_path):
-    done, _ = asked(tmp_path, "--wanted", "bias=0.01")
+    done, _ = optimised(tmp_path, "--wanted", "bias=0.01")
     assert isinstance(done.exception, RecipeInvalid)
     assert "times those" in str(done.exception)
-    assert "% of the textbook plan's time, for bias" in str(done.exception) or "without end" in str(done.exception)
+    assert "uninterrupted measurement" in str(done.exception)
 
 
 @pytest.mark.slow
 def test_the_textbook_plan_is_matched_in_six_tenths_of_its_time(tmp_path):
-    done, _ = asked(tmp_path, "--verification", "1")
+    done, _ = optimised(tmp_path, "--verification", "1")
     document = json.loads(done.stdout)
     assert document["share"] <= 0.60
     assert document["worst"] <= 1.0

@@ -33,8 +33,8 @@ def test_warm_up_is_named_by_what_follows_a_power_on_whatever_the_bias_has_come_
     follower = inquiry.runner(move, silent)
     for name in FOLLOW_UP:
         follower.stage(name)
-    inquiry.measured(move, follower.run)
-    finding = inquiry.look()
+    inquiry.add_run(move, follower.run)
+    finding = inquiry.diagnose()
 
     first = runner.run.table("dwells")["dwell"].nunique()
     assert switched(finding.state) == [first + 2]

@@ -76,7 +76,7 @@ def test_the_ranks_of_polynomials_on_the_sphere_are_reproduced(name):
 
 
 def test_faces_cannot_see_cross_coupling_and_say_what_to_add():
-    sight = {s.effect: s for s in visibility.sights(planned("six"), ("bias", "scale", "misalignment"), 1e-5)}
+    sight = {s.effect: s for s in visibility.visibilities(planned("six"), ("bias", "scale", "misalignment"), 1e-5)}
     assert not sight["cross_coupling"].seen
     assert "45" in sight["cross_coupling"].breaker or "90°" in sight["cross_coupling"].breaker
     assert sight["second_order"].seen
@@ -108,7 +108,7 @@ def test_a_tumble_in_one_plane_sees_as_little_as_published():
 @pytest.mark.parametrize("name", TABLE)
 def test_the_command_tells_the_same_part_axis_by_axis(name):
     ids = ("second_order", "third_order", "odd_quadratic", "scale_asymmetry", "cross_coupling")
-    rows = {s.effect: s for s in visibility.sights(planned(name), BASE, 1e-5, ids)}
+    rows = {s.effect: s for s in visibility.visibilities(planned(name), BASE, 1e-5, ids)}
     for (effect, _), expected in zip(COLUMNS, TABLE[name], strict=True):
         if effect in ids:
             by_axis = rows[effect].by_axis if rows[effect].seen else (0.0, 0.0, 0.0)
@@ -140,13 +140,17 @@ def left(state, base, column, axis=0):
 
 
 def test_monotone_soaks_hide_ageing_as_far_as_published():
-    sight = {s.effect: s for s in visibility.sights(soaks(RISING), THERMAL, 1e-5, ["aging_linear", "scale_aging"])}
-    assert sight["aging_linear"].left == pytest.approx(0.021, abs=0.001)
-    assert sight["scale_aging"].left == pytest.approx(0.005, abs=0.0005)
+    sight = {
+        s.effect: s for s in visibility.visibilities(soaks(RISING), THERMAL, 1e-5, ["aging_linear", "scale_aging"])
+    }
+    assert sight["aging_linear"].remaining_fraction == pytest.approx(0.021, abs=0.001)
+    assert sight["scale_aging"].remaining_fraction == pytest.approx(0.005, abs=0.0005)
 
 
 def test_soaks_up_and_down_show_all_of_ageing():
-    sight = {s.effect: s for s in visibility.sights(soaks(CLOSED), THERMAL, 1e-5, ["aging_linear", "scale_aging"])}
+    sight = {
+        s.effect: s for s in visibility.visibilities(soaks(CLOSED), THERMAL, 1e-5, ["aging_linear", "scale_aging"])
+    }
     for one in sight.values():
         assert one.by_axis == pytest.approx([1.0, 1.0, 1.0], abs=0.005)
 
@@ -154,8 +158,8 @@ def test_soaks_up_and_down_show_all_of_ageing():
 def test_shuffled_soaks_show_most_of_ageing(rng):
     parts = []
     for _ in range(60):
-        found = visibility.sights(soaks(rng.permutation(CLOSED)), THERMAL, 1e-5, ["aging_linear", "scale_aging"])
-        parts.append([s.left for s in found])
+        found = visibility.visibilities(soaks(rng.permutation(CLOSED)), THERMAL, 1e-5, ["aging_linear", "scale_aging"])
+        parts.append([s.remaining_fraction for s in found])
     ageing, scale_ageing = np.mean(parts, axis=0)
     assert ageing == pytest.approx(0.93, abs=0.05)
     assert 0.86 - 0.03 < scale_ageing < 1.0
@@ -202,7 +206,7 @@ def test_a_ramp_in_one_pose_makes_the_rate_a_function_of_the_temperature():
      ("twenty_six", "cross_coupling", 25.0), ("six", "third_order", None), ("twenty_six", "third_order", 47.0)],
 )  # fmt: skip
 def test_three_sigma_floors_are_the_published_ones(plan, effect, floor):
-    (sight,) = visibility.sights(planned(plan), BASE, 11.4e-6, [effect])
+    (sight,) = visibility.visibilities(planned(plan), BASE, 11.4e-6, [effect])
     if floor is None:
         assert not sight.seen
         assert sight.floor == np.inf
@@ -212,6 +216,6 @@ def test_three_sigma_floors_are_the_published_ones(plan, effect, floor):
 
 def test_a_floor_under_a_given_covariance_is_that_of_white_noise_where_it_is_white():
     state = planned("twenty_six")
-    white = visibility.sights(state, BASE, 11.4e-6, ["third_order"])[0].floor
-    given = visibility.sights(state, BASE, 1.0, ["third_order"], covariance=11.4e-6**2 * np.eye(26))[0].floor
+    white = visibility.visibilities(state, BASE, 11.4e-6, ["third_order"])[0].floor
+    given = visibility.visibilities(state, BASE, 1.0, ["third_order"], covariance=11.4e-6**2 * np.eye(26))[0].floor
     assert given == pytest.approx(white)

@@ -8,7 +8,7 @@ from inertial.fits.wander import fit_lot_with_wander, student
 from inertial.frames import force_from_angles
 from inertial.noise.dwells import DwellNoise, dwell_covariance
 from inertial.planning.expected import expected_errors
-from inertial.planning.visibility import sights
+from inertial.planning.visibility import visibilities
 from inertial.state import State
 
 LINEAR = ("bias", "scale", "misalignment")
@@ -84,7 +84,7 @@ def test_of_effects_as_large_as_their_floor_half_stand_out_by_three_sigma(rng, k
     state = plan("fibonacci24")
     noise = covariance(state.time, *KINDS[kind])
     own = DwellNoise(*(1e-6 * x for x in KINDS[kind]))
-    seen = sights(
+    seen = visibilities(
         state, LINEAR, 1.0, ["second_order", "third_order"], covariance=dwell_covariance(state.time, DWELL_S, own)
     )
     white = np.linalg.inv(np.linalg.cholesky(noise))

@@ -10,7 +10,7 @@ from small_station import MemorySink, lot_of, quiet_progress, short_recipe, stat
 from inertial.planning.sequences import SequenceStep as Wanted
 from inertial.planning.sequences import timeline
 from pipelines.capture.capture import capture
-from pipelines.inquiry.followup import circumstances, place_after, station_minutes
+from pipelines.inquiry.followup import circumstances, state_after, station_minutes
 from pipelines.schedule.planned_state import planned_state
 from pipelines.schedule.steps import steps
 from pipelines.schedule.timing import StationPose, minutes
@@ -124,7 +124,7 @@ def test_devices_read_on_the_way_are_planned_at_the_temperatures_they_have_there
 def test_follow_ups_and_plans_take_the_same_time_and_the_same_temperatures(tmp_path):
     """The same steps, as the science proposes them and as the station is asked for them: soaked, on the way, after a pause."""
     job = job_of(tmp_path)
-    place = place_after(job)
+    place = state_after(job)
     wanted = [
         Wanted(0.3, -1.0, 25.0, wait=5.0), Wanted(2.0, 2.5, 25.0, wait=5.0, off=90.0),
         Wanted(1.0, 0.2, 55.0), Wanted(-1.5, 0.2, 55.0),

@@ -21,7 +21,7 @@ def columns(angles):
     return design.local_columns(design.split(MODEL)[0], state, {})
 
 
-def parting(size=3e-5, wanted=50.0):
+def discrimination(size=3e-5, wanted=50.0):
     return Discrimination(BASE, (CUBIC, ODD), (np.full((3, 1), size), np.full((3, 1), size)), wanted)
 
 
@@ -39,21 +39,21 @@ def left_by_the_wrong_one(rows, true, wrong, size=3e-5):
 
 def test_separations_are_what_a_fit_of_the_wrong_rival_leaves():
     rows = columns(poses.plan("fibonacci24"))
-    found = parting().separations(normal(rows))
+    found = discrimination().separations(normal(rows))
     assert found[0] == pytest.approx(sum(left_by_the_wrong_one(rows, CUBIC, ODD)), rel=1e-5)
     assert found[1] == pytest.approx(sum(left_by_the_wrong_one(rows, ODD, CUBIC)), rel=1e-5)
-    lot = replace(parting(), units=8).separations(normal(rows))
+    lot = replace(discrimination(), units=8).separations(normal(rows))
     assert lot == pytest.approx(8.0 * found)
 
 
 def test_six_faces_do_not_part_a_cubic_from_an_odd_quadratic():
-    assert np.all(parting().shortfall(normal(columns(poses.plan("eighteen")))) > 1.0)
-    assert parting().separations(normal(columns(poses.plan("six")))).max() < 1e-6
+    assert np.all(discrimination().ratio_to_required(normal(columns(poses.plan("eighteen")))) > 1.0)
+    assert discrimination().separations(normal(columns(poses.plan("six")))).max() < 1e-6
 
 
 def test_a_plan_that_does_not_determine_the_model_parts_nothing():
     rows = columns(np.repeat(poses.plan("six")[:2], 6, axis=0))
-    assert np.all(np.isinf(parting().shortfall(normal(rows))))
+    assert np.all(np.isinf(discrimination().ratio_to_required(normal(rows))))
 
 
 def test_exchanges_part_rivals_half_as_far_again_as_spread_directions():
@@ -69,6 +69,7 @@ def test_exchanges_part_rivals_half_as_far_again_as_spread_directions():
     )
     start = np.arange(0, 60, 60 / n).astype(np.intp)
     before, after = (
-        parting().separations(slots.matrix(plan)).min() for plan in (start, exchanged(slots, start, parting().value))
+        discrimination().separations(slots.matrix(plan)).min()
+        for plan in (start, exchanged(slots, start, discrimination().objective))
     )
     assert after > 1.5 * before

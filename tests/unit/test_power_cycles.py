@@ -19,7 +19,7 @@ from inertial.planning.sequences import SequenceStep, StationPace, extended
 from inertial.power import coldness, switched
 from inertial.state import History, State
 from pipelines.inquiry.explanation import what
-from pipelines.inquiry.followup import circumstances, follow_up, place_after, station_minutes
+from pipelines.inquiry.followup import circumstances, follow_up, state_after, station_minutes
 from pipelines.tables.dwells import lot_arrays, measured
 
 UP, DOWN = (0.0, 0.0), (math.pi, 0.0)
@@ -162,11 +162,11 @@ def test_a_power_order_reaches_the_recipe_the_minutes_and_the_words(tmp_path):
     follower = follow_up(wanted, job, job, ("first",), "why")
     assert follower.recipe.off_at(0) == [0.0, 600.0, 0.0]
     assert circumstances(job, job, 30.0).reach.power
-    place = place_after(job)
+    place = state_after(job)
     plain = [SequenceStep(*UP, 25.0), SequenceStep(*UP, 25.0), SequenceStep(*DOWN, 25.0)]
     assert station_minutes(wanted, job, place) - station_minutes(plain, job, place) == pytest.approx(10.0, abs=0.02)
     told = Proposal(("power",), tuple(wanted), ("warm_up", "aging_log"), ("warm_up", "aging_log"), 10.0, 1.0, 50.0, 1.0)
-    assert what(run_of(), told) == "Switching the units off for 10 min: warm_up begins again, aging_log goes on"
+    assert what(run_of(), told) == "Switching the units off for 10 min: warm_up restarts, aging_log continues"
 
 
 def test_dwells_of_runs_that_switched_nothing_stand_beside_those_of_one_that_did(rng):

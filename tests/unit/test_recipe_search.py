@@ -10,12 +10,12 @@ from inertial.frames import force_from_angles
 from inertial.noise.dwells import DwellNoise, dwell_covariance
 from pipelines.jobs.model_files import STARTING_MODEL
 from pipelines.jobs.recipes import load_recipe
-from pipelines.planning.dwell_counts import FEWEST, fewest_dwells, least
-from pipelines.planning.layout import PlanDesign, TimedDesign, spanned
+from pipelines.planning.dwell_counts import FEWEST, fewest_dwells, smallest_passing
 from pipelines.planning.plan import identified, plan_context
-from pipelines.planning.requirement import Requirement, between, candidates
+from pipelines.planning.requirement import Requirement, candidates, temperature_choices
 from pipelines.planning.soak_orders import mirrored, orders
 from pipelines.planning.textbook import reference_errors, textbook
+from pipelines.planning.timed_design import PlanDesign, TimedDesign, spanned
 from pipelines.schedule.timing import spent
 from schemas.station import load_station
 from stations.plant.preset import load_preset
@@ -26,35 +26,35 @@ ANALOGUE = Path(__file__).resolve().parents[2] / "deploy" / "recipes" / "analogu
 
 
 @pytest.fixture(scope="module")
-def layout():
+def timed():
     base = load_recipe().model_copy(update={"effects": list(STARTING_MODEL), "static_record_s": 0.0})
     against = plan_context(textbook(base, (-10.0, 60.0)), STATION, NOISE)
-    wish = Requirement(reference_errors(against, base), (), (-10.0, 60.0), candidates(STATION))
-    return TimedDesign(base, STATION, NOISE, wish, slowest=float(against.state.time[-1]))
+    requirement = Requirement(reference_errors(against, base), (), (-10.0, 60.0), candidates(STATION))
+    return TimedDesign(base, STATION, NOISE, requirement, slowest=float(against.state.time[-1]))
 
 
-def test_no_soak_has_a_dwell_too_many(layout: TimedDesign) -> None:
+def test_no_soak_has_a_dwell_too_many(timed: TimedDesign) -> None:
     made, allowed = PlanDesign((25.0, -10.0, 60.0, 25.0), (), 2.0), np.full((3, 6), 1.4)
-    found = fewest_dwells(layout, made, allowed)
+    found = fewest_dwells(timed, made, allowed)
     assert found is not None
-    assert np.all(layout.shortfall(found)[0] <= allowed)
+    assert np.all(timed.ratio_and_seconds(found)[0] <= allowed)
     assert len(set(found.counts)) > 1
     for soak, count in enumerate(found.counts):
         fewer = list(found.counts)
         fewer[soak] -= 1
-        assert count == FEWEST or np.any(layout.shortfall(replace(found, counts=tuple(fewer)))[0] > allowed)
+        assert count == FEWEST or np.any(timed.ratio_and_seconds(replace(found, counts=tuple(fewer)))[0] > allowed)
 
 
-def test_no_number_of_dwells_is_given_where_none_is_enough(layout: TimedDesign) -> None:
-    assert fewest_dwells(layout, PlanDesign((25.0, -10.0, 60.0, 25.0), (), 2.0), np.full((3, 6), 0.05)) is None
-    assert least(lambda n: n >= 7, 1, 20) == 7
-    assert least(lambda n: n >= 7, 1, 6) is None
+def test_no_number_of_dwells_is_given_where_none_is_enough(timed: TimedDesign) -> None:
+    assert fewest_dwells(timed, PlanDesign((25.0, -10.0, 60.0, 25.0), (), 2.0), np.full((3, 6), 0.05)) is None
+    assert smallest_passing(lambda n: n >= 7, 1, 20) == 7
+    assert smallest_passing(lambda n: n >= 7, 1, 6) is None
 
 
-def test_the_table_of_flicker_gives_the_covariance_of_dwells(layout: TimedDesign) -> None:
+def test_the_table_of_flicker_gives_the_covariance_of_dwells(timed: TimedDesign) -> None:
     time = np.sort(np.random.default_rng(3).uniform(900.0, 8000.0, 40)).round(1) + 20.0 * np.arange(40)
-    exact = dwell_covariance(time, 2.0, NOISE, slowest=layout.slowest)
-    assert layout.covariance(time, 2.0) == pytest.approx(exact, rel=1e-4)
+    exact = dwell_covariance(time, 2.0, NOISE, slowest=timed.slowest)
+    assert timed.covariance(time, 2.0) == pytest.approx(exact, rel=1e-4)
 
 
 def test_a_plan_that_reaches_too_little_is_widened_by_few_poses():
@@ -78,7 +78,7 @@ def test_what_the_textbook_plan_cannot_identify_is_wanted_as_the_recipe_knows_it
 
 
 def test_orders_without_coming_back_may_be_one_soak_and_those_upside_down_are_known():
-    found = orders((), STATION, 900.0, legal=between((-10.0, 60.0)), back=False)
+    found = orders((), STATION, 900.0, optional=temperature_choices((-10.0, 60.0)), back=False)
     assert found[0] == (25.0,)
     assert (-10.0, 60.0) in found
     assert mirrored((25.0, -10.0, 60.0)) == (25.0, 60.0, -10.0)
@@ -90,7 +90,7 @@ def test_wander_alone_forbids_the_bias_of_a_qa700_in_six_tenths_of_the_textbooks
     noise = DwellNoise(1e-6 * part.noise_density_ug, 1e-6 * part.bias_instability_ug, 1e-6 * part.rate_random_walk_ug)
     base = load_recipe().model_copy(update={"effects": list(STARTING_MODEL), "static_record_s": 0.0})
     against = plan_context(textbook(base, (-10.0, 60.0)), STATION, noise)
-    time = np.arange(6.0, 0.6 * 60.0 * spent(against.stretches).total, 12.0)
+    time = np.arange(6.0, 0.6 * 60.0 * spent(against.activities).total, 12.0)
     covariance = dwell_covariance(time, 12.0, noise, slowest=float(against.state.time[-1]))
     best = 1e6 / np.sqrt(np.linalg.inv(covariance).sum())
     assert best == pytest.approx(23.0, abs=0.1)

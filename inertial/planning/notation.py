@@ -1,4 +1,4 @@
-"""The term of an effect's equation for one axis and column, and its symbol, for sentences."""
+"""Symbols and terms of an effect's equation for one axis and column, as text."""
 
 import re
 
@@ -14,34 +14,34 @@ def symbol(effect: AnyEffect, column: int | None = None) -> str:
     return ", ".join(each)
 
 
-def signature(effect: AnyEffect, axis: int, column: int) -> str:
-    """What one coefficient of an effect multiplies, with the axes' letters in it: ``fx·fy``, ``θ²``, ``dT/dt``."""
+def factor_text(effect: AnyEffect, axis: int, column: int) -> str:
+    """The factor that one coefficient of an effect multiplies, with the letters of the axes: ``fx·fy``, ``θ²``, ``dT/dt``."""
     if "=" in effect.equation or not isinstance(effect, SensorEffect):
-        return f"the signature of {effect.id}"
+        return f"the column of {effect.id}"
     symbols = [part.strip() for part in effect.symbol.split(",")]
     factors = _factors(re.split(r"[,;] (?![^(]*\))", effect.equation)[0], symbols, column)
     if not factors:
-        return f"the signature of {effect.id}"
+        return f"the column of {effect.id}"
     text = "·".join(factors)
     if text.startswith("(") and text.endswith(")") and len(factors) == 1:
         text = text[1:-1]
     return _lettered(text, axis)
 
 
-def _factors(sum_: str, symbols: list[str], column: int) -> list[str]:
-    """Factors beside the coefficient in one term of a sum; sums in brackets that hold coefficients are opened."""
-    terms = [t for t in _split(sum_, "+") if any(s in t for s in symbols)] or [sum_]
-    found: list[str] = []
+def _factors(terms_text: str, symbols: list[str], column: int) -> list[str]:
+    """Factors beside the coefficient in one term of a sum; brackets that contain coefficients are expanded."""
+    terms = [t for t in _split(terms_text, "+") if any(s in t for s in symbols)] or [terms_text]
+    factors: list[str] = []
     for factor in _split(terms[column] if column < len(terms) else terms[0], "·"):
         if _holds(factor, symbols):
             continue
         opened = factor.startswith("(") and factor.endswith(")") and any(s in factor for s in symbols)
-        found += _factors(factor[1:-1], symbols, column) if opened else [factor]
-    return found
+        factors += _factors(factor[1:-1], symbols, column) if opened else [factor]
+    return factors
 
 
 def _split(text: str, sign: str) -> list[str]:
-    """Parts of a text between the signs that stand outside brackets."""
+    """Parts of a text, split at a sign outside brackets."""
     parts, depth = [""], 0
     for letter in text:
         depth += {"(": 1, ")": -1}.get(letter, 0)
@@ -53,13 +53,13 @@ def _split(text: str, sign: str) -> list[str]:
 
 
 def _holds(factor: str, symbols: list[str]) -> bool:
-    """Whether a factor is a coefficient: one of the symbols, alone, numbered or with others in brackets."""
+    """Whether a factor is a coefficient: one of the symbols, alone or with a number."""
     bare = factor.lstrip("½−-").strip()
     return any(re.fullmatch(rf"{re.escape(s)}\w?", bare) for s in symbols)
 
 
 def _lettered(text: str, axis: int) -> str:
-    """The names of the standard for own, next and other axis as letters of the fixture's axes."""
+    """The text with the standard's axis indices i, p, o replaced by the letters of the axes."""
     next_axis, other = others(axis)
     letters = {"i": AXES[axis], "p": AXES[next_axis], "j": AXES[next_axis], "o": AXES[other], "k": AXES[other]}
     return re.sub(r"f([ipojk])(?![A-Za-z_])", lambda m: f"f{letters[m.group(1)]}", text)

@@ -1,4 +1,4 @@
-"""Designs of a recipe laid out in time: when each dwell would be taken, what it would show, and how long all takes."""
+"""Plan designs with times: the time and columns of every dwell, the covariance of the dwell means, and the station time."""
 
 from __future__ import annotations
 
@@ -35,15 +35,15 @@ if TYPE_CHECKING:
 
 SHORTEST_DWELL_S = 1.0
 LONGEST_DWELLS = 3.0
-"""Longest dwell over the recipe's own."""
+"""Longest dwell to try, as a multiple of the recipe's dwell."""
 
 _GRAIN_S, _LONG_S = 2.0, 600.0
-"""Steps of time in which the covariance of flicker is tabulated, and in which its length grows."""
+"""Step of the table of flicker covariance, and the increment of its length, s."""
 
 
 @dataclass(frozen=True)
 class PlanDesign:
-    """Soaks in order, in °C, how many dwells each has, and how long a dwell is."""
+    """Soak temperatures in order, °C; the number of dwells at each; the length of a dwell, s."""
 
     order: tuple[float, ...]
     counts: tuple[int, ...]
@@ -56,31 +56,42 @@ class PlanDesign:
 
     @property
     def fixed(self) -> NDArray[np.bool_]:
-        """Dwells that begin or end a soak: they are taken in the reference pose, (n,)."""
+        """Dwells that begin or end a soak, (n,): they use the reference pose."""
         change = np.diff(self.group) != 0
         return np.concatenate([[True], change]) | np.concatenate([change, [True]])
 
 
 class TimedDesign:
-    """Designs for one recipe, station, noise and wish."""
+    """Times, columns and covariance of plan designs for one recipe, station, noise and requirement.
+
+    slowest : s, longest time over which flicker is modelled
+    """
 
     def __init__(
-        self, recipe: Recipe, station: StationConfig, noise: DwellNoise, wish: Requirement, *, slowest: float
+        self, recipe: Recipe, station: StationConfig, noise: DwellNoise, requirement: Requirement, *, slowest: float
     ) -> None:
-        self.recipe, self.station, self.noise, self.wish, self.slowest = recipe, station, noise, wish, slowest
-        places = numbered("p", wish.candidates)
-        standing = [StationPose(outer=p.outer_deg, inner=p.inner_deg) for p in places]
-        self.travel = np.array([[move_seconds(a, b, station) for b in places] for a in standing])
-        self.force = force_from_angles(*np.radians(wish.candidates).T)
-        self._reference = int(np.argmax(np.min(np.abs(self.force), axis=1)))  # its least component is largest
+        self.recipe, self.station, self.noise, self.requirement, self.slowest = (
+            recipe,
+            station,
+            noise,
+            requirement,
+            slowest,
+        )
+        poses = numbered("p", requirement.candidates)
+        starts = [StationPose(outer=p.outer_deg, inner=p.inner_deg) for p in poses]
+        self.travel = np.array([[move_seconds(a, b, station) for b in poses] for a in starts])
+        self.force = force_from_angles(*np.radians(requirement.candidates).T)
+        self._reference = int(
+            np.argmax(np.min(np.abs(self.force), axis=1))
+        )  # the pose whose smallest component is largest
         self._spread = spread(self.force)
-        self._sensor, _ = design.split(wish.effects or tuple(recipe.effects))
+        self._sensor, _ = design.split(requirement.effects or tuple(recipe.effects))
         self._verification = len({(p.outer_deg, p.inner_deg) for p in recipe.verification})
 
-    def dwells(self) -> tuple[float, ...]:
-        """Lengths of a dwell that are worth a try, s: the one that brings most for its time, and longer ones.
+    def dwell_lengths(self) -> tuple[float, ...]:
+        """Lengths of a dwell to try, s: the one with most information per time, and three and nine times that.
 
-        Where the slow wander rules, time and not number of dwells is what counts, and longer ones make fewer records.
+        Where slow wander dominates, the total time counts and not the number of dwells; longer dwells then need fewer records.
         """
         least = math.ceil(max(SHORTEST_DWELL_S, FEWEST_SAMPLES / self.recipe.rate_hz))
         most = max(float(least), LONGEST_DWELLS * self.recipe.dwell_s)
@@ -93,78 +104,82 @@ class TimedDesign:
         best = float(lengths[int(np.argmin(cost))])
         return tuple(x for x in (best, 3.0 * best, 9.0 * best) if x <= most)
 
-    def start(self, made: PlanDesign) -> Choice:
-        """A plain design (n,): poses far from one another in turn."""
-        choice = self._spread[np.cumsum(~made.fixed) % len(self._spread)]
-        choice[made.fixed] = self._reference
+    def start(self, plan: PlanDesign) -> Choice:
+        """Starting arrangement (n,): candidates in an order of large distances."""
+        choice = self._spread[np.cumsum(~plan.fixed) % len(self._spread)]
+        choice[plan.fixed] = self._reference
         return choice.astype(np.intp)
 
-    def shortfall(self, made: PlanDesign) -> tuple[Array, float]:
-        """What a plain design lacks of the wish (above one), and its station time in s."""
-        choice = self.start(made)
-        time, seconds = self._times(made, choice)
-        rows = self._columns(time, np.asarray(made.order)[made.group], self.force[choice], choice)
+    def ratio_and_seconds(self, plan: PlanDesign) -> tuple[Array, float]:
+        """Ratios to the requirement (met at ≤ 1) of a design's starting arrangement, and its station time in s."""
+        choice = self.start(plan)
+        time, seconds = self._times(plan, choice)
+        rows = self._columns(time, np.asarray(plan.order)[plan.group], self.force[choice], choice)
         flat = np.moveaxis(rows, 0, 1).reshape(time.size, -1)
-        solved = np.linalg.solve(self.covariance(time, made.dwell_s), flat)
+        solved = np.linalg.solve(self.covariance(time, plan.dwell_s), flat)
         n, width = time.size, rows.shape[-1]
         left, right = (np.moveaxis(x.reshape(n, 3, width), 1, 0) for x in (flat, solved))
-        return self.wish.shortfall(np.swapaxes(left, -1, -2) @ right), seconds
+        return self.requirement.ratio_to_required(np.swapaxes(left, -1, -2) @ right), seconds
 
-    def alike(self) -> NDArray[np.bool_]:
-        """Columns (3, p) that no pose changes: bias, and what it does over temperature and time."""
+    def pose_independent(self) -> NDArray[np.bool_]:
+        """Columns (3, p) that do not depend on the pose: bias and its dependence on temperature and time."""
         every = np.arange(len(self.force))
-        rows = self._columns(np.full(every.size, 1000.0), np.full(every.size, max(self.wish.levels)), self.force, every)
+        rows = self._columns(
+            np.full(every.size, 1000.0), np.full(every.size, max(self.requirement.levels)), self.force, every
+        )
         return np.ptp(rows, axis=1) <= 1e-9 * np.max(np.abs(rows), axis=1)
 
-    def slots(self, made: PlanDesign) -> tuple[PlanSlots, Choice]:
-        """Every candidate in every slot, and a plain design."""
-        choice = self.start(made)
-        time, seconds = self._times(made, choice)
+    def slots(self, plan: PlanDesign) -> tuple[PlanSlots, Choice]:
+        """Every candidate in every slot of a design, and its starting arrangement."""
+        choice = self.start(plan)
+        time, seconds = self._times(plan, choice)
         n, c = time.size, len(self.force)
         every = np.tile(np.arange(c), n)
-        heat = np.repeat(np.asarray(made.order)[made.group], c)
+        heat = np.repeat(np.asarray(plan.order)[plan.group], c)
         rows = self._columns(np.repeat(time, c), heat, self.force[every], every).reshape(3, n, c, -1)
-        weight = np.asarray(np.linalg.inv(self.covariance(time, made.dwell_s)), dtype=np.float64)
-        still = seconds - float(np.sum(self.travel[choice[:-1], choice[1:]]))
-        return PlanSlots(np.moveaxis(rows, 0, 2), weight, self.travel, still, made.group, made.fixed), choice
+        weight = np.asarray(np.linalg.inv(self.covariance(time, plan.dwell_s)), dtype=np.float64)
+        without_travel = seconds - float(np.sum(self.travel[choice[:-1], choice[1:]]))
+        return PlanSlots(np.moveaxis(rows, 0, 2), weight, self.travel, without_travel, plan.group, plan.fixed), choice
 
     def covariance(self, time: Array, dwell_s: float) -> Array:
-        """Covariance (n, n) of dwell means, g²: as :func:`dwell_covariance`, with the flicker from a table."""
-        found = dwell_covariance(time, dwell_s, replace(self.noise, instability=0.0))
+        """Covariance (n, n) of dwell means, g²: :func:`dwell_covariance` with flicker interpolated from a table."""
+        covariance = dwell_covariance(time, dwell_s, replace(self.noise, instability=0.0))
         if self.noise.instability > 0.0:
             longest = max(self.slowest, _LONG_S * math.ceil(float(time.max()) / _LONG_S))
             grid, values, own = _flicker(dwell_s, self.slowest if time.max() <= self.slowest else longest)
             gap = np.abs(time[:, None] - time)
             flicker = np.interp(gap, grid, values)
             np.fill_diagonal(flicker, own)
-            found += self.noise.instability**2 * flicker
-        return found
+            covariance += self.noise.instability**2 * flicker
+        return covariance
 
-    def _times(self, made: PlanDesign, choice: Choice) -> tuple[Array, float]:
-        """Middle of every dwell, and the end of all, s."""
-        recipe, order = self.recipe, made.order
+    def _times(self, plan: PlanDesign, choice: Choice) -> tuple[Array, float]:
+        """Middle of every dwell and end of the last, s."""
+        recipe, order = self.recipe, plan.order
         typical = float(np.median(self.travel))
-        beside = recipe.settle_s + self.station.pace.record_s + made.dwell_s
+        beside = recipe.settle_s + self.station.pace.record_s + plan.dwell_s
         moves = np.concatenate([[typical], self.travel[choice[:-1], choice[1:]]])
         each = moves + beside
-        first = np.concatenate([[0], np.cumsum(made.counts)[:-1]])
+        first = np.concatenate([[0], np.cumsum(plan.counts)[:-1]])
         each[first] += soak_waits(order, self.station, recipe.soak_min_s)
-        verified = [len(turns(self._verification, self.wish.verification, k, len(order))) for k in range(len(order))]
+        verified = [
+            len(turns(self._verification, self.requirement.verification, k, len(order))) for k in range(len(order))
+        ]
         checks = np.array(verified, dtype=np.float64) * (typical + beside)
         each[first[1:]] += checks[:-1]
         end = np.cumsum(each)
-        return end - 0.5 * made.dwell_s, float(end[-1] + checks[-1]) + self._static_soak(order[-1])
+        return end - 0.5 * plan.dwell_s, float(end[-1] + checks[-1]) + self._static_soak(order[-1])
 
     def _static_soak(self, last: float) -> float:
-        """Seconds of the soak before the static record; none where it is taken at the last temperature, or not at all."""
+        """Soak before the static record, s; 0 where that is at the last temperature, or is not taken."""
         at, recipe = self.recipe.static_temperature_C, self.recipe
         if recipe.static_record_s <= 0.0 or at == last:
             return 0.0
         return soaked(StationPose(air=last, device=last), at, self.station, recipe.soak_min_s)[0]
 
     def _columns(self, time: Array, heat: Array, force: Array, choice: Choice) -> Array:
-        """Design columns (3, n, p) over those wanted."""
-        angles = np.radians(self.wish.candidates[choice])
+        """Design columns (3, n, p) in units of the required errors."""
+        angles = np.radians(self.requirement.candidates[choice])
         gravity = self.recipe.local_gravity_m_s2 / STANDARD_GRAVITY_M_S2
         state = State(
             force=gravity * force,
@@ -177,21 +192,21 @@ class TimedDesign:
             inner=angles[:, 1],
         )
         columns = design.local_columns(self._sensor, state, design.starting_values(self._sensor, state))
-        return columns * self.wish.wanted[:, None, :]
+        return columns * self.requirement.errors[:, None, :]
 
 
 def soak_waits(order: Sequence[float], station: StationConfig, shortest_s: float) -> list[float]:
-    """Station time of each soak, s, from the room on."""
+    """Station time of each soak, s, from room temperature."""
     room = station.simulation.room_C if station.simulation else station.pace.room_C
-    now, found = StationPose(air=room, device=room), list[float]()
+    now, seconds = StationPose(air=room, device=room), list[float]()
     for temperature in order:
         waited, now = soaked(now, temperature, station, shortest_s)
-        found.append(waited)
-    return found
+        seconds.append(waited)
+    return seconds
 
 
 def spread(force: Array) -> Choice:
-    """Candidates (c,) in an order in which each lies far from those before it, opposite poses one after the other."""
+    """Candidates (c,) ordered so that each is far from those before it, opposite poses in pairs."""
     chosen = [0]
     while len(chosen) < len(force):
         last = force[chosen[-1]]
@@ -202,13 +217,13 @@ def spread(force: Array) -> Choice:
 
 
 def spanned(force: Array, choice: Choice, fixed: NDArray[np.bool_], needed_g: float) -> Choice:
-    """A plan (n,) of candidates that reaches as far on every axis as a recipe must, with as few poses replaced as that takes.
+    """A plan (n,) of candidates with the required span of specific force on every axis, as few poses as possible replaced.
 
     Parameters
     ----------
     force : (c, 3), of the candidates
-    fixed : (n,), slots that stay as they are
-    needed_g : largest minus smallest component
+    fixed : (n,), slots that are not changed
+    needed_g : g, required difference of the largest and smallest component
     """
     found, free = choice.copy(), ~fixed
     for axis in np.flatnonzero(np.ptp(force[choice], axis=0) < needed_g):
@@ -221,7 +236,7 @@ def spanned(force: Array, choice: Choice, fixed: NDArray[np.bool_], needed_g: fl
 
 @lru_cache(maxsize=32)
 def _flicker(dwell_s: float, longest: float) -> tuple[Array, Array, float]:
-    """Covariance of flicker with B = 1 over the time between dwells, and the variance of one dwell."""
+    """Covariance of dwell means under flicker of B = 1 against the time between them, and the variance of one dwell."""
     grid = np.concatenate(
         [np.arange(0.5 * dwell_s + 1e-6, 200.0, 0.25), np.arange(200.0, longest + _GRAIN_S, _GRAIN_S)]
     )
