@@ -22,7 +22,7 @@ class Noise:
 
     white : one-sided density, µg/√Hz; flicker : bias instability B, µg; walk : K, µg/√s
     unit_factors, axis_factors : factors on all of it, in turn over units and axes
-    unit_white : factors on the white part by unit
+    unit_white, unit_slow, axis_slow : factors on the white part by unit; on 1/f and walk by unit and by axis
     tails : degrees of freedom of a t distribution for the white part of the dwells; 0 for normal
     """
 
@@ -32,6 +32,8 @@ class Noise:
     unit_factors: tuple[float, ...] = (1.0,)
     axis_factors: tuple[float, float, float] = (1.0, 1.0, 1.0)
     unit_white: tuple[float, ...] = (1.0,)
+    unit_slow: tuple[float, ...] = (1.0,)
+    axis_slow: tuple[float, float, float] = (1.0, 1.0, 1.0)
     tails: int = 0
 
     def factors(self, units: int) -> Floats:
@@ -57,7 +59,8 @@ def dwell_noise(noise: Noise, start: Floats, duration: Floats, units: int, rng: 
     first = ((start - begin) / GRID_S).astype(int)
     last = np.maximum(((start + duration - begin) / GRID_S).astype(int), first + 1)
     means = (whole[:, last] - whole[:, first]) / (last - first)
-    found = found + means.reshape(units, 3, -1).transpose(0, 2, 1)
+    slow_factors = np.resize(noise.unit_slow, units)[:, None] * np.array(noise.axis_slow)
+    found = found + means.reshape(units, 3, -1).transpose(0, 2, 1) * slow_factors[:, None, :]
     return found * noise.factors(units)[:, None, :]
 
 

@@ -28,8 +28,8 @@ class Fitting:
     """A model's columns in a problem, ready to be fitted to some dwells of any series."""
 
     def __init__(self, problem: Problem, terms: Sequence[Term]) -> None:
-        self._x = _stacked(problem, [t for t in terms if t.effect.scope != "station"])
-        self._z = _stacked(problem, [t for t in terms if t.effect.scope == "station"])
+        self._x = _stacked(problem, [t for t in terms if not t.shared])
+        self._z = _stacked(problem, [t for t in terms if t.shared])
         self._weight = np.where(np.isfinite(problem.error), 1.0 / problem.error, 0.0)
 
     def left(self, series: Array, train: NDArray[np.bool_]) -> Array:

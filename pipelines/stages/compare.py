@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from threadpoolctl import threadpool_limits
 
 from inertial import effects as catalogue
 from inertial.criticism.comparison import estimate, residuals_of, rms
@@ -49,7 +50,9 @@ def compare(
         A unit of the fresh run was not in the first, or a quantity that the model needs is missing.
     """
     try:
-        return _compared(measured(dwells, history), effects, None if fresh is None else measured(fresh, fresh_history))
+        with threadpool_limits(1):
+            again = None if fresh is None else measured(fresh, fresh_history)
+            return _compared(measured(dwells, history), effects, again)
     except InertialError as problem:
         raise DataRejected(str(problem)) from None
 
