@@ -113,7 +113,9 @@ def _confirmed(made: Made, effect: str, again: tuple[Any, Any]) -> bool | None:
     from pipelines.models import Version
 
     versions = [Version(1, BASE, (), (), None), Version(2, (*BASE, effect), (effect,), (), None)]
-    return evolution(versions, lambda model: compare(made.dwells, model, made.history, *again))[-1]["confirmed"]
+    return evolution(
+        versions, lambda model, before: compare(made.dwells, model, made.history, *again, before=before)
+    )[-1]["confirmed"]
 
 
 def _pooled(work: Callable[..., Any], tasks: list[Any], jobs: int) -> Iterator[Any]:

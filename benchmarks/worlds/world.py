@@ -58,6 +58,7 @@ class Scene:
     wait: Floats
     fine: Floats
     fine_temperature: Floats
+    fine_air: Floats
     powered: float
 
     @property
@@ -87,12 +88,12 @@ def force_of(outer: Floats, inner: Floats) -> Floats:
 def make(world: World, seed: int) -> Made:
     """The tables of a world; the same seed gives the same bytes."""
     plan, device, first, second, third = (np.random.default_rng(s) for s in np.random.SeedSequence(seed).spawn(5))
-    scene, again = _scene(world, plan, first), None
+    scene = _scene(world, plan, first)
     lot = _Lot.drawn(device, world.units)
     again = _with_heat(scene, world, second)
     noises = [1e-6 * dwell_noise(world.noise, s.start, s.duration, world.units, g) for s, g in ((scene, first), (again, second))]
     floor = float(np.sqrt(np.mean((noises[0] - noises[0].mean(axis=1, keepdims=True)) ** 2)))
-    extra = [_hidden(world, lot, scene, again, floor, third)]
+    extra = _hidden(world, scene, again, floor, third)
     told = None
     tables = []
     shift = 1e-6 * world.turn_on * second.standard_normal((world.units, 1, 3))
@@ -102,8 +103,8 @@ def make(world: World, seed: int) -> Made:
         turned, readings = None, s.temperature + 0.003 * rng.standard_normal(s.temperature.shape)
         if k == 0 and world.fault:
             true, turned, readings, noise, told = FAULTS[world.fault](true, readings, noise, world.amount, third)
-        output = lot.output(true, turned) + extra[0][k] + noise + k * shift
-        tables.append((_table(world, lot, s, readings, output, rng), _history(lot, s, rng)))
+        output = lot.output(true, turned) + extra[k] + noise + k * shift
+        tables.append((_table(world, s, readings, output, rng), _history(s, rng, air=world.fault == "unsoaked")))
     return Made(tables[0][0], tables[0][1], tables[1][0], tables[1][1], told, 1e6 * floor)
 
 
@@ -163,7 +164,7 @@ def _scene(world: World, rng: np.random.Generator, heat: np.random.Generator) ->
     empty = np.zeros((world.units, 0))
     scene = Scene(
         np.array(outer), np.array(inner), np.array(start), duration, np.array(place), empty, empty, np.array(wait),
-        np.zeros(0), empty, 1800.0,
+        np.zeros(0), empty, np.zeros(0), 1800.0,
     )  # fmt: skip
     return _with_heat(scene, world, heat)
 
@@ -189,11 +190,11 @@ def _with_heat(scene: Scene, world: World, rng: np.random.Generator) -> Scene:
     middle = scene.start + 0.5 * scene.duration
     own = np.stack([np.interp(middle, fine, b) for b in body])
     around = np.broadcast_to(np.interp(middle, fine, air), own.shape)
-    return replace(scene, temperature=own, chamber=around, fine=fine, fine_temperature=body)
+    return replace(scene, temperature=own, chamber=around, fine=fine, fine_temperature=body, fine_air=air)
 
 
 def _hidden(
-    world: World, lot: _Lot, scene: Scene, again: Scene, floor: float, rng: np.random.Generator
+    world: World, scene: Scene, again: Scene, floor: float, rng: np.random.Generator
 ) -> tuple[Floats, Floats]:
     """What the hidden effects add to the run and to the fresh one, (units, n, 3), g."""
     found = [np.zeros((world.units, len(scene.start), 3)) for _ in range(2)]
@@ -221,9 +222,8 @@ def _left(scene: Scene, shape: Floats) -> Floats:
 
 
 def _table(
-    world: World, lot: _Lot, scene: Scene, readings: Floats, output: Floats, rng: np.random.Generator
+    world: World, scene: Scene, readings: Floats, output: Floats, rng: np.random.Generator
 ) -> pd.DataFrame:
-    del lot
     units, n = readings.shape
     samples = np.maximum((scene.duration * RATE_HZ).astype(int), 2)
     white = 1e-6 * world.noise.white * np.sqrt(RATE_HZ / 2.0) * world.noise.factors(units)
@@ -259,13 +259,13 @@ def _quantised(
     return mean, spread
 
 
-def _history(lot: _Lot, scene: Scene, rng: np.random.Generator) -> pd.DataFrame:
-    del lot
+def _history(scene: Scene, rng: np.random.Generator, *, air: bool) -> pd.DataFrame:
+    """The units' temperatures against time; the chamber's air where nothing else is read."""
     every = slice(None, None, 6)
     rows = [
         pd.DataFrame({
             "unit": f"W{unit + 1:03d}", "time_s": scene.fine[every],
-            "unit_C": body[every] + 0.003 * rng.standard_normal(scene.fine[every].size),
+            "unit_C": (scene.fine_air + 1.0 if air else body)[every] + 0.003 * rng.standard_normal(scene.fine[every].size),
         })
         for unit, body in enumerate(scene.fine_temperature)
     ]  # fmt: skip

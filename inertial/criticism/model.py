@@ -18,6 +18,12 @@ from inertial.errors import NotIdentified
 
 Array = NDArray[np.float64]
 
+_LONG = 400
+"""Dwells above which shares are looked for by half decades: a whitener takes long, and so many dwells are kept at each."""
+
+_HANGING = 1e-3
+"""Part of a column that the others leave below which one factorisation is not trusted."""
+
 _OWN = 20
 """Degrees of freedom of a block from which on its own variance tells of the shares; fewer are taken to be alike."""
 
@@ -108,7 +114,8 @@ class Model:
     @cached_property
     def noise(self) -> Noise:
         """Shares of wander by restricted likelihood, pooled over the blocks, and variances of the blocks."""
-        return self.noise_at(best_shares(self._restricted, None if self._near is None else self._near.shares))
+        near = None if self._near is None else self._near.shares
+        return self.noise_at(best_shares(self._restricted, near, finest=4 if self.problem.n > _LONG else 2))
 
     def noise_at(self, shares: Shares) -> Noise:
         """The noise at given shares: each block's variance drawn together with the others' as far as they are alike."""
@@ -133,13 +140,50 @@ class Model:
 
     def _restricted(self, shares: Shares) -> float:
         """−2 log restricted likelihood, each block with a variance of its own where it can carry one."""
-        space = self._rough(shares)
-        dof = space.by_block
+        quick = self._quick(shares)
+        if quick is None:
+            space = self._rough(shares)
+            information, squares, dof = space.information, space.squares, space.by_block
+        else:
+            information, squares = quick
+            dof = self.problem.covariance.count - float(self.local.shape[-1])
+        logdet = float(np.sum(self.problem.covariance.logdet(shares)))
         if float(np.median(dof)) < _OWN:
-            return space.logdet + space.information + variance.deviance(space.squares, dof)
+            return logdet + information + variance.deviance(squares, dof)
         known = dof > 0
-        own = dof[known] * np.log(np.maximum(space.squares[known], 1e-300) / dof[known])
-        return space.logdet + space.information + float(np.sum(own))
+        own = dof[known] * np.log(np.maximum(squares[known], 1e-300) / dof[known])
+        return logdet + information + float(np.sum(own))
+
+    @cached_property
+    def _stacked(self) -> Array:
+        """Columns with coefficients by block, of unit size, and the measurements behind them, (blocks, n, p + 1)."""
+        unit = self.local / self._sizes[:, None, :]
+        return np.concatenate([unit, self.problem.y[..., None]], axis=-1)
+
+    def _quick(self, shares: Shares) -> tuple[float, Array] | None:
+        """log|HᵀV⁻¹H|, up to a constant, and sums of squares, by one factorisation; None where columns hang together."""
+        if self.shared.shape[-1]:
+            return None
+        white = self.problem.covariance.whiten(self._stacked, shares)
+        gram = np.swapaxes(white, -1, -2) @ white
+        size = np.sqrt(np.maximum(np.diagonal(gram, axis1=-2, axis2=-1), 1e-300))
+        try:
+            root = np.linalg.cholesky(gram / (size[:, :, None] * size[:, None, :]))
+        except np.linalg.LinAlgError:
+            return None
+        diagonal = np.diagonal(root, axis1=-2, axis2=-1)
+        if float(diagonal[:, :-1].min(initial=1.0)) < _HANGING:
+            return None
+        information = 2.0 * float(np.sum(np.log(diagonal[:, :-1] * size[:, :-1])))
+        information += 2.0 * float(np.sum(np.log(self._sizes)))
+        return information, (diagonal[:, -1] * size[:, -1]) ** 2
+
+    @cached_property
+    def _sizes(self) -> Array:
+        """Sizes of the columns with coefficients by block, (blocks, p)."""
+        there = self.problem.covariance.there[..., None]
+        size = np.sqrt(np.einsum("bnp,bnp->bp", self.local * there, self.local * there))
+        return np.where(size > 0.0, size, 1.0)
 
     @cached_property
     def space(self) -> Space:

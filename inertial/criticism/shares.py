@@ -12,6 +12,9 @@ Place = tuple[int | None, int | None]
 _STRIDES = (4, 2, 1)
 """Half decades, quarters, eighths."""
 
+_LEAST = 1e-3
+"""Deviance that a step must bring."""
+
 
 def best_shares(deviance: Callable[[Shares], float], near: Shares | None = None, *, finest: int = 1) -> Shares:
     """The shares at which a deviance is least, walked to from a start.
@@ -32,10 +35,9 @@ def best_shares(deviance: Callable[[Shares], float], near: Shares | None = None,
     for stride in _STRIDES:
         if stride < finest:
             break
-        for _ in range(40):
-            around = sorted(_around(here, stride), key=_order)
-            best = min(around, key=at)
-            if at(best) >= at(here):
+        for _ in range(60):
+            best = next((p for p in _around(here, stride) if at(p) < at(here) - _LEAST), None)
+            if best is None:
                 break
             here = best
     return shares_at(here)
@@ -57,27 +59,22 @@ def _inside(k: int) -> int:
     return min(max(k, LEAST_SHARE), LARGEST_SHARE)
 
 
-def _around(place: Place, stride: int) -> set[Place]:
-    """Neighbours, each share up or down, one for the other, or gone."""
-    first, second = (_moves(k, stride) for k in place)
-    near = {(a, place[1]) for a in first} | {(place[0], b) for b in second}
-    near |= {(a, b) for a in first[1:3] for b in second[1:3]}
-    # a share that is not there yet only shows where it is as large as the other
-    if place[1] is None and place[0] is not None:
-        near |= {(place[0], place[0]), (_inside(place[0] - 8), place[0])}
-    if place[0] is None and place[1] is not None:
-        near |= {(place[1], place[1]), (place[1], _inside(place[1] - 8))}
-    return near - {place}
+def _around(place: Place, stride: int) -> list[Place]:
+    """Neighbours: each share up or down, one for the other; at the first stride also none, or there at last."""
+    first, second = place
+    near: list[Place] = [(first, k) for k in _moved(second, stride)] + [(k, second) for k in _moved(first, stride)]
+    if first is not None and second is not None:
+        near += [(_inside(first - stride), _inside(second + stride)), (_inside(first + stride), _inside(second - stride))]
+        near += [(_inside(first - stride), _inside(second - stride)), (_inside(first + stride), _inside(second + stride))]
+    if stride == _STRIDES[0]:
+        near += [(first, None), (None, second)]
+        # a share that is not there yet only shows where it is as large as the other
+        if second is None:
+            near += [(first, LEAST_SHARE + 8), *([] if first is None else [(first, first), (_inside(first - 8), first)])]
+        if first is None:
+            near += [(LEAST_SHARE + 8, second), *([] if second is None else [(second, second), (second, _inside(second - 8))])]
+    return [p for p in dict.fromkeys(near) if p != place]
 
 
-def _moves(k: int | None, stride: int) -> list[int | None]:
-    """None, down, up."""
-    if k is None:
-        return [None, None, LEAST_SHARE + 8] if stride > 1 else [None, None, LEAST_SHARE]
-    down = k - stride
-    return [None, down if down >= LEAST_SHARE else None, _inside(k + stride)]
-
-
-def _order(place: Place) -> tuple[int, int]:
-    first, second = (-100 if k is None else k for k in place)
-    return first, second
+def _moved(k: int | None, stride: int) -> list[int]:
+    return [] if k is None else [_inside(k + stride), _inside(k - stride)]
