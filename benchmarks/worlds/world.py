@@ -180,7 +180,7 @@ def _with_heat(scene: Scene, world: World, rng: np.random.Generator) -> Scene:
         begin = arrives[s] - ramp - 30.0 if world.fault == "unsoaked" else min(ends[s - 1] + 5.0, arrives[s] - 30.0)
         gone = np.clip((fine - begin) / ramp, 0.0, 1.0)
         air = np.where(fine >= begin, world.soaks[s - 1] + gone * (world.soaks[s] - world.soaks[s - 1]), air)
-    tau = 300.0 * (1.0 + 0.1 * rng.standard_normal(world.units))[:, None]
+    tau = 300.0 * (1.0 + 0.03 * rng.standard_normal(world.units))[:, None]
     body = np.empty((world.units, fine.size))
     body[:, 0] = air[0]
     decay = 1.0 - np.exp(-5.0 / tau[:, 0])

@@ -11,13 +11,14 @@ from inertial import effects as catalogue
 from inertial.criticism.adequacy import adequacy
 from inertial.criticism.bad_dwells import BadDwell, bad_dwells, heavy_tails, without
 from inertial.criticism.classes import EffectClass, class_of
-from inertial.criticism.decisions import ADEQUATE_ABOVE, NAMED_BELOW
+from inertial.criticism.decisions import ADEQUATE_ABOVE, NAMED_BELOW, RISES
 from inertial.criticism.drivers import Driver, Place, drivers_of, places
 from inertial.criticism.field import Field
 from inertial.criticism.handling import alternatives
 from inertial.criticism.handling.base import Handling
-from inertial.criticism.heldout import fit_rms, heldout_rms
+from inertial.criticism.heldout import fit_rms
 from inertial.criticism.influence import Influence, influence, log_p_without
+from inertial.criticism.left_out import LeftOut, left_out
 from inertial.criticism.likelihood import shared_noise
 from inertial.criticism.model import Model, Term, refuse_without_freedom
 from inertial.criticism.penalty import PER_COEFFICIENT, cost_of_model, log_p_value
@@ -45,15 +46,22 @@ UNEXPLAINED = 0.5
 class Named:
     """A class of effects that is missing, with the errors before and after it is added; g.
 
+    heldout_before, heldout_after : on dwells left out, the worst of the kinds that can judge both; NaN where none can
     units, dwells : that an alternative of scope "data" concerns, none for all units; told : what it did, in words
     """
 
     effects: EffectClass
     rms_after: float
+    heldout_before: float
     heldout_after: float
     units: tuple[int, ...] = ()
     dwells: tuple[int, ...] = ()
     told: str = ""
+
+    @property
+    def predicts(self) -> bool:
+        """Whether what was not fitted is predicted no worse with it: nothing else is worth to be added to a model."""
+        return not self.heldout_after > (1.0 + RISES) * self.heldout_before
 
 
 @dataclass(frozen=True)
@@ -177,8 +185,9 @@ def _mend(run: _Run, fields: Field, found: Found, term: Term) -> None:
     units = (int(place["unit"]),) if "unit" in place else ()
     told = alternative.told(problem.lot, size, **place)
     dwells = tuple(alternative.dwells(problem.lot, **place))
-    after = fit_rms(problem, model.terms)
-    run.handled.append(Named(group, after, heldout_rms(problem, model.terms), units, dwells, told))
+    before, after = left_out(found.model), left_out(model)
+    errors = fit_rms(problem, model.terms), *_worst(before, after)
+    run.handled.append(Named(group, *errors, units, dwells, told))
     lot = alternative.mended(run.lot, size, **place)
     if lot is None:
         run.beside.append(term)
@@ -301,11 +310,23 @@ def _classes(field: Field, base: Model, final: Model) -> list[EffectClass]:
 
 def _named(problem: Problem, base: Model, classes: Sequence[EffectClass]) -> tuple[Named, ...]:
     """Errors after each class is added to those before it."""
-    terms, found = list(base.terms), []
+    found: list[Named] = []
+    model = base
+    before = left_out(base) if classes else None
     for group in classes:
-        terms.append(group.members[0].term)
-        found.append(Named(group, fit_rms(problem, terms), heldout_rms(problem, terms)))
+        first = next((m.term for m in group.members if not isinstance(m.term.effect, Handling)), group.members[0].term)
+        model = model.with_term(first)
+        after = left_out(model)
+        worst = _worst(before, after) if before is not None else (float("nan"), float("nan"))
+        found.append(Named(group, fit_rms(problem, model.terms), *worst))
+        before = after
     return tuple(found)
+
+
+def _worst(before: LeftOut, after: LeftOut) -> tuple[float, float]:
+    """The worst error on dwells left out, before and after, over the kinds that can judge both."""
+    kinds = set(before.density) & set(after.density)
+    return before.rms(kinds), after.rms(kinds)
 
 
 def _covariate(classes: Sequence[EffectClass]) -> Unexplained | None:

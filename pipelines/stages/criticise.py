@@ -12,7 +12,7 @@ from inertial.criticism.diagnosis import Diagnosis
 from inertial.criticism.diagnosis import diagnose as diagnose_lot
 from inertial.criticism.faults import Fault, find_faults
 from inertial.errors import InertialError
-from pipelines.stages.compare import compare
+from pipelines.stages.compare import compare, without_history
 from pipelines.stages.condense import condense
 from pipelines.stages.found import (
     Names,
@@ -118,6 +118,8 @@ def document(
     faulty = {f.unit for f in faults}
     units = tuple(u for k, u in enumerate(found.units) if k not in faulty)
     names = Names(units, tuple(int(d) for d in found.dwells))
+    terms = [*diagnosis.base.terms, *(m.term for n in diagnosis.named for m in n.effects.physics)]
+    warnings = without_history(found, terms)
     return {
         "adequate": bool(diagnosis.adequate),
         "blocked_by": blocked,
@@ -136,8 +138,9 @@ def document(
         "without_influence": without_influence(diagnosis),
         "removed": removed_of(diagnosis, names),
         "recommended": [
-            n.effects.simplest.effect.id for n in diagnosis.named if not n.effects.of_data
+            n.effects.simplest.effect.id for n in diagnosis.named if not n.effects.of_data and n.predicts
         ],
+        "warnings": warnings,
         "unexplained": None
         if diagnosis.unexplained is None
         else {

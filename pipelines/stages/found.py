@@ -31,6 +31,11 @@ def probability(log_p: float) -> float:
     return float(max(np.exp(min(log_p, 0.0)), 1e-300))
 
 
+def known(value: float) -> float | None:
+    """A number; None where it is not one."""
+    return float(value) if np.isfinite(value) else None
+
+
 def classes_of(diagnosis: Diagnosis, names: Names) -> list[dict[str, Any]]:
     """Rows of all classes: what handling did first, as nothing is to be read into a run before it is mended."""
     rows = [_class(n, names) for n in diagnosis.handled]
@@ -47,7 +52,8 @@ def _class(named: Named, names: Names) -> dict[str, Any]:
         "effects": list(group.ids),
         "scope": scope,
         "rms_after_ug": MICRO * named.rms_after,
-        "heldout_after_ug": MICRO * named.heldout_after,
+        "heldout_after_ug": known(MICRO * named.heldout_after),
+        "heldout_before_ug": known(MICRO * named.heldout_before),
         "p_value": probability(group.log_p),
         "size_ug": MICRO * group.size,
         "nonlinear": {} if scope == "data" else dict(simplest.values),

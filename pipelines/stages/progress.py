@@ -10,6 +10,7 @@ from inertial.criticism.came_again import came_again
 from inertial.criticism.comparison import estimate
 from inertial.criticism.decisions import BLOCKS, LEFT_OUT
 from inertial.criticism.left_out import left_out
+from pipelines.stages.found import known
 from schemas.units import MICRO
 
 if TYPE_CHECKING:
@@ -41,10 +42,10 @@ def _by_fresh(before: Model, after: Model, fresh: Lot) -> dict[str, Any]:
     return {
         "judged_by": "fresh run",
         "confirmed": found.confirmed,
-        "part": _known(found.part),
-        "part_u": _known(found.error),
+        "part": known(found.part),
+        "part_u": known(found.error),
         "fall_ug": MICRO * found.fall,
-        "fall_u_ug": _known(MICRO * found.fall_error),
+        "fall_u_ug": known(MICRO * found.fall_error),
         "estimated_again": found.again,
         "log_density": None,
     }
@@ -64,7 +65,7 @@ def _by_left_out(before: LeftOut, after: LeftOut) -> dict[str, Any]:
         "part": None,
         "part_u": None,
         "fall_ug": MICRO * falls[worst] if falls else None,
-        "fall_u_ug": _known(MICRO * _error(*missed[worst])) if falls else None,
+        "fall_u_ug": known(MICRO * _error(*missed[worst])) if falls else None,
         "estimated_again": None,
         "log_density": gain,
     }
@@ -81,8 +82,3 @@ def _error(before: np.ndarray, after: np.ndarray) -> float:
         falls.append(one - other)
     count = len(falls)
     return float(np.sqrt((count - 1) / count * np.sum((np.array(falls) - np.mean(falls)) ** 2)))
-
-
-def _known(value: float) -> float | None:
-    """A number; None where it is not one."""
-    return float(value) if np.isfinite(value) else None
