@@ -108,14 +108,14 @@ def looped(task: tuple[str, str, int]) -> tuple[str, dict[str, Any]]:
 
 def _confirmed(made: Made, effect: str, again: tuple[Any, Any]) -> bool | None:
     """The verdict on an effect that is added to the plain model."""
+    from pipelines.models import Version
     from pipelines.stages.compare import compare
     from pipelines.stages.evolution import evolution
-    from pipelines.models import Version
 
     versions = [Version(1, BASE, (), (), None), Version(2, (*BASE, effect), (effect,), (), None)]
-    return evolution(
-        versions, lambda model, before: compare(made.dwells, model, made.history, *again, before=before)
-    )[-1]["confirmed"]
+    return evolution(versions, lambda model, before: compare(made.dwells, model, made.history, *again, before=before))[
+        -1
+    ]["confirmed"]
 
 
 def _pooled(work: Callable[..., Any], tasks: list[Any], jobs: int) -> Iterator[Any]:
@@ -166,11 +166,15 @@ def _line(name: str, rows: list[dict[str, Any]]) -> str:
     if whole[0]["found"] is not None:
         parts.append(f"fault told {interval(sum(r['found'] for r in whole), n)}")
     if whole[0]["held"] is not None:
-        parts.append(f"in class {interval(sum(r['held'] for r in whole), n)}, exact {sum(r['held'] and r['alone'] for r in whole)}")
+        parts.append(
+            f"in class {interval(sum(r['held'] for r in whole), n)}, exact {sum(r['held'] and r['alone'] for r in whole)}"
+        )
     told = Counter("+".join("|".join(e) for e in r["named"]) or "-" for r in whole)
     faults = Counter(b[0] for r in whole for b in r["blocked"])
     parts.append("; ".join(f"{k} ×{v}" for k, v in told.most_common(6)) + (f" {dict(faults)}" if faults else ""))
-    parts.append(f"{sum(r['seconds'] for r in whole) / n:.1f} s" + (f", {len(rows) - n} broken" if n < len(rows) else ""))
+    parts.append(
+        f"{sum(r['seconds'] for r in whole) / n:.1f} s" + (f", {len(rows) - n} broken" if n < len(rows) else "")
+    )
     return " · ".join(parts)
 
 
@@ -179,9 +183,8 @@ def _loop_line(name: str, rows: list[dict[str, Any]]) -> str:
     for key in ("wrong fresh", "wrong left out", "right fresh", "right left out"):
         every = [v for r in rows for _, v in r.get(key, [])]
         if every:
-            parts.append(
-                f"{key}: confirmed {interval(sum(v is True for v in every), len(every))}, refuted {sum(v is False for v in every)}"
-            )
+            confirmed = interval(sum(v is True for v in every), len(every))
+            parts.append(f"{key}: confirmed {confirmed}, refuted {sum(v is False for v in every)}")
     return " · ".join(parts)
 
 

@@ -108,9 +108,13 @@ def level_error(rng: np.random.Generator, units: int, scene: Any) -> Effect:
     def effect(s: Any) -> Floats:
         up = np.stack([np.full(s.outer.size, lean[0]), np.full(s.outer.size, lean[1]), np.zeros(s.outer.size)], axis=-1)
         x, y, z = up.T
-        about_outer = np.stack([x, np.cos(s.outer) * y + np.sin(s.outer) * z, -np.sin(s.outer) * y + np.cos(s.outer) * z])
+        about_outer = np.stack(
+            [x, np.cos(s.outer) * y + np.sin(s.outer) * z, -np.sin(s.outer) * y + np.cos(s.outer) * z]
+        )
         c, d = np.cos(s.inner), np.sin(s.inner)
-        fixture = np.stack([c * about_outer[0] + d * about_outer[1], -d * about_outer[0] + c * about_outer[1], about_outer[2]])
+        fixture = np.stack(
+            [c * about_outer[0] + d * about_outer[1], -d * about_outer[0] + c * about_outer[1], about_outer[2]]
+        )
         return np.broadcast_to(fixture.T, (units, s.outer.size, 3))
 
     return effect

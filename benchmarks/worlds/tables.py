@@ -49,7 +49,9 @@ _HIDDEN = (
     "third_order", "second_order", "cross_coupling", "bias_temperature_quadratic", "scale_temperature_quadratic",
     "misalignment_temperature", "aging_linear", "warm_up", "step_change", "level_error",
 )  # fmt: skip
-HIDDEN: dict[str, World] = {f"{name}_{size:g}": World(hidden=((name, size),)) for size in (1.0, 2.0) for name in _HIDDEN}
+HIDDEN: dict[str, World] = {
+    f"{name}_{size:g}": World(hidden=((name, size),)) for size in (1.0, 2.0) for name in _HIDDEN
+}
 HIDDEN |= {
     f"{name}_2_K4": World(hidden=((name, 2.0),), noise=Noise(walk=4.0)) for name in ("third_order", "cross_coupling")
 }

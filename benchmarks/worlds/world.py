@@ -67,7 +67,6 @@ class Scene:
         return force_of(self.outer, self.inner)
 
 
-
 @dataclass(frozen=True)
 class Made:
     """The tables of a run and of a fresh one, with what was done to the first."""
@@ -91,16 +90,19 @@ def make(world: World, seed: int) -> Made:
     scene = _scene(world, plan, first)
     lot = _Lot.drawn(device, world.units)
     again = _with_heat(scene, world, second)
-    noises = [1e-6 * dwell_noise(world.noise, s.start, s.duration, world.units, g) for s, g in ((scene, first), (again, second))]
+    noises = [
+        1e-6 * dwell_noise(world.noise, s.start, s.duration, world.units, g)
+        for s, g in ((scene, first), (again, second))
+    ]
     floor = float(np.sqrt(np.mean((noises[0] - noises[0].mean(axis=1, keepdims=True)) ** 2)))
     extra = _hidden(world, scene, again, floor, third)
     told = None
     tables = []
     shift = 1e-6 * world.turn_on * second.standard_normal((world.units, 1, 3))
-    for k, (s, noise, rng) in enumerate(((scene, noises[0], first), (again, noises[1], second))):
+    for k, (s, drawn, rng) in enumerate(((scene, noises[0], first), (again, noises[1], second))):
         rest = 1e-6 * world.rest * rng.standard_normal((2, len(s.start)))
         true = replace(s, outer=s.outer + rest[0], inner=s.inner + rest[1])
-        turned, readings = None, s.temperature + 0.003 * rng.standard_normal(s.temperature.shape)
+        noise, turned, readings = drawn, None, s.temperature + 0.003 * rng.standard_normal(s.temperature.shape)
         if k == 0 and world.fault:
             true, turned, readings, noise, told = FAULTS[world.fault](true, readings, noise, world.amount, third)
         output = lot.output(true, turned) + extra[k] + noise + k * shift
@@ -143,7 +145,9 @@ def _scene(world: World, rng: np.random.Generator, heat: np.random.Generator) ->
     moves = 20.0
     low, high = world.durations
     soaks = len(world.soaks)
-    duration = np.exp(rng.uniform(np.log(low), np.log(high), count * soaks)) if high > low else np.full(count * soaks, low)
+    duration = (
+        np.exp(rng.uniform(np.log(low), np.log(high), count * soaks)) if high > low else np.full(count * soaks, low)
+    )
     span = float(np.sum(duration) + moves * count * soaks)
     rest = max((3600.0 * world.hours - span) / max(soaks - 1, 1), 600.0) if soaks > 1 else 0.0
     start, outer, inner, place, wait = [], [], [], [], []
@@ -193,9 +197,7 @@ def _with_heat(scene: Scene, world: World, rng: np.random.Generator) -> Scene:
     return replace(scene, temperature=own, chamber=around, fine=fine, fine_temperature=body, fine_air=air)
 
 
-def _hidden(
-    world: World, scene: Scene, again: Scene, floor: float, rng: np.random.Generator
-) -> tuple[Floats, Floats]:
+def _hidden(world: World, scene: Scene, again: Scene, floor: float, rng: np.random.Generator) -> tuple[Floats, Floats]:
     """What the hidden effects add to the run and to the fresh one, (units, n, 3), g."""
     found = [np.zeros((world.units, len(scene.start), 3)) for _ in range(2)]
     for name, size in world.hidden:
@@ -221,9 +223,7 @@ def _left(scene: Scene, shape: Floats) -> Floats:
     return out
 
 
-def _table(
-    world: World, scene: Scene, readings: Floats, output: Floats, rng: np.random.Generator
-) -> pd.DataFrame:
+def _table(world: World, scene: Scene, readings: Floats, output: Floats, rng: np.random.Generator) -> pd.DataFrame:
     units, n = readings.shape
     samples = np.maximum((scene.duration * RATE_HZ).astype(int), 2)
     white = 1e-6 * world.noise.white * np.sqrt(RATE_HZ / 2.0) * world.noise.factors(units)

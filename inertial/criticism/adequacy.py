@@ -157,7 +157,9 @@ def _drops(candidate: Candidate, space: Space, noise: Array) -> list[tuple[Array
     left = space.project(flat)
     found: list[tuple[Array, int]] = []
     if candidate.shared:
-        left = left.reshape(blocks * n, grid, p) / np.maximum(np.sqrt(np.sum(size.reshape(blocks, grid, p) ** 2, axis=0)), 1e-300)
+        left = left.reshape(blocks * n, grid, p) / np.maximum(
+            np.sqrt(np.sum(size.reshape(blocks, grid, p) ** 2, axis=0)), 1e-300
+        )
         noise_flat = noise.reshape(blocks * n, -1)
         for g in range(grid):
             u, s, _ = np.linalg.svd(left[:, g], full_matrices=False)

@@ -20,6 +20,9 @@ from inertial.criticism.space import Space
 
 Array = NDArray[np.float64]
 
+_ENOUGH = 3
+"""Units, or stretches of time, from which on their scatter tells of an error."""
+
 _SPARE = 2.0
 """Dwells per coefficient of the base model from which on a fresh run determines it again."""
 
@@ -71,7 +74,9 @@ def came_again(lot: Lot, before: Estimate, after: Estimate) -> CameAgain:
     left = np.nan_to_num(residuals_of(problem, before))
     change = left - np.nan_to_num(residuals_of(problem, after))
     base, again = _base(problem, before.terms)
-    space = Space(problem.covariance, noise, left * zero, base.local, np.concatenate([base.shared, change[..., None]], axis=-1))
+    space = Space(
+        problem.covariance, noise, left * zero, base.local, np.concatenate([base.shared, change[..., None]], axis=-1)
+    )
     shared = space.gram[1:, 1:]
     # what all share and is estimated again comes first, the change last: its coefficient is λ
     own = float(shared[-1, -1])
@@ -121,7 +126,7 @@ def _falls(problem: Problem, base: Model, left: Array, change: Array) -> tuple[f
         cells[:, k, :2] = here.sum(axis=(1, 2))
         cells[:, k, 2] = there[:, stretch == k].reshape(units, -1).sum(axis=1)
     before, after = (float(np.sqrt(cells[..., i].sum() / max(cells[..., 2].sum(), 1.0))) for i in (0, 1))
-    spread = [_jackknife(cells.sum(axis=axis)) for axis in (0, 1) if cells.shape[1 - axis] > 1]
+    spread = [_jackknife(cells.sum(axis=axis)) for axis in (0, 1) if cells.shape[1 - axis] >= _ENOUGH]
     return before, after, float(np.max(spread)) if spread else float("nan")
 
 

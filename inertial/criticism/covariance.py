@@ -12,12 +12,14 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import lapack, solve_triangular
+from scipy.linalg import get_lapack_funcs, solve_triangular
 
 from inertial.criticism.decisions import SHARE_STEP
 from inertial.criticism.noise import LONGEST, flicker_kernel, walk_kernel
 
 Array = NDArray[np.float64]
+
+_invert = get_lapack_funcs(("trtri",), dtype=np.float64)[0]
 
 _EVEN = 1.5
 """White standard errors of a block that differ by less than this factor are taken as equal."""
@@ -151,7 +153,7 @@ class Covariance:
             if i is not None:
                 covariance += 10.0 ** (i / SHARE_STEP) * wander[place][np.ix_(there, there)]
         lower = np.linalg.cholesky(covariance)
-        inverse = lapack.dtrtri(lower, lower=1)[0]
+        inverse = _invert(lower, lower=1)[0]
         whole = np.zeros((there.size, there.size))
         whole[np.ix_(there, there)] = np.tril(inverse)
         return whole, 2.0 * float(np.sum(np.log(np.diagonal(lower))))

@@ -1,67 +1,34 @@
 """The diagnosis of a lot: adequacy, where the model fails, classes of missing effects, what is left unexplained."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
-from functools import cached_property
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.random import Generator
 
 from inertial import effects as catalogue
 from inertial.criticism.adequacy import adequacy
-from inertial.criticism.bad_dwells import BadDwell, bad_dwells, heavy_tails, without
+from inertial.criticism.bad_dwells import BadDwell, heavy_tails
 from inertial.criticism.classes import EffectClass, class_of
-from inertial.criticism.decisions import ADEQUATE_ABOVE, NAMED_BELOW, RISES
+from inertial.criticism.decisions import ADEQUATE_ABOVE, NAMED_BELOW
 from inertial.criticism.drivers import Driver, Place, drivers_of, places
+from inertial.criticism.examination import Named, Part, Run, Search, examined, worst
 from inertial.criticism.field import Field
-from inertial.criticism.handling import alternatives
 from inertial.criticism.handling.base import Handling
 from inertial.criticism.heldout import fit_rms
 from inertial.criticism.influence import Influence, influence, log_p_without
-from inertial.criticism.left_out import LeftOut, left_out
+from inertial.criticism.left_out import left_out
 from inertial.criticism.likelihood import shared_noise
-from inertial.criticism.model import Model, Term, refuse_without_freedom
-from inertial.criticism.penalty import PER_COEFFICIENT, cost_of_model, log_p_value
+from inertial.criticism.model import Model
+from inertial.criticism.penalty import PER_COEFFICIENT, log_p_value
 from inertial.criticism.problem import Lot, Problem
-from inertial.criticism.refinement import terms_of
-from inertial.criticism.search import Found, Rival, anything, search
-from inertial.criticism.slope import slope_of
-from inertial.criticism.turn_on import with_turn_on
-from inertial.criticism.unknown import Suspect, better_curve, suspects
+from inertial.criticism.search import Found, Rival
+from inertial.criticism.unknown import better_curve
 from inertial.effects.base import AnyEffect
-from inertial.effects.covariate import COVARIATE_PREFIX, Covariate
-
-_MANY = 32  # units of a lot that is searched whole
-_ENOUGH = 24  # units, spread over the lot, that a larger one is searched in
-_MENDED = 6  # alternatives that are told of one run at the most
-
-DECISIVE = 0.2
-"""Share of what a curve brings by which it must beat the effects chosen so far to end the search for more."""
+from inertial.effects.covariate import Covariate
 
 UNEXPLAINED = 0.5
 """Share of the floor below which a smooth dependence is left alone."""
-
-
-@dataclass(frozen=True)
-class Named:
-    """A class of effects that is missing, with the errors before and after it is added; g.
-
-    heldout_before, heldout_after : on dwells left out, the worst of the kinds that can judge both; NaN where none can
-    units, dwells : that an alternative of scope "data" concerns, none for all units; told : what it did, in words
-    """
-
-    effects: EffectClass
-    rms_after: float
-    heldout_before: float
-    heldout_after: float
-    units: tuple[int, ...] = ()
-    dwells: tuple[int, ...] = ()
-    told: str = ""
-
-    @property
-    def predicts(self) -> bool:
-        """Whether what was not fitted is predicted no worse with it: nothing else is worth to be added to a model."""
-        return not self.heldout_after > (1.0 + RISES) * self.heldout_before
 
 
 @dataclass(frozen=True)
@@ -102,26 +69,6 @@ class Diagnosis:
     log_p_without: float | None = None
 
 
-@dataclass
-class _Run:
-    """A lot under examination: what was mended so far, and what stays in the model beside the effects that are judged."""
-
-    lot: Lot
-    effects: tuple[str, ...]
-    beside: list[Term] = field(default_factory=list[Term])
-    handled: list[Named] = field(default_factory=list[Named])
-    removed: list[BadDwell] = field(default_factory=list[BadDwell])
-
-    def model(self) -> Model:
-        """The model that is judged, in the lot without its bad dwells."""
-        lot = without(self.lot, self.removed) if self.removed else self.lot
-        problem = Problem(lot)
-        base = Model(problem, with_turn_on(lot.state, terms_of(catalogue.get_all(self.effects), problem)))
-        refuse_without_freedom(base)
-        problem.slope = slope_of(base)
-        return base if not self.beside else Model(problem, [*base.terms, *self.beside], near=base.noise)
-
-
 def diagnose(lot: Lot, effects: Sequence[str], rng: Generator) -> Diagnosis:
     """The diagnosis of a lot against a model.
 
@@ -131,77 +78,11 @@ def diagnose(lot: Lot, effects: Sequence[str], rng: Generator) -> Diagnosis:
     effects : ids of the model to judge
     rng : draws the noise that adequacy is measured against
     """
-    run = _Run(lot, tuple(effects))
-    run.removed = bad_dwells(run.model())
-    found = _mended(run)
-    if run.removed and found.found.added:
-        # what physics explains is no bad dwell
-        whole = Problem(run.lot, slope=found.base.problem.slope)
-        kept = bad_dwells(Model(whole, found.model.terms, near=found.model.noise))
-        if {(d.unit, d.dwell) for d in kept} != {(d.unit, d.dwell) for d in run.removed}:
-            run.removed = kept
-            found = _mended(run)
+    run, found = examined(lot, effects)
     return _told(run, found, rng)
 
 
-@dataclass(frozen=True)
-class _Search:
-    """A search that ended without a further alternative."""
-
-    base: Model
-    field: Field
-    part: "_Part"
-    found: Found
-
-    @property
-    def model(self) -> Model:
-        """With everything that was added."""
-        return self.found.model
-
-
-def _mended(run: _Run) -> _Search:
-    """The search for effects, each alternative that comes first told and taken out of the lot before it begins again."""
-    while True:
-        base = run.model()
-        fields = Field(base.problem, _candidates(base, run.effects), alternatives())
-        part = _part(fields, base)
-        found = search(part.field, part.base, stop=part.imitates)
-        if found.handling is None and part.field is not fields:
-            found = replace(search(fields, base, stop=part.imitates, start=found.added), ladder=found.ladder)
-        if found.handling is None or len(run.handled) >= _MENDED:
-            return _Search(base, fields, part, found)
-        _mend(run, part.field, found, found.handling)
-
-
-def _mend(run: _Run, fields: Field, found: Found, term: Term) -> None:
-    """Take what handling did out of a run, and note it."""
-    model = found.model.with_term(term)
-    group = class_of(fields, model, term)
-    problem = fields.problem
-    alternative, place = term.effect, {k: v for k, v in term.keywords.items() if isinstance(v, float)}
-    if not isinstance(alternative, Handling):
-        raise TypeError(term.effect.id)
-    size = model.shared_sizes(term)
-    units = (int(place["unit"]),) if "unit" in place else ()
-    told = alternative.told(problem.lot, size, **place)
-    dwells = tuple(alternative.dwells(problem.lot, **place))
-    before, after = left_out(found.model), left_out(model)
-    errors = fit_rms(problem, model.terms), *_worst(before, after)
-    run.handled.append(Named(group, *errors, units, dwells, told))
-    lot = alternative.mended(run.lot, size, **place)
-    if lot is None:
-        run.beside.append(term)
-    else:
-        run.lot = lot
-
-
-def _candidates(base: Model, held: Sequence[str]) -> list[AnyEffect]:
-    state = base.problem.lot.state
-    effects = [e for e in catalogue.catalogue().values() if e.id not in set(held)]
-    return [*effects, *(Covariate(name) for name in state.covariates if f"{COVARIATE_PREFIX}{name}" not in set(held))]
-
-
-def _told(run: _Run, search_: _Search, rng: Generator) -> Diagnosis:
+def _told(run: Run, search_: Search, rng: Generator) -> Diagnosis:
     """The diagnosis of what was searched."""
     base, fields, found = search_.base, search_.field, search_.found
     problem = base.problem
@@ -249,41 +130,6 @@ def _influence(base: Model, named: Sequence[Named]) -> tuple[tuple[Influence, ..
     return carried, log_p_without(rest, terms[0], carried) if carried else None
 
 
-@dataclass(frozen=True)
-class _Part:
-    """As much of a lot as the search for effects needs: what all units of a large lot share shows in two dozen of them."""
-
-    field: Field
-    base: Model
-
-    @cached_property
-    def suspected(self) -> list[Suspect]:
-        """Curves of every driver."""
-        return suspects(self.field.problem)
-
-    def imitates(self, chosen: Sequence[Term]) -> bool:
-        """Whether a curve of one driver does better than the effects chosen: by far, or leaving nothing else to find."""
-        instead = better_curve(self.base, chosen, self.suspected)
-        if instead is None:
-            return False
-        fit = instead[0]
-        problem = self.field.problem
-        effects = cost_of_model(Model(problem, [*self.base.terms, *chosen], near=fit.model.noise))
-        by_far = effects - fit.cost > DECISIVE * (cost_of_model(self.base) - fit.cost)
-        return by_far or not anything(self.field, fit.model)
-
-
-def _part(field: Field, base: Model) -> _Part:
-    lot = field.problem.lot
-    if lot.state.time.shape[0] <= _MANY:
-        return _Part(field, base)
-    pick = np.linspace(0, lot.state.time.shape[0] - 1, _ENOUGH).round().astype(int)
-    slope = field.problem.slope
-    problem = Problem(lot.units(pick.tolist()), slope=None if slope is None else slope[pick])
-    terms = [t for t in base.terms if not isinstance(t.effect, Handling)]
-    return _Part(Field(problem, field.effects, [a for a in field.handling if a.fewest_units > 1]), Model(problem, terms))
-
-
 def _unseen(field: Field, base: Model, candidates: Sequence[AnyEffect]) -> tuple[str, ...]:
     """Effects whose columns the plan leaves empty, makes one with the model's, or does not carry the quantities for."""
     gains = field.gains(base.at(base.problem.covariance.white_noise()), {t.effect.id for t in base.terms})
@@ -317,16 +163,10 @@ def _named(problem: Problem, base: Model, classes: Sequence[EffectClass]) -> tup
         first = next((m.term for m in group.members if not isinstance(m.term.effect, Handling)), group.members[0].term)
         model = model.with_term(first)
         after = left_out(model)
-        worst = _worst(before, after) if before is not None else (float("nan"), float("nan"))
-        found.append(Named(group, fit_rms(problem, model.terms), *worst))
+        errors = worst(before, after) if before is not None else (float("nan"), float("nan"))
+        found.append(Named(group, fit_rms(problem, model.terms), *errors))
         before = after
     return tuple(found)
-
-
-def _worst(before: LeftOut, after: LeftOut) -> tuple[float, float]:
-    """The worst error on dwells left out, before and after, over the kinds that can judge both."""
-    kinds = set(before.density) & set(after.density)
-    return before.rms(kinds), after.rms(kinds)
 
 
 def _covariate(classes: Sequence[EffectClass]) -> Unexplained | None:
@@ -338,7 +178,7 @@ def _covariate(classes: Sequence[EffectClass]) -> Unexplained | None:
     return None
 
 
-def _beyond(part: "_Part", base: Model, found: Found, drivers: list[Driver]) -> tuple[Model, Unexplained | None]:
+def _beyond(part: Part, base: Model, found: Found, drivers: list[Driver]) -> tuple[Model, Unexplained | None]:
     """The effects that stand, and the driver that is left: effects that only imitate a curve of one driver are taken back."""
     instead = better_curve(part.base, found.added, part.suspected) if found.added else None
     if instead is not None:

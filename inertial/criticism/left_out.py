@@ -39,7 +39,7 @@ class LeftOut:
 
     def rms(self, kinds: set[Kind] | None = None) -> float:
         """The worst RMS over the kinds that can judge the model, g; NaN where none can."""
-        usable = [k for k in self.density if kinds is None or k in kinds]
+        usable: list[Kind] = [k for k in self.density if kinds is None or k in kinds]
         return max((_rms(self.missed[k]) for k in usable), default=float("nan"))
 
 
@@ -83,9 +83,10 @@ class _Parts:
         if z.shape[-1]:
             beta = np.linalg.lstsq(self.inner, np.einsum("bnq,bn->q", z, self.py), rcond=1e-10)[0]
             self.py = self.py - self.pz @ beta
-        white = model.at(space.noise).covariance.whiten(
-            np.broadcast_to(np.eye(n), (blocks, n, n)), space.noise.shares
-        ) / space.noise.scale[:, None, None]
+        white = (
+            model.at(space.noise).covariance.whiten(np.broadcast_to(np.eye(n), (blocks, n, n)), space.noise.shares)
+            / space.noise.scale[:, None, None]
+        )
         self.precision = np.einsum("bti,bti->bi", white, white)
 
     def predicted(self, out: NDArray[np.bool_]) -> tuple[Array, float] | None:
@@ -107,7 +108,9 @@ class _Parts:
             if not self._known(b, places, inverse):
                 return None
             off = inverse @ self.py[b, places]
-            density += 0.5 * float(np.sum(np.log(values / self.level[b] ** 2))) - 0.5 * places.size * np.log(2.0 * np.pi)
+            density += 0.5 * float(np.sum(np.log(values / self.level[b] ** 2))) - 0.5 * places.size * np.log(
+                2.0 * np.pi
+            )
             density -= 0.5 * float(self.py[b, places] @ off)
             shared = self.pz[b, places]
             inner -= shared.T @ inverse @ shared

@@ -176,7 +176,7 @@ class Model:
             return None
         information = 2.0 * float(np.sum(np.log(diagonal[:, :-1] * size[:, :-1])))
         information += 2.0 * float(np.sum(np.log(self._sizes)))
-        return information, (diagonal[:, -1] * size[:, -1]) ** 2
+        return information, np.asarray((diagonal[:, -1] * size[:, -1]) ** 2, dtype=np.float64)
 
     @cached_property
     def _sizes(self) -> Array:

@@ -1,4 +1,4 @@
-"""The price of an effect: what it must take off beyond what noise would, and the probability that noise alone takes off as much."""
+"""The price of an effect, and the probability that noise alone takes off as much."""
 
 import numpy as np
 from scipy import stats

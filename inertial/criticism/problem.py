@@ -185,7 +185,9 @@ class Problem:
                 self._kept[key] = kept
         return kept
 
-    def pieces(self, effect: AnyEffect | Handling, grid: Sequence[Values], *, first: int | None = None) -> Iterator[Candidate]:
+    def pieces(
+        self, effect: AnyEffect | Handling, grid: Sequence[Values], *, first: int | None = None
+    ) -> Iterator[Candidate]:
         """The candidate of an effect in pieces of its grid, so small that large lots are worked on in bounded memory."""
         if isinstance(effect, Handling):
             yield from self._places(effect, grid)

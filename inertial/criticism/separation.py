@@ -69,7 +69,9 @@ def rivals_of(model: Model, terms: Sequence[Term], others: Sequence[Term]) -> Ri
     units = model.problem.lot.state.time.shape[0]
     pick = np.unique(np.linspace(0, units - 1, min(units, _FEW)).round().astype(int)).tolist()
     blocks = pick if model.problem.lot.radial else [3 * u + a for u in pick for a in range(3)]
-    others = [t for t in others if not isinstance(t.effect, Handling)]  # of single units, and no step to come changes them
+    others = [
+        t for t in others if not isinstance(t.effect, Handling)
+    ]  # of single units, and no step to come changes them
     predicted = tuple(_coefficients(Model(model.problem, [t, *others], near=model.noise), t, blocks) for t in terms)
     widened_by = shared_factor(Model(model.problem, [terms[0], *others], near=model.noise), terms[0]) if terms else 1.0
     return Rivals(

@@ -45,7 +45,10 @@ def best_shares(deviance: Callable[[Shares], float], near: Shares | None = None,
 
 def place_of(shares: Shares) -> Place:
     """The place of the lattice nearest to shares."""
-    first, second = (None if s <= 10.0 ** ((LEAST_SHARE - 4) / SHARE_STEP) else _inside(round(SHARE_STEP * np.log10(s))) for s in shares)
+    first, second = (
+        None if s <= 10.0 ** ((LEAST_SHARE - 4) / SHARE_STEP) else _inside(round(SHARE_STEP * np.log10(s)))
+        for s in shares
+    )
     return first, second
 
 
@@ -62,17 +65,29 @@ def _inside(k: int) -> int:
 def _around(place: Place, stride: int) -> list[Place]:
     """Neighbours: each share up or down, one for the other; at the first stride also none, or there at last."""
     first, second = place
-    near: list[Place] = [(first, k) for k in _moved(second, stride)] + [(k, second) for k in _moved(first, stride)]
+    near: list[Place] = [*((first, k) for k in _moved(second, stride)), *((k, second) for k in _moved(first, stride))]
     if first is not None and second is not None:
-        near += [(_inside(first - stride), _inside(second + stride)), (_inside(first + stride), _inside(second - stride))]
-        near += [(_inside(first - stride), _inside(second - stride)), (_inside(first + stride), _inside(second + stride))]
+        near += [
+            (_inside(first - stride), _inside(second + stride)),
+            (_inside(first + stride), _inside(second - stride)),
+        ]
+        near += [
+            (_inside(first - stride), _inside(second - stride)),
+            (_inside(first + stride), _inside(second + stride)),
+        ]
     if stride == _STRIDES[0]:
         near += [(first, None), (None, second)]
         # a share that is not there yet only shows where it is as large as the other
         if second is None:
-            near += [(first, LEAST_SHARE + 8), *([] if first is None else [(first, first), (_inside(first - 8), first)])]
+            near += [
+                (first, LEAST_SHARE + 8),
+                *([] if first is None else [(first, first), (_inside(first - 8), first)]),
+            ]
         if first is None:
-            near += [(LEAST_SHARE + 8, second), *([] if second is None else [(second, second), (second, _inside(second - 8))])]
+            near += [
+                (LEAST_SHARE + 8, second),
+                *([] if second is None else [(second, second), (second, _inside(second - 8))]),
+            ]
     return [p for p in dict.fromkeys(near) if p != place]
 
 

@@ -24,7 +24,9 @@ def slope_of(model: Model) -> Array | None:
     found = estimate(model)
     ends: list[Array] = []
     for sign in (1.0, -1.0):
-        history = None if state.history is None else History(state.history.time, state.history.temperature + sign * _STEP)
+        history = (
+            None if state.history is None else History(state.history.time, state.history.temperature + sign * _STEP)
+        )
         moved = replace(state, temperature=state.temperature + sign * _STEP, history=history, memory={})
         problem = Problem(replace(lot, state=moved))
         local = [t for t in found.terms if not t.shared]

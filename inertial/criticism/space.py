@@ -159,7 +159,9 @@ class Space:
         left = self.project(flat, candidate.blocks)
         if candidate.shared:
             rows = slice(None) if candidate.blocks is None else candidate.blocks
-            return self._gain_shared(left.reshape(blocks, n, grid, p), size.reshape(blocks, grid, p), self.targets[rows])
+            return self._gain_shared(
+                left.reshape(blocks, n, grid, p), size.reshape(blocks, grid, p), self.targets[rows]
+            )
         safe = np.where(size > 0.0, size, 1.0)
         left = (left / safe[:, None, :]).reshape(blocks, n, grid, p)
         return self._gain_local(left)

@@ -106,8 +106,8 @@ def _print(rows: list[dict[str, Any]], name: str) -> None:
         whole=5,
     )
     out.print(
-        "left out: the worst of poses, soaks and stretches of time · fresh run: coefficients unchanged, each unit's bias of that day "
-        "in it · floor: the noise as each version sees it",
+        "left out: the worst of poses, soaks and stretches of time · fresh run: coefficients unchanged, each unit's "
+        "bias of that day in it · floor: the noise as each version sees it",
         style="dim",
         soft_wrap=True,
     )
@@ -116,7 +116,8 @@ def _print(rows: list[dict[str, Any]], name: str) -> None:
     refuted = [name for row in rows if row["confirmed"] is False for name in row["added"]]
     if refuted:
         out.print(
-            f"{', '.join(refuted)}: evidence against it. The change that it predicts did not come again; take it out of the model.",
+            f"{', '.join(refuted)}: evidence against it. The change that it predicts did not come again; "
+            "take it out of the model.",
             style="bold red",
             soft_wrap=True,
         )

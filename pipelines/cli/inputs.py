@@ -34,7 +34,7 @@ def dwells_and_history(source: str, history: str, archive: str | None) -> tuple[
 
 
 def history_beside(source: str) -> str:
-    """The history of a file of dwells that stands in its folder: NAME-history, or history for a file called dwells; else empty."""
+    """The history in the folder of a file of dwells: NAME-history, or history for a file called dwells; else empty."""
     from pathlib import Path
 
     dwells = Path(source)

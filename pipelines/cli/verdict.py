@@ -48,7 +48,9 @@ def _dwells(document: dict[str, Any]) -> None:
     removed, out = document.get("removed"), console()
     if removed and removed["heavy_tails"]:
         count = len(removed["dwells"])
-        out.print(f"{count} dwells left out: the noise has heavier tails than a normal one", style="dim", soft_wrap=True)
+        out.print(
+            f"{count} dwells left out: the noise has heavier tails than a normal one", style="dim", soft_wrap=True
+        )
     carried, without = document.get("influence") or [], document.get("without_influence")
     if carried and without and not document["adequate"]:
         dwells = ", ".join(f"{d['unit']} {d['dwell']} ({100.0 * d['share']:.0f} %)" for d in carried[:5])
@@ -164,7 +166,9 @@ def _classes(document: dict[str, Any]) -> None:
         console().print(
             "(!) a size that this effect has not been seen to reach: look for another cause, too", markup=False
         )
-    legend = "left: error after it is added · left out: on dwells that the fit has not seen, the worst of poses, soaks, stretches of time"
+    legend = (
+        "left: error after it is added · left out: on dwells not fitted, the worst of poses, soaks, stretches of time"
+    )
     console().print(legend, style="dim", markup=False)
 
 

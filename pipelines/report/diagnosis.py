@@ -70,7 +70,9 @@ def _class(group: dict[str, Any], document: dict[str, Any]) -> dict[str, Any]:
     if group["scope"] == "data":
         values = [group.get("evidence", "")]
     else:
-        values = [f"{p.name} = {_value(group['nonlinear'].get(p.name))} {p.unit}" for p in effects.get(simplest).nonlinear]
+        values = [
+            f"{p.name} = {_value(group['nonlinear'].get(p.name))} {p.unit}" for p in effects.get(simplest).nonlinear
+        ]
     members = [_member(name) for name in group["effects"]]
     return {**group, "members": members, "recommended": simplest, "values": ", ".join(values)}
 

@@ -9,6 +9,7 @@ from threadpoolctl import threadpool_limits
 
 from inertial import effects as catalogue
 from inertial.criticism.comparison import estimate, residuals_of, rms
+from inertial.criticism.handling.base import Handling
 from inertial.criticism.left_out import left_out
 from inertial.criticism.model import Model, refuse_without_freedom
 from inertial.criticism.problem import Problem
@@ -113,7 +114,7 @@ def without_history(found: Measured, terms: Sequence[Term]) -> list[str]:
         f"{t.effect.id} depends on the temperature between the dwells, and no history was given: its size is of little worth; "
         "give --history FILE"
         for t in terms
-        if t.effect.memory and "temperature" in drivers_of(found.state, t.effect)
+        if not isinstance(t.effect, Handling) and t.effect.memory and "temperature" in drivers_of(found.state, t.effect)
     ]
 
 

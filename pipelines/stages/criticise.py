@@ -137,9 +137,7 @@ def document(
         "influence": influence_of(diagnosis, names),
         "without_influence": without_influence(diagnosis),
         "removed": removed_of(diagnosis, names),
-        "recommended": [
-            n.effects.simplest.effect.id for n in diagnosis.named if not n.effects.of_data and n.predicts
-        ],
+        "recommended": [n.effects.simplest.effect.id for n in diagnosis.named if not n.effects.of_data and n.predicts],
         "warnings": warnings,
         "unexplained": None
         if diagnosis.unexplained is None

@@ -73,7 +73,9 @@ def quantised(readings: Readings) -> Iterator[Fault]:
                 break
             coarse = _coarse_step(readings, unit, axis)
             if coarse is not None:
-                evidence = f"the scatter of axis {'xyz'[axis]} follows where its mean lies between steps of {coarse:.4g}"
+                evidence = (
+                    f"the scatter of axis {'xyz'[axis]} follows where its mean lies between steps of {coarse:.4g}"
+                )
                 yield Fault("quantised", unit, (), f"{evidence}: the samples jump between two of them")
                 break
 
@@ -94,7 +96,9 @@ def _coarse_step(readings: Readings, unit: int, axis: int) -> float | None:
     if readings.spread is None or readings.count is None:
         return None
     there = readings.there[unit]
-    mean, spread, count = (a[there] for a in (readings.output[unit, :, axis], readings.spread[unit, :, axis], readings.count[unit]))
+    mean, spread, count = (
+        a[there] for a in (readings.output[unit, :, axis], readings.spread[unit, :, axis], readings.count[unit])
+    )
     typical = float(np.median(spread))
     if mean.size < 16 or typical <= 0.0 or np.std(spread) / typical < _UNEVEN / np.sqrt(2.0 * float(np.median(count))):
         return None

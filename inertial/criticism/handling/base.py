@@ -113,9 +113,7 @@ def tilts(state: State) -> Array:
     if outer is None or inner is None:
         return np.zeros((*state.force.shape, 0))
     by_outer = np.stack([np.cos(outer) * np.sin(inner), np.cos(outer) * np.cos(inner), -np.sin(outer)], axis=-1)
-    by_inner = np.stack(
-        [np.sin(outer) * np.cos(inner), -np.sin(outer) * np.sin(inner), np.zeros_like(outer)], axis=-1
-    )
+    by_inner = np.stack([np.sin(outer) * np.cos(inner), -np.sin(outer) * np.sin(inner), np.zeros_like(outer)], axis=-1)
     return np.stack([by_outer, by_inner], axis=-1)
 
 

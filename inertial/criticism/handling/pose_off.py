@@ -36,7 +36,8 @@ class PoseOff(Handling):
         """The two angles."""
         del lot, place
         angles = np.degrees(size)
-        return f"the pose was off by about {angles[0]:+.3f}° (outer) and {angles[1]:+.3f}° (inner) every time; its dwells are left out"
+        off = f"about {angles[0]:+.3f}° (outer) and {angles[1]:+.3f}° (inner)"
+        return f"the pose was off by {off} every time; its dwells are left out"
 
     def mended(self, lot: "Lot", size: Array, **place: float) -> "Lot | None":
         """Without the dwells of the pose."""

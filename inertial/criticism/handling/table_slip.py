@@ -29,4 +29,5 @@ class TableSlip(Handling):
     def told(self, lot: "Lot", size: Array, **place: float) -> str:
         """The two angles."""
         del lot, place
-        return f"the table's angles changed by {1e3 * size[0]:+.3f} mrad (outer) and {1e3 * size[1]:+.3f} mrad (inner); home it and repeat"
+        off = f"{1e3 * size[0]:+.3f} mrad (outer) and {1e3 * size[1]:+.3f} mrad (inner)"
+        return f"the table's angles changed by {off}; home it and repeat"

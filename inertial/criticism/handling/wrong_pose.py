@@ -34,7 +34,8 @@ class WrongPose(Handling):
         """The two angles."""
         del lot, place
         angles = np.degrees(size)
-        return f"the pose was off by about {angles[0]:+.3f}° (outer) and {angles[1]:+.3f}° (inner) for all units; the dwell is left out"
+        off = f"about {angles[0]:+.3f}° (outer) and {angles[1]:+.3f}° (inner)"
+        return f"the pose was off by {off} for all units; the dwell is left out"
 
     def mended(self, lot: "Lot", size: Array, **place: float) -> "Lot | None":
         """Without the dwell: two angles find it but do not mend it."""
