@@ -13,7 +13,9 @@ from numpy.typing import NDArray
 
 from inertial.criticism.decisions import BLOCKS
 from inertial.criticism.handling.base import soaks
+from inertial.criticism.heldout import residuals
 from inertial.criticism.model import Model
+from inertial.criticism.noise import LONGEST
 from inertial.criticism.problem import Problem
 
 Array = NDArray[np.float64]
@@ -45,6 +47,8 @@ class LeftOut:
 
 def left_out(model: Model) -> LeftOut:
     """The prediction of dwells left out: poses in six folds, soaks one by one, six stretches of time."""
+    if model.problem.n > LONGEST:
+        return _without_wander(model)
     parts = _Parts(model)
     missed: dict[Kind, Array] = {}
     density: dict[Kind, float] = {}
@@ -60,6 +64,16 @@ def left_out(model: Model) -> LeftOut:
         if sound:
             density[kind] = total
     return LeftOut(missed, density)
+
+
+def _without_wander(model: Model) -> LeftOut:
+    """Poses left out by weighted least squares: a record so long that no wander is reckoned with says no more."""
+    problem = model.problem
+    fold = _by_pose(problem)
+    whole = np.full((problem.blocks, problem.n), np.nan)
+    for k in range(int(fold.max()) + 1):
+        whole[:, fold == k] = residuals(problem, model.terms, fold != k)[:, fold == k]
+    return LeftOut({"poses": whole}, {"poses": 0.0})
 
 
 class _Parts:
