@@ -106,7 +106,8 @@ class Covariance:
             if place is None:
                 place = len(self._kernels)
                 self._kernels.append(_Kernel(time[block], there, profile))
-            steps = round(SHARE_STEP * np.log10(self.white / self.level[block] ** 2))
+            # by quarters of a decade: levels within a factor of 1.3 share a whitener, the rest is in the block's own variance
+            steps = 2 * round(0.5 * SHARE_STEP * np.log10(self.white / self.level[block] ** 2))
             found.setdefault((place, steps), []).append(block)
         return [(place, steps, np.array(blocks)) for (place, steps), blocks in found.items()]
 
@@ -160,6 +161,12 @@ class Covariance:
 
     def whiten(self, columns: Array, shares: Shares, blocks: NDArray[np.intp] | None = None) -> Array:
         """Columns (blocks, n, m) of all or some blocks with white noise of variance s² in them; zero where a dwell is missing."""
+        if len(self._groups) == 1:
+            place, steps, _ = self._groups[0]
+            level = self.level if blocks is None else self.level[blocks]
+            found = self._whitener(place, steps, shares)
+            if found is not None:
+                return np.matmul(found[0], columns / level[:, None, None])
         place_of = np.arange(len(self.level)) if blocks is None else blocks
         where = np.full(len(self.level), -1)
         where[place_of] = np.arange(place_of.size)

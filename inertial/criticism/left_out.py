@@ -102,6 +102,7 @@ class _Parts:
             / space.noise.scale[:, None, None]
         )
         self.precision = np.einsum("bti,bti->bi", white, white)
+        self.typical = [self._spread(b) for b in range(blocks)]
 
     def predicted(self, out: NDArray[np.bool_]) -> tuple[Array, float] | None:
         """How far the dwells ``out`` (n,) are missed, (blocks, k), and their log density; None where that cannot be judged."""
@@ -147,10 +148,10 @@ class _Parts:
         """Whether the other dwells determine the model where these stand: not much worse than wander alone would have it."""
         expected = np.sqrt(np.mean(np.diagonal(inverse)))
         alone = np.sqrt(np.mean(1.0 / self.precision[block, places]))
-        wander = np.sqrt(self.spread(block))
+        wander = np.sqrt(self.typical[block])
         return bool(expected < _BLIND * max(float(alone), float(wander)))
 
-    def spread(self, block: int) -> float:
+    def _spread(self, block: int) -> float:
         """Variance of what the model leaves of a block: nothing that it predicts should be much worse."""
         there = self.there[block]
         values = np.linalg.eigvalsh(self.p[block][np.ix_(there, there)])
