@@ -144,7 +144,9 @@ def main() -> int:
     for table in options.tables:
         worlds = LOOP if table == "loop" else TABLES[table]
         names = [n for n in worlds if not options.world or n in options.world]
-        tasks = [(table, name, seed) for name in names for seed in seeds]
+        # seeds of its own for each world: the same draw in all of them would count as many
+        places = {name: 1000 * k for k, name in enumerate(worlds)}
+        tasks = [(table, name, seed + places[name]) for name in names for seed in seeds]
         rows: dict[str, list[dict[str, Any]]] = defaultdict(list)
         for name, row in _pooled(looped if table == "loop" else diagnosed, tasks, options.jobs):
             rows[name].append(row)

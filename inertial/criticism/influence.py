@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from inertial.criticism.likelihood import weighed
+from inertial.criticism.likelihood import along_mean, shared_noise, weighed
 from inertial.criticism.model import Model, Term
 from inertial.criticism.penalty import fall, freedom
 from inertial.criticism.problem import Lot, Problem
@@ -66,4 +66,5 @@ def log_p_without(model: Model, term: Term, dwells: tuple[Influence, ...]) -> fl
     rank = int(gain.rank[0])
     if rank == 0:
         return 0.0
-    return weighed(float(fall(space, gain)[0]), rank, freedom(term)).log_p
+    common = along_mean(model, model.noise, term) * (1.0 - 1.0 / shared_noise(model.with_term(term)))
+    return weighed(float(fall(space, gain)[0]) * (1.0 - common), rank, freedom(term)).log_p

@@ -63,7 +63,8 @@ def likelihood_ratio(model: Model, term: Term, places: int = 1) -> Ratio:
     plain = _deviance(model.space, model.space)
     dof = max(space.dof, 1)
     deviance = max(plain - full[best], 0.0) * max(dof - rank, 0) / dof
-    deviance *= 1.0 - along_mean(model, noises[best], term) * (1.0 - 1.0 / shared_noise(model))
+    # by what the units share with the term inside: an effect that is alike in all of them is no noise
+    deviance *= 1.0 - along_mean(model, noises[best], term) * (1.0 - 1.0 / shared_noise(richer))
     return weighed(deviance, rank, freedom(term), places)
 
 
