@@ -8,7 +8,6 @@ from numpy.typing import NDArray
 from inertial.criticism.faults.fault import Fault, dwells_of
 from inertial.criticism.readings import Array, Readings, exchanged, find_split
 
-
 _COMMON = 5.0
 """Times the usual misfit that half of the units reach in a dwell whose pose is wrong for all."""
 
