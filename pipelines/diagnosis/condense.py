@@ -10,7 +10,7 @@ import pandas as pd
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-MOST = 1000
+MOST = 500
 """Dwells of a unit whose full covariance is still handled: it grows with their square, the work with their cube."""
 
 _REFERENCE = ("force_x", "force_y", "force_z", "outer_deg", "inner_deg")
