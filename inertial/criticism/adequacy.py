@@ -1,45 +1,77 @@
-"""Is the model good enough for the noise that is there: the largest of many tests, against its own distribution."""
+"""Is the model good enough for the noise that is there: the largest of many looks, against its own distribution."""
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 
 import numpy as np
 from numpy.random import Generator
 from numpy.typing import NDArray
 from scipy import stats
 
+from inertial.criticism.covariance import Noise, Shares
+from inertial.criticism.decisions import CERTAIN_BELOW, DRAWS, ENOUGH, LEAST_SHARE
 from inertial.criticism.drivers import Driver
+from inertial.criticism.field import Candidates
+from inertial.criticism.likelihood import shared_noise
+from inertial.criticism.model import Model
 from inertial.criticism.penalty import log_p_value
-from inertial.criticism.search import Candidates
+from inertial.criticism.shares import place_of, shares_at
 from inertial.criticism.space import SEEN, Candidate, Space
 
 Array = NDArray[np.float64]
 
-_DRAWS = 400
-_FEWEST = 60
-_NUMBERS = 10_000_000
-"""Random numbers drawn at the most: large lots get fewer draws."""
+_BATCH = 33
+_NUMBERS = 4_000_000
+"""Random numbers drawn at a time at the most: large lots get fewer draws."""
 
-_CLEAR = np.log(1e-4)
+_OFF = (-8, -4, 0, 4, 8)
+"""Eighths of a decade about the fitted shares at which the noise of a draw is estimated again."""
 
 
-def adequacy(field: Candidates, drivers: list[Driver], space: Space, rng: Generator) -> float:
+def adequacy(field: Candidates, drivers: list[Driver], model: Model, rng: Generator) -> float:
     """Natural logarithm of the probability that an adequate model fits as badly somewhere, over all looks together.
 
-    The look that fails most is compared with the most failing look of noise drawn from the fitted covariance; a failure far
-    beyond what draws can show is charged with the number of looks instead.
+    The look that fails most is compared with the most failing look of noise drawn from the fitted covariance, whose own noise
+    is estimated again; a failure far beyond what draws can show is charged with the number of looks instead.
     """
+    space = model.space
+    common = shared_noise(model)
     worst, looks = 0.0, 0
     for candidate in _everything(field, drivers):
         gain = space.gain(candidate)
         looks += gain.drop.size
-        tested = [log_p_value(space, float(d), int(r)) for d, r in zip(gain.drop, gain.rank, strict=True)]
-        worst = min(worst, *tested)
+        for place, (drop, rank) in enumerate(zip(gain.drop.tolist(), gain.rank.tolist(), strict=True)):
+            found = log_p_value(space, drop, rank)
+            if found < worst and common > 1.0:
+                found = log_p_value(space, drop * _own_part(space, candidate, place, common), rank)
+            worst = min(worst, found)
     charged = worst + np.log(max(looks, 1))
-    if charged < _CLEAR:
+    if charged < np.log(CERTAIN_BELOW):
         return float(charged)
-    drawn = _worst_of_noise(_everything(field, drivers), space, rng)
-    beyond = float(np.mean(drawn <= worst))
-    return float(np.log(max(beyond, 0.5 / drawn.size)))
+    return _against_draws(_Draws(model, rng), lambda: _everything(field, drivers), worst)
+
+
+def _against_draws(draws: "_Draws", looks: Callable[[], Iterable[Candidate]], worst: float) -> float:
+    """Logarithm of the share of draws that fail as much somewhere; drawing ends when that is plain."""
+    blocks, n = draws.model.problem.blocks, draws.model.problem.n
+    batch = int(np.clip(_NUMBERS // (blocks * n), 5, _BATCH))
+    drawn, beyond = 0, 0
+    while drawn < DRAWS and beyond < ENOUGH:
+        found = draws.worst(looks(), batch)
+        drawn, beyond = drawn + found.size, beyond + int(np.count_nonzero(found <= worst))
+    return float(np.log((1.0 + beyond) / (1.0 + drawn)))
+
+
+def _own_part(space: Space, candidate: Candidate, place: int, common: float) -> float:
+    """Part of what a look takes off that is left when the noise which all units share is reckoned with."""
+    if candidate.shared:
+        return 1.0 / common
+    units = space.targets.shape[0] // 3
+    columns = space.project(space.whiten(candidate.columns[:, :, place, :]))
+    inverse = np.linalg.pinv(np.swapaxes(columns, -1, -2) @ columns, rcond=1e-4, hermitian=True)
+    fitted = columns @ (inverse @ (np.swapaxes(columns, -1, -2) @ space.residual[..., None]))
+    fitted = fitted[..., 0].reshape(units, 3, -1)
+    whole = max(float(np.sum(fitted**2)), 1e-300)
+    return 1.0 - float(units * np.sum(fitted.mean(axis=0) ** 2) / whole) * (1.0 - 1.0 / common)
 
 
 def _everything(field: Candidates, drivers: list[Driver]) -> Iterator[Candidate]:
@@ -47,33 +79,87 @@ def _everything(field: Candidates, drivers: list[Driver]) -> Iterator[Candidate]
     yield from (d.candidate for d in drivers)
 
 
-def _worst_of_noise(candidates: Iterable[Candidate], space: Space, rng: Generator) -> Array:
-    """Smallest log p over all looks for each draw of noise, (draws,)."""
-    blocks, n = space.targets.shape[:2]
-    draws = int(np.clip(_NUMBERS // (blocks * n), _FEWEST, _DRAWS))
-    noise = rng.standard_normal((blocks, n, draws))
-    noise = noise - space.q[0] @ (np.swapaxes(space.q[0], -1, -2) @ noise)
-    total = np.einsum("bnd,bnd->d", noise, noise)
-    worst = np.zeros(draws)
-    for candidate in candidates:
-        for drop, rank in _drops(candidate, space, noise):
-            after = space.dof - rank
+class _Draws:
+    """Noise drawn from a model's covariance, each draw with shares and variances of its own."""
+
+    def __init__(self, model: Model, rng: Generator) -> None:
+        self.model, self.rng = model, rng
+        self.places = _lattice(model.noise.shares)
+
+    def worst(self, looks: Iterable[Candidate], count: int) -> Array:
+        """Smallest log p over all looks for each of so many draws."""
+        covariance = self.model.problem.covariance
+        shape = (self.model.problem.blocks, self.model.problem.n, count)
+        series = covariance.coloured(self.model.noise, self.rng.standard_normal(shape))
+        deviances = np.stack([self._deviances(shares, series) for shares in self.places])
+        chosen = np.argmin(deviances, axis=0)
+        spaces = {int(k): _At(self.model, self.places[k], series[:, :, chosen == k]) for k in np.unique(chosen)}
+        worst = np.zeros(count)
+        for candidate in looks:
+            for k, space in spaces.items():
+                own = chosen == k
+                worst[own] = np.minimum(worst[own], space.worst(candidate))
+        return worst
+
+    def _deviances(self, shares: Shares, series: Array) -> Array:
+        """Restricted deviance of each draw at some shares, (draws,)."""
+        space = self._space(shares)
+        left = space.project(space.whiten(series))
+        squares = np.einsum("bnd,bnd->bd", left, left)
+        dof = space.by_block[:, None]
+        return space.logdet + space.information + np.sum(dof * np.log(np.maximum(squares, 1e-300)), axis=0)
+
+    def _space(self, shares: Shares) -> Space:
+        return self.model.at(Noise(shares, np.ones(self.model.problem.blocks)))
+
+
+class _At:
+    """Draws whose shares were found to be the same."""
+
+    def __init__(self, model: Model, shares: Shares, series: Array) -> None:
+        self.space = model.at(Noise(shares, model.noise.scale))
+        left = self.space.project(self.space.whiten(series))
+        squares, dof = np.einsum("bnd,bnd->bd", left, left), self.space.by_block[:, None]
+        prior = model.noise.prior
+        if np.isfinite(prior):
+            variance = (squares + prior) / (dof + prior)  # the centre of the prior is one in units of the fitted scale
+        else:
+            variance = np.broadcast_to(squares.sum(axis=0) / max(float(dof.sum()), 1.0), squares.shape)
+        self.left = left / np.sqrt(variance)[:, None, :]
+        self.total = np.einsum("bnd,bnd->d", self.left, self.left)
+
+    def worst(self, candidate: Candidate) -> Array:
+        """Smallest log p of a candidate over its grid, for each draw."""
+        found = np.zeros(self.left.shape[-1])
+        for drop, rank in _drops(candidate, self.space, self.left):
+            after = self.space.dof - rank
             if rank and after > 0:
-                ratio = (drop / rank) / (np.maximum(total - drop, 1e-300) / after)
-                worst = np.minimum(worst, stats.f.logsf(ratio, rank, after))
-    return worst
+                ratio = (drop / rank) / (np.maximum(self.total - drop, 1e-300) / after)
+                found = np.minimum(found, stats.f.logsf(ratio, rank, after))
+        return found
+
+
+def _lattice(shares: Shares) -> list[Shares]:
+    """Shares about the fitted ones, and none."""
+    each: list[set[int | None]] = []
+    for k in place_of(shares):
+        near = {LEAST_SHARE, LEAST_SHARE + 8} if k is None else {max(k + d, LEAST_SHARE) for d in _OFF}
+        each.append({None, *near})
+    return [shares_at((a, b)) for a in each[0] for b in each[1]]
 
 
 def _drops(candidate: Candidate, space: Space, noise: Array) -> list[tuple[Array, int]]:
     """For every value of the nonlinear parameters: what the candidate takes off each draw, and its rank."""
-    blocks, n, grid, p = candidate.columns.shape
-    flat = (candidate.columns / space.spread[..., None, None]).reshape(blocks, n, grid * p)
+    white = candidate.whitened(space.covariance, space.noise)
+    blocks, n, grid, p = white.shape
+    flat = white.reshape(blocks, n, grid * p)
     size = np.sqrt(np.einsum("bnm,bnm->bm", flat, flat))
-    q = space.q[0]
-    left = flat - q @ (np.swapaxes(q, -1, -2) @ flat)
+    left = space.project(flat)
     found: list[tuple[Array, int]] = []
     if candidate.shared:
-        left = left.reshape(blocks * n, grid, p) / np.sqrt(np.sum(size.reshape(blocks, grid, p) ** 2, axis=0))
+        left = left.reshape(blocks * n, grid, p) / np.maximum(
+            np.sqrt(np.sum(size.reshape(blocks, grid, p) ** 2, axis=0)), 1e-300
+        )
         noise_flat = noise.reshape(blocks * n, -1)
         for g in range(grid):
             u, s, _ = np.linalg.svd(left[:, g], full_matrices=False)

@@ -6,7 +6,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from inertial.criticism.classes import TOLD_APART
+from inertial.criticism.decisions import TOLD_APART
 from inertial.criticism.heldout import Fitting
 from inertial.criticism.model import Model, Term
 from inertial.criticism.penalty import cost_of, freedom
@@ -102,7 +102,7 @@ class RivalDiscrimination:
         rest = with_turn_on(problem.lot.state, rivals.rest)
         fits = [Fitting(problem, [*rest, wrong]) for wrong in rivals.terms]
         n = problem.n - len(grid)
-        error = _error(problem)[:, n:, None]
+        error = _error(problem, rivals)[:, n:, None]
 
         def apart(train: NDArray[np.bool_]) -> Array:
             total = np.zeros(len(grid))
@@ -151,10 +151,11 @@ class Sighting:
     def shown(self, steps: Sequence[SequenceStep], pace: StationPace) -> Array:
         """Chi-square a coefficient that each effect of typical size would leave, (effects,)."""
         rivals = self.rivals
-        problem = widened(rivals, steps, pace) if steps else Problem(rivals.lot, steep=rivals.steep)
+        problem = widened(rivals, steps, pace) if steps else Problem(rivals.lot)
         columns, sizes = _typical(problem, self.terms)
         rest = with_turn_on(problem.lot.state, rivals.rest)
-        left = left_of(Model(problem, rest), problem.basis.rotate(columns), rivals.share)
+        noise = problem.covariance.taken(rivals.noise, rivals.covariance)
+        left = left_of(Model(problem, rest), columns, noise)
         per_column = left * rivals.weight / rivals.variance / problem.blocks
         return np.array([float(np.mean(part)) for part in np.split(per_column, np.cumsum(sizes)[:-1])])
 
@@ -167,7 +168,7 @@ class Sighting:
         columns, _ = _typical(problem, self.terms)
         fit = Fitting(problem, with_turn_on(problem.lot.state, rivals.rest))
         n = problem.n - len(grid)
-        error = _error(problem)[:, n:, None]
+        error = _error(problem, rivals)[:, n:, None]
 
         def shown(train: NDArray[np.bool_]) -> Array:
             left = fit.left(columns, train)[:, n:] / error
@@ -222,8 +223,8 @@ class Score(Protocol):
         ...
 
 
-def _error(problem: Problem) -> Array:
-    return np.where(np.isfinite(problem.error), problem.error, np.inf)
+def _error(problem: Problem, rivals: Rivals) -> Array:
+    return np.where(np.isfinite(problem.error), problem.error * rivals.noise.scale[:, None], np.inf)
 
 
 def _needed(rivals: Rivals) -> Array:

@@ -2,31 +2,25 @@
 
 from dataclasses import dataclass
 
-import numpy as np
-
+from inertial.criticism.decisions import TOLD_APART
+from inertial.criticism.field import Candidates
+from inertial.criticism.handling.base import Handling
 from inertial.criticism.model import Model, Term
-from inertial.criticism.penalty import cost_in, freedom, log_p_value
 from inertial.criticism.refinement import refine
-from inertial.criticism.search import Candidates, size_of
-from inertial.criticism.shared_noise import shared_factor
-from inertial.criticism.space import Space
+from inertial.criticism.search import judge, scanned, size_of
 
-LEAD = 10.0
-"""Penalised chi-square by which the wrong one of two leads with probability Φ(−√10) = 8e-4, where units are independent."""
+__all__ = ["TOLD_APART", "EffectClass", "Member", "class_of"]
 
-ROOM = 5.0
-"""Chi-square for readings of the drivers that are not exact."""
+_NEAR = 60.0
+"""Rivals further off at the noise of the best are not looked at with their own."""
 
-TOLD_APART = LEAD + ROOM
-"""Difference of penalised chi-square that parts two effects; what noise the units share makes of the lead comes on top."""
-
-_NEAR = 80.0
-"""Rivals further off on the grid of their nonlinear parameters are not refined."""
+_MOST = 9
+"""Rivals whose own noise is estimated."""
 
 
 @dataclass(frozen=True)
 class Member:
-    """An effect that explains the data as well as the best of its class; ``score`` in chi-square above the best."""
+    """An effect that explains the data as well as the best of its class; ``score`` in chi-square behind the best."""
 
     term: Term
     score: float
@@ -51,56 +45,30 @@ class EffectClass:
 
     @property
     def simplest(self) -> Term:
-        """The member to recommend."""
+        """The member to recommend; what handling does comes before physics."""
         return min(self.members, key=lambda m: m.term.effect.simplicity).term
+
+    @property
+    def physics(self) -> tuple[Member, ...]:
+        """The members that are effects."""
+        return tuple(m for m in self.members if not isinstance(m.term.effect, Handling))
+
+    @property
+    def of_data(self) -> bool:
+        """Whether what handling does explains the data as well as any effect."""
+        return len(self.physics) < len(self.members)
 
 
 def class_of(field: Candidates, model: Model, term: Term) -> EffectClass:
-    """The class of one term of a model, all others held in it."""
-    rest = model.without(term.effect.id)
-    space = rest.at(model.share)
-    variance = model.space.variance
-    scored = [(s, t) for s, t in _scores(field, rest, space, variance) if term.effect.id not in t.effect.after]
-    own = _score(field, space, variance, term)
-    scored.append((own, term))
-    best = min(s for s, _ in scored)
-    near = [(s, t) for s, t in scored if s < best + _NEAR]
-    refined = [(_score(field, space, variance, r), r) for r in (refine(rest, t, model.share) for _, t in near)]
-    by_id: dict[str, Member] = {}
-    for score, found in sorted([*refined, (own, term)], key=lambda pair: pair[0]):
-        by_id.setdefault(found.effect.id, Member(found, score))
-    least = min(m.score for m in by_id.values())
-    first = min(by_id.values(), key=lambda m: m.score).term
-    apart = LEAD * shared_factor(rest.with_term(first), first) + ROOM
-    members = [Member(m.term, m.score - least) for m in by_id.values() if m.score < least + apart]
-    best_term = members[0].term
-    gain = space.gain(best_term.candidate(field.problem))
-    log_p = log_p_value(space, float(gain.drop[0]), int(gain.rank[0]))
-    return EffectClass(tuple(members), log_p, size_of(rest, best_term))
-
-
-def _scores(field: Candidates, rest: Model, space: Space, variance: float) -> list[tuple[float, Term]]:
-    """Every candidate at its best grid value, whole and by its leading column."""
-    leave = {t.effect.id for t in rest.terms}
-    found: list[tuple[float, Term]] = []
-    for primary, gains in ((False, field.gains(space, leave)), (True, field.primary_gains(space, leave))):
-        for effect in field.effects:
-            if effect.id not in gains:
-                continue
-            gain, grid = gains[effect.id], field.grids[effect.id]
-            place = int(np.argmax(gain.drop))
-            if gain.rank[place]:
-                first = effect.primary if primary else None
-                term = Term(effect, tuple(grid[place].items()), first)
-                found.append((_penalised(field, term, float(gain.drop[place]), int(gain.rank[place]), variance), term))
-    return found
-
-
-def _score(field: Candidates, space: Space, variance: float, term: Term) -> float:
-    gain = space.gain(term.candidate(field.problem))
-    return _penalised(field, term, float(gain.drop[0]), int(gain.rank[0]), variance)
-
-
-def _penalised(field: Candidates, term: Term, drop: float, rank: int, variance: float) -> float:
-    """Penalised chi-square of a term beside the rest; the noise is the whole model's for every rival."""
-    return -drop / variance + cost_in(field.problem, rank, freedom(term))
+    """The class of one term of a model, all others held in it; every serious rival with its own noise."""
+    rest = model.without_term(term)
+    leave = {t.effect.id for t in rest.terms if not isinstance(t.effect, Handling)}
+    looked = scanned(field, rest.at(model.noise), leave)
+    least = max((score for _, score in looked), default=0.0) - _NEAR
+    near = [t for t, score in looked[:_MOST] if score > least and t.effect.id != term.effect.id]
+    near = [t for t in near if term.effect.id not in t.effect.after]
+    judged = [judge(field, rest, refine(rest, t, model.noise)) for t in near]
+    judged = sorted([judge(field, rest, term), *judged], key=lambda r: r.cost)
+    best = judged[0]
+    members = tuple(Member(r.term, r.cost - best.cost) for r in judged if r.cost < best.cost + TOLD_APART)
+    return EffectClass(members, best.log_p, size_of(rest, best.term))

@@ -28,10 +28,10 @@ class Estimate:
 
 
 def estimate(model: Model) -> Estimate:
-    """Coefficients at the model's own share of wander."""
-    spread = model.problem.basis.spread(model.share)[..., None]
-    x, z = model.local / spread, model.shared / spread
-    y = model.problem.y / spread[..., 0]
+    """Coefficients at the model's own noise."""
+    space = model.space
+    x, z = space.local, space.whiten(model.shared)
+    y = space.whiten(model.problem.y[..., None])[..., 0]
     size = np.sqrt(np.einsum("bnp,bnp->bp", x, x))
     size = np.where(size > 0.0, size, 1.0)
     unit = x / size[:, None, :]
@@ -39,7 +39,7 @@ def estimate(model: Model) -> Estimate:
         np.float64
     )
     shared, shared_error = np.zeros(0), np.zeros(0)
-    variance = model.space.variance
+    variance = space.variance
     if z.shape[-1]:
         free = _free(unit, inverse, z)
         target = _free(unit, inverse, y[..., None])[..., 0]
@@ -95,7 +95,7 @@ def _shrinkable(model: Model, count: int) -> NDArray[np.bool_]:
     """Which local coefficients are drawn together: those of the effects beyond bias, scale and misalignment."""
     flags: list[bool] = []
     for term in model.terms:
-        if term.effect.scope != "station":
+        if not term.shared:
             columns = model.problem.columns(term.effect, term.keywords).shape[-1]
             flags += [term.effect.id not in OWN] * (columns if term.first is None else min(term.first, columns))
     return np.array([*flags, *[False] * (count - len(flags))], dtype=bool)
@@ -108,14 +108,14 @@ def _free(unit: Array, inverse: Array, columns: Array) -> Array:
 
 def residuals_of(problem: Problem, found: Estimate) -> Array:
     """Residuals (blocks, n) in g of a problem under given coefficients; NaN where a dwell is missing."""
-    local = [t for t in found.terms if t.effect.scope != "station"]
-    shared = [t for t in found.terms if t.effect.scope == "station"]
+    local = [t for t in found.terms if not t.shared]
+    shared = [t for t in found.terms if t.shared]
     left = problem.series.copy()
     if local:
         left -= np.einsum("bnp,bp->bn", _columns(problem, local), found.local)
     if shared:
         left -= _columns(problem, shared) @ found.shared
-    return np.where(np.isfinite(problem.basis.error), left, np.nan)
+    return np.where(np.isfinite(problem.error), left, np.nan)
 
 
 def _columns(problem: Problem, terms: Sequence[Term]) -> Array:

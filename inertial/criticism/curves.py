@@ -30,23 +30,23 @@ class CurveFit:
 
 
 def fit_curve(model: Model, driver: str, candidate: Candidate) -> CurveFit:
-    """The best common curve of a driver beside a model, with the share of wander estimated anew."""
+    """The best common curve of a driver beside a model, with the noise estimated anew."""
     if candidate.shared:
         fitted = model.with_shared_curves(candidate.columns[:, :, 0, :])
         return CurveFit(driver, fitted, fitted.space.shared_rank, cost_of_model(fitted))
-    share, fitted, rank = model.share, model, 0
+    noise, fitted, rank = model.noise, model, 0
     for _ in range(2):
-        column, rank = _curve(model.at(share), candidate)
+        column, rank = _curve(model.at(noise), candidate)
         fitted = model.with_curves(column)
-        share = fitted.share
+        noise = fitted.noise
     shape = rank - candidate.columns.shape[0]
     return CurveFit(driver, fitted, rank, cost_of_model(fitted) + PER_COEFFICIENT * shape)
 
 
 def _curve(space: Space, candidate: Candidate) -> tuple[Array, int]:
-    """Rotated column (blocks, n, 1) of the common curve that takes off most, and the coefficients it spends."""
+    """Column (blocks, n, 1) of the common curve that takes off most, and the coefficients it spends."""
     whole = candidate.columns[:, :, 0, :]
-    white = whole / space.spread[..., None]
+    white = space.whiten(whole)
     free = space.project(white)
     even = _evened(np.einsum("bnp,bnr->pr", free, free), np.sqrt(np.einsum("bnp,bnp->p", white, white)))
     whole, free = whole @ even, free @ even

@@ -1,57 +1,34 @@
 """The diagnosis of a lot: adequacy, where the model fails, classes of missing effects, what is left unexplained."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
-from functools import cached_property
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.random import Generator
 
 from inertial import effects as catalogue
 from inertial.criticism.adequacy import adequacy
+from inertial.criticism.bad_dwells import BadDwell, heavy_tails
 from inertial.criticism.classes import EffectClass, class_of
-from inertial.criticism.drivers import Driver, Misfit, drivers_of, places, varies
-from inertial.criticism.heldout import fit_rms, heldout_rms
-from inertial.criticism.model import Model, Term, refuse_without_freedom
-from inertial.criticism.penalty import PER_COEFFICIENT, cost_of_model, log_p_value
+from inertial.criticism.decisions import ADEQUATE_ABOVE, NAMED_BELOW
+from inertial.criticism.drivers import Driver, Misfit, drivers_of, places
+from inertial.criticism.examination import Named, Part, Run, Search, examined, worst
+from inertial.criticism.field import Candidates
+from inertial.criticism.handling.base import Handling
+from inertial.criticism.heldout import fit_rms
+from inertial.criticism.influence import Influence, influence, log_p_without
+from inertial.criticism.left_out import left_out
+from inertial.criticism.likelihood import shared_noise
+from inertial.criticism.model import Model
+from inertial.criticism.penalty import PER_COEFFICIENT, log_p_value
 from inertial.criticism.problem import Lot, Problem
-from inertial.criticism.refinement import terms_of
-from inertial.criticism.search import (
-    NAMED_BELOW,
-    Candidates,
-    Rival,
-    SearchResult,
-    anything,
-    search,
-)
-from inertial.criticism.turn_on import with_turn_on
-from inertial.criticism.unknown import Suspect, better_curve, suspects
+from inertial.criticism.search import Rival, SearchResult
+from inertial.criticism.unknown import better_curve
 from inertial.effects.base import AnyEffect
-from inertial.effects.covariate import COVARIATE_PREFIX, Covariate
-
-STEEPER = 0.0
-"""Penalised chi-square by which a random walk beside the 1/f wander must beat the effects found without it."""
-
-_MANY = 32  # units of a lot that is searched whole
-_ENOUGH = 24  # units, spread over the lot, that a larger one is searched in
-
-DECISIVE = 0.2
-"""Share of what a curve brings by which it must beat the effects chosen so far to end the search for more."""
+from inertial.effects.covariate import Covariate
 
 UNEXPLAINED = 0.5
 """Share of the floor below which a smooth dependence is left alone."""
-
-ADEQUATE_ABOVE = 0.05
-"""Probability above which a model passes: the nominal rate of false alarms."""
-
-
-@dataclass(frozen=True)
-class Named:
-    """A class of effects that is missing, with the errors before and after it is added; g."""
-
-    effects: EffectClass
-    rms_after: float
-    heldout_after: float
 
 
 @dataclass(frozen=True)
@@ -67,8 +44,10 @@ class Unexplained:
 class Diagnosis:
     """What a lot says of a model; errors in g.
 
-    problem, base, final : the series, the model judged, the model with everything that was found
-    rms : of the base model's residuals; floor : of the noise that is there; share : of wander in it, ρ
+    problem, base, final : the series without what handling spoilt, the model judged, the model with everything that was found
+    rms : of the base model's residuals; floor : of the noise that is there
+    handled : what handling did; removed : single dwells that were left out; heavy : whether these are tails of the noise
+    influence : dwells that carry the verdict; log_p_without : of its first class when these are left out
     """
 
     problem: Problem
@@ -83,6 +62,11 @@ class Diagnosis:
     unexplained: Unexplained | None
     unseen: tuple[str, ...]
     ladder: tuple[Rival, ...]
+    handled: tuple[Named, ...] = ()
+    removed: tuple[BadDwell, ...] = ()
+    heavy: bool = False
+    influence: tuple[Influence, ...] = ()
+    log_p_without: float | None = None
 
 
 def diagnose(lot: Lot, effects: Sequence[str], rng: Generator) -> Diagnosis:
@@ -94,98 +78,61 @@ def diagnose(lot: Lot, effects: Sequence[str], rng: Generator) -> Diagnosis:
     effects : ids of the model to judge
     rng : draws the noise that adequacy is measured against
     """
-    found = _examined(Problem(lot), effects, rng)
-    if found.adequate or (found.unexplained is not None and _covariate([n.effects for n in found.named]) is None):
-        return found
-    # what looks like drift, ageing and steps may be a wander steeper than 1/f: it is believed where it does better without them
-    steep = Problem(lot, steep=True)
-    bare = min(cost_of_model(Model(steep, m.terms)) for m in (found.base, found.final))
-    if bare > cost_of_model(found.final) - STEEPER:
-        return found
-    return _examined(steep, effects, rng)
+    run, found = examined(lot, effects)
+    return _told(run, found, rng)
 
 
-def _examined(problem: Problem, effects: Sequence[str], rng: Generator) -> Diagnosis:
-    """The diagnosis under one kind of wander."""
-    lot = problem.lot
-    held = catalogue.get_all(effects)
-    base = Model(problem, with_turn_on(lot.state, terms_of(held, problem)))
-    refuse_without_freedom(base)
-    candidates = [e for e in catalogue.catalogue().values() if e.id not in set(effects)]
-    covariates = [
-        Covariate(name)
-        for name, values in lot.state.covariates.items()
-        if varies(values) and f"{COVARIATE_PREFIX}{name}" not in set(effects)
-    ]
-    field = Candidates(problem, [*candidates, *covariates])
+def _told(run: Run, search_: Search, rng: Generator) -> Diagnosis:
+    """The diagnosis of what was searched."""
+    base, fields, found = search_.base, search_.field, search_.found
+    problem = base.problem
     drivers = drivers_of(problem)
-    unseen = _unseen(field, base, candidates)
-    log_p = adequacy(field, drivers, base.space, rng)
-    part = _part(field, base)
-    found = search(part.field, part.base, stop=part.imitates)
-    if part.field is not field:
-        found = replace(search(field, base, stop=part.imitates, start=found.added), ladder=found.ladder)
-    adequate = log_p >= np.log(ADEQUATE_ABOVE) and not found.added
-    final, unexplained = (found.model, None) if adequate else _beyond(part, base, found, drivers)
-    classes = _classes(field, base, final)
+    log_p = adequacy(fields, drivers, base, rng)
+    heavy = bool(run.removed) and heavy_tails(base)
+    named_data = bool(run.handled) or (bool(run.removed) and not heavy)
+    sound = log_p >= np.log(ADEQUATE_ABOVE) and not found.added
+    final, unexplained = (found.model, None) if sound else _beyond(search_.part, base, found, drivers)
+    classes = _classes(fields, base, final)
     named = _named(problem, base, classes)
     if unexplained is None:
         unexplained = _covariate(classes)
-    floor = final.floor()
-    where = places(problem, drivers, base.at(final.share), final.space.variance)
+    where = places(problem, drivers, base.at(final.noise), final.space.variance)
     charged = tuple(p for p in where if p.log_p + np.log(len(drivers)) < np.log(ADEQUATE_ABOVE))
+    carried, log_without = _influence(base, named)
     return Diagnosis(
         problem=problem,
         base=base,
         final=final,
         rms=fit_rms(problem, base.terms),
-        floor=floor,
+        floor=final.floor(),
         log_p=log_p,
-        adequate=adequate,
-        where=() if adequate else charged,
+        adequate=sound and not named_data,
+        where=() if sound else charged,
         named=named,
         unexplained=unexplained,
-        unseen=unseen,
+        unseen=_unseen(fields, base, [e for e in catalogue.catalogue().values() if e.id not in set(run.effects)]),
         ladder=found.ladder,
+        handled=tuple(run.handled),
+        removed=tuple(run.removed),
+        heavy=heavy,
+        influence=carried,
+        log_p_without=log_without,
     )
 
 
-@dataclass(frozen=True)
-class _Part:
-    """As much of a lot as the search for effects needs: what all units of a large lot share shows in two dozen of them."""
-
-    field: Candidates
-    base: Model
-
-    @cached_property
-    def suspected(self) -> list[Suspect]:
-        """Curves of every driver."""
-        return suspects(self.field.problem)
-
-    def imitates(self, chosen: Sequence[Term]) -> bool:
-        """Whether a curve of one driver does better than the effects chosen: by far, or leaving nothing else to find."""
-        instead = better_curve(self.base, chosen, self.suspected)
-        if instead is None:
-            return False
-        fit = instead[0]
-        problem = self.field.problem
-        effects = cost_of_model(Model(problem, [*self.base.terms, *chosen], near=fit.model.share))
-        by_far = effects - fit.cost > DECISIVE * (cost_of_model(self.base) - fit.cost)
-        return by_far or not anything(self.field, fit.model)
-
-
-def _part(field: Candidates, base: Model) -> _Part:
-    lot = field.problem.lot
-    if lot.state.time.shape[0] <= _MANY:
-        return _Part(field, base)
-    pick = np.linspace(0, lot.state.time.shape[0] - 1, _ENOUGH).round().astype(int)
-    problem = Problem(lot.units(pick.tolist()), steep=field.problem.steep)
-    return _Part(Candidates(problem, field.effects), Model(problem, base.terms))
+def _influence(base: Model, named: Sequence[Named]) -> tuple[tuple[Influence, ...], float | None]:
+    """Dwells that carry the verdict on the largest class beside the others, and its probability without them."""
+    if not named:
+        return influence(base, None), None
+    terms = [n.effects.members[0].term for n in named]
+    rest = Model(base.problem, [*base.terms, *terms[1:]], near=base.noise)
+    carried = influence(rest, terms[0])
+    return carried, log_p_without(rest, terms[0], carried) if carried else None
 
 
 def _unseen(field: Candidates, base: Model, candidates: Sequence[AnyEffect]) -> tuple[str, ...]:
     """Effects whose columns the plan leaves empty, makes one with the model's, or does not carry the quantities for."""
-    gains = field.gains(base.at(0.0), {t.effect.id for t in base.terms})
+    gains = field.gains(base.at(base.problem.covariance.white_noise()), {t.effect.id for t in base.terms})
     blind = [name for name, gain in gains.items() if not gain.rank.any()]
     order = [e.id for e in candidates]
     return tuple(sorted({*blind, *field.lacking} & set(order), key=order.index))
@@ -197,22 +144,28 @@ def _classes(field: Candidates, base: Model, final: Model) -> list[EffectClass]:
     model, found = final, []
     for term in [t for t in final.terms if t.effect.id not in held]:
         group = class_of(field, model, term)
-        best = group.members[0].term
+        best = next((m.term for m in group.members if not isinstance(m.term.effect, Handling)), term)
         if (
             best is not term
         ):  # a rival that is better beside the others takes the place, so that no other class has it too
             others = [t for t in model.terms if t is not term]
-            model = Model(base.problem, [*others, best], near=model.share)
+            model = Model(base.problem, [*others, best], near=model.noise)
         found.append(group)
     return sorted(found, key=lambda c: -c.size)
 
 
 def _named(problem: Problem, base: Model, classes: Sequence[EffectClass]) -> tuple[Named, ...]:
     """Errors after each class is added to those before it."""
-    terms, found = list(base.terms), []
+    found: list[Named] = []
+    model = base
+    before = left_out(base) if classes else None
     for group in classes:
-        terms.append(group.members[0].term)
-        found.append(Named(group, fit_rms(problem, terms), heldout_rms(problem, terms)))
+        first = next((m.term for m in group.members if not isinstance(m.term.effect, Handling)), group.members[0].term)
+        model = model.with_term(first)
+        after = left_out(model)
+        errors = worst(before, after) if before is not None else (float("nan"), float("nan"))
+        found.append(Named(group, fit_rms(problem, model.terms), *errors))
+        before = after
     return tuple(found)
 
 
@@ -225,12 +178,12 @@ def _covariate(classes: Sequence[EffectClass]) -> Unexplained | None:
     return None
 
 
-def _beyond(part: "_Part", base: Model, found: SearchResult, drivers: list[Driver]) -> tuple[Model, Unexplained | None]:
+def _beyond(part: Part, base: Model, found: SearchResult, drivers: list[Driver]) -> tuple[Model, Unexplained | None]:
     """The effects that stand, and the driver that is left: effects that only imitate a curve of one driver are taken back."""
     instead = better_curve(part.base, found.added, part.suspected) if found.added else None
     if instead is not None:
         fit, kept = instead
-        before = part.base.at(fit.model.share)
+        before = part.base.at(fit.model.noise)
         drop = max(before.rss - fit.model.space.rss, 0.0)
         log_p = log_p_value(before, drop, fit.rank) + float(np.log(len(part.suspected)))
         return Model(base.problem, [*base.terms, *kept]), Unexplained(fit.driver, "curve", log_p)
@@ -253,9 +206,9 @@ def _convincing(model: Model, driver: Driver, looks: int) -> bool:
 def _driver_log_p(model: Model, driver: Driver) -> float:
     """Logarithm of the probability that noise follows a driver as much, the share of wander estimated with it inside."""
     richer = model.with_curves(driver.candidate.columns[:, :, 0, :])
-    space = model.at(richer.share)
+    space = model.at(richer.noise)
     gain = space.gain(driver.candidate)
-    return log_p_value(space, float(gain.drop[0]), int(gain.rank[0]))
+    return log_p_value(space, float(gain.drop[0]) / shared_noise(model), int(gain.rank[0]))
 
 
 def _worth(model: Model, driver: Driver) -> float:

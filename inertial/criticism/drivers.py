@@ -23,7 +23,7 @@ _CERTAIN = -600.0
 
 @dataclass(frozen=True)
 class Driver:
-    """Rotated columns of a smooth dependence on one driver.
+    """Columns of a smooth dependence on one driver.
 
     name : as in the exchange format (``unit_C``, ``time_s``, a covariate), or ``pose``, ``approach``, ``temperature_rate``
     values : (units, n) of the driver itself, None where it is not one quantity
@@ -115,8 +115,8 @@ def _pose_columns(state: State, most: int) -> Array:
 def _by_block(problem: Problem, columns: Array) -> Candidate:
     """Columns (units, n, d), the same for every axis, as a candidate."""
     each = columns if problem.lot.radial else np.repeat(columns, 3, axis=0)
-    rotated = problem.basis.rotate(np.broadcast_to(each, (problem.blocks, problem.n, columns.shape[-1])))
-    return Candidate(rotated[:, :, None, :], shared=False)
+    whole = np.broadcast_to(each, (problem.blocks, problem.n, columns.shape[-1]))
+    return Candidate(whole[:, :, None, :], shared=False)
 
 
 def _by_axis(problem: Problem, values: Array) -> Candidate:
@@ -124,7 +124,7 @@ def _by_axis(problem: Problem, values: Array) -> Candidate:
     if problem.lot.radial:
         return _by_block(problem, values)
     column = np.swapaxes(values, -1, -2).reshape(problem.blocks, problem.n, 1)
-    return Candidate(problem.basis.rotate(column)[:, :, None, :], shared=False)
+    return Candidate(column[:, :, None, :], shared=False)
 
 
 def places(problem: Problem, drivers: list[Driver], space: Space, floor_variance: float) -> list[Misfit]:

@@ -1,4 +1,4 @@
-"""Error of a model on dwells left out: whole poses at a time, so that what is predicted was not seen in any row."""
+"""Least squares of a model on some dwells, and what it leaves of all."""
 
 from collections.abc import Sequence
 
@@ -9,8 +9,6 @@ from inertial.criticism.model import Term
 from inertial.criticism.problem import Problem
 
 Array = NDArray[np.float64]
-
-_FOLDS = 6
 
 
 def residuals(problem: Problem, terms: Sequence[Term], train: NDArray[np.bool_]) -> Array:
@@ -28,8 +26,8 @@ class Fitting:
     """A model's columns in a problem, ready to be fitted to some dwells of any series."""
 
     def __init__(self, problem: Problem, terms: Sequence[Term]) -> None:
-        self._x = _stacked(problem, [t for t in terms if t.effect.scope != "station"])
-        self._z = _stacked(problem, [t for t in terms if t.effect.scope == "station"])
+        self._x = _stacked(problem, [t for t in terms if not t.shared])
+        self._z = _stacked(problem, [t for t in terms if t.shared])
         self._weight = np.where(np.isfinite(problem.error), 1.0 / problem.error, 0.0)
 
     def left(self, series: Array, train: NDArray[np.bool_]) -> Array:
@@ -44,33 +42,10 @@ class Fitting:
         return series - x @ solve(series)
 
 
-def heldout_rms(problem: Problem, terms: Sequence[Term]) -> float:
-    """RMS error in g on poses left out, each pose in one of six folds."""
-    fold = _folds(problem)
-    squares, count = 0.0, 0
-    for k in range(_FOLDS):
-        test = fold == k
-        if test.any() and not test.all():
-            left = residuals(problem, terms, ~test)[:, test]
-            squares += float(np.nansum(left**2))
-            count += int(np.count_nonzero(np.isfinite(left)))
-    return float(np.sqrt(squares / max(count, 1)))
-
-
 def fit_rms(problem: Problem, terms: Sequence[Term]) -> float:
     """RMS residual in g of the fit to all dwells."""
     left = residuals(problem, terms, np.ones(problem.n, dtype=bool))
     return float(np.sqrt(np.nanmean(left**2)))
-
-
-def _folds(problem: Problem) -> NDArray[np.intp]:
-    """Fold of each dwell, (n,): equal poses together; dwells in turn where no pose comes again."""
-    force = np.round(problem.lot.state.force[0], 3)
-    _, pose = np.unique(force, axis=0, return_inverse=True)
-    pose = pose.reshape(-1)
-    if pose.max() + 1 < 2 * _FOLDS:
-        return np.arange(problem.n) % _FOLDS
-    return (pose * 7) % _FOLDS  # neighbours on the sphere fall into different folds
 
 
 def _stacked(problem: Problem, terms: Sequence[Term]) -> Array:

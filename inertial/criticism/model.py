@@ -1,4 +1,4 @@
-"""A model under criticism: its columns in a problem, and the share of wander that its residuals show."""
+"""A model under criticism: its columns in a problem, and the noise that its residuals show."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -7,14 +7,25 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from inertial.criticism.problem import Problem
-from inertial.criticism.space import Candidate, Space, information
+from inertial.criticism import variance
+from inertial.criticism.covariance import Noise, Shares
+from inertial.criticism.handling.base import Handling
+from inertial.criticism.problem import SHARED, Problem
+from inertial.criticism.shares import best_shares
+from inertial.criticism.space import Candidate, Space
 from inertial.effects.base import AnyEffect
 from inertial.errors import NotIdentified
 
 Array = NDArray[np.float64]
 
-_SHARES = np.concatenate([[0.0], np.geomspace(0.02, 2e4, 13)])
+_LONG = 400
+"""Dwells above which shares are looked for by half decades: a whitener takes long, and so many dwells are kept at each."""
+
+_HANGING = 1e-3
+"""Part of a column that the others leave below which one factorisation is not trusted."""
+
+_OWN = 20
+"""Degrees of freedom of a block from which on its own variance tells of the shares; fewer are taken to be alike."""
 
 
 @dataclass(frozen=True)
@@ -25,9 +36,14 @@ class Term:
     first : how many of its columns are used; None for all
     """
 
-    effect: AnyEffect
+    effect: AnyEffect | Handling
     values: tuple[tuple[str, float | tuple[float, ...]], ...] = ()
     first: int | None = None
+
+    @property
+    def shared(self) -> bool:
+        """Whether all blocks share its coefficients."""
+        return self.effect.scope in SHARED
 
     @property
     def keywords(self) -> dict[str, float | tuple[float, ...]]:
@@ -44,8 +60,8 @@ class Model:
 
     Parameters
     ----------
-    near : a share of wander near which this model's is looked for
-    curves, shared_curves : (blocks, n, d), rotated columns of a driver that is no effect, sized by block or for all blocks
+    near : noise near which this model's is looked for
+    curves, shared_curves : (blocks, n, d), columns of a driver that is no effect, sized by block or for all blocks
     """
 
     def __init__(
@@ -53,18 +69,19 @@ class Model:
         problem: Problem,
         terms: Sequence[Term],
         *,
-        near: float | None = None,
+        near: Noise | None = None,
         curves: Array | None = None,
         shared_curves: Array | None = None,
     ) -> None:
         self.problem, self.terms, self._near = problem, tuple(terms), near
         self._curves, self._shared_curves = curves, shared_curves
+        self._spaces: dict[Shares, Space] = {}
 
     @cached_property
     def local(self) -> Array:
-        """Rotated columns with coefficients by block, (blocks, n, p)."""
-        found = [self._of(t) for t in self.terms if t.effect.scope != "station"]
-        found += [self._start(t) for t in self.terms if t.effect.scope != "station"]
+        """Columns with coefficients by block, (blocks, n, p)."""
+        found = [self._of(t) for t in self.terms if not t.shared]
+        found += [self._start(t) for t in self.terms if not t.shared]
         if self._curves is not None:
             found.append(self._curves)
         if not found:
@@ -73,62 +90,137 @@ class Model:
 
     @cached_property
     def shared(self) -> Array:
-        """Rotated columns with coefficients of all blocks, (blocks, n, q)."""
-        found = [self._of(t) for t in self.terms if t.effect.scope == "station"]
+        """Columns with coefficients of all blocks, (blocks, n, q)."""
+        found = [self._of(t) for t in self.terms if t.shared]
         if self._shared_curves is not None:
             found.append(self._shared_curves)
         if not found:
             return np.zeros((self.problem.blocks, self.problem.n, 0))
-        found += [self._start(t) for t in self.terms if t.effect.scope == "station"]
+        found += [self._start(t) for t in self.terms if t.shared]
         return np.concatenate(found, axis=-1)
 
     def _of(self, term: Term) -> Array:
-        columns = self.problem.rotated(term.effect, term.keywords)
+        columns = self.problem.columns(term.effect, term.keywords)
         return columns if term.first is None else columns[..., : term.first]
 
     def _start(self, term: Term) -> Array:
-        """Rotated columns of the unknown state of a term's memory before the first dwell."""
-        columns = self.problem.start(term.effect, term.keywords)
-        return self.problem.basis.rotate(columns) if columns.shape[-1] else columns
+        """Columns of the unknown state of a term's memory before the first dwell."""
+        return self.problem.start(term.effect, term.keywords)
 
-    def at(self, share: float) -> Space:
-        """What the model leaves, whitened at a share of wander."""
-        return Space(self.problem.basis, share, self.problem.y, self.local, self.shared)
+    def at(self, noise: Noise) -> Space:
+        """What the model leaves, whitened for a noise."""
+        return Space(self.problem.covariance, noise, self.problem.y, self.local, self.shared)
 
     @cached_property
-    def share(self) -> float:
-        """ρ by restricted maximum likelihood, pooled over the blocks."""
-        shares = _SHARES
-        if self._near is not None:
-            around = self._near * np.array([0.03, 0.1, 0.3, 0.6, 1.0, 1.6, 3.0]) if self._near > 0.0 else _SHARES[1:6]
-            shares = np.concatenate([[0.0], np.minimum(around, _SHARES[-1] * np.linspace(1.0, 1.1, around.size))])
-        found = np.array([self._deviance(s) for s in shares])
-        best = int(np.argmin(found))
-        if 0 < best < shares.size - 1 and shares[best - 1] > 0.0:
-            return float(np.exp(_vertex(np.log(shares[best - 1 : best + 2]), found[best - 1 : best + 2])))
-        return float(shares[best])
+    def noise(self) -> Noise:
+        """Shares of wander by restricted likelihood, pooled over the blocks, and variances of the blocks."""
+        near = None if self._near is None else self._near.shares
+        return self.noise_at(best_shares(self._restricted, near, finest=4 if self.problem.n > _LONG else 2))
 
-    def _deviance(self, share: float) -> float:
-        space = self.at(share)
-        return space.restricted(np.array(information(self.local, space.spread)))
+    def noise_at(self, shares: Shares) -> Noise:
+        """The noise at given shares: each block's variance drawn together with the others' as far as they are alike."""
+        space = self._rough(shares)
+        squares, prior = variance.moderated(space.squares, space.by_block)
+        return Noise(shares, np.sqrt(squares), prior)
+
+    def _rough(self, shares: Shares) -> Space:
+        """The space at shares, the blocks weighed as they are known before."""
+        if shares not in self._spaces:
+            scale = np.ones(self.problem.blocks) if self._near is None else self._near.scale
+            if self._near is None and self.shared.shape[-1]:
+                scale = self._own_scale
+            self._spaces[shares] = self.at(Noise(shares, scale))
+        return self._spaces[shares]
+
+    @cached_property
+    def _own_scale(self) -> Array:
+        """Standard deviations of the blocks under white noise: weights for columns that all share."""
+        space = self.at(self.problem.covariance.white_noise())
+        return np.sqrt(variance.moderated(space.squares, space.by_block)[0])
+
+    def _restricted(self, shares: Shares) -> float:
+        """−2 log restricted likelihood, each block with a variance of its own where it can carry one."""
+        quick = self._quick(shares)
+        if quick is None:
+            space = self._rough(shares)
+            information, squares, dof = space.information, space.squares, space.by_block
+        else:
+            information, squares = quick
+            dof = self.problem.covariance.count - float(self.local.shape[-1])
+        logdet = float(np.sum(self.problem.covariance.logdet(shares)))
+        if float(np.median(dof)) < _OWN:
+            return logdet + information + variance.deviance(squares, dof)
+        known = dof > 0
+        own = dof[known] * np.log(np.maximum(squares[known], 1e-300) / dof[known])
+        return logdet + information + float(np.sum(own))
+
+    @cached_property
+    def _stacked(self) -> Array:
+        """Columns with coefficients by block, of unit size, and the measurements behind them, (blocks, n, p + 1)."""
+        unit = self.local / self._sizes[:, None, :]
+        return np.concatenate([unit, self.problem.y[..., None]], axis=-1)
+
+    def _quick(self, shares: Shares) -> tuple[float, Array] | None:
+        """log|HᵀV⁻¹H|, up to a constant, and sums of squares, by one factorisation; None where columns hang together."""
+        if self.shared.shape[-1]:
+            return None
+        white = self.problem.covariance.whiten(self._stacked, shares)
+        gram = np.swapaxes(white, -1, -2) @ white
+        size = np.sqrt(np.maximum(np.diagonal(gram, axis1=-2, axis2=-1), 1e-300))
+        try:
+            root = np.linalg.cholesky(gram / (size[:, :, None] * size[:, None, :]))
+        except np.linalg.LinAlgError:
+            return None
+        diagonal = np.diagonal(root, axis1=-2, axis2=-1)
+        if float(diagonal[:, :-1].min(initial=1.0)) < _HANGING:
+            return None
+        information = 2.0 * float(np.sum(np.log(diagonal[:, :-1] * size[:, :-1])))
+        information += 2.0 * float(np.sum(np.log(self._sizes)))
+        return information, np.asarray((diagonal[:, -1] * size[:, -1]) ** 2, dtype=np.float64)
+
+    @cached_property
+    def _sizes(self) -> Array:
+        """Sizes of the columns with coefficients by block, (blocks, p)."""
+        there = self.problem.covariance.there[..., None]
+        size = np.sqrt(np.einsum("bnp,bnp->bp", self.local * there, self.local * there))
+        return np.where(size > 0.0, size, 1.0)
 
     @cached_property
     def space(self) -> Space:
-        """What the model leaves, whitened at its own share of wander."""
-        return self.at(self.share)
+        """What the model leaves, whitened for its own noise."""
+        return self.at(self.noise)
 
     def floor(self) -> float:
         """RMS of the noise of a dwell mean, g: white and wander about the record's own mean."""
-        basis, space = self.problem.basis, self.space
+        covariance, noise = self.problem.covariance, self.noise
         # the constant part of the wander goes into the bias of the run and is no error of the dwells against each other
-        slow = space.share * basis.wander_about_mean
-        return float(np.sqrt(space.variance * basis.white * (1.0 + slow)))
+        each = (noise.scale * covariance.level) ** 2 * (1.0 + covariance.about_mean(noise.shares))
+        return float(np.sqrt(np.sum(each * covariance.count) / max(int(covariance.count.sum()), 1)))
+
+    def shared_sizes(self, term: Term) -> Array:
+        """Coefficients (k,) of a term that all blocks share."""
+        at = 0
+        for other in (t for t in self.terms if t.shared):
+            count = self._of(other).shape[-1]
+            if other is term:
+                space = self.space
+                found = np.linalg.lstsq(space.gram[1:, 1:], space.gram[1:, 0], rcond=1e-10)[0]
+                return found[at : at + count].astype(np.float64)
+            at += count
+        return np.zeros(0)
 
     def explained(self, candidate: Candidate, floor: float) -> float:
         """RMS, g, of what a candidate explains that the model cannot absorb, less what noise of RMS ``floor`` would."""
-        gain = self.at(0.0).gain(candidate)
-        beyond = float(gain.drop[0]) * self.problem.basis.white - floor**2 * float(gain.rank[0])
+        covariance = self.problem.covariance
+        gain = self._even.gain(candidate)
+        beyond = float(gain.drop[0]) * covariance.white - floor**2 * float(gain.rank[0])
         return float(np.sqrt(max(beyond, 0.0) / self.problem.count))
+
+    @cached_property
+    def _even(self) -> Space:
+        """The space in which all blocks count alike: of the lot's white noise."""
+        covariance = self.problem.covariance
+        return self.at(Noise(Shares(), np.sqrt(covariance.white) / covariance.level))
 
     def _variant(
         self, terms: Sequence[Term], curves: Array | None = None, shared_curves: Array | None = None
@@ -137,7 +229,7 @@ class Model:
         return Model(
             self.problem,
             terms,
-            near=self.share,
+            near=self.noise,
             curves=self._curves if curves is None else curves,
             shared_curves=self._shared_curves if shared_curves is None else shared_curves,
         )
@@ -158,6 +250,10 @@ class Model:
         """The model less one effect."""
         return self._variant([t for t in self.terms if t.effect.id != effect_id])
 
+    def without_term(self, term: Term) -> "Model":
+        """The model less one term."""
+        return self._variant([t for t in self.terms if t is not term])
+
 
 def refuse_without_freedom(model: Model) -> None:
     """Refuse to judge a model that has as many coefficients as there are measurements: it fits anything, and tells nothing.
@@ -167,17 +263,9 @@ def refuse_without_freedom(model: Model) -> None:
     NotIdentified
         No degree of freedom is left.
     """
-    if model.at(0.0).dof < 1:
+    if model.at(model.problem.covariance.white_noise()).dof < 1:
         count, series = model.problem.count, model.problem.blocks
         raise NotIdentified(
             f"model: {count // series} dwells a unit leave nothing to judge the model by, more dwells than its coefficients on "
             "an axis are needed; measure more poses or repeats, or judge a smaller model"
         )
-
-
-def _vertex(x: Array, y: Array) -> float:
-    """Abscissa of the parabola through three points, kept between the outer two."""
-    a = np.polyfit(x - x[1], y, 2)
-    if a[0] <= 0.0:
-        return float(x[1])
-    return float(np.clip(x[1] - a[1] / (2.0 * a[0]), x[0], x[2]))

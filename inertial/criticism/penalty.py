@@ -1,25 +1,41 @@
-"""The price of an effect: penalised deviance, and the probability that noise alone takes off as much."""
+"""The price of an effect, and the probability that noise alone takes off as much."""
 
 import numpy as np
 from scipy import stats
 
+from inertial.criticism import variance
+from inertial.criticism.handling.base import Handling
 from inertial.criticism.model import Model, Term
-from inertial.criticism.problem import Problem
-from inertial.criticism.space import Space
+from inertial.criticism.space import Gain, Space
 
 PER_COEFFICIENT = 2.5
 PER_COLUMN = 6.0
-"""Penalty, in chi-square, for each coefficient and each column: a larger effect must earn its size."""
+"""Price, in chi-square, for each coefficient and each column where whole models are compared, curves among them."""
 
 
 def cost_of(rank: int, columns: int, nonlinear: int) -> float:
-    """Penalty of an effect, in chi-square."""
+    """Price, in chi-square, of an effect beside a model whose size is not known yet."""
     return PER_COEFFICIENT * (rank + nonlinear) + PER_COLUMN * columns
 
 
-def cost_in(problem: Problem, rank: int, nonlinear: int) -> float:
-    """Penalty of an effect that the plan determines so many coefficients of, in chi-square."""
-    return cost_of(rank, max(1, round(rank / problem.blocks)), nonlinear)
+def price(deviance: float, coefficients: float) -> float:
+    """What coefficients cost that take off so much, in chi-square: k·(1 + ln(D/k)), and all of it where D is below k.
+
+    Coefficients from a normal distribution whose variance is fitted to them: the evidence is the likelihood ratio less this.
+    """
+    if coefficients <= 0 or deviance <= coefficients:
+        return max(deviance, 0.0)
+    return coefficients * (1.0 + float(np.log(deviance / coefficients)))
+
+
+def fall(space: Space, gain: Gain) -> np.ndarray:
+    """Deviances (grid,) that a candidate takes off at the noise of a space, the variances found anew."""
+    prior = space.noise.prior
+    if np.isfinite(prior) and gain.by_block.any():
+        whole = (space.by_block + prior)[:, None]
+        return np.sum(-whole * np.log1p(-np.minimum(gain.by_block / np.maximum(whole, 1e-9), 0.999)), axis=0)
+    dof = max(space.dof, 1)
+    return -dof * np.log1p(-np.minimum(gain.drop / max(space.rss, 1e-300), 0.999))
 
 
 def log_p_value(space: Space, drop: float, rank: int) -> float:
@@ -31,20 +47,19 @@ def log_p_value(space: Space, drop: float, rank: int) -> float:
     return float(stats.f.logsf((drop / rank) / (left / after), rank, after))
 
 
-def deviance(space: Space, drop: float = 0.0) -> float:
-    """−2 log likelihood, up to a constant, of what a model leaves, less ``drop`` of its sum of squares."""
-    count = space.basis.count
-    return count * float(np.log(max(space.rss - drop, 1e-300) / count)) + space.logdet
-
-
 def cost_of_model(model: Model) -> float:
     """Penalised deviance of a whole model: the fewer coefficients and columns, the better."""
     space = model.space
     nonlinear = sum(freedom(t) for t in model.terms)
     columns = model.local.shape[-1] + model.shared.shape[-1]
-    return deviance(space) + cost_of(space.local_rank + space.shared_rank, columns, nonlinear)
+    rank = space.local_rank + space.shared_rank
+    count = model.problem.covariance.count.astype(np.float64)
+    deviance = space.logdet + variance.deviance(space.squares, count)
+    return deviance + cost_of(rank, columns, nonlinear)
 
 
 def freedom(term: Term) -> int:
     """Number of nonlinear parameters that were found from the data: one, or three where the axes have their own."""
-    return sum(len(v) if isinstance(v, tuple) else 1 for v in term.keywords.values()) if term.effect.nonlinear else 0
+    if isinstance(term.effect, Handling) or not term.effect.nonlinear:
+        return 0
+    return sum(len(v) if isinstance(v, tuple) else 1 for v in term.keywords.values())

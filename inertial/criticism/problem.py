@@ -1,28 +1,32 @@
 """A lot's dwells as series in g: one block per unit and axis, or one per unit where only the norm of gravity is known."""
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
 from functools import cached_property
+from itertools import groupby
 
 import numpy as np
 from numpy.typing import NDArray
 
-from inertial.criticism.noise import Basis, basis
+from inertial.criticism.covariance import Covariance
+from inertial.criticism.handling.base import Handling, by_block
+from inertial.criticism.lot import Lot
 from inertial.criticism.space import Candidate
 from inertial.effects import SensorEffect
 from inertial.effects.base import AnyEffect, excited
-from inertial.state import State
 
 Array = NDArray[np.float64]
 
+SHARED = ("station", "data")
+"""Scopes of effects whose coefficients all blocks share."""
+
 _PIECE = 4_000_000
-"""Numbers of rotated columns worked on at a time."""
+"""Numbers of columns worked on at a time."""
 
 _WIDEST = 3
 """Columns an axis that an effect usually has at the most."""
 
 _CACHE = 15_000_000
-"""Numbers of rotated columns kept between passes; beyond, they are made again: memory stays bounded for large lots."""
+"""Numbers of columns kept between passes; beyond, they are made again: memory stays bounded for large lots."""
 
 
 Values = Mapping[str, float | tuple[float, ...]]
@@ -34,59 +38,35 @@ def on_axis(values: Values, axis: int) -> dict[str, float]:
     return {name: value[axis] if isinstance(value, tuple) else value for name, value in values.items()}
 
 
-@dataclass(frozen=True)
-class Lot:
-    """Measurements of a lot in g.
+class Problem:
+    """Series and columns of a lot by block.
 
-    state : the dwells of all units, (units, n)
-    output : (units, n, 3), output over the nominal scale: g
-    error : (units, n, 3), white standard error of each dwell mean, g; infinite where a dwell is missing
-    response : (units, 3, 3), K over its diagonal: how a change of force shows on each axis
-    radial : only the norm of the force is known; the state's force is then the corrected output's own direction
+    Parameters
+    ----------
+    slope : (units, n, 3), g/K, by which the outputs follow temperature as far as that is known: what a wrong thermometer acts by
     """
 
-    state: State
-    output: Array
-    error: Array
-    response: Array
-    radial: bool = False
-
-    def units(self, index: Sequence[int]) -> "Lot":
-        """The lot of some units only."""
-        pick = np.asarray(index, dtype=np.intp)
-        return replace(
-            self,
-            state=self.state.pick(pick),
-            output=self.output[pick],
-            error=self.error[pick],
-            response=self.response[pick],
-        )
-
-
-class Problem:
-    """Series and columns of a lot in the blocks' rotated coordinates; ``steep`` wander has a random walk in it."""
-
-    def __init__(self, lot: Lot, *, steep: bool = False) -> None:
-        self.lot, self.steep = lot, steep
+    def __init__(self, lot: Lot, *, slope: Array | None = None) -> None:
+        self.lot, self.slope = lot, slope
         units, n = lot.state.time.shape
         self.blocks = units if lot.radial else 3 * units
         self.n = n
         self.error = self._error()
-        self.series = self._series()
+        self.y = self._series()
         self._kept: dict[tuple[object, ...], Candidate] = {}
         self._terms: dict[tuple[object, ...], Array] = {}
         self._room = _CACHE
 
-    @cached_property
-    def basis(self) -> Basis:
-        """The rotation in which the noise of the dwells is diagonal."""
-        time = self.lot.state.time if self.lot.radial else np.repeat(self.lot.state.time, 3, axis=0)
-        return basis(time, self.error, steep=self.steep)
+    @property
+    def series(self) -> Array:
+        """Measurements (blocks, n), g."""
+        return self.y
 
     @cached_property
-    def y(self) -> Array:
-        """Rotated measurements, (blocks, n)."""
-        return self.basis.rotate(self.series[..., None])[..., 0]
+    def covariance(self) -> Covariance:
+        """The covariances of the blocks, at any noise."""
+        time = self.lot.state.time if self.lot.radial else np.repeat(self.lot.state.time, 3, axis=0)
+        return Covariance(time, self.error)
 
     def _series(self) -> Array:
         """Measurements (blocks, n), g: outputs, or what the norm of the corrected output exceeds 1 g by."""
@@ -110,16 +90,30 @@ class Problem:
         """Number of measurements."""
         return int(np.isfinite(self.error).sum())
 
-    def columns(self, effect: AnyEffect, values: Values) -> Array:
+    def columns(self, effect: AnyEffect | Handling, values: Values) -> Array:
         """Columns of an effect by block, (blocks, n, p), g per unit of the coefficient; radial lots join the axes' columns."""
+        key = (effect.id, *values.items())
+        kept = self._terms.get(key)
+        if kept is None:
+            kept = self._columns(effect, values)
+            if kept.size < self._room:
+                self._room -= kept.size
+                self._terms[key] = kept
+        return kept
+
+    def _columns(self, effect: AnyEffect | Handling, values: Values) -> Array:
+        if isinstance(effect, Handling):
+            return effect.columns(self.lot, self.slope, **on_axis(values, 0))
         if isinstance(effect, SensorEffect):
             state = self.lot.state
             axes = [effect.columns(state, axis, **on_axis(values, axis)) for axis in range(3)]
             return self._by_axis([excited(effect, columns) for columns in axes])
         return self.seen(effect.force_change(self.lot.state, **on_axis(values, 0)))
 
-    def start(self, effect: AnyEffect, values: Values) -> Array:
+    def start(self, effect: AnyEffect | Handling, values: Values) -> Array:
         """Columns (blocks, n, k) of the unknown state of an effect's memory before the first dwell."""
+        if isinstance(effect, Handling):
+            return np.zeros((self.blocks, self.n, 0))
         if isinstance(effect, SensorEffect):
             state = self.lot.state
             columns = self._by_axis([effect.start_columns(state, axis, **on_axis(values, axis)) for axis in range(3)])
@@ -148,34 +142,44 @@ class Problem:
             return np.einsum("uni,uinq->unq", self._direction, seen)
         return seen.reshape(self.blocks, self.n, -1)
 
-    def rotated(self, effect: AnyEffect, values: Values) -> Array:
-        """Rotated columns (blocks, n, p) of an effect."""
-        key = (effect.id, *values.items())
-        kept = self._terms.get(key)
-        if kept is None:
-            kept = self.basis.rotate(self.columns(effect, values))
-            if kept.size < self._room:
-                self._room -= kept.size
-                self._terms[key] = kept
-        return kept
-
-    def candidate(self, effect: AnyEffect, grid: Sequence[Values], *, first: int | None = None) -> Candidate:
-        """Rotated columns of an effect over values of its nonlinear parameters; ``first`` keeps only so many columns an axis."""
-        key = (effect.id, len(grid), tuple(grid[0].items()), tuple(grid[-1].items()))
+    def candidate(self, effect: AnyEffect | Handling, grid: Sequence[Values], *, first: int | None = None) -> Candidate:
+        """Columns of an effect over values of its nonlinear parameters; ``first`` keeps only so many columns an axis."""
+        key = (effect.id, len(grid), tuple(grid[0].items()), tuple(grid[-1].items()), first)
         kept = self._kept.get(key)
         if kept is None:
-            stacked = np.stack([self.basis.rotate(self.columns(effect, values)) for values in grid], axis=2)
-            kept = Candidate(stacked, shared=effect.scope == "station")
+            stacked = np.stack([self._columns(effect, values) for values in grid], axis=2)
+            stacked = stacked if first is None else np.ascontiguousarray(stacked[..., :first])
+            kept = Candidate(stacked, effect.scope in SHARED, key=key if len(grid) > 1 or not grid[0] else None)
             if stacked.size < self._room:
                 self._room -= stacked.size
                 self._kept[key] = kept
-        if first is None:
-            return kept
-        return Candidate(kept.columns[..., :first], kept.shared)
+        return kept
 
-    def pieces(self, effect: AnyEffect, grid: Sequence[Values], *, first: int | None = None) -> Iterator[Candidate]:
+    def pieces(
+        self, effect: AnyEffect | Handling, grid: Sequence[Values], *, first: int | None = None
+    ) -> Iterator[Candidate]:
         """The candidate of an effect in pieces of its grid, so small that large lots are worked on in bounded memory."""
+        if isinstance(effect, Handling):
+            yield from self._places(effect, grid)
+            return
         width = 1 + self.blocks * self.n * _WIDEST
         size = max(1, _PIECE // width)
         for start in range(0, len(grid), size):
             yield self.candidate(effect, grid[start : start + size], first=first)
+
+    def _places(self, effect: Handling, grid: Sequence[Values]) -> Iterator[Candidate]:
+        """The places of an alternative, those of one unit together."""
+        for unit, places in groupby(grid, key=lambda values: values.get("unit")):
+            each = list(places)
+            key = (effect.id, unit, len(each), *each[0].items(), *each[-1].items())
+            if key not in self._kept:
+                found = [effect.change(self.lot, self.slope, **on_axis(p, 0)) for p in each]
+                blocks = None
+                if unit is None:
+                    units = self.lot.state.time.shape[0]
+                    found = [np.broadcast_to(f, (units, *f.shape[1:])) for f in found]
+                else:
+                    blocks = 3 * int(on_axis({"unit": unit}, 0)["unit"]) + np.arange(3)
+                columns = np.stack([by_block(f) for f in found], axis=2)
+                self._kept[key] = Candidate(columns, shared=True, blocks=blocks, key=key)
+            yield self._kept[key]

@@ -8,6 +8,7 @@ import numpy as np
 from inertial import effects as catalogue
 from inertial.criticism.aims import Objective, RivalDiscrimination, Sighting
 from inertial.criticism.classes import EffectClass
+from inertial.criticism.handling.base import Handling
 from inertial.criticism.menus import Kind, Reach, StepSequence, courses, pose_grid, present, reach_of, temperatures
 from inertial.criticism.model import Model, Term
 from inertial.criticism.separation import Rivals, rivals_of
@@ -15,6 +16,7 @@ from inertial.design import grid_of
 from inertial.errors import MissingInput
 from inertial.planning.reasons import drivers_of
 from inertial.planning.sequences import SequenceStep, StationPace, standing, timeline
+from inertial.state import State
 
 MICRO = 1e6
 
@@ -105,7 +107,7 @@ def sighting(
     state = model.problem.lot.state
     steady = (around.reach or reach_of(state)).temperature is None
     terms = [t for name in unseen if (t := _term(model, name)) is not None and t.effect.typical_ug[1] > floor]
-    terms = [t for t in terms if not (steady and "temperature" in drivers_of(state, t.effect))]
+    terms = [t for t in terms if not (steady and "temperature" in _drivers(state, t))]
     if not terms:
         return None
     rivals = rivals_of(model, [], model.terms)
@@ -135,6 +137,11 @@ def _term(model: Model, name: str) -> Term | None:
     return Term(effect, tuple(grid[len(grid) // 2].items()))
 
 
+def _drivers(state: State, term: Term) -> frozenset[str]:
+    """What an effect answers to; nothing for what handling does."""
+    return frozenset() if isinstance(term.effect, Handling) else frozenset(drivers_of(state, term.effect))
+
+
 @dataclass(frozen=True)
 class _Offer:
     """A course with what is there after it, the station time until then, and what it brings per minute."""
@@ -154,7 +161,7 @@ class ProposalSearch:
         self.reach = around.reach or reach_of(self.state)
         self.pace = around.pace
         # dwells on the way shake everything that follows temperature: only for what answers to its rate
-        answers = [drivers_of(self.state, t.effect) for t in aim.terms]
+        answers = [_drivers(self.state, t) for t in aim.terms]
         self.rated = any("rate" in found for found in answers)
         self.timed = any("since_power" in found for found in answers)
 

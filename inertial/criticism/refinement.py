@@ -5,6 +5,8 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from inertial.criticism.covariance import Noise
+from inertial.criticism.handling.base import Handling
 from inertial.criticism.model import Model, Term
 from inertial.criticism.problem import Problem
 from inertial.criticism.space import Candidate, Space
@@ -17,21 +19,35 @@ AXES_DIFFER = 30.0
 """Chi-square that one value per axis must take off beyond one value for all."""
 
 
-def refine(model: Model, term: Term, share: float, *, axes: bool = True) -> Term:
+def refine(model: Model, term: Term, noise: Noise, *, axes: bool = True) -> Term:
     """A term with its continuous nonlinear parameters moved to the best fit near their grid values.
 
     One value serves all units and axes, unless one per axis takes off far more than noise could.
     """
-    space = model.at(share)
+    space = model.at(noise)
+    if isinstance(term.effect, Handling):
+        return _placed(space, model.problem, term)
     state = model.problem.lot.state
     continuous = [p for p in term.effect.parameters(state) if not p.choices]
     for parameter in continuous:
         term = _refine_one(space, model.problem, term, parameter)
-    if not axes or term.effect.scope == "station" or model.problem.lot.radial:
+    if not axes or term.shared or model.problem.lot.radial:
         return term
     for parameter in continuous:
         term = _per_axis(space, model.problem, term, parameter)
     return term
+
+
+def _placed(space: Space, problem: Problem, term: Term) -> Term:
+    """An alternative at the best dwell near its own."""
+    if not isinstance(term.effect, Handling):
+        return term
+    near = term.effect.near(problem.lot, **{k: v for k, v in term.keywords.items() if isinstance(v, float)})
+    if len(near) < 2:
+        return term
+    pieces = list(problem.pieces(term.effect, near))
+    drop = np.concatenate([space.gain(Candidate(p.columns, p.shared, p.blocks)).drop for p in pieces])
+    return Term(term.effect, tuple(near[int(np.argmax(drop))].items()))
 
 
 def _refine_one(space: Space, problem: Problem, term: Term, parameter: Nonlinear) -> Term:
@@ -91,8 +107,8 @@ def _around(parameter: Nonlinear, centre: float, width: float) -> Array:
 def _varied(problem: Problem, term: Term, parameter: Nonlinear, values: Array) -> Candidate:
     """A term's columns at several values of one parameter."""
     sets = [{**term.keywords, parameter.name: float(v)} for v in values]
-    columns = np.stack([problem.rotated(term.effect, s) for s in sets], axis=2)
-    return Candidate(columns[..., : term.first], term.effect.scope == "station")
+    columns = np.stack([problem.columns(term.effect, s) for s in sets], axis=2)
+    return Candidate(columns[..., : term.first], term.shared)
 
 
 def _with_value(term: Term, parameter: Nonlinear, value: float | tuple[float, ...]) -> Term:
@@ -109,5 +125,5 @@ def terms_of(effects: Sequence[AnyEffect], problem: Problem) -> list[Term]:
         rest = Model(problem, [t for i, t in enumerate(terms) if i != place])
         gain = rest.space.gain(problem.candidate(effect, grid))
         best = Term(effect, tuple(grid[int(np.argmax(gain.drop))].items()))
-        terms[place] = refine(rest, best, rest.share)
+        terms[place] = refine(rest, best, rest.noise)
     return terms

@@ -1,37 +1,37 @@
 """The search for missing effects: forward with the noise estimated anew, and back again over what was chosen."""
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from inertial.criticism.covariance import Shares
+from inertial.criticism.decisions import MATERIAL, NAMED_BELOW
+from inertial.criticism.field import Candidates
+from inertial.criticism.handling.base import Handling
+from inertial.criticism.likelihood import likelihood_ratio, weighed
 from inertial.criticism.model import Model, Term
-from inertial.criticism.penalty import cost_in, cost_of_model, deviance, freedom, log_p_value
-from inertial.criticism.problem import Problem
+from inertial.criticism.penalty import cost_of_model, fall
 from inertial.criticism.refinement import refine
-from inertial.criticism.space import Candidate, Gain, Space
-from inertial.design import grid_of
-from inertial.effects.base import AnyEffect
-from inertial.errors import MissingInput
+from inertial.criticism.space import Gain, Space
 
 Array = NDArray[np.float64]
 
-NAMED_BELOW = 1e-4
-"""Probability, over all looks together, below which an effect is named."""
-
-MATERIAL = 0.2
-"""Share of the floor below which a significant effect is not named: remainders of imperfect drivers are of that size."""
-
-_FINALISTS = 6  # rivals for which the noise is estimated anew
+_FINALISTS = 5  # of each look at the noise, for which the noise is estimated anew
 _AGAIN = 3  # the same where an effect is examined again
 _MOST = 6  # effects that one search may add
-_SHARES_TRIED = (1.0, 0.15, 0.01)  # of the wander: with the effect inside there is less of it
+_REFINED, _SAME = 3, 0.05  # turns of refinement, and the change of a nonlinear parameter that ends them
+_LESS = Shares(0.25, 1.0 / 30.0)
+"""Parts of 1/f and of random walk at which the candidates are looked at once more: a drift hidden in the walk comes up there."""
 
 
 @dataclass(frozen=True)
 class Rival:
-    """A candidate effect on its best values, judged beside a model."""
+    """A candidate on its best values, judged beside a model.
+
+    drop : deviance that it takes off; cost : what is left to pay, the less the better
+    """
 
     term: Term
     drop: float
@@ -42,67 +42,21 @@ class Rival:
 
 @dataclass(frozen=True)
 class SearchResult:
-    """Outcome of the search: the model with what was added, and the rivals of the first step, best first."""
+    """Outcome of the search: the model with what was added, and the rivals of the first step, best first.
+
+    handling : the alternative that ended the search, as it was the best of its step; ``model`` is what it was found beside
+    """
 
     model: Model
     added: tuple[Term, ...]
     ladder: tuple[Rival, ...]
-
-
-class Candidates:
-    """The candidates of a search, those that these dwells carry the quantities for."""
-
-    def __init__(self, problem: Problem, effects: Iterable[AnyEffect]) -> None:
-        self.problem = problem
-        self.effects: list[AnyEffect] = []
-        self.grids: dict[str, list[dict[str, float]]] = {}
-        self.lacking: dict[str, str] = {}
-        for effect in effects:
-            try:
-                grid = grid_of(effect, problem.lot.state)
-                problem.columns(effect, grid[0])
-            except MissingInput as reason:
-                self.lacking[effect.id] = reason.quantity
-                continue
-            self.effects.append(effect)
-            self.grids[effect.id] = grid
-
-    @property
-    def looks(self) -> int:
-        """Number of tests made in one pass: every effect at every value of its nonlinear parameters."""
-        return sum(len(g) for g in self.grids.values())
-
-    def gains(self, space: Space, leave: set[str]) -> dict[str, Gain]:
-        """Gain of every candidate that the model does not hold already."""
-        found: dict[str, Gain] = {}
-        for effect in self.effects:
-            if effect.id not in leave:
-                found[effect.id] = self._gain(space, effect, None)
-        return found
-
-    def _gain(self, space: Space, effect: AnyEffect, first: int | None) -> Gain:
-        pieces = self.problem.pieces(effect, self.grids[effect.id], first=first)
-        return Gain.joined([space.gain(piece) for piece in pieces])
-
-    def pieces(self) -> Iterator[Candidate]:
-        """Every candidate at every value of its nonlinear parameters, in pieces."""
-        for effect in self.effects:
-            yield from self.problem.pieces(effect, self.grids[effect.id])
-
-    def primary_gains(self, space: Space, leave: set[str]) -> dict[str, Gain]:
-        """Gain of the leading column alone, for effects of several columns whose first is an effect of its own."""
-        found: dict[str, Gain] = {}
-        for effect in self.effects:
-            first = effect.primary
-            if effect.id not in leave and first is not None:
-                found[effect.id] = self._gain(space, effect, first)
-        return found
+    handling: Term | None = None
 
 
 def search(
     field: Candidates, base: Model, stop: Callable[[Sequence[Term]], bool], start: Sequence[Term] = ()
 ) -> SearchResult:
-    """The effects that the measurements call for beyond a base model.
+    """The effects that the measurements call for beyond a base model, or the alternative that must be mended first.
 
     Parameters
     ----------
@@ -110,17 +64,18 @@ def search(
     start : effects that a part of the lot called for already
     """
     chosen: list[Term] = list(start)
-    model, ladder = Model(field.problem, [*base.terms, *chosen], near=base.share) if chosen else base, ()
+    model, ladder = Model(field.problem, [*base.terms, *chosen], near=base.noise) if chosen else base, ()
     for _ in range(_MOST - len(chosen)):
-        rivals = _contest(field, model)
+        rivals = contest(field, model)
         ladder = ladder or tuple(rivals)
         best = next((r for r in rivals if convincing(field, model, r)), None)
         if best is None or (len(chosen) >= 2 and stop(chosen)):
             break
+        if isinstance(best.term.effect, Handling):
+            return SearchResult(model, tuple(chosen), ladder, best.term)
         best = _parent_first(field, model, best)
-        term = refine(model, best.term, model.with_term(best.term).share)
-        chosen.append(term)
-        model = model.with_term(term)
+        chosen.append(best.term)
+        model = model.with_term(best.term)
         if len(chosen) > 1:
             model, chosen = _reexamine(field, base, model, chosen)
     if len(chosen) > len(start):
@@ -133,7 +88,7 @@ def _parent_first(field: Candidates, model: Model, rival: Rival) -> Rival:
     held = {t.effect.id for t in model.terms}
     for effect in field.effects:
         if effect.id in rival.term.effect.after and effect.id not in held:
-            parent = judge(field, model, Term(effect, tuple(field.grids[effect.id][0].items())), model.share)
+            parent = judge(field, model, Term(effect, tuple(field.grids[effect.id][0].items())))
             if convincing(field, model, parent):
                 return parent
     return rival
@@ -141,13 +96,17 @@ def _parent_first(field: Candidates, model: Model, rival: Rival) -> Rival:
 
 def anything(field: Candidates, model: Model) -> bool:
     """Whether any effect is still called for beyond a model."""
-    return any(convincing(field, model, r) for r in _contest(field, model))
+    return any(convincing(field, model, r) for r in contest(field, model, finalists=_AGAIN))
 
 
 def convincing(field: Candidates, model: Model, rival: Rival) -> bool:
-    """Whether a rival is significant over all looks, and large enough to matter."""
+    """Whether a rival is significant over all looks, pays for itself, and is large enough to matter."""
     if rival.log_p + np.log(max(field.looks, 1)) > np.log(NAMED_BELOW):
         return False
+    if -rival.cost < np.log(max(field.problem.count, 1)):
+        return False
+    if isinstance(rival.term.effect, Handling):
+        return True
     return size_of(model, rival.term) > MATERIAL * model.with_term(rival.term).floor()
 
 
@@ -156,47 +115,66 @@ def size_of(model: Model, term: Term) -> float:
     return model.explained(term.candidate(model.problem), model.with_term(term).floor())
 
 
-def _contest(field: Candidates, model: Model, barred: str = "", finalists: int = _FINALISTS) -> list[Rival]:
-    """Rivals by their penalised likelihood, the finalists with the noise estimated anew beside them."""
-    leave = {*(t.effect.id for t in model.terms), barred}
-    tried: dict[str, tuple[float, int, int | None]] = {}
-    for factor in _SHARES_TRIED:
-        space = model.at(model.share * factor)
-        for primary, gains in ((False, field.gains(space, leave)), (True, field.primary_gains(space, leave))):
-            for name, gain in gains.items():
-                place, score = _best_of(field, space, name, gain)
-                if gain.rank[place] and (name not in tried or score < tried[name][0]):
-                    effect = next(e for e in field.effects if e.id == name)
-                    tried[name] = (score, place, effect.primary if primary else None)
-    ranked = sorted(tried, key=lambda k: tried[k][0])[:finalists]
-    found = [_exact(field, model, name, tried[name][1], tried[name][2]) for name in ranked]
-    return sorted(found, key=lambda r: r.cost)
+def contest(field: Candidates, model: Model, barred: str = "", finalists: int = _FINALISTS) -> list[Rival]:
+    """Rivals, best first: those that look best at the model's noise or at less wander, each with its own noise then."""
+    leave = {*(t.effect.id for t in model.terms if not isinstance(t.effect, Handling)), barred}
+    chosen: dict[str, Term] = {}
+    noise = model.noise
+    less = Shares(noise.shares.flicker * _LESS.flicker, noise.shares.walk * _LESS.walk)
+    for other in [noise] if less == noise.shares else [noise, model.noise_at(less)]:
+        looked = scanned(field, model.at(other), leave)
+        for term, _ in looked[:finalists]:
+            chosen.setdefault(term.effect.id, term)
+    return sorted((_exact(field, model, term) for term in chosen.values()), key=lambda r: r.cost)
 
 
-def _best_of(field: Candidates, space: Space, name: str, gain: Gain) -> tuple[int, float]:
-    """Best grid value of a candidate, and its penalised deviance there."""
-    place = int(np.argmax(gain.drop))
-    nonlinear = len(field.grids[name][0]) if len(field.grids[name]) > 1 else 0
-    cost = cost_in(field.problem, int(gain.rank[place]), nonlinear)
-    return place, deviance(space, float(gain.drop[place])) + cost
+def scanned(field: Candidates, space: Space, leave: set[str]) -> list[tuple[Term, float]]:
+    """Candidates at their best grid value with their scores at one noise, best first; those that cannot pay left out."""
+    tried: dict[str, tuple[float, Term]] = {}
+    whole, first = field.gains(space, leave, handling=True), field.primary_gains(space, leave)
+    for primary, gains in ((False, whole), (True, first)):
+        for name, gain in gains.items():
+            score, place = _best_of(field, space, name, gain)
+            if score > 0.0 and (name not in tried or score > tried[name][0]):
+                effect = field.of(name)
+                values = tuple(field.grids[name][place].items())
+                tried[name] = (score, Term(effect, values, effect.primary if primary else None))
+    return [(term, score) for score, term in sorted(tried.values(), key=lambda pair: -pair[0])]
 
 
-def _exact(field: Candidates, model: Model, name: str, place: int, first: int | None) -> Rival:
-    """A finalist with its nonlinear parameters refined and the share of wander estimated with it inside."""
-    effect = next(e for e in field.effects if e.id == name)
-    term = Term(effect, tuple(field.grids[name][place].items()), first)
-    term = refine(model, term, model.with_term(term).share, axes=False)
-    richer = model.with_term(term)
-    return judge(field, model, term, richer.share)
+def _best_of(field: Candidates, space: Space, name: str, gain: Gain) -> tuple[float, int]:
+    """Best score of a candidate at a noise, and its place on the grid; nothing where noise alone would do as much."""
+    falls = fall(space, gain)
+    place = int(np.argmax(falls))
+    if not gain.rank[place]:
+        return 0.0, place
+    several = len(field.grids[name]) > 1 and field.places(name) == 1
+    nonlinear = len(field.grids[name][0]) if several else 0
+    found = weighed(float(falls[place]), int(gain.rank[place]), nonlinear, field.places(name))
+    likely = found.log_p + np.log(max(field.looks, 1)) > np.log(NAMED_BELOW)
+    return (0.0 if likely else found.score), place
 
 
-def judge(field: Candidates, model: Model, term: Term, share: float) -> Rival:
-    """A term beside a model at a given share of wander."""
-    space = model.at(share)
-    gain = space.gain(term.candidate(field.problem))
-    drop, rank = float(gain.drop[0]), int(gain.rank[0])
-    cost = deviance(space, drop) + cost_in(field.problem, rank, freedom(term))
-    return Rival(term, drop, rank, cost, log_p_value(space, drop, rank))
+def _exact(field: Candidates, model: Model, term: Term) -> Rival:
+    """A finalist with its nonlinear parameters refined, and the noise estimated with it inside."""
+    for _ in range(_REFINED if term.effect.nonlinear else 1):
+        before = term
+        term = refine(model, term, model.with_term(term).noise)
+        if not _moved(before, term):
+            break
+    return judge(field, model, term)
+
+
+def _moved(before: Term, after: Term) -> bool:
+    """Whether a nonlinear parameter went anywhere: then part of the effect had counted as noise, and the noise is another now."""
+    old, new = (np.ravel(np.array([np.mean(v) for v in t.keywords.values()])) for t in (before, after))
+    return bool(np.any(np.abs(new - old) > _SAME * np.abs(old) + 1e-12))
+
+
+def judge(field: Candidates, model: Model, term: Term) -> Rival:
+    """A term beside a model, with the noise estimated with it inside."""
+    found = likelihood_ratio(model, term, field.places(term.effect.id))
+    return Rival(term, found.deviance, found.rank, -found.score, found.log_p)
 
 
 def _reexamine(field: Candidates, base: Model, model: Model, chosen: list[Term]) -> tuple[Model, list[Term]]:
@@ -205,7 +183,7 @@ def _reexamine(field: Candidates, base: Model, model: Model, chosen: list[Term])
         if len(chosen) < 2:
             break
         rest = model.without(term.effect.id)
-        rivals = _contest(field, rest, finalists=_AGAIN)
+        rivals = [r for r in contest(field, rest, finalists=_AGAIN) if not isinstance(r.term.effect, Handling)]
         best = next((r for r in rivals if convincing(field, rest, r)), None)
         best = None if best is None else _parent_first(field, rest, best)
         others = [t for t in chosen if t is not term]
@@ -213,7 +191,7 @@ def _reexamine(field: Candidates, base: Model, model: Model, chosen: list[Term])
             chosen, model = others, rest
             continue
         chosen = [*others, term if best.term.effect.id == term.effect.id else best.term]
-        model = Model(field.problem, [*base.terms, *chosen], near=model.share)
+        model = Model(field.problem, [*base.terms, *chosen], near=model.noise)
     return model, chosen
 
 
@@ -221,13 +199,14 @@ def _taken_apart(field: Candidates, base: Model, model: Model, chosen: list[Term
     """Each effect of several columns once more against two simpler ones that together do what it does."""
     for term in tuple(chosen):
         columns = term.candidate(field.problem).columns.shape[-1]
-        if columns < 2 or term.effect.scope == "station":
+        if columns < 2 or term.shared:
             continue
         others = [t for t in chosen if t is not term]
         pair: list[Term] = []
-        rest = Model(field.problem, [*base.terms, *others], near=model.share)
+        rest = Model(field.problem, [*base.terms, *others], near=model.noise)
         for _ in range(2):
-            rivals = [r for r in _contest(field, rest, barred=term.effect.id) if convincing(field, rest, r)]
+            every = contest(field, rest, barred=term.effect.id, finalists=_AGAIN)
+            rivals = [r for r in every if not isinstance(r.term.effect, Handling) and convincing(field, rest, r)]
             if not rivals:
                 break
             pair.append(rivals[0].term)

@@ -12,6 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inertial.criticism.comparison import estimate
+from inertial.criticism.covariance import Covariance, Noise
+from inertial.criticism.handling.base import Handling
 from inertial.criticism.model import Model, Term
 from inertial.criticism.problem import Lot, Problem
 from inertial.criticism.shared_noise import shared_factor
@@ -36,8 +38,8 @@ class Rivals:
     lot : a few units of it; weight : units of the whole lot over these
     rest : the terms of the model beside the rivals
     predicted : per rival, its coefficients (blocks, p) or (p,) for a station's effect
-    share, variance : of the noise; what units share of it makes the variance larger
-    steep : whether the wander has a random walk in it
+    noise : of the few units; variance : what units share of it makes it larger
+    covariance : that the noise's shares are counted in
     """
 
     lot: Lot
@@ -45,9 +47,9 @@ class Rivals:
     rest: tuple[Term, ...]
     terms: tuple[Term, ...]
     predicted: tuple[Array, ...]
-    share: float
+    noise: Noise
     variance: float
-    steep: bool
+    covariance: Covariance
 
     @property
     def ids(self) -> tuple[str, ...]:
@@ -67,17 +69,20 @@ def rivals_of(model: Model, terms: Sequence[Term], others: Sequence[Term]) -> Ri
     units = model.problem.lot.state.time.shape[0]
     pick = np.unique(np.linspace(0, units - 1, min(units, _FEW)).round().astype(int)).tolist()
     blocks = pick if model.problem.lot.radial else [3 * u + a for u in pick for a in range(3)]
-    predicted = tuple(_coefficients(Model(model.problem, [t, *others], near=model.share), t, blocks) for t in terms)
-    widened_by = shared_factor(Model(model.problem, [terms[0], *others], near=model.share), terms[0]) if terms else 1.0
+    others = [
+        t for t in others if not isinstance(t.effect, Handling)
+    ]  # of single units, and no step to come changes them
+    predicted = tuple(_coefficients(Model(model.problem, [t, *others], near=model.noise), t, blocks) for t in terms)
+    widened_by = shared_factor(Model(model.problem, [terms[0], *others], near=model.noise), terms[0]) if terms else 1.0
     return Rivals(
         lot=model.problem.lot.units(pick),
         weight=units / len(pick),
         rest=tuple(others),
         terms=tuple(terms),
         predicted=predicted,
-        share=model.share,
+        noise=model.noise.pick(blocks),
         variance=model.space.variance * widened_by,
-        steep=model.problem.steep,
+        covariance=model.problem.covariance,
     )
 
 
@@ -85,7 +90,7 @@ def _coefficients(model: Model, term: Term, blocks: Sequence[int]) -> Array:
     """Coefficients of the first term of a model: of some blocks, or shared."""
     found = estimate(model)
     columns = model.problem.columns(term.effect, term.keywords)[..., : term.first].shape[-1]
-    return found.shared[:columns] if term.effect.scope == "station" else found.local[list(blocks), :columns]
+    return found.shared[:columns] if term.shared else found.local[list(blocks), :columns]
 
 
 def separations(rivals: Rivals, steps: Sequence[SequenceStep] = (), pace: StationPace | None = None) -> Array:
@@ -95,13 +100,14 @@ def separations(rivals: Rivals, steps: Sequence[SequenceStep] = (), pace: Statio
     ----------
     steps : taken after what was measured; none for what the measurements so far part
     """
-    problem = widened(rivals, steps, pace) if steps else Problem(rivals.lot, steep=rivals.steep)
-    rotated = problem.basis.rotate(predictions(rivals, problem))
+    problem = widened(rivals, steps, pace) if steps else Problem(rivals.lot)
+    targets = predictions(rivals, problem)
+    noise = problem.covariance.taken(rivals.noise, rivals.covariance)
     count = len(rivals.terms)
     left = np.zeros((count, count))
     for column, wrong in enumerate(rivals.terms):
         rest = with_turn_on(problem.lot.state, rivals.rest)
-        near = [left_of(Model(problem, [*rest, t]), rotated, rivals.share) for t in _neighbours(problem, wrong)]
+        near = [left_of(Model(problem, [*rest, t]), targets, noise) for t in _neighbours(problem, wrong)]
         left[:, column] = np.min(near, axis=0)
     np.fill_diagonal(left, 0.0)
     return left * rivals.weight / rivals.variance
@@ -137,10 +143,10 @@ def smallest(left: Array) -> Array:
     return np.minimum(left, left.T)
 
 
-def left_of(model: Model, targets: Array, share: float) -> Array:
+def left_of(model: Model, targets: Array, noise: Noise) -> Array:
     """Whitened sums of squares (r,) that a model leaves of some series (blocks, n, r)."""
-    space: Space = model.at(share)
-    free = space.project(targets / space.spread[..., None])
+    space: Space = model.at(noise)
+    free = space.project(space.whiten(targets))
     blocks, n, count = free.shape
     flat = free.reshape(blocks * n, count)
     if model.shared.shape[-1]:
@@ -167,8 +173,8 @@ def widened(rivals: Rivals, steps: Sequence[SequenceStep], pace: StationPace | N
     units = lot.state.time.shape[0]
     state = extended(lot.state, steps, pace, response=lot.response)
     scale = 1.0 if pace is None or pace.last_dwell_s <= 0.0 else float(np.sqrt(pace.last_dwell_s / pace.dwell_s))
-    typical = scale * np.median(np.where(np.isfinite(lot.error), lot.error, np.nan), axis=1, keepdims=True)
+    typical = scale * np.nanmedian(np.where(np.isfinite(lot.error), lot.error, np.nan), axis=1, keepdims=True)
     typical = np.where(np.isfinite(typical), typical, np.nanmedian(typical))
     error = np.concatenate([lot.error, np.broadcast_to(typical, (units, len(steps), 3))], axis=1)
     output = np.concatenate([lot.output, np.zeros((units, len(steps), 3))], axis=1)
-    return Problem(replace(lot, state=state, output=output, error=error), steep=rivals.steep)
+    return Problem(replace(lot, state=state, output=output, error=error))

@@ -31,7 +31,7 @@ def shared_factor(model: Model, term: Term) -> float:
     if units < 2 or problem.lot.radial:
         return 1.0
     together = _together(model, units)
-    return 1.0 + (units - 1) * together * (1.0 if term.effect.scope == "station" else _alike(model, term, units))
+    return 1.0 + (units - 1) * together * (1.0 if term.shared else _alike(model, term, units))
 
 
 def _together(model: Model, units: int) -> float:
@@ -47,7 +47,7 @@ def _alike(model: Model, term: Term, units: int) -> float:
     """How far a term adds the same to every unit, 0 … 1."""
     found = estimate(model)
     at = 0
-    for other in (t for t in model.terms if t.effect.scope != "station"):
+    for other in (t for t in model.terms if not t.shared):
         columns = model.problem.columns(other.effect, other.keywords)[..., : other.first]
         if other.effect.id == term.effect.id:
             series = np.einsum("bnp,bp->bn", columns, found.local[:, at : at + columns.shape[-1]])

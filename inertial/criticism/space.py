@@ -11,7 +11,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from inertial.criticism.noise import Basis
+from inertial.criticism.covariance import Covariance, Noise
 
 Array = NDArray[np.float64]
 
@@ -21,14 +21,29 @@ SEEN = 0.01
 
 @dataclass(frozen=True)
 class Candidate:
-    """Rotated columns of an effect at one or more values of its nonlinear parameters.
+    """Columns of an effect at one or more values of its nonlinear parameters.
 
-    columns : (blocks, n, grid, p), rotated by the basis
+    columns : (blocks, n, grid, p), g per unit of the coefficient
     shared : whether all blocks share the p coefficients
+    blocks : the blocks that the columns are of, all where None; the columns of the others are zero. Only where shared
+    key : under which whitened columns are kept; not kept where None
     """
 
     columns: Array
     shared: bool
+    blocks: NDArray[np.intp] | None = None
+    key: object = None
+
+    def whitened(self, covariance: Covariance, noise: Noise) -> Array:
+        """The columns in the whitened space, (blocks, n, grid, p)."""
+        blocks, n, grid, p = self.columns.shape
+        flat = self.columns.reshape(blocks, n, grid * p)
+        if self.key is None:
+            white = covariance.whiten(flat, noise.shares, self.blocks)
+        else:
+            white = covariance.whitened(self.key, flat, noise.shares, self.blocks)
+        scale = noise.scale if self.blocks is None else noise.scale[self.blocks]
+        return (white / scale[:, None, None]).reshape(blocks, n, grid, p)
 
 
 @dataclass(frozen=True)
@@ -57,26 +72,28 @@ class Gain:
 
 
 class Space:
-    """The measurements after a model, whitened at a share of wander.
+    """The measurements after a model, whitened for its noise: of variance one where the model is right.
 
     Parameters
     ----------
-    basis : the rotation
-    share : ρ, the wander's variance over the white one
-    y : (blocks, n), rotated measurements
-    local : (blocks, n, p), rotated columns with coefficients per block
-    shared : (blocks, n, q), rotated columns with coefficients of all blocks
+    y : (blocks, n), measurements, g
+    local : (blocks, n, p), columns with coefficients per block
+    shared : (blocks, n, q), columns with coefficients of all blocks
     """
 
-    def __init__(self, basis: Basis, share: float, y: Array, local: Array, shared: Array) -> None:
-        self.basis, self.share = basis, share
-        self.spread = basis.spread(share)
-        self.q = _orthonormal(local / self.spread[..., None])
-        targets = np.concatenate([y[..., None], shared], axis=-1) / self.spread[..., None]
-        self.targets = self.project(targets)
+    def __init__(self, covariance: Covariance, noise: Noise, y: Array, local: Array, shared: Array) -> None:
+        self.covariance, self.noise = covariance, noise
+        white = self.whiten(np.concatenate([y[..., None], shared, local], axis=-1))
+        self.local = white[..., 1 + shared.shape[-1] :]
+        self.q, self.ranks = _orthonormal(self.local)
+        self.targets = self.project(white[..., : 1 + shared.shape[-1]])
         self.gram = np.einsum("bnt,bns->ts", self.targets, self.targets)
-        self.local_rank = self.q[1]
+        self.local_rank = int(self.ranks.sum())
         self.shared_rank = int(np.linalg.matrix_rank(self.gram[1:, 1:], tol=None)) if shared.shape[-1] else 0
+
+    def whiten(self, columns: Array) -> Array:
+        """Columns (blocks, n, m) in this space."""
+        return self.covariance.whiten(columns, self.noise.shares) / self.noise.scale[:, None, None]
 
     @cached_property
     def rss(self) -> float:
@@ -86,17 +103,27 @@ class Space:
     @cached_property
     def dof(self) -> int:
         """Degrees of freedom of the residuals."""
-        return self.basis.count - self.local_rank - self.shared_rank
+        return int(self.covariance.count.sum()) - self.local_rank - self.shared_rank
+
+    @cached_property
+    def by_block(self) -> Array:
+        """Degrees of freedom of each block, (blocks,)."""
+        return np.maximum(self.covariance.count - self.ranks, 0).astype(np.float64)
+
+    @cached_property
+    def squares(self) -> Array:
+        """Sums of squares of each block over its white variance, (blocks,): the scale is not taken out."""
+        return np.einsum("bn,bn->b", self.residual, self.residual) * self.noise.scale**2
 
     @cached_property
     def variance(self) -> float:
-        """a: the factor by which the noise exceeds the white standard errors given, squared."""
+        """Mean square of what is left: one where the noise is this model's own."""
         return self.rss / max(self.dof, 1)
 
     @cached_property
     def logdet(self) -> float:
-        """Log-determinant of the covariance of all blocks, without the common factor a."""
-        return float(np.sum(np.log(self.spread**2))) * (self.targets.shape[0] / self.spread.shape[0])
+        """Log-determinant of the covariance of all blocks, scales apart."""
+        return float(np.sum(self.covariance.logdet(self.noise.shares)))
 
     @cached_property
     def residual(self) -> Array:
@@ -106,23 +133,35 @@ class Space:
         beta = np.linalg.lstsq(self.gram[1:, 1:], self.gram[1:, 0], rcond=None)[0]
         return self.targets[..., 0] - self.targets[..., 1:] @ beta
 
-    def restricted(self, information: Array) -> float:
-        """−2 log restricted likelihood, up to a constant, given log|XᵀV⁻¹X| of the model."""
-        return self.dof * np.log(self.rss / max(self.dof, 1)) + self.logdet + float(np.sum(information))
+    @cached_property
+    def information(self) -> float:
+        """log|HᵀV⁻¹H| of the local columns over all blocks, scales apart."""
+        if self.local.shape[-1] == 0:
+            return 0.0
+        columns = self.local * self.noise.scale[:, None, None]
+        size = np.sqrt(np.einsum("bnp,bnp->bp", columns, columns))
+        safe = np.where(size > 0.0, size, 1.0)
+        unit = columns / safe[:, None, :]
+        values = np.linalg.eigvalsh(np.swapaxes(unit, -1, -2) @ unit)
+        return float(np.sum(np.log(np.maximum(values, SEEN**2))) + 2.0 * np.sum(np.log(safe)))
 
-    def project(self, columns: Array) -> Array:
-        """Columns (blocks, n, m) less what the local columns explain."""
-        q = self.q[0]
+    def project(self, columns: Array, blocks: NDArray[np.intp] | None = None) -> Array:
+        """Whitened columns (blocks, n, m) less what the local columns explain."""
+        q = self.q if blocks is None else self.q[blocks]
         return columns - q @ (np.swapaxes(q, -1, -2) @ columns)
 
     def gain(self, candidate: Candidate) -> Gain:
         """What a candidate explains of what is left."""
-        blocks, n, grid, p = candidate.columns.shape
-        flat = (candidate.columns / self.spread[..., None, None]).reshape(blocks, n, grid * p)
+        white = candidate.whitened(self.covariance, self.noise)
+        blocks, n, grid, p = white.shape
+        flat = white.reshape(blocks, n, grid * p)
         size = np.sqrt(np.einsum("bnm,bnm->bm", flat, flat))
-        left = self.project(flat)
+        left = self.project(flat, candidate.blocks)
         if candidate.shared:
-            return self._gain_shared(left.reshape(blocks, n, grid, p), size.reshape(blocks, grid, p))
+            rows = slice(None) if candidate.blocks is None else candidate.blocks
+            return self._gain_shared(
+                left.reshape(blocks, n, grid, p), size.reshape(blocks, grid, p), self.targets[rows]
+            )
         safe = np.where(size > 0.0, size, 1.0)
         left = (left / safe[:, None, :]).reshape(blocks, n, grid, p)
         return self._gain_local(left)
@@ -151,42 +190,30 @@ class Space:
         drop = np.array([self.rss - _schur(self.gram - t) for t in taken])
         return Gain(drop, rank, by_block)
 
-    def _gain_shared(self, left: Array, size: Array) -> Gain:
-        grid = left.shape[2]
-        drop, rank = np.zeros(grid), np.zeros(grid, dtype=np.intp)
+    def _gain_shared(self, left: Array, size: Array, targets: Array) -> Gain:
+        """Gain of columns with common coefficients: all values of the grid at once."""
+        blocks, n, grid, p = left.shape
         total = np.sqrt(np.sum(size**2, axis=0))
-        for g in range(grid):
-            safe = np.where(total[g] > 0.0, total[g], 1.0)
-            columns = left[:, :, g, :] / safe
-            both = np.concatenate([self.targets, columns], axis=-1)
-            gram = np.einsum("bnt,bns->ts", both, both)
-            k = self.targets.shape[-1]
-            own = gram[k:, k:]
-            if k > 1:
-                cross = gram[1:k, k:]
-                own = own - cross.T @ np.linalg.lstsq(gram[1:k, 1:k], cross, rcond=None)[0]
-            rank[g] = int(np.count_nonzero(np.linalg.eigvalsh(own) > SEEN**2))
-            if rank[g]:
-                drop[g] = self.rss - _schur(gram)
-        return Gain(drop, rank, np.zeros((left.shape[0], grid)))
+        columns = left / np.where(total > 0.0, total, 1.0)
+        by_value = columns.transpose(2, 3, 0, 1).reshape(grid, p, blocks * n)
+        own = by_value @ np.swapaxes(by_value, -1, -2)
+        inside = by_value @ targets.reshape(blocks * n, -1)  # (grid, p, t)
+        along = inside[..., 0]
+        if self.targets.shape[-1] > 1:
+            inner = np.linalg.pinv(self.gram[1:, 1:], rcond=1e-10, hermitian=True)
+            own = own - inside[..., 1:] @ inner @ np.swapaxes(inside[..., 1:], -1, -2)
+            along = along - inside[..., 1:] @ (inner @ self.gram[1:, 0])
+        values, vectors = np.linalg.eigh(own)
+        seen = values > SEEN**2
+        onto = np.einsum("gpr,gp->gr", vectors, along)
+        drop = np.sum(np.where(seen, onto**2 / np.where(seen, values, 1.0), 0.0), axis=1)
+        return Gain(drop, seen.sum(axis=1), np.zeros((self.targets.shape[0], grid)))
 
 
-def information(local: Array, spread: Array) -> float:
-    """log|XᵀV⁻¹X| summed over the blocks, for rotated columns (blocks, n, p)."""
-    if local.shape[-1] == 0:
-        return 0.0
-    scaled = local / spread[..., None]
-    size = np.sqrt(np.einsum("bnp,bnp->bp", scaled, scaled))
-    safe = np.where(size > 0.0, size, 1.0)
-    unit = scaled / safe[:, None, :]
-    values = np.linalg.eigvalsh(np.swapaxes(unit, -1, -2) @ unit)
-    return float(np.sum(np.log(np.maximum(values, SEEN**2))) + 2.0 * np.sum(np.log(safe)))
-
-
-def _orthonormal(columns: Array) -> tuple[Array, int]:
-    """Orthonormal bases (blocks, n, p) of what the columns span; directions below the tolerance are zeroed; total rank."""
+def _orthonormal(columns: Array) -> tuple[Array, NDArray[np.intp]]:
+    """Orthonormal bases (blocks, n, p) of what the columns span, directions below the tolerance zeroed; ranks (blocks,)."""
     if columns.shape[-1] == 0:
-        return columns, 0
+        return columns, np.zeros(len(columns), dtype=np.intp)
     size = np.sqrt(np.einsum("bnp,bnp->bp", columns, columns))
     q = columns / np.where(size > 0.0, size, 1.0)[:, None, :]
     keep = np.ones((1, 1), dtype=bool)
@@ -195,7 +222,7 @@ def _orthonormal(columns: Array) -> tuple[Array, int]:
         keep = values > tolerance
         scale = np.where(keep, 1.0 / np.sqrt(np.where(keep, values, 1.0)), 0.0)
         q = q @ (vectors * scale[:, None, :])
-    return q, int(keep.sum())
+    return q, keep.sum(axis=-1)
 
 
 def _schur(gram: Array) -> float:

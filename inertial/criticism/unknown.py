@@ -71,7 +71,7 @@ def suspects(problem: Problem) -> list[Suspect]:
                 found.append(Suspect(name, _alike(problem, steps)))
     if not problem.lot.radial:
         own = np.stack([state.along(axis) for axis in range(3)], axis=1).reshape(problem.blocks, problem.n)
-        found.append(Suspect("pose", _rotated(problem, curve(own, _KNOTS)), _unit_range(own)))
+        found.append(Suspect("pose", _columns(curve(own, _KNOTS)), _unit_range(own)))
         found += _table(problem)
     found += [Suspect("time_s", _alike(problem, _swing(state.time, c))) for c in _CYCLES]
     return found
@@ -80,7 +80,7 @@ def suspects(problem: Problem) -> list[Suspect]:
 def better_curve(base: Model, chosen: Sequence[Term], field: Sequence[Suspect]) -> tuple[CurveFit, list[Term]] | None:
     """The curve that explains a lot better than the effects chosen, with those it leaves standing; None if none does."""
     held = {t.effect.id.removeprefix(COVARIATE_PREFIX) for t in chosen}
-    whole = cost_of_model(Model(base.problem, [*base.terms, *chosen], near=base.share))
+    whole = cost_of_model(Model(base.problem, [*base.terms, *chosen], near=base.noise))
     bare = cost_of_model(base)
     promising = [s for s in _promising(base, field) if s.driver not in held]
     fits = [fit_curve(base, s.driver, s.candidate) for s in promising]
@@ -116,7 +116,7 @@ def _with_others(
     for term in chosen:
         if _function_of(base, term, suspect[0]):
             continue
-        beside = Model(base.problem, [*base.terms, *kept, term], near=base.share)
+        beside = Model(base.problem, [*base.terms, *kept, term], near=base.noise)
         tried = [fit_curve(beside, s.driver, s.candidate) for s in suspect[:2]]
         tried += [f for s in suspect[:1] if (f := _sharp(beside, s)) is not None]
         again = min(tried, key=lambda f: f.cost)
@@ -127,11 +127,11 @@ def _with_others(
 
 def _function_of(base: Model, term: Term, suspect: Suspect) -> bool:
     """Whether a flexible curve of the driver, block by block, reproduces nine tenths of a term's columns."""
-    columns = base.problem.rotated(term.effect, term.keywords)[..., : term.first]
-    before = base.at(0.0)
+    columns = base.problem.columns(term.effect, term.keywords)[..., : term.first]
+    before = base.at(base.problem.covariance.white_noise())
     whole = np.concatenate([base.local, suspect.candidate.columns[:, :, 0, :]], axis=-1)
-    after = type(before)(base.problem.basis, 0.0, base.problem.y, whole, base.shared)
-    left = [float(np.sum(s.project(columns / s.spread[..., None]) ** 2)) for s in (before, after)]
+    after = type(before)(before.covariance, before.noise, base.problem.y, whole, base.shared)
+    left = [float(np.sum(s.project(s.whiten(columns)) ** 2)) for s in (before, after)]
     return left[1] < 0.1 * left[0]
 
 
@@ -142,12 +142,12 @@ def _sharp(model: Model, suspect: Suspect) -> CurveFit | None:
     z = suspect.values
     shapes = [np.exp(-0.5 * ((z - c) / w) ** 2) for w in _WIDTHS for c in _CENTRES]
     shapes += [np.maximum(z - c, 0.0) for c in _CENTRES] + [(z > c).astype(float) for c in _CENTRES]
-    rotated = model.problem.basis.rotate(np.stack(shapes, axis=-1))
-    gain = model.space.gain(Candidate(rotated[..., None], shared=False))
+    columns = np.stack(shapes, axis=-1)
+    gain = model.space.gain(Candidate(columns[..., None], shared=False))
     best = int(np.argmax(gain.drop))
     if not gain.rank[best]:
         return None
-    column = rotated[..., best : best + 1]
+    column = columns[..., best : best + 1]
     if best < len(_WIDTHS) * len(_CENTRES):
         column = _narrowed(model, z, _CENTRES[best % len(_CENTRES)], _WIDTHS[best // len(_CENTRES)])
     fitted = model.with_curves(column)
@@ -164,9 +164,9 @@ def _narrowed(model: Model, z: Array, centre: float, width: float) -> Array:
             for dc in (-1, -0.5, 0, 0.5, 1)
             for dw in (-1, 0, 1)
         ]
-        rotated = model.problem.basis.rotate(np.stack([np.exp(-0.5 * ((z - c) / w) ** 2) for c, w in pairs], axis=-1))
-        best = int(np.argmax(space.gain(Candidate(rotated[..., None], shared=False)).drop))
-        (centre, width), column = pairs[best], rotated[..., best : best + 1]
+        columns = np.stack([np.exp(-0.5 * ((z - c) / w) ** 2) for c, w in pairs], axis=-1)
+        best = int(np.argmax(space.gain(Candidate(columns[..., None], shared=False)).drop))
+        (centre, width), column = pairs[best], columns[..., best : best + 1]
     return column
 
 
@@ -197,11 +197,11 @@ def _levels(values: Array) -> Array | None:
 def _alike(problem: Problem, columns: Array) -> Candidate:
     """Columns (units, n, d), the same for every axis."""
     each = columns if problem.lot.radial else np.repeat(columns, 3, axis=0)
-    return _rotated(problem, np.broadcast_to(each, (problem.blocks, problem.n, columns.shape[-1])))
+    return _columns(np.broadcast_to(each, (problem.blocks, problem.n, columns.shape[-1])))
 
 
-def _rotated(problem: Problem, columns: Array, *, shared: bool = False) -> Candidate:
-    return Candidate(problem.basis.rotate(columns)[:, :, None, :], shared=shared)
+def _columns(columns: Array, *, shared: bool = False) -> Candidate:
+    return Candidate(columns[:, :, None, :], shared=shared)
 
 
 def _swing(time: Array, cycles: float) -> Array:
@@ -221,5 +221,5 @@ def _table(problem: Problem) -> list[Suspect]:
             turns = [h for k in range(1, _HARMONICS + 1) for h in (np.sin(k * angle), np.cos(k * angle))]
             tilts = [frames.to_fixture(v, state.outer, state.inner) for v in ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0))]
             change = np.stack([t[..., None] * v for t in turns for v in tilts], axis=-1)
-            found.append(Suspect(name, _rotated(problem, problem.seen(change), shared=True)))
+            found.append(Suspect(name, _columns(problem.seen(change), shared=True)))
     return found

@@ -1,4 +1,4 @@
-"""``tumbleline compare``: a model against the dwells it is fitted to, poses left out, and a fresh run."""
+"""``tumbleline compare``: a model against the dwells it is fitted to, dwells left out, and a fresh run."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ def command(
     *,
     as_json: JsonOption = False,
 ) -> None:
-    """Fit a model to dwells and tell its error there, on poses left out, and on a fresh run with the coefficients unchanged."""
+    """Fit a model to dwells and tell its error there, on dwells left out, and on a fresh run with the coefficients unchanged."""
     from pipelines.cli.inputs import add_effect_files, both_runs, judged_effects
     from pipelines.diagnosis.diagnose import default_model
 
@@ -64,14 +64,15 @@ def compared(
     history: pd.DataFrame | None,
     fresh: pd.DataFrame | None,
     fresh_history: pd.DataFrame | None,
+    before: list[str] | None = None,
 ) -> dict[str, Any]:
-    """The comparison, computed on one thread: the matrices are small."""
+    """The comparison, on one thread: the matrices are small. What was added to ``before`` is judged where it is given."""
     from threadpoolctl import threadpool_limits
 
     with threadpool_limits(1), error_console().status("fitting"):
         from pipelines.diagnosis.diagnose import compare  # loads scipy.stats: after the first line
 
-        return compare(dwells, effects, history, fresh, fresh_history)
+        return compare(dwells, effects, history, fresh, fresh_history, before)
 
 
 def print_comparison(document: dict[str, Any], poses: int = POSES) -> None:
@@ -80,7 +81,7 @@ def print_comparison(document: dict[str, Any], poses: int = POSES) -> None:
     out.print(f"model  {', '.join(document['effects'])}", markup=False, soft_wrap=True)
     lines = [
         ["fitted to these dwells", short(document["rms_ug"])],
-        ["poses left out", short(document["heldout_rms_ug"])],
+        ["dwells left out: the worst of poses, soaks, stretches of time", short(document["heldout_rms_ug"])],
     ]
     if document["fresh_rms_ug"] is not None:
         lines.append(["fresh run, coefficients unchanged", short(document["fresh_rms_ug"])])
@@ -103,6 +104,8 @@ def print_comparison(document: dict[str, Any], poses: int = POSES) -> None:
     if worst:
         print_table(["force x y z\ng", "dwells", "rms\nµg"], worst, title="Worst poses")
     _parameters(document)
+    for text in document["warnings"]:
+        out.print(f"warning: {text}", style="yellow", markup=False, soft_wrap=True)
 
 
 def _parameters(document: dict[str, Any]) -> None:

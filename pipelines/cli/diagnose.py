@@ -50,12 +50,15 @@ def command(
 
     Exit status 0: the model is adequate. 1: it is not, or every unit has a data fault. 2: the input cannot be used.
     """
-    from pipelines.cli.inputs import add_effect_files, dwells_and_history, judged_effects
+    from pipelines.cli.inputs import add_effect_files, dwells_and_history, history_beside, judged_effects
+    from pipelines.importers.exchange import is_file
 
     add_effect_files(effect_file)
     judged = judged_effects(dwells, archive, effects, model, "diagnose")
     table, temperatures = dwells_and_history(dwells, history, archive)
+    beside = history or (history_beside(dwells) if is_file(dwells) else "")
     document, report_text = diagnosed(table, temperatures, judged, dwells, wanted=report is not None)
+    document["history"] = beside or None
     if report is not None:
         write_report(report, report_text)
     if as_json:

@@ -38,6 +38,39 @@ def print_findings(document: dict[str, Any]) -> None:
     _faults(document["blocked_by"])
     _where(document["where"])
     _classes(document)
+    _dwells(document)
+    for text in document.get("warnings", ()):
+        console().print(f"warning: {text}", style="yellow", markup=False, soft_wrap=True)
+
+
+def _dwells(document: dict[str, Any]) -> None:
+    """Dwells that were left out as tails of the noise, and those that carry the verdict."""
+    removed, out = document.get("removed"), console()
+    if removed and removed["heavy_tails"]:
+        count = len(removed["dwells"])
+        out.print(
+            f"{count} dwells left out: the noise has heavier tails than a normal one", style="dim", soft_wrap=True
+        )
+    carried, without = document.get("influence") or [], document.get("without_influence")
+    if carried and without and not document["adequate"]:
+        dwells = ", ".join(f"{d['unit']} {d['dwell']} ({100.0 * d['share']:.0f} %)" for d in carried[:5])
+        out.print(
+            f"dwells that carry most of it: {dwells}; without {without['dwells']} of them p {equal(without['p_value'])}",
+            style="dim",
+            markup=False,
+            soft_wrap=True,
+        )
+
+
+def symbol_of(name: str) -> str:
+    """The symbol of an effect, or of what handling does."""
+    from inertial import effects
+    from inertial.criticism.handling import named
+
+    handled = named(name)
+    if handled is not None:
+        return handled.symbol
+    return effects.get(name).symbol if name in effects.catalogue() or ":" in name else "a single dwell"
 
 
 def verdict(document: dict[str, Any]) -> str:
@@ -52,13 +85,24 @@ def verdict(document: dict[str, Any]) -> str:
         return f"ADEQUATE: {left}."
     if error["rms_ug"] < SMALL * error["floor_ug"]:
         left += "; what is wrong is small beside it, but no noise"
-    named = [" or ".join(group["effects"]) for group in document["classes"]]
+    spoilt = [told_of(group) for group in document["classes"] if group["scope"] == "data"]
+    named = [" or ".join(group["effects"]) for group in document["classes"] if group["scope"] != "data"]
+    if spoilt:
+        rest = f"; missing beside it: {', and '.join(named)}" if named else ""
+        return f"NOT ADEQUATE: {left}; the data: {'; '.join(spoilt)}{rest}."
     if named:
         return f"NOT ADEQUATE: {left}; missing: {', and '.join(named)}."
     if document["unexplained"]:
         driver = document["unexplained"]["driver"]
         return f"NOT ADEQUATE: {left}; the rest follows {driver}, and no effect of the catalogue explains it."
     return f"NOT ADEQUATE: {left}; nothing that was recorded explains the rest."
+
+
+def told_of(group: dict[str, Any]) -> str:
+    """What handling did, with the unit and the first dwell that it concerns, and the effects that explain as much."""
+    units, dwells = group.get("units") or [], group.get("dwells") or []
+    where = f"{', '.join(units) or 'all units'}{f', dwell {dwells[0]}' if dwells else ''}"
+    return f"{' or '.join(group['effects'])} ({where})"
 
 
 def chance(p: float | None) -> str:
@@ -107,14 +151,14 @@ def _classes(document: dict[str, Any]) -> None:
         return
     lines = []
     for group in document["classes"]:
-        simplest = effects.get(recommended_of(document, group))
-        names = "\n".join(f"{name} ({effects.get(name).symbol})" for name in group["effects"])
-        values = ", ".join(
-            f"{p.name} = {short_values(group['nonlinear'].get(p.name))} {p.unit}" for p in simplest.nonlinear
-        )
+        names = "\n".join(f"{name} ({symbol_of(name)})" for name in group["effects"])
+        chosen = recommended_of(document, group)
+        nonlinear = [] if group["scope"] == "data" else effects.get(chosen).nonlinear
+        values = ", ".join(f"{p.name} = {short_values(group['nonlinear'].get(p.name))} {p.unit}" for p in nonlinear)
         size = short(group["size_ug"]) + ("" if group["plausible"] else " (!)")
         errors = short(group["rms_after_ug"]), short(group["heldout_after_ug"])
-        lines.append([names, simplest.scope, size, chance(group["p_value"]), *errors, values])
+        text = group.get("evidence") or values
+        lines.append([names, group["scope"], size, chance(group["p_value"]), *errors, text])
     columns = ["effect", "of the", "size\nµg", "p", "left\nµg", "left out\nµg", "with"]
     title = "What is missing; effects in one row cannot be told apart by these data"
     print_table(columns, lines, title=title, whole=6)
@@ -122,7 +166,9 @@ def _classes(document: dict[str, Any]) -> None:
         console().print(
             "(!) a size that this effect has not been seen to reach: look for another cause, too", markup=False
         )
-    legend = "left: error after it is added · left out: the same on poses that the fit has not seen"
+    legend = (
+        "left: error after it is added · left out: on dwells not fitted, the worst of poses, soaks, stretches of time"
+    )
     console().print(legend, style="dim", markup=False)
 
 
@@ -154,17 +200,31 @@ def _next_command(out: Console, document: dict[str, Any], source: str, model: Pa
         return
     from pipelines.jobs.model_files import STARTING_MODEL
 
-    file = str(model or "model.toml")
+    file = str(model or _free_name())
     judged = ",".join(document["effects"])
     start = "" if (model and model.exists()) or judged == ",".join(STARTING_MODEL) else f" --effects {judged}"
+    history = f" --history {document['history']}" if document.get("history") else ""
+    fresh = " --fresh-history ITS-HISTORY" if history else ""
     out.print("\nNext:", style="bold")
     for place, name in enumerate(document["recommended"]):
         out.print(f"  tumbleline extend {file} {name}{start if place == 0 else ''}", markup=False, soft_wrap=True)
     out.print(
-        f"  tumbleline compare {source} --model {file} --fresh ANOTHER-RUN-OF-THE-SAME-UNITS",
+        f"  tumbleline history {file} --dwells {source}{history} --fresh ANOTHER-RUN-OF-THE-SAME-UNITS{fresh}",
         markup=False,
         soft_wrap=True,
     )
+    several = [group["effects"] for group in document["classes"] if len(group["effects"]) > 1]
+    if several:
+        told = "; ".join(" or ".join(effects) for effects in several)
+        out.print(f"These data do not tell apart: {told}. What is added is one of them.", style="dim", soft_wrap=True)
+
+
+def _free_name() -> str:
+    """A name for a new model file: one that is there belongs to another model."""
+    from pathlib import Path
+
+    names = ("model.toml", *(f"model-{k}.toml" for k in range(2, 1000)))
+    return next(name for name in names if not Path(name).exists())
 
 
 def _unseen(document: dict[str, Any]) -> None:

@@ -42,13 +42,13 @@ def command(
     *,
     as_json: JsonOption = False,
 ) -> None:
-    """Show what each version of a model added, who, when, why, and the error on the run, on poses left out and on a fresh run.
+    """Show what each version of a model added, who, when, why, and the error on the run, on dwells left out and on a fresh run.
 
     Without --dwells only the changes are shown.
     """
     from pipelines.cli.compare import compared
     from pipelines.cli.inputs import add_effect_files, both_runs
-    from pipelines.diagnosis.model_history import FIGURES, evolution, told
+    from pipelines.diagnosis.model_history import FIGURES, JUDGED, evolution, told
     from pipelines.jobs.model_files import read_model, versions
 
     add_effect_files(effect_file)
@@ -56,10 +56,11 @@ def command(
     _refuse_picture(picture, dwells)
     if dwells:
         tables = both_runs(dwells, history, fresh, fresh_history, archive)
-        rows = evolution(versions(found), lambda names: compared(names, *tables))
+        rows = evolution(versions(found), lambda effects, before: compared(effects, *tables, before=before))
     else:
         rows = [
-            {**told(version), **dict.fromkeys(FIGURES), "confirmed": None, "words": ""} for version in versions(found)
+            {**told(version), **dict.fromkeys([*FIGURES, *JUDGED]), "text": "", "warnings": []}
+            for version in versions(found)
         ]
     if picture is not None:
         from pipelines.report.evolution import draw_evolution
@@ -91,28 +92,35 @@ def _print(rows: list[dict[str, Any]], name: str) -> None:
         [str(row["version"]), _change(row), row["by"], row["at"][:16].replace("T", " "), row["why"]] for row in rows
     ]
     print_table(["version", "change", "by", "when", "why"], changes, title=f"Model {name}", whole=2)
-    if rows[0]["rms_ug"] is None:
+    if rows[0]["fitted_ug"] is None:
         return
-    fresh = rows[0]["fresh_rms_ug"] is not None
-    keys = ["rms_ug", "heldout_rms_ug", *(["fresh_rms_ug"] if fresh else []), "floor_ug"]
+    fresh = rows[0]["fresh_ug"] is not None
+    keys = ["fitted_ug", "heldout_ug", *(["fresh_ug"] if fresh else []), "floor_ug"]
     heads = {
-        "rms_ug": "fitted\nµg",
-        "heldout_rms_ug": "left out\nµg",
-        "fresh_rms_ug": "fresh run\nµg",
+        "fitted_ug": "fitted\nµg",
+        "heldout_ug": "left out\nµg",
+        "fresh_ug": "fresh run\nµg",
         "floor_ug": "floor\nµg",
     }
-    errors = [[str(row["version"]), *(short(row[key]) for key in keys), row["words"]] for row in rows]
+    errors = [[str(row["version"]), *(short(row[key]) for key in keys), row["text"]] for row in rows]
     print_table(
         ["version", *(heads[k] for k in keys), "judged by data that were not fitted"],
         errors,
         title="Error, rms",
         whole=5,
     )
-    out.print("floor: the noise as each version sees it; what is missing counts as noise there", style="dim")
-    unconfirmed = [name for row in rows if row["confirmed"] is False for name in row["added"]]
-    if unconfirmed:
+    out.print(
+        "left out: the worst of poses, soaks and stretches of time · fresh run: coefficients unchanged, each unit's "
+        "bias of that day in it · floor: the noise as each version sees it",
+        style="dim",
+        soft_wrap=True,
+    )
+    for text in dict.fromkeys(text for row in rows for text in row["warnings"]):
+        out.print(f"warning: {text}", style="yellow", markup=False, soft_wrap=True)
+    refuted = [name for row in rows if row["confirmed"] is False for name in row["added"]]
+    if refuted:
         out.print(
-            f"{', '.join(unconfirmed)}: no progress. What fits the run better and fresh data no better is not there; "
+            f"{', '.join(refuted)}: evidence against it. The change that it predicts did not come again; "
             "take it out of the model.",
             style="bold red",
             soft_wrap=True,

@@ -16,16 +16,34 @@ def dwells_and_history(source: str, history: str, archive: str | None) -> tuple[
 
     Parameters
     ----------
-    history : a file; empty for the run's own
+    history : a file; empty for the run's own, or for the one that stands beside a file of dwells
     """
+    from pipelines.cli.options import error_console
     from pipelines.importers.exchange import is_file, read_dwells, read_history
 
     dwells = read_dwells(source, archive=archive)
+    if is_file(source) and not history:
+        history = history_beside(source)
+        if history:
+            error_console().print(f"history: {history}, found beside the dwells", markup=False, soft_wrap=True)
     if history:
         return dwells, read_history(history, archive=archive)
     if is_file(source) or not _has_history(source, archive):
         return dwells, None
     return dwells, read_history(source, archive=archive)
+
+
+def history_beside(source: str) -> str:
+    """The history in the folder of a file of dwells: NAME-history, or history for a file called dwells; else empty."""
+    from pathlib import Path
+
+    dwells = Path(source)
+    stems = [f"{dwells.stem}-history", f"{dwells.stem}_history"]
+    if dwells.stem.endswith("dwells"):
+        stems.append(f"{dwells.stem.removesuffix('dwells')}history")
+    endings = dict.fromkeys((dwells.suffix, ".parquet", ".csv"))
+    found = (dwells.with_name(stem + ending) for stem in stems for ending in endings)
+    return next((str(path) for path in found if path.is_file()), "")
 
 
 def judged_effects(source: str, archive: str | None, listed: str, model: Path | None, where: str) -> list[str] | None:

@@ -10,17 +10,15 @@ from pipelines.cli.options import (
     ArchiveOption,
     JsonOption,
     console,
-    error_console,
     print_json,
     print_table,
     rows,
     short,
 )
+from pipelines.cli.remarks import tell_of
 from schemas.errors import DONE, PART_FAILED
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
     from pipelines.archive import Archive, Run
 
 PART = "Results"
@@ -90,14 +88,6 @@ def _show_run(run: Run, *, as_json: bool) -> None:
     else:
         console().print(_unfinished(run), markup=False, soft_wrap=True)
     console().print(f"tables  {', '.join(tables)}", markup=False)
-
-
-def tell_of(run: Run, serials: Sequence[str]) -> None:
-    """Say on the error stream whose signatures are missing, and which libraries differ, behind what is shown."""
-    from pipelines.certificates.handed_out import library_remarks, signature_remarks
-
-    for line in (*signature_remarks(run, serials), *library_remarks(run)):
-        error_console().print(f"show: {line}", markup=False, soft_wrap=True)
 
 
 def _unfinished(run: Run) -> str:

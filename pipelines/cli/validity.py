@@ -41,7 +41,7 @@ def _made(archive: Archive, valid: Calibration) -> dict[str, Any]:
     """The coefficients of a calibration, and from which code, libraries and data they were made."""
     from pipelines.archive import Run
     from pipelines.certificates.certified_coefficients import coefficients_of
-    from pipelines.cli.show import tell_of
+    from pipelines.cli.remarks import tell_of
 
     run = Run(archive, valid.run)
     if not (run.path / "run.json").is_file():

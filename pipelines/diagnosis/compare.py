@@ -5,15 +5,19 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from threadpoolctl import threadpool_limits
 
 from inertial import effects as catalogue
 from inertial.criticism.comparison import estimate, residuals_of, rms
-from inertial.criticism.heldout import heldout_rms
+from inertial.criticism.handling.base import Handling
+from inertial.criticism.left_out import left_out
 from inertial.criticism.model import Model, refuse_without_freedom
 from inertial.criticism.problem import Problem
 from inertial.criticism.refinement import terms_of
 from inertial.effects import StationEffect
 from inertial.errors import InertialError
+from inertial.planning.reasons import drivers_of
+from pipelines.stages.progress import progress
 from pipelines.tables.dwells import Measured, lot_of, measured
 from schemas.errors import DataRejected
 from schemas.units import MICRO
@@ -25,6 +29,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from inertial.criticism.comparison import Estimate
+    from inertial.criticism.model import Term
 
     Array = NDArray[np.float64]
 
@@ -35,6 +40,7 @@ def compare(
     history: pd.DataFrame | None = None,
     fresh: pd.DataFrame | None = None,
     fresh_history: pd.DataFrame | None = None,
+    before: Sequence[str] | None = None,
 ) -> dict[str, Any]:
     """How well a model fits a lot, and a fresh run of the same units with the coefficients unchanged.
 
@@ -42,6 +48,7 @@ def compare(
     ----------
     dwells, fresh : exchange format; the model is fitted to ``dwells`` only
     history, fresh_history : temperatures against time of the two runs
+    before : the model that this one was extended from; what was added to it is judged then
 
     Raises
     ------
@@ -49,24 +56,30 @@ def compare(
         A unit of the fresh run was not in the first, or a quantity that the model needs is missing.
     """
     try:
-        return _compared(measured(dwells, history), effects, None if fresh is None else measured(fresh, fresh_history))
+        with threadpool_limits(1):
+            again = None if fresh is None else measured(fresh, fresh_history)
+            return _compared(measured(dwells, history), effects, again, before)
     except InertialError as problem:
         raise DataRejected(str(problem)) from None
 
 
-def _compared(found: Measured, effects: Sequence[str], fresh: Measured | None) -> dict[str, Any]:
+def _compared(
+    found: Measured, effects: Sequence[str], fresh: Measured | None, before: Sequence[str] | None
+) -> dict[str, Any]:
     square = "misalignment" not in effects
     problem = Problem(lot_of(found, square=square))
     model = Model(problem, terms_of(catalogue.get_all(effects), problem))
     refuse_without_freedom(model)
     fitted = estimate(model)
     left = residuals_of(problem, fitted)
+    out = left_out(model)
     units = _by_unit(found, left)
     answer: dict[str, Any] = {
         "effects": [t.effect.id for t in model.terms],
         "rms_ug": MICRO * rms(left),
         "floor_ug": MICRO * model.floor(),
-        "heldout_rms_ug": MICRO * heldout_rms(problem, model.terms),
+        "heldout_rms_ug": MICRO * out.rms(),
+        "heldout": {kind: MICRO * rms(out.missed[kind]) for kind in out.density},
         "fresh_rms_ug": None,
         "by_unit": {
             u: {"rms_ug": MICRO * rms(r), "fresh_rms_ug": None} for u, r in zip(found.units, units, strict=True)
@@ -75,7 +88,10 @@ def _compared(found: Measured, effects: Sequence[str], fresh: Measured | None) -
         "by_pose": _by_pose(found, left),
         "nonlinear": {t.effect.id: t.keywords for t in model.terms if t.keywords},
         "station": _station(fitted),
+        "warnings": without_history(found, model.terms),
+        "progress": None,
     }
+    again: Measured | None = None
     if fresh is not None:
         again = _same_units(found, fresh)
         on_fresh = residuals_of(Problem(lot_of(again, like=found, square=square)), fitted)
@@ -83,7 +99,23 @@ def _compared(found: Measured, effects: Sequence[str], fresh: Measured | None) -
         for unit, values in zip(again.units, _by_unit(again, on_fresh), strict=True):
             answer["by_unit"][unit]["fresh_rms_ug"] = MICRO * rms(values)
         answer["fresh_by_pose"] = _by_pose(again, on_fresh)
+    if before is not None:
+        lesser = Model(problem, terms_of(catalogue.get_all(list(before)), problem))
+        lot = None if again is None else lot_of(again, like=found, square=square)
+        answer["progress"] = progress(lesser, model, out, lot)
     return answer
+
+
+def without_history(found: Measured, terms: Sequence[Term]) -> list[str]:
+    """A sentence for every effect that remembers the temperature between the dwells where no history of it was given."""
+    if found.state.temperature is None or found.state.history is not None:
+        return []
+    return [
+        f"{t.effect.id} depends on the temperature between the dwells, and no history was given: its size is of little worth; "
+        "give --history FILE"
+        for t in terms
+        if not isinstance(t.effect, Handling) and t.effect.memory and "temperature" in drivers_of(found.state, t.effect)
+    ]
 
 
 def _station(fitted: Estimate) -> list[dict[str, Any]]:

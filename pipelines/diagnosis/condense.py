@@ -12,7 +12,7 @@ from inertial.quantities import BY_COLUMN
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-MOST = 1000
+MOST = 500
 """Dwells of a unit whose full covariance is still handled: it grows with their square, the work with their cube."""
 
 _REFERENCE = ("force_x", "force_y", "force_z", "outer_deg", "inner_deg")

@@ -5,15 +5,25 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from threadpoolctl import threadpool_limits
 
 from inertial import effects as catalogue
 from inertial.criticism.diagnosis import Diagnosis
 from inertial.criticism.diagnosis import diagnose as diagnose_lot
 from inertial.criticism.faults import Fault, find_faults
 from inertial.errors import InertialError
-from pipelines.diagnosis.compare import compare
+from pipelines.diagnosis.compare import compare, without_history
 from pipelines.diagnosis.condense import condense
 from pipelines.diagnosis.next_measurement import proposed
+from pipelines.stages.found import (
+    Names,
+    classes_of,
+    influence_of,
+    noise_of,
+    probability,
+    removed_of,
+    without_influence,
+)
 from pipelines.tables.dwells import Measured, lot_of, measured
 from schemas.errors import DataRejected
 from schemas.units import MICRO
@@ -74,8 +84,10 @@ def examined(
     if not sound:
         return found, faults, None
     try:
-        lot = lot_of(found.pick(sound) if blocked else found, square="misalignment" not in model)
-        return found, faults, diagnose_lot(lot, model, np.random.default_rng(_SEED))
+        # two threads on small matrices wait for each other: on a busy machine sixty times as long
+        with threadpool_limits(1):
+            lot = lot_of(found.pick(sound) if blocked else found, square="misalignment" not in model)
+            return found, faults, diagnose_lot(lot, model, np.random.default_rng(_SEED))
     except InertialError as problem:
         raise DataRejected(str(problem)) from None
 
@@ -97,44 +109,42 @@ def document(
             "error": {"rms_ug": None, "floor_ug": None, "p_value": None},
             "where": [],
             "classes": [],
+            "influence": [],
             "recommended": [],
             "unexplained": None,
             "unseen": [],
             "next_measurements": [],
         }
+    faulty = {f.unit for f in faults}
+    units = tuple(u for k, u in enumerate(found.units) if k not in faulty)
+    names = Names(units, tuple(int(d) for d in found.dwells))
+    terms = [*diagnosis.base.terms, *(m.term for n in diagnosis.named for m in n.effects.physics)]
+    warnings = without_history(found, terms)
     return {
         "adequate": bool(diagnosis.adequate),
         "blocked_by": blocked,
         "error": {
             "rms_ug": MICRO * diagnosis.rms,
             "floor_ug": MICRO * diagnosis.floor,
-            "p_value": _probability(diagnosis.log_p),
-            "wander_share": diagnosis.final.share,
+            "p_value": probability(diagnosis.log_p),
+            **noise_of(diagnosis.final),
         },
         "where": [
-            {"driver": p.driver, "axes": list(p.axes), "share": round(p.share, 4), "p_value": _probability(p.log_p)}
+            {"driver": p.driver, "axes": list(p.axes), "share": round(p.share, 4), "p_value": probability(p.log_p)}
             for p in diagnosis.where
         ],
-        "classes": [
-            {
-                "effects": list(n.effects.ids),
-                "scope": n.effects.simplest.effect.scope,
-                "rms_after_ug": MICRO * n.rms_after,
-                "heldout_after_ug": MICRO * n.heldout_after,
-                "p_value": _probability(n.effects.log_p),
-                "size_ug": MICRO * n.effects.size,
-                "nonlinear": dict(n.effects.simplest.values),
-                "plausible": _plausible(n.effects.size, n.effects.simplest.effect.typical_ug),
-            }
-            for n in diagnosis.named
-        ],
-        "recommended": [n.effects.simplest.effect.id for n in diagnosis.named],
+        "classes": classes_of(diagnosis, names),
+        "influence": influence_of(diagnosis, names),
+        "without_influence": without_influence(diagnosis),
+        "removed": removed_of(diagnosis, names),
+        "recommended": [n.effects.simplest.effect.id for n in diagnosis.named if not n.effects.of_data and n.predicts],
+        "warnings": warnings,
         "unexplained": None
         if diagnosis.unexplained is None
         else {
             "driver": diagnosis.unexplained.driver,
             "shape": diagnosis.unexplained.shape,
-            "p_value": _probability(diagnosis.unexplained.log_p),
+            "p_value": probability(diagnosis.unexplained.log_p),
         },
         "unseen": list(diagnosis.unseen),
         "next_measurements": (proposed(diagnosis) if following is None else following).rows(),
@@ -148,13 +158,3 @@ def _fault(found: Measured, fault: Fault) -> dict[str, Any]:
         "dwells": [int(found.dwells[k]) for k in fault.dwells],
         "evidence": fault.evidence,
     }
-
-
-def _probability(log_p: float) -> float:
-    """A probability; one below the smallest number is given as that."""
-    return float(max(np.exp(min(log_p, 0.0)), 1e-300))
-
-
-def _plausible(size: float, typical: tuple[float, float]) -> bool:
-    """Whether a size in g is what the effect has been seen to reach, within a factor of ten below."""
-    return 0.1 * typical[0] <= MICRO * size <= typical[1]

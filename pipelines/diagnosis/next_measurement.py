@@ -52,9 +52,11 @@ def proposed(diagnosis: Diagnosis, around: Circumstances | None = None) -> Propo
     """
     parting: list[tuple[EffectClass, Proposal | None]] = []
     already: list[SequenceStep] = []
-    for named in diagnosis.named:
+    for named in (*diagnosis.handled, *diagnosis.named):
         if len(named.effects.members) > 1:
-            wanted = _parted(diagnosis, named.effects, around, already)
+            # what handling did is not parted from physics by more poses, but by what its own words say
+            handled = named.effects.of_data
+            wanted = None if handled else _parted(diagnosis, named.effects, around, already)
             already += wanted.steps if wanted is not None else ()
             parting.append((named.effects, wanted))
     return Proposed(tuple(parting), sighting(diagnosis.final, diagnosis.unseen, around, already))
@@ -71,7 +73,8 @@ def _parted(
 
 def _breaker(group: EffectClass) -> dict[str, Any]:
     """What would part a class, in words, where no steps of the station do."""
-    first, second = group.members[0].term.effect, group.members[1].term.effect
+    ordered = sorted(group.members[:2], key=lambda m: m.term.effect.scope == "data")
+    first, second = (m.term.effect for m in ordered)
     outer, inner, temperature = BREAKER_POSE
     why = f"{first.id} | {second.id}: {second.breaker}"
     return {"outer_deg": outer, "inner_deg": inner, "chamber_C": temperature, "why": why}

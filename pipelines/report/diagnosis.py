@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from inertial import effects
+from inertial.criticism.handling import named as handled
 from pipelines.report.diagnosis_plots import driver_plots, model_plot, pose_maps
 from pipelines.report.numbers import plain
 from pipelines.report.residuals import drivers_shown, left_by
@@ -66,13 +67,22 @@ def equal(p: float) -> str:
 
 def _class(group: dict[str, Any], document: dict[str, Any]) -> dict[str, Any]:
     simplest = next((name for name in document["recommended"] if name in group["effects"]), group["effects"][0])
-    chosen = effects.get(simplest)
-    values = [f"{p.name} = {_value(group['nonlinear'].get(p.name))} {p.unit}" for p in chosen.nonlinear]
-    members = [
-        {"id": name, "symbol": effects.get(name).symbol, "equation": effects.get(name).equation}
-        for name in group["effects"]
-    ]
+    if group["scope"] == "data":
+        values = [group.get("evidence", "")]
+    else:
+        values = [
+            f"{p.name} = {_value(group['nonlinear'].get(p.name))} {p.unit}" for p in effects.get(simplest).nonlinear
+        ]
+    members = [_member(name) for name in group["effects"]]
     return {**group, "members": members, "recommended": simplest, "values": ", ".join(values)}
+
+
+def _member(name: str) -> dict[str, str]:
+    """An effect, or what handling did, with its symbol and equation."""
+    known = handled(name) or (effects.get(name) if name in effects.catalogue() or ":" in name else None)
+    if known is None:
+        return {"id": name, "symbol": "", "equation": "one dwell of one unit"}
+    return {"id": name, "symbol": known.symbol, "equation": known.equation}
 
 
 def _value(value: float | tuple[float, ...] | list[float] | None) -> str:

@@ -16,9 +16,9 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 LINES = (
-    ("rms_ug", "fitted to this run", "#7a7a7a", "o", "-"),
-    ("heldout_rms_ug", "poses left out", "#0072b2", "s", "-"),
-    ("fresh_rms_ug", "fresh run, coefficients unchanged", "#d55e00", "D", "-"),
+    ("fitted_ug", "fitted to this run", "#7a7a7a", "o", "-"),
+    ("heldout_ug", "dwells left out", "#0072b2", "s", "-"),
+    ("fresh_ug", "fresh run, coefficients unchanged", "#d55e00", "D", "-"),
 )
 ASIDE = (-0.05, 0.0, 0.05)  # errors that are alike would hide each other
 FLOOR = "#009e73"
@@ -61,7 +61,7 @@ def draw(place: Axes, rows: list[dict[str, Any]]) -> None:
     for k, row in enumerate(rows):
         if row["confirmed"] is False:
             place.axvspan(k - 0.4, k + 0.4, color="#c62828", alpha=0.08, linewidth=0)
-            place.annotate("not confirmed", (k, 1.12 * top), ha="center", color="#c62828", fontsize=9)
+            place.annotate("not there", (k, 1.12 * top), ha="center", color="#c62828", fontsize=9)
     place.set_xticks(at, [_label(row) for row in rows])
     place.set(ylabel="error / µg rms", ylim=(0.0, 1.42 * top), xlim=(-0.5, len(rows) - 0.5))
     place.grid(visible=False, axis="x")

@@ -107,24 +107,56 @@ def test_effects_and_model_together_are_refused(tmp_path):
         chosen_effects("bias", tmp_path / "m.toml", "compare")
 
 
-def errors(fit, heldout, fresh):
-    return {"rms_ug": fit, "heldout_rms_ug": heldout, "fresh_rms_ug": fresh, "floor_ug": 5.0}
+def errors(fit, heldout, fresh, progress=None):
+    figures = {"rms_ug": fit, "heldout_rms_ug": heldout, "fresh_rms_ug": fresh, "floor_ug": 5.0}
+    return {**figures, "progress": progress, "warnings": []}
 
 
-def test_an_effect_that_is_not_there_is_no_progress():
+def judged(confirmed, part, error, fall, density=None):
+    by = "fresh run" if part is not None else "dwells left out"
+    return {
+        "judged_by": by, "confirmed": confirmed, "part": part, "part_u": error, "fall_ug": fall, "fall_u_ug": 0.4,
+        "log_density": density,
+    }  # fmt: skip
+
+
+def rows_of(model, told):
+    asked = []
+
+    def compare(effects, before):
+        asked.append((len(effects), None if before is None else len(before)))
+        return told[len(effects)]
+
+    return evolution(versions(model), compare), asked
+
+
+def test_an_effect_is_judged_against_the_version_before_it_and_refuted_only_by_evidence_against_it():
     text, _ = extended(COMMENTED, step("third_order"), "model")
     _, model = extended(text, step("warm_up"), "model")
-    told = {2: errors(15.0, 16.0, 15.5), 3: errors(5.0, 5.2, 5.1), 4: errors(4.9, 5.3, 5.12)}
-    rows = evolution(versions(model), lambda names: told[len(names)])
+    told = {
+        2: errors(15.0, 16.0, 15.5),
+        3: errors(5.0, 5.2, 5.1, judged(True, 0.98, 0.02, 10.4)),
+        4: errors(4.9, 5.3, 5.12, judged(False, -0.1, 0.1, -0.02)),
+    }
+    rows, asked = rows_of(model, told)
+    assert asked == [(2, None), (3, 2), (4, 3)]
     assert [row["confirmed"] for row in rows] == [None, True, False]
-    assert (
-        "NOT confirmed: warm_up fits the run better, but the error does not fall on the fresh run" in rows[-1]["words"]
-    )
+    assert [(rows[1][k], rows[2][k]) for k in ("fall_ug", "fall_u_ug")] == [(10.4, -0.02), (0.4, 0.4)]
+    assert "confirmed: 0.98 ± 0.04" in rows[1]["text"]
+    assert rows[2]["text"].startswith("NOT there: -0.10 ± 0.20")
 
 
-def test_without_a_fresh_run_poses_left_out_decide():
+def test_what_a_fresh_run_cannot_decide_asks_for_one_more_run_and_is_not_taken_out():
     _, model = extended(COMMENTED, step("third_order"), "model")
-    told = {2: errors(15.0, 16.0, None), 3: errors(14.0, 16.1, None)}
-    rows = evolution(versions(model), lambda names: told[len(names)])
-    assert rows[-1]["confirmed"] is False
-    assert "on poses left out" in rows[-1]["words"]
+    rows, _ = rows_of(model, {2: errors(15.0, 16.0, 15.5), 3: errors(14.9, 16.0, 15.4, judged(None, 0.5, 0.4, 0.1))})
+    assert rows[-1]["confirmed"] is None
+    assert "not decided" in rows[-1]["text"]
+    assert "one more run" in rows[-1]["text"]
+
+
+def test_without_a_fresh_run_nothing_is_refuted():
+    _, model = extended(COMMENTED, step("third_order"), "model")
+    told = {2: errors(15.0, 16.0, None), 3: errors(14.0, 16.1, None, judged(None, None, None, -0.1, density=-3.0))}
+    rows, _ = rows_of(model, told)
+    assert rows[-1]["confirmed"] is None
+    assert "a fresh run of the same units decides" in rows[-1]["text"]

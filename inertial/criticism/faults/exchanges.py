@@ -8,6 +8,9 @@ from numpy.typing import NDArray
 from inertial.criticism.faults.fault import Fault, dwells_of
 from inertial.criticism.readings import Array, Readings, exchanged, find_split
 
+_COMMON = 5.0
+"""Times the usual misfit that half of the units reach in a dwell whose pose is wrong for all."""
+
 
 def changed_units(readings: Readings) -> Iterator[Fault]:
     """A calibration that changes during the run: to that of another unit (cables exchanged), or to another range."""
@@ -72,9 +75,9 @@ def wrong_poses(readings: Readings) -> Iterator[Fault]:
     typical = np.nanmedian(size, axis=1, keepdims=True)
     out = size > np.maximum(0.02, 15.0 * typical)
     if len(out) > 2:
-        out &= (
-            np.nanmean(out, axis=0, keepdims=True) < 0.5
-        )  # what most units show is the plan's or the table's, not one unit's
+        # what most units show is the plan's or the table's, not one unit's: the search for effects tells it for all
+        ratio = np.nanmedian(size / np.where(typical > 0.0, typical, np.inf), axis=0, keepdims=True)
+        out &= ratio < _COMMON
     for unit, row in enumerate(out):
         places = np.flatnonzero(row)
         if not places.size or places.size > 0.4 * row.size:

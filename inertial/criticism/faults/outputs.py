@@ -60,17 +60,71 @@ def outliers(readings: Readings) -> Iterator[Fault]:
 
 
 def quantised(readings: Readings) -> Iterator[Fault]:
-    """Outputs on a lattice whose step, over √12, exceeds the noise of a mean."""
+    """Outputs on a lattice whose step, over √12, exceeds the noise of a mean; or samples that jump between its steps."""
     for unit, out in enumerate(readings.output):
         there = readings.there[unit]
         for axis in range(3):
-            step = lattice_step(out[there, axis])
             noise = _white(readings, unit, axis)
-            if step is not None and noise is not None and step / np.sqrt(12.0) > 1.5 * noise:
+            step = lattice_step(out[there, axis])
+            if step is not None and noise is not None and step / np.sqrt(12.0) > noise:
                 ratio = step / np.sqrt(12.0) / noise
                 evidence = f"axis {'xyz'[axis]} moves in steps of {step:.3g}: LSB/√12 is {ratio:.1f} times the noise"
                 yield Fault("quantised", unit, (), evidence)
                 break
+            coarse = _coarse_step(readings, unit, axis)
+            if coarse is not None:
+                evidence = (
+                    f"the scatter of axis {'xyz'[axis]} follows where its mean lies between steps of {coarse:.4g}"
+                )
+                yield Fault("quantised", unit, (), f"{evidence}: the samples jump between two of them")
+                break
+
+
+_UNEVEN = 5.0
+"""Times the spread of a scatter from so many samples, beyond which scatters of dwells differ for another reason."""
+
+_FOLLOWS = 0.7
+"""Share of the variances' own variance that the place between two steps explains, from which on it is the steps."""
+
+
+def _coarse_step(readings: Readings, unit: int, axis: int) -> float | None:
+    """Step of a converter that is coarser than the noise of a sample; None where there is none.
+
+    With steps q well above the noise, samples take the two next values: their variance is q²·p·(1 − p), p the place of the mean
+    between the two, and it comes again with every step.
+    """
+    if readings.spread is None or readings.count is None:
+        return None
+    there = readings.there[unit]
+    mean, spread, count = (
+        a[there] for a in (readings.output[unit, :, axis], readings.spread[unit, :, axis], readings.count[unit])
+    )
+    typical = float(np.median(spread))
+    if mean.size < 16 or typical <= 0.0 or np.std(spread) / typical < _UNEVEN / np.sqrt(2.0 * float(np.median(count))):
+        return None
+    square = spread**2 - np.mean(spread**2)
+    whole, reach = float(np.sum(square**2)), float(np.ptp(mean))
+    # p(1 − p) is at most a quarter: the largest scatter is half a step
+    low, high = 1.6 * float(spread.max()), 2.6 * float(spread.max())
+    if reach <= 0.0 or reach / low > _MOST_STEPS:
+        return None
+    rates = np.arange(1.0 / high, 1.0 / low, 1.0 / (6.0 * reach))
+    best, step = 0.0, 0.0
+    for part in np.array_split(rates, max(1, rates.size // 2000)):
+        phase = 2.0 * np.pi * np.outer(part, mean - mean[0])
+        waves = np.stack([np.cos(phase), np.sin(phase)], axis=-1)
+        waves = waves - waves.mean(axis=1, keepdims=True)
+        gram = np.swapaxes(waves, -1, -2) @ waves + 1e-9 * np.eye(2)
+        inside = np.einsum("rnk,n->rk", waves, square)
+        explained = np.einsum("rk,rk->r", inside, np.linalg.solve(gram, inside[..., None])[..., 0]) / whole
+        place = int(np.argmax(explained))
+        if explained[place] > best:
+            best, step = float(explained[place]), 1.0 / float(part[place])
+    return step if best > _FOLLOWS else None
+
+
+_MOST_STEPS = 20_000
+"""Steps over the range of the means beyond which the step cannot be told from so few dwells."""
 
 
 def _white(readings: Readings, unit: int, axis: int) -> float | None:

@@ -1,0 +1,83 @@
+"""What goes wrong at a station: each takes the scene as it was and gives it as it is, and tells what was done."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+Floats = np.ndarray
+Done = tuple[Any, Floats | None, Floats, Floats, "Told | None"]
+
+
+@dataclass(frozen=True)
+class Told:
+    """The truth: names under which it may be told, the units (empty: all) and dwells it touches."""
+
+    names: tuple[str, ...]
+    units: tuple[str, ...]
+    dwells: tuple[int, ...]
+
+
+def bad_dwell(scene: Any, readings: Floats, noise: Floats, amount: float, rng: np.random.Generator) -> Done:
+    """One dwell of one unit is off by ``amount`` mg in a random direction."""
+    unit, dwell = int(rng.integers(len(noise))), int(rng.integers(2, noise.shape[1] - 2))
+    way = rng.standard_normal(3)
+    noise = noise.copy()
+    noise[unit, dwell] += 1e-3 * amount * way / np.linalg.norm(way)
+    return scene, None, readings, noise, Told(("bad_dwell",), (f"W{unit + 1:03d}",), (dwell,))
+
+
+def unit_moved(scene: Any, readings: Floats, noise: Floats, amount: float, rng: np.random.Generator) -> Done:
+    """One unit turns by ``amount`` mrad about a random axis in the middle third of the run."""
+    unit, n = int(rng.integers(len(noise))), noise.shape[1]
+    at = int(rng.integers(n // 3, 2 * n // 3))
+    way = rng.standard_normal(3)
+    turned = np.zeros(noise.shape)
+    turned[unit, at:] = 1e-3 * amount * way / np.linalg.norm(way)
+    names = ("unit_moved", "misalignment_temperature") if len(noise) == 1 else ("unit_moved",)
+    return scene, turned, readings, noise, Told(names, (f"W{unit + 1:03d}",), (at,))
+
+
+def thermometer(scene: Any, readings: Floats, noise: Floats, amount: float, rng: np.random.Generator) -> Done:
+    """All thermometers of one soak read ``amount`` K too much."""
+    soak = int(rng.integers(int(scene.soak.max()) + 1))
+    wrong = scene.soak == soak
+    return scene, None, readings + amount * wrong, noise, Told(("soak_thermometer",), (), tuple(np.flatnonzero(wrong)))
+
+
+def wrong_pose(scene: Any, readings: Floats, noise: Floats, amount: float, rng: np.random.Generator) -> Done:
+    """The table stands ``amount`` degrees off in one dwell, for all units."""
+    dwell = int(rng.integers(2, noise.shape[1] - 2))
+    way = rng.uniform(0.0, 2.0 * np.pi)
+    off = np.zeros(noise.shape[1])
+    off[dwell] = np.radians(amount)
+    scene = replace(scene, outer=scene.outer + np.cos(way) * off, inner=scene.inner + np.sin(way) * off)
+    return scene, None, readings, noise, Told(("wrong_pose",), (), (dwell,))
+
+
+def table_slip(scene: Any, readings: Floats, noise: Floats, amount: float, rng: np.random.Generator) -> Done:
+    """The table slips on its drives by ``amount`` mrad in the middle third of the run."""
+    n = noise.shape[1]
+    at, way = int(rng.integers(n // 3, 2 * n // 3)), rng.uniform(0.0, 2.0 * np.pi)
+    after = 1e-3 * amount * (np.arange(n) >= at)
+    scene = replace(scene, outer=scene.outer + np.cos(way) * after, inner=scene.inner + np.sin(way) * after)
+    return scene, None, readings, noise, Told(("table_slip",), (), (at,))
+
+
+def unsoaked(scene: Any, readings: Floats, noise: Floats, amount: float, rng: np.random.Generator) -> Done:
+    """The devices are not soaked, and what is read is the chamber's air."""
+    del readings, amount, rng
+    return scene, None, scene.chamber + 1.0, noise, Told(("thermal_lag", "device_not_soaked"), (), ())
+
+
+FAULTS: dict[str, Callable[..., Done]] = {
+    "bad_dwell": bad_dwell,
+    "unit_moved": unit_moved,
+    "thermometer": thermometer,
+    "wrong_pose": wrong_pose,
+    "table_slip": table_slip,
+    "unsoaked": unsoaked,
+}

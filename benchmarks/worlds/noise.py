@@ -1,0 +1,79 @@
+"""Noise of a device in real time on a grid of one second: white, 1/f by fractional summation, random walk, tails.
+
+Nothing here is shared with the estimator, which takes 1/f for a sum of relaxations, or with the blind runs.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+
+GRID_S = 1.0
+PAST = 3  # record lengths of 1/f before the record
+
+
+@dataclass(frozen=True)
+class Noise:
+    """What a device's output wanders by.
+
+    white : one-sided density, µg/√Hz; flicker : bias instability B, µg; walk : K, µg/√s
+    unit_factors, axis_factors : factors on all of it, in turn over units and axes
+    unit_white, unit_slow, axis_slow : factors on the white part by unit; on 1/f and walk by unit and by axis
+    tails : degrees of freedom of a t distribution for the white part of the dwells; 0 for normal
+    """
+
+    white: float = 25.0
+    flicker: float = 30.0
+    walk: float = 0.0
+    unit_factors: tuple[float, ...] = (1.0,)
+    axis_factors: tuple[float, float, float] = (1.0, 1.0, 1.0)
+    unit_white: tuple[float, ...] = (1.0,)
+    unit_slow: tuple[float, ...] = (1.0,)
+    axis_slow: tuple[float, float, float] = (1.0, 1.0, 1.0)
+    tails: int = 0
+
+    def factors(self, units: int) -> Floats:
+        """Factor on everything, (units, 3)."""
+        own = np.resize(self.unit_factors, units)
+        return own[:, None] * np.array(self.axis_factors)
+
+
+def dwell_noise(noise: Noise, start: Floats, duration: Floats, units: int, rng: np.random.Generator) -> Floats:
+    """Errors of the dwell means, (units, n, 3), µg, for dwells that start at ``start`` (n,) s."""
+    white = noise.white / np.sqrt(2.0 * duration)
+    shape = (units, len(start), 3)
+    drawn = rng.standard_t(noise.tails, shape) / np.sqrt(3.0) if noise.tails else rng.standard_normal(shape)
+    found = drawn * white[:, None] * np.resize(noise.unit_white, units)[:, None, None]
+    begin, end = float(start.min()), float((start + duration).max())
+    steps = int(np.ceil((end - begin) / GRID_S)) + 2
+    slow = np.zeros((3 * units, steps))
+    if noise.flicker > 0.0:
+        slow += noise.flicker * fractional(rng, 3 * units, steps)
+    if noise.walk > 0.0:
+        slow += noise.walk * np.sqrt(GRID_S) * np.cumsum(rng.standard_normal((3 * units, steps)), axis=1)
+    whole = np.concatenate([np.zeros((3 * units, 1)), np.cumsum(slow, axis=1)], axis=1)
+    first = ((start - begin) / GRID_S).astype(int)
+    last = np.maximum(((start + duration - begin) / GRID_S).astype(int), first + 1)
+    means = (whole[:, last] - whole[:, first]) / (last - first)
+    slow_factors = np.resize(noise.unit_slow, units)[:, None] * np.array(noise.axis_slow)
+    found = found + means.reshape(units, 3, -1).transpose(0, 2, 1) * slow_factors[:, None, :]
+    return found * noise.factors(units)[:, None, :]
+
+
+def fractional(rng: np.random.Generator, channels: int, steps: int) -> Floats:
+    """1/f noise of bias instability one, (channels, steps): white noise summed to the order one half.
+
+    Kasdin, Proc. IEEE 83 (1995) 802, with alpha = 1: innovations of variance B² have the two-sided density B²/(2πf), whose
+    Allan variance is B²·2·ln 2/π.
+    """
+    total = (1 + PAST) * steps
+    k = np.arange(1, total)
+    response = np.concatenate([[1.0], np.cumprod((k - 0.5) / k)])
+    size = 1 << int(np.ceil(np.log2(2 * total)))
+    drive = rng.standard_normal((channels, total))
+    series = np.fft.irfft(np.fft.rfft(drive, size) * np.fft.rfft(response, size), size)[:, :total]
+    return series[:, -steps:]

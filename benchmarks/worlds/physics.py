@@ -1,0 +1,137 @@
+"""Hidden physics, written from the equations in words of physics; each draws what differs from unit to unit."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+Floats = np.ndarray
+Effect = Callable[[Any], Floats]
+
+
+def _sizes(rng: np.random.Generator, units: int, count: int = 1) -> Floats:
+    """Coefficients of units and axes, (units, 3, count): a part that the design makes, a part of each unit's own."""
+    return rng.standard_normal((1, 3, count)) + 0.5 * rng.standard_normal((units, 3, count))
+
+
+def _of_force(shape: Callable[[Floats], Floats]) -> Callable[..., Effect]:
+    def draw(rng: np.random.Generator, units: int, scene: Any) -> Effect:
+        del scene
+        size = _sizes(rng, units)[..., 0]
+        return lambda s: size[:, None] * shape(s.force)[None]
+
+    return draw
+
+
+def _of_temperature(shape: Callable[[Floats, Floats], Floats]) -> Callable[..., Effect]:
+    """``shape(warm (units, n, 1), force (n, 3))`` gives (units, n, 3)."""
+
+    def draw(rng: np.random.Generator, units: int, scene: Any) -> Effect:
+        del scene
+        size = _sizes(rng, units)[..., 0]
+        return lambda s: size[:, None] * shape((s.temperature - 25.0)[..., None], s.force)
+
+    return draw
+
+
+def cross_coupling(rng: np.random.Generator, units: int, scene: Any) -> Effect:
+    """f_i·f_j and f_i·f_k."""
+    del scene
+    size = _sizes(rng, units, 2)
+
+    def effect(s: Any) -> Floats:
+        f = s.force
+        parts = [np.stack([f[:, i] * f[:, (i + 1) % 3], f[:, i] * f[:, (i + 2) % 3]]) for i in range(3)]
+        return np.stack([np.einsum("uk,kn->un", size[:, i], parts[i]) for i in range(3)], axis=-1)
+
+    return effect
+
+
+def misalignment_temperature(rng: np.random.Generator, units: int, scene: Any) -> Effect:
+    """Axes that turn with temperature."""
+    del scene
+    size = _sizes(rng, units, 2)
+
+    def effect(s: Any) -> Floats:
+        warm, f = s.temperature - 25.0, s.force
+        return np.stack([
+            warm * (size[:, i, :1] * f[:, (i + 1) % 3] + size[:, i, 1:] * f[:, (i + 2) % 3]) for i in range(3)
+        ], axis=-1)  # fmt: skip
+
+    return effect
+
+
+def aging_linear(rng: np.random.Generator, units: int, scene: Any) -> Effect:
+    """Bias that runs off at an even rate."""
+    size = _sizes(rng, units)[..., 0]
+    return lambda s: size[:, None] * (s.start / scene.start[-1])[None, :, None]
+
+
+def warm_up(rng: np.random.Generator, units: int, scene: Any) -> Effect:
+    """Bias that settles after power-on."""
+    del scene
+    size, tau = _sizes(rng, units)[..., 0], float(np.exp(rng.uniform(np.log(900.0), np.log(3000.0))))
+    return lambda s: size[:, None] * np.exp(-s.start / tau)[None, :, None]
+
+
+def step_change(rng: np.random.Generator, units: int, scene: Any) -> Effect:
+    """Bias that jumps once, at the same time in the lot."""
+    size, at = _sizes(rng, units)[..., 0], float(rng.uniform(0.3, 0.7)) * scene.start[-1]
+    return lambda s: size[:, None] * (s.start > at)[None, :, None]
+
+
+def thermal_hysteresis(rng: np.random.Generator, units: int, scene: Any) -> Effect:
+    """Play between temperature and bias: the bias follows the edge of a gap of some kelvin."""
+    size, half = _sizes(rng, units)[..., 0], float(rng.uniform(4.0, 12.0))
+    del scene
+
+    def effect(s: Any) -> Floats:
+        body, state = s.fine_temperature, np.empty_like(s.fine_temperature)
+        held = body[:, 0].copy()
+        for k in range(body.shape[1]):
+            held = np.clip(held, body[:, k] - half, body[:, k] + half)
+            state[:, k] = held - body[:, k]
+        middle = s.start + 0.5 * s.duration
+        own = np.stack([np.interp(middle, s.fine, one) for one in state])
+        return size[:, None] * own[..., None]
+
+    return effect
+
+
+def level_error(rng: np.random.Generator, units: int, scene: Any) -> Effect:
+    """The outer axis is not level: up leans in the laboratory, alike for all units."""
+    del scene
+    lean = rng.standard_normal(2)
+
+    def effect(s: Any) -> Floats:
+        up = np.stack([np.full(s.outer.size, lean[0]), np.full(s.outer.size, lean[1]), np.zeros(s.outer.size)], axis=-1)
+        x, y, z = up.T
+        about_outer = np.stack(
+            [x, np.cos(s.outer) * y + np.sin(s.outer) * z, -np.sin(s.outer) * y + np.cos(s.outer) * z]
+        )
+        c, d = np.cos(s.inner), np.sin(s.inner)
+        fixture = np.stack(
+            [c * about_outer[0] + d * about_outer[1], -d * about_outer[0] + c * about_outer[1], about_outer[2]]
+        )
+        return np.broadcast_to(fixture.T, (units, s.outer.size, 3))
+
+    return effect
+
+
+PHYSICS: dict[str, Callable[..., Effect]] = {
+    "third_order": _of_force(lambda f: f**3),
+    "odd_quadratic": _of_force(lambda f: f * np.abs(f)),
+    "second_order": _of_force(lambda f: f**2),
+    "scale_asymmetry": _of_force(np.abs),
+    "cross_coupling": cross_coupling,
+    "bias_temperature_quadratic": _of_temperature(lambda w, f: w**2 + 0.0 * f),
+    "scale_temperature_quadratic": _of_temperature(lambda w, f: w**2 * f),
+    "misalignment_temperature": misalignment_temperature,
+    "aging_linear": aging_linear,
+    "warm_up": warm_up,
+    "step_change": step_change,
+    "thermal_hysteresis": thermal_hysteresis,
+    "level_error": level_error,
+}

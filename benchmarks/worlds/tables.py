@@ -1,0 +1,75 @@
+"""The worlds of each table, by name."""
+
+from __future__ import annotations
+
+from noise import Noise
+from world import World
+
+PLAIN = Noise()
+NULLS: dict[str, World] = {
+    "B30": World(),
+    "K2": World(noise=Noise(walk=2.0)),
+    "K4": World(noise=Noise(walk=4.0)),
+    "K8": World(noise=Noise(walk=8.0)),
+    "K4_one_unit": World(units=1, noise=Noise(walk=4.0)),
+    "K4_two_units": World(units=2, noise=Noise(walk=4.0)),
+    "white": World(noise=Noise(flicker=0.0)),
+    "B300": World(noise=Noise(flicker=300.0)),
+    "one_unit": World(units=1),
+    "two_units": World(units=2),
+    "many_units": World(units=32),
+    "one_unit_x3": World(noise=Noise(unit_factors=(3.0, *[1.0] * 7))),
+    "axis_x3": World(noise=Noise(axis_factors=(1.0, 1.0, 3.0))),
+    "axis_x1.5": World(noise=Noise(axis_factors=(1.0, 1.0, 1.5))),
+    "units_spread": World(noise=Noise(unit_factors=(0.5, 2.0, 1.0, 0.7, 1.4, 0.6, 1.7, 1.0))),
+    "one_unit_white_x12": World(noise=Noise(unit_white=(12.0, *[1.0] * 7))),
+    "one_unit_slow_x3": World(noise=Noise(unit_slow=(3.0, *[1.0] * 7))),
+    "axis_slow_x3": World(noise=Noise(axis_slow=(1.0, 1.0, 3.0))),
+    "units_slow_spread": World(noise=Noise(unit_slow=(0.5, 2.0, 1.0, 0.7, 1.4, 0.6, 1.7, 1.0))),
+    "t3": World(noise=Noise(white=100.0, tails=3)),
+    "lengths": World(durations=(2.0, 60.0)),
+    "rest20": World(rest=20.0),
+    "lsb5": World(noise=Noise(white=50.0, flicker=5.0), lsb=5.0),
+}
+FAULTS: dict[str, World] = {
+    "dwell_0.3mg": World(fault="bad_dwell", amount=0.3),
+    "dwell_0.5mg": World(fault="bad_dwell", amount=0.5),
+    "dwell_2mg": World(fault="bad_dwell", amount=2.0),
+    "dwell_5mg": World(fault="bad_dwell", amount=5.0),
+    "moved_0.2mrad": World(fault="unit_moved", amount=0.2),
+    "thermometer_0.5K": World(fault="thermometer", amount=0.5),
+    "pose_2deg": World(fault="wrong_pose", amount=2.0),
+    "pose_0.1deg": World(fault="wrong_pose", amount=0.1),
+    "slip_0.2mrad": World(fault="table_slip", amount=0.2),
+    "unsoaked": World(fault="unsoaked"),
+    "moved_one_unit": World(units=1, fault="unit_moved", amount=0.2),
+    "dwell_one_unit": World(units=1, fault="bad_dwell", amount=0.5),
+}
+_HIDDEN = (
+    "third_order", "second_order", "cross_coupling", "bias_temperature_quadratic", "scale_temperature_quadratic",
+    "misalignment_temperature", "aging_linear", "warm_up", "step_change", "level_error",
+)  # fmt: skip
+HIDDEN: dict[str, World] = {
+    f"{name}_{size:g}": World(hidden=((name, size),)) for size in (1.0, 2.0) for name in _HIDDEN
+}
+HIDDEN |= {
+    f"{name}_2_K4": World(hidden=((name, 2.0),), noise=Noise(walk=4.0)) for name in ("third_order", "cross_coupling")
+}
+HIDDEN |= {f"{name}_2_one_unit": World(units=1, hidden=((name, 2.0),)) for name in ("third_order", "cross_coupling")}
+HIDDEN["third_order_and_dwell"] = World(hidden=(("third_order", 2.0),), fault="bad_dwell", amount=1.0)
+HIDDEN["cubic_and_moved"] = World(hidden=(("third_order", 2.0),), fault="unit_moved", amount=0.3)
+TABLES = {"nulls": NULLS, "faults": FAULTS, "hidden": HIDDEN}
+WRONG = (
+    "bias_temperature_quadratic", "scale_temperature_quadratic", "aging_linear", "aging_log", "step_change", "warm_up",
+    "thermal_hysteresis", "third_order", "cross_coupling",
+)  # fmt: skip
+"""Effects that are put into the model of a run in which they are not."""
+
+RIGHT = ("third_order", "cross_coupling", "second_order", "bias_temperature_quadratic", "misalignment_temperature")
+LOOP: dict[str, World] = {
+    "B30": World(),
+    "K4": World(noise=Noise(walk=4.0)),
+    "one_unit": World(units=1),
+    "one_unit_K4": World(units=1, noise=Noise(walk=4.0)),
+    "turn_on_300": World(turn_on=300.0),
+}

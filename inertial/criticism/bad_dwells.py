@@ -1,0 +1,172 @@
+"""Single dwells that are off, by what is left when each is deleted; and tails that are heavier than normal.
+
+With P = V⁻¹ − V⁻¹H(HᵀV⁻¹H)⁻¹HᵀV⁻¹ a dwell deleted from its series is off by (Py)_i/P_ii, and (Py)_i²/P_ii over its variance is
+chi-square: no fit is needed to know it. Deleting says which dwell; weights that fall off with the size change all, and name none.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import stats
+
+from inertial.criticism.decisions import BAD_DWELL, COMMON, HEAVY, MOST_BAD
+from inertial.criticism.model import Model
+from inertial.criticism.problem import Lot, Problem
+from inertial.criticism.space import Space
+
+Array = NDArray[np.float64]
+
+_ROUNDS = 8
+_ALIKE = 0.6
+"""Of the largest deviation: dwells that are less far off are looked at again when the noise is known without the largest."""
+
+_TELLS = 100
+"""Values from which on tails are told from a normal distribution's."""
+
+_LEAST_DOF = 6
+"""Degrees of freedom of a unit below which none of its dwells is told from the others."""
+
+
+@dataclass(frozen=True)
+class BadDwell:
+    """A dwell of one unit: how far it is off its neighbours in time and the model, (axes,) g, in standard deviations."""
+
+    unit: int
+    dwell: int
+    off: Array
+    deviations: float
+
+
+def without(lot: Lot, found: list[BadDwell]) -> Lot:
+    """The lot without some dwells of some units."""
+    error = lot.error.copy()
+    for one in found:
+        error[one.unit, one.dwell] = np.inf
+    return replace(lot, error=error)
+
+
+def bad_dwells(model: Model) -> list[BadDwell]:
+    """The dwells that do not belong to a model and its noise, the noise estimated again without them."""
+    found: list[BadDwell] = []
+    lot = model.problem.lot
+    for _ in range(_ROUNDS):
+        more = _round(model, int(MOST_BAD * lot.state.time.size) + 1 - len(found))
+        if not more:
+            break
+        found += more
+        problem = Problem(without(lot, found), slope=model.problem.slope)
+        model = Model(problem, model.terms, near=model.noise)
+    return found
+
+
+def _round(model: Model, most: int) -> list[BadDwell]:
+    """Dwells that stand out at one noise, the largest first, each deleted before the next."""
+    space = model.space
+    axes = 1 if model.problem.lot.radial else 3
+    looked = _Deletion(space, axes)
+    found: list[BadDwell] = []
+    while len(found) < most:
+        best = looked.worst()
+        if best is None:
+            break
+        unit, dwell, deviations = best
+        if found and deviations < _ALIKE * found[0].deviations:
+            break
+        found.append(BadDwell(unit, dwell, looked.delete(unit, dwell), deviations))
+    return found
+
+
+class _Deletion:
+    """Deletion statistics of every dwell of every unit, dwells deleted one by one."""
+
+    def __init__(self, space: Space, axes: int) -> None:
+        self.space, self.axes = space, axes
+        blocks, n = space.residual.shape
+        self.there = space.covariance.there.copy()
+        self.units, self.n = blocks // axes, n
+        scaled = space.noise.scale[:, None]
+        self.left, self.size = np.empty((blocks, n)), np.empty((blocks, n))
+        for block in range(blocks):
+            roots = self._roots(block)
+            self.left[block] = roots.T @ space.residual[block]
+            self.size[block] = np.einsum("tn,tn->n", roots, roots)
+        # in units of the white variance of each block: its own variance is found again as dwells go
+        self.left, self.size = self.left * scaled**2, self.size * scaled**2
+        self.squares, self.dof = space.squares.copy(), space.by_block.copy()
+        if np.isfinite(space.noise.prior):
+            # the prior's part of each block's variance
+            self.centre = np.maximum(space.noise.scale**2 * (self.dof + space.noise.prior) - self.squares, 0.0)
+        self.prior, self.looks = space.noise.prior, max(int(self.there.sum()) // axes, 1)
+
+    def _roots(self, block: int) -> Array:
+        """M (n, n) with MᵀM = P, in whitened units."""
+        space = self.space
+        eye = space.covariance.whiten(np.eye(self.n)[None], space.noise.shares, np.array([block]))
+        return space.project(eye / space.noise.scale[block], np.array([block]))[0]
+
+    def worst(self) -> tuple[int, int, float] | None:
+        """Unit and dwell that stand out most, and by how much; None where none does by more than chance would have it."""
+        known = self.there & (self.size > 1e-9 * self.size.max())
+        drop = np.where(known, self.left**2 / np.where(known, self.size, 1.0), 0.0)
+        statistic = self._studentised(drop)
+        if self.units > 2:
+            together = np.median(statistic, axis=0) > float(stats.chi2.isf(COMMON, self.axes))
+            statistic = np.where(together, 0.0, statistic)
+        unit, dwell = np.unravel_index(int(np.argmax(statistic)), statistic.shape)
+        dof = float(self.dof.reshape(self.units, -1).min(axis=1)[unit])
+        freedom = self.axes * (dof - 1.0 + min(self.prior, 1e6)) if np.isfinite(self.prior) else float(self.dof.sum())
+        chance = float(stats.f.sf(statistic[unit, dwell] / self.axes, self.axes, max(freedom, 1.0))) * self.looks
+        found = int(unit), int(dwell), float(np.sqrt(statistic[unit, dwell]))
+        return found if chance < BAD_DWELL and dof >= _LEAST_DOF else None
+
+    def _studentised(self, drop: Array) -> Array:
+        """Squares of each dwell over a variance without it, (units, n)."""
+        if np.isfinite(self.prior):
+            squares, dof = self.squares[:, None], self.dof[:, None]
+            variance = np.maximum(squares - drop, 0.0) + self.centre[:, None]
+            variance = variance / np.maximum(dof - 1.0 + self.prior, 1.0)
+        else:
+            every = drop.reshape(self.units, self.axes, self.n).sum(axis=1)
+            total, count = float(self.squares.sum()), float(self.dof.sum())
+            variance = np.repeat((total - every) / max(count - self.axes, 1.0), self.axes, axis=0)
+        return (drop / np.maximum(variance, 1e-300)).reshape(self.units, self.axes, self.n).sum(axis=1)
+
+    def delete(self, unit: int, dwell: int) -> Array:
+        """Take one dwell out; by how much it was off, (axes,), g."""
+        blocks = range(unit * self.axes, (unit + 1) * self.axes)
+        off = np.array([self.left[b, dwell] / self.size[b, dwell] for b in blocks])
+        for place, b in enumerate(blocks):
+            self.squares[b] -= self.left[b, dwell] ** 2 / self.size[b, dwell]
+            self.dof[b] -= 1.0
+            roots = self._roots(b)
+            column = roots.T @ roots[:, dwell] * self.space.noise.scale[b] ** 2
+            for other in np.flatnonzero(~self.there[b] & self.space.covariance.there[b]):
+                column = column - self._held(b, int(other), dwell)
+            self.left[b] -= column * off[place]
+            self.size[b] = np.maximum(self.size[b] - column**2 / max(float(column[dwell]), 1e-300), 0.0)
+            self.there[b, dwell] = False
+        return off
+
+    def _held(self, block: int, gone: int, dwell: int) -> Array:
+        """What an earlier deletion took off a column of P."""
+        roots = self._roots(block)
+        scale = self.space.noise.scale[block] ** 2
+        first = roots.T @ roots[:, gone] * scale
+        return first * float(first[dwell] / max(first[gone], 1e-300))
+
+
+def heavy_tails(model: Model) -> bool:
+    """Whether what a model leaves has more large values than a normal distribution: no fault of single dwells then.
+
+    By the kurtosis of the deletion residuals: whitening spreads what one dwell is off over those that follow.
+    """
+    space = model.space
+    looked = _Deletion(space, 1 if model.problem.lot.radial else 3)
+    known = looked.there & (looked.size > 1e-9 * looked.size.max())
+    scaled = looked.left / np.sqrt(np.where(known, looked.size, 1.0)) / space.noise.scale[:, None]
+    white = scaled[known]
+    if white.size < _TELLS:
+        return False
+    excess = float(np.mean(white**4) / np.mean(white**2) ** 2) - 3.0
+    return bool(excess > HEAVY * np.sqrt(24.0 / white.size))

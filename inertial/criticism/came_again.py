@@ -1,0 +1,153 @@
+"""How much of a change that an effect predicts comes again on a fresh run: λ with its standard error.
+
+e0 is what the model without the effect misses the fresh run by, d the difference of the two models' predictions. Both less what
+may be another on another day (the base model's coefficients, or each unit's bias alone where the fresh run does not determine
+them), λ = Σ dᵀV⁻¹e0 / Σ dᵀV⁻¹d: one where the effect is there as it was fitted, zero where it is not.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from inertial.criticism.bad_dwells import bad_dwells, without
+from inertial.criticism.comparison import Estimate, residuals_of
+from inertial.criticism.decisions import BLOCKS, CONFIRMED, REFUTED
+from inertial.criticism.likelihood import shared_noise
+from inertial.criticism.model import Model, Term
+from inertial.criticism.problem import Lot, Problem
+from inertial.criticism.space import Space
+
+Array = NDArray[np.float64]
+
+_ENOUGH = 3
+"""Units, or stretches of time, from which on their scatter tells of an error."""
+
+_SPARE = 2.0
+"""Dwells per coefficient of the base model from which on a fresh run determines it again."""
+
+
+@dataclass(frozen=True)
+class CameAgain:
+    """What a fresh run says of an effect.
+
+    part : λ; error : of it, one standard deviation
+    before, after : RMS that the models leave, g, what may be another on another day taken out; fall_error : of their difference
+    again : what was estimated again, "base" or "bias"
+    """
+
+    part: float
+    error: float
+    before: float
+    after: float
+    fall_error: float
+    again: str
+
+    @property
+    def fall(self) -> float:
+        """By how much the error falls, g."""
+        return self.before - self.after
+
+    @property
+    def confirmed(self) -> bool | None:
+        """Confirmed, not there, or (None) not decided."""
+        if not np.isfinite(self.part) or not np.isfinite(self.error):
+            return None
+        if self.part > CONFIRMED * self.error:
+            return True
+        return False if self.part + 2.0 * self.error < REFUTED else None
+
+
+def came_again(lot: Lot, before: Estimate, after: Estimate) -> CameAgain:
+    """The part of a predicted change that came again.
+
+    Parameters
+    ----------
+    lot : the fresh run, in the scale of the first
+    before, after : the models without and with the effect, fitted to the first run
+    """
+    whole = Model(Problem(lot), after.terms)
+    lot = without(lot, bad_dwells(whole))
+    problem = Problem(lot)
+    noise = Model(problem, after.terms, near=whole.noise).noise
+    zero = np.where(np.isfinite(problem.error), 1.0, 0.0)
+    left = np.nan_to_num(residuals_of(problem, before))
+    change = left - np.nan_to_num(residuals_of(problem, after))
+    base, again = _base(problem, before.terms)
+    space = Space(
+        problem.covariance, noise, left * zero, base.local, np.concatenate([base.shared, change[..., None]], axis=-1)
+    )
+    shared = space.gram[1:, 1:]
+    # what all share and is estimated again comes first, the change last: its coefficient is λ
+    own = float(shared[-1, -1])
+    along = float(space.gram[-1, 0])
+    if shared.shape[0] > 1:
+        rest = np.linalg.pinv(shared[:-1, :-1], rcond=1e-10, hermitian=True)
+        along -= float(shared[-1, :-1] @ rest @ space.gram[1:-1, 0])
+        own -= float(shared[-1, :-1] @ rest @ shared[:-1, -1])
+    if own <= 1e-9 * max(float(np.sum(space.whiten(change[..., None]) ** 2)), 1e-300):
+        return CameAgain(float("nan"), float("nan"), *_falls(problem, base, left, change), again)
+    wide = _together(Model(problem, after.terms, near=noise), space.targets[..., -1])
+    return CameAgain(along / own, float(np.sqrt(wide / own)), *_falls(problem, base, left, change), again)
+
+
+def _base(problem: Problem, terms: tuple[Term, ...]) -> tuple[Model, str]:
+    """What is estimated again: the whole base where the fresh run determines it, else the bias alone."""
+    base = Model(problem, [t for t in terms if t.first is None])
+    space = base.at(problem.covariance.white_noise())
+    columns = base.local.shape[-1]
+    full = bool(np.all(space.ranks == columns)) and problem.n >= _SPARE * columns
+    if full:
+        return base, "base"
+    return Model(problem, [t for t in terms if t.effect.id == "bias"]), "bias"
+
+
+def _together(model: Model, change: Array) -> float:
+    """Factor on the variance of λ where the units share noise and the change is alike in them."""
+    units = model.problem.lot.state.time.shape[0]
+    if units < 2 or model.problem.lot.radial:
+        return 1.0
+    by_unit = change.reshape(units, 3, -1)
+    alike = float(units * np.sum(by_unit.mean(axis=0) ** 2) / max(float(np.sum(by_unit**2)), 1e-300))
+    return 1.0 + alike * (shared_noise(model) - 1.0)
+
+
+def _falls(problem: Problem, base: Model, left: Array, change: Array) -> tuple[float, float, float]:
+    """RMS before and after, and the standard error of their difference over units and stretches of time."""
+    space = base.at(problem.covariance.white_noise())
+    there = np.isfinite(problem.error)
+    ends = [_own_out(problem, base, space, series)[..., None] for series in (left, left - change)]
+    both = np.where(there[..., None], np.concatenate(ends, axis=-1), 0.0) ** 2
+    units = problem.lot.state.time.shape[0]
+    stretch = np.arange(problem.n) * min(BLOCKS, problem.n) // problem.n
+    cells = np.zeros((units, int(stretch.max()) + 1, 3))
+    for k in range(cells.shape[1]):
+        here = both[:, stretch == k].reshape(units, -1, int((stretch == k).sum()), 2)
+        cells[:, k, :2] = here.sum(axis=(1, 2))
+        cells[:, k, 2] = there[:, stretch == k].reshape(units, -1).sum(axis=1)
+    before, after = (float(np.sqrt(cells[..., i].sum() / max(cells[..., 2].sum(), 1.0))) for i in (0, 1))
+    spread = [_jackknife(cells.sum(axis=axis)) for axis in (0, 1) if cells.shape[1 - axis] >= _ENOUGH]
+    return before, after, float(np.max(spread)) if spread else float("nan")
+
+
+def _own_out(problem: Problem, base: Model, space: Space, series: Array) -> Array:
+    """Series (blocks, n), g, less what the base model takes up by plain least squares."""
+    level = problem.covariance.level[:, None]
+    local = np.where(np.isfinite(problem.error)[..., None], base.local, 0.0) / level[..., None]
+    q = np.linalg.svd(local, full_matrices=False) if local.shape[-1] else None
+    if q is None:
+        return series
+    u, s, _ = q
+    u = u * (s > 1e-9 * s[:, :1])[:, None, :]
+    own = np.where(np.isfinite(problem.error), series, 0.0)
+    del space
+    return own - (u @ (np.swapaxes(u, -1, -2) @ own[..., None]))[..., 0]
+
+
+def _jackknife(parts: Array) -> float:
+    """Standard error of the fall, parts (k, 3) of squares before, after and counts left out in turn."""
+    total = parts.sum(axis=0)
+    rest = np.maximum(total - parts, 0.0)
+    falls = np.sqrt(rest[:, 0] / np.maximum(rest[:, 2], 1.0)) - np.sqrt(rest[:, 1] / np.maximum(rest[:, 2], 1.0))
+    k = len(falls)
+    return float(np.sqrt((k - 1) / k * np.sum((falls - falls.mean()) ** 2)))

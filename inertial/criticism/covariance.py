@@ -1,0 +1,240 @@
+"""Whitening of a lot's series: white noise, 1/f and random walk, with whiteners shared by blocks that are alike.
+
+A block is the series of one unit and axis. Its covariance is s²·(diag(e²) + F·K_F + W·K_W), where e is the white standard error
+of its dwells and F and W, in units of the lot's white variance, are the same for all blocks. Blocks that have the same dwells at
+the same times and about the same white noise share a whitener; a missing dwell only leaves out its row.
+"""
+
+from collections import OrderedDict
+from dataclasses import dataclass
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import get_lapack_funcs, solve_triangular
+
+from inertial.criticism.decisions import SHARE_STEP
+from inertial.criticism.noise import LONGEST, walk_kernel
+from inertial.noise.flicker import flicker_kernel
+
+Array = NDArray[np.float64]
+
+_invert = get_lapack_funcs(("trtri",), dtype=np.float64)[0]
+
+_EVEN = 1.5
+"""White standard errors of a block that differ by less than this factor are taken as equal."""
+
+_WHITENERS = 24_000_000
+"""Numbers of whiteners that are kept."""
+
+_COLUMNS = 12_000_000
+"""Numbers of whitened columns that are kept between passes; beyond, they are made again."""
+
+
+class Shares(NamedTuple):
+    """Variances of 1/f and of random walk at the end of the record, over the lot's white variance."""
+
+    flicker: float = 0.0
+    walk: float = 0.0
+
+
+@dataclass(frozen=True)
+class Noise:
+    """Noise of a lot.
+
+    scale : (blocks,), s: standard deviations over those that the white errors and the shares make
+    prior : degrees of freedom by which the blocks' variances are drawn together; infinite where one serves all
+    """
+
+    shares: Shares
+    scale: Array
+    prior: float = np.inf
+
+    def pick(self, blocks: list[int]) -> "Noise":
+        """The noise of some blocks."""
+        return Noise(self.shares, self.scale[blocks], self.prior)
+
+
+@dataclass(frozen=True)
+class _Kernel:
+    """Dwells that are there, their times and white profile: what blocks of one whitener have in common."""
+
+    time: Array
+    there: NDArray[np.bool_]
+    profile: Array
+
+    def fits(self, time: Array, there: NDArray[np.bool_], profile: Array) -> bool:
+        alike = bool(np.array_equal(there, self.there)) and bool(np.all(np.abs(time - self.time) < 1.0))
+        ratio = np.where(there, profile / self.profile, 1.0)
+        return alike and float(ratio.max()) < _EVEN and float(ratio.min()) > 1.0 / _EVEN
+
+
+class Covariance:
+    """The covariances of all blocks, at any shares of wander.
+
+    Parameters
+    ----------
+    time : (blocks, n), s
+    error : (blocks, n), white standard error of each dwell, g; infinite where a dwell is missing
+    """
+
+    def __init__(self, time: Array, error: Array) -> None:
+        self.there = np.isfinite(error)
+        self.count = self.there.sum(axis=1)
+        white = np.where(self.there, error, 0.0) ** 2
+        typical = np.sqrt(white.sum(axis=1) / np.maximum(self.count, 1))
+        known = typical > 0.0
+        self.level = np.where(known, typical, np.median(typical[known]) if known.any() else 1.0)
+        self.white = float(np.exp(np.mean(np.log(self.level**2))))
+        """White variance that shares are counted in, g²."""
+        self.span = max(float(np.ptp(time)), 1.0)
+        self._kernels: list[_Kernel] = []
+        self._groups = self._grouped(time, error)
+        self._whiteners: OrderedDict[tuple[int, int | None, int | None], tuple[Array, float]] = OrderedDict()
+        self._kept: OrderedDict[tuple[object, Shares], Array] = OrderedDict()
+        self._used = 0
+
+    def _grouped(self, time: Array, error: Array) -> list[tuple[int, int, NDArray[np.intp]]]:
+        """(kernel, steps by which its shares are larger than the lot's, blocks)."""
+        found: dict[tuple[int, int], list[int]] = {}
+        for block, there in enumerate(self.there):
+            profile = np.where(there, np.where(there, error[block], 1.0) / self.level[block], 1.0)
+            own = profile[there]
+            if own.size and own.max() < _EVEN * own.min():
+                profile = np.ones_like(profile)
+            place = next((i for i, k in enumerate(self._kernels) if k.fits(time[block], there, profile)), None)
+            if place is None:
+                place = len(self._kernels)
+                self._kernels.append(_Kernel(time[block], there, profile))
+            # by quarters of a decade: levels within a factor of 1.3 share a whitener, the rest is in the block's own variance
+            steps = 2 * round(0.5 * SHARE_STEP * np.log10(self.white / self.level[block] ** 2))
+            found.setdefault((place, steps), []).append(block)
+        return [(place, steps, np.array(blocks)) for (place, steps), blocks in found.items()]
+
+    @cached_property
+    def _wander(self) -> tuple[Array, Array] | None:
+        """Covariances of 1/f and of random walk of variance one, (kernels, n, n); None for records too long for them."""
+        if self.there.shape[1] > LONGEST:
+            return None
+        time = np.stack([k.time for k in self._kernels])
+        return flicker_kernel(time), walk_kernel(time)
+
+    def about_mean(self, shares: Shares) -> Array:
+        """Mean variance of the wander of each block about its record's own mean, over its white variance, (blocks,)."""
+        found = np.zeros(len(self.level))
+        if self._wander is None:
+            return found
+        for place, steps, blocks in self._groups:
+            there = self._kernels[place].there
+            for share, kernel in zip(shares, self._wander, strict=True):
+                own = kernel[place][np.ix_(there, there)]
+                n = max(len(own), 1)
+                found[blocks] += share * 10.0 ** (steps / SHARE_STEP) * (np.trace(own) / n - own.sum() / n**2)
+        return found
+
+    def _whitener(self, place: int, steps: int, shares: Shares) -> tuple[Array, float] | None:
+        """Lower triangle (n, n) that makes a block's noise white, and the log-determinant of its covariance."""
+        index = [None if s <= 0.0 else round(SHARE_STEP * np.log10(s)) + steps for s in shares]
+        if self._wander is None or index == [None, None]:
+            return None
+        key = (place, index[0], index[1])
+        if key not in self._whiteners:
+            self._whiteners[key] = self._made(place, index)
+            most = max(_WHITENERS // self.there.shape[1] ** 2, 4)
+            while len(self._whiteners) > most:
+                self._whiteners.popitem(last=False)
+        self._whiteners.move_to_end(key)
+        return self._whiteners[key]
+
+    def _made(self, place: int, index: list[int | None]) -> tuple[Array, float]:
+        kernel = self._kernels[place]
+        there = kernel.there
+        covariance = np.diag(kernel.profile[there] ** 2)
+        for i, wander in zip(index, self._wander or (), strict=True):
+            if i is not None:
+                covariance += 10.0 ** (i / SHARE_STEP) * wander[place][np.ix_(there, there)]
+        lower = np.linalg.cholesky(covariance)
+        inverse = _invert(lower, lower=1)[0]
+        whole = np.zeros((there.size, there.size))
+        whole[np.ix_(there, there)] = np.tril(inverse)
+        return whole, 2.0 * float(np.sum(np.log(np.diagonal(lower))))
+
+    def whiten(self, columns: Array, shares: Shares, blocks: NDArray[np.intp] | None = None) -> Array:
+        """Columns (blocks, n, m) of all or some blocks with white noise of variance s² in them; zero where a dwell is missing."""
+        if len(self._groups) == 1:
+            place, steps, _ = self._groups[0]
+            level = self.level if blocks is None else self.level[blocks]
+            found = self._whitener(place, steps, shares)
+            if found is not None:
+                return np.matmul(found[0], columns / level[:, None, None])
+        place_of = np.arange(len(self.level)) if blocks is None else blocks
+        where = np.full(len(self.level), -1)
+        where[place_of] = np.arange(place_of.size)
+        out = np.empty(columns.shape)
+        for place, steps, members in self._groups:
+            rows = where[members]
+            rows = rows[rows >= 0]
+            if rows.size:
+                own = columns[rows] / self.level[place_of[rows], None, None]
+                found = self._whitener(place, steps, shares)
+                if found is None:
+                    kernel = self._kernels[place]
+                    out[rows] = own * np.where(kernel.there, 1.0 / kernel.profile, 0.0)[:, None]
+                else:
+                    n, m = columns.shape[1:]
+                    flat = found[0] @ own.transpose(1, 0, 2).reshape(n, -1)
+                    out[rows] = flat.reshape(n, rows.size, m).transpose(1, 0, 2)
+        return out
+
+    def coloured(self, noise: Noise, drawn: Array) -> Array:
+        """Series (blocks, n, m), g, with this noise, from independent normal numbers; zero where a dwell is missing."""
+        out = np.empty(drawn.shape)
+        for place, steps, members in self._groups:
+            kernel = self._kernels[place]
+            found = self._whitener(place, steps, noise.shares)
+            n, m = drawn.shape[1:]
+            flat = drawn[members].transpose(1, 0, 2).reshape(n, -1)
+            made = np.zeros_like(flat)
+            if found is None:
+                made = flat * (kernel.profile * kernel.there)[:, None]
+            else:
+                there = kernel.there
+                made[there] = solve_triangular(found[0][np.ix_(there, there)], flat[there], lower=True)
+            own = made.reshape(n, members.size, m).transpose(1, 0, 2)
+            out[members] = own * (self.level * noise.scale)[members, None, None]
+        return out
+
+    def whitened(self, key: object, columns: Array, shares: Shares, blocks: NDArray[np.intp] | None = None) -> Array:
+        """The same, kept under a key for the next time."""
+        name = (key, shares)
+        found = self._kept.get(name)
+        if found is None:
+            found = self.whiten(columns, shares, blocks)
+            self._kept[name] = found
+            self._used += found.size
+            while self._used > _COLUMNS and self._kept:
+                self._used -= self._kept.popitem(last=False)[1].size
+        else:
+            self._kept.move_to_end(name)
+        return found
+
+    def logdet(self, shares: Shares) -> Array:
+        """Log-determinants of the blocks' covariances over their white variance, (blocks,)."""
+        found = np.zeros(len(self.level))
+        for place, steps, members in self._groups:
+            kernel = self._kernels[place]
+            whitener = self._whitener(place, steps, shares)
+            white = 2.0 * float(np.sum(np.log(kernel.profile[kernel.there])))
+            found[members] = white if whitener is None else whitener[1]
+        return found
+
+    def white_noise(self) -> Noise:
+        """White noise as the errors say."""
+        return Noise(Shares(), np.ones(len(self.level)))
+
+    def taken(self, noise: Noise, other: "Covariance") -> Noise:
+        """Noise of another covariance, of the same blocks, in the units of this one."""
+        factor = other.white / self.white
+        shares = Shares(noise.shares.flicker * factor, noise.shares.walk * factor * self.span / other.span)
+        return Noise(shares, noise.scale, noise.prior)

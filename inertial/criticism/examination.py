@@ -1,0 +1,194 @@
+"""A run under examination: bad dwells and what handling did are taken out of it before any physics is read into it."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+
+import numpy as np
+
+from inertial import effects as catalogue
+from inertial.criticism.bad_dwells import BadDwell, bad_dwells, without
+from inertial.criticism.classes import EffectClass, class_of
+from inertial.criticism.decisions import RISES
+from inertial.criticism.drivers import varies
+from inertial.criticism.field import Candidates
+from inertial.criticism.handling import alternatives
+from inertial.criticism.handling.base import Handling
+from inertial.criticism.heldout import fit_rms
+from inertial.criticism.left_out import LeftOut, left_out
+from inertial.criticism.model import Model, Term, refuse_without_freedom
+from inertial.criticism.penalty import cost_of_model
+from inertial.criticism.problem import Lot, Problem
+from inertial.criticism.refinement import terms_of
+from inertial.criticism.search import SearchResult, anything, search
+from inertial.criticism.slope import slope_of
+from inertial.criticism.turn_on import with_turn_on
+from inertial.criticism.unknown import Suspect, better_curve, suspects
+from inertial.effects.base import AnyEffect
+from inertial.effects.covariate import COVARIATE_PREFIX, Covariate
+
+_MANY = 32  # units of a lot that is searched whole
+_ENOUGH = 24  # units, spread over the lot, that a larger one is searched in
+_MENDED = 6  # alternatives that are told of one run at the most
+
+DECISIVE = 0.2
+"""Share of what a curve brings by which it must beat the effects chosen so far to end the search for more."""
+
+
+@dataclass(frozen=True)
+class Named:
+    """A class of effects that is missing, with the errors before and after it is added; g.
+
+    heldout_before, heldout_after : on dwells left out, the worst of the kinds that can judge both; NaN where none can
+    units, dwells : that an alternative of scope "data" concerns, none for all units; told : what it did, in words
+    """
+
+    effects: EffectClass
+    rms_after: float
+    heldout_before: float
+    heldout_after: float
+    units: tuple[int, ...] = ()
+    dwells: tuple[int, ...] = ()
+    told: str = ""
+
+    @property
+    def predicts(self) -> bool:
+        """Whether what was not fitted is predicted no worse with it: nothing else is worth to be added to a model."""
+        return not self.heldout_after > (1.0 + RISES) * self.heldout_before
+
+
+@dataclass
+class Run:
+    """A lot under examination: what was mended so far, and what stays in the model beside the effects that are judged."""
+
+    lot: Lot
+    effects: tuple[str, ...]
+    beside: list[Term] = field(default_factory=list[Term])
+    handled: list[Named] = field(default_factory=list[Named])
+    removed: list[BadDwell] = field(default_factory=list[BadDwell])
+
+    def model(self) -> Model:
+        """The model that is judged, in the lot without its bad dwells."""
+        lot = without(self.lot, self.removed) if self.removed else self.lot
+        problem = Problem(lot)
+        base = Model(problem, with_turn_on(lot.state, terms_of(catalogue.get_all(self.effects), problem)))
+        refuse_without_freedom(base)
+        problem.slope = slope_of(base)
+        return base if not self.beside else Model(problem, [*base.terms, *self.beside], near=base.noise)
+
+
+def examined(lot: Lot, effects: Sequence[str]) -> "tuple[Run, Search]":
+    """A run without what spoilt it, and the search for effects in it."""
+    run = Run(lot, tuple(effects))
+    run.removed = bad_dwells(run.model())
+    found = mended(run)
+    if run.removed and found.found.added:
+        # what physics explains is no bad dwell
+        whole = Problem(run.lot, slope=found.base.problem.slope)
+        kept = bad_dwells(Model(whole, found.model.terms, near=found.model.noise))
+        if {(d.unit, d.dwell) for d in kept} != {(d.unit, d.dwell) for d in run.removed}:
+            run.removed = kept
+            found = mended(run)
+    return run, found
+
+
+@dataclass(frozen=True)
+class Search:
+    """A search that ended without a further alternative."""
+
+    base: Model
+    field: Candidates
+    part: "Part"
+    found: SearchResult
+
+    @property
+    def model(self) -> Model:
+        """With everything that was added."""
+        return self.found.model
+
+
+def mended(run: Run) -> Search:
+    """The search for effects, each alternative that comes first told and taken out of the lot before it begins again."""
+    while True:
+        base = run.model()
+        fields = Candidates(base.problem, candidates_of(base, run.effects), alternatives())
+        part = _part(fields, base)
+        found = search(part.field, part.base, stop=part.imitates)
+        if found.handling is None and part.field is not fields:
+            found = replace(search(fields, base, stop=part.imitates, start=found.added), ladder=found.ladder)
+        if found.handling is None or len(run.handled) >= _MENDED:
+            return Search(base, fields, part, found)
+        _mend(run, part.field, found, found.handling)
+
+
+def _mend(run: Run, fields: Candidates, found: SearchResult, term: Term) -> None:
+    """Take what handling did out of a run, and note it."""
+    model = found.model.with_term(term)
+    group = class_of(fields, model, term)
+    problem = fields.problem
+    alternative, place = term.effect, {k: v for k, v in term.keywords.items() if isinstance(v, float)}
+    if not isinstance(alternative, Handling):
+        raise TypeError(term.effect.id)
+    size = model.shared_sizes(term)
+    units = (int(place["unit"]),) if "unit" in place else ()
+    told = alternative.told(problem.lot, size, **place)
+    dwells = tuple(alternative.dwells(problem.lot, **place))
+    before, after = left_out(found.model), left_out(model)
+    errors = fit_rms(problem, model.terms), *worst(before, after)
+    run.handled.append(Named(group, *errors, units, dwells, told))
+    lot = alternative.mended(run.lot, size, **place)
+    if lot is None:
+        run.beside.append(term)
+    else:
+        run.lot = lot
+
+
+def candidates_of(base: Model, held: Sequence[str]) -> list[AnyEffect]:
+    """Effects and covariates beyond those that a model holds."""
+    state = base.problem.lot.state
+    effects = [e for e in catalogue.catalogue().values() if e.id not in set(held)]
+    names = [name for name, values in state.covariates.items() if varies(values)]
+    return [*effects, *(Covariate(name) for name in names if f"{COVARIATE_PREFIX}{name}" not in set(held))]
+
+
+@dataclass(frozen=True)
+class Part:
+    """As much of a lot as the search for effects needs: what all units of a large lot share shows in two dozen of them."""
+
+    field: Candidates
+    base: Model
+
+    @cached_property
+    def suspected(self) -> list[Suspect]:
+        """Curves of every driver."""
+        return suspects(self.field.problem)
+
+    def imitates(self, chosen: Sequence[Term]) -> bool:
+        """Whether a curve of one driver does better than the effects chosen: by far, or leaving nothing else to find."""
+        instead = better_curve(self.base, chosen, self.suspected)
+        if instead is None:
+            return False
+        fit = instead[0]
+        problem = self.field.problem
+        effects = cost_of_model(Model(problem, [*self.base.terms, *chosen], near=fit.model.noise))
+        by_far = effects - fit.cost > DECISIVE * (cost_of_model(self.base) - fit.cost)
+        return by_far or not anything(self.field, fit.model)
+
+
+def _part(field: Candidates, base: Model) -> Part:
+    lot = field.problem.lot
+    if lot.state.time.shape[0] <= _MANY:
+        return Part(field, base)
+    pick = np.linspace(0, lot.state.time.shape[0] - 1, _ENOUGH).round().astype(int)
+    slope = field.problem.slope
+    problem = Problem(lot.units(pick.tolist()), slope=None if slope is None else slope[pick])
+    terms = [t for t in base.terms if not isinstance(t.effect, Handling)]
+    return Part(
+        Candidates(problem, field.effects, [a for a in field.handling if a.fewest_units > 1]), Model(problem, terms)
+    )
+
+
+def worst(before: LeftOut, after: LeftOut) -> tuple[float, float]:
+    """The worst error on dwells left out, before and after, over the kinds that can judge both."""
+    kinds = set(before.density) & set(after.density)
+    return before.rms(kinds), after.rms(kinds)

@@ -1,0 +1,80 @@
+"""The candidates of a search: effects at the values of their nonlinear parameters, alternatives at their places."""
+
+from collections.abc import Iterable, Iterator
+
+from inertial.criticism.handling.base import Handling
+from inertial.criticism.problem import Problem
+from inertial.criticism.space import Candidate, Gain, Space
+from inertial.design import grid_of
+from inertial.effects.base import AnyEffect
+from inertial.errors import MissingInput
+
+
+class Candidates:
+    """The candidates that a lot's dwells carry the quantities for.
+
+    Parameters
+    ----------
+    effects : of the catalogue, and covariates
+    handling : alternatives to them
+    """
+
+    def __init__(self, problem: Problem, effects: Iterable[AnyEffect], handling: Iterable[Handling] = ()) -> None:
+        self.problem = problem
+        self.effects: list[AnyEffect] = []
+        self.handling: list[Handling] = []
+        self.grids: dict[str, list[dict[str, float]]] = {}
+        self.lacking: dict[str, str] = {}
+        for effect in effects:
+            try:
+                grid = grid_of(effect, problem.lot.state)
+                problem.columns(effect, grid[0])
+            except MissingInput as reason:
+                self.lacking[effect.id] = reason.quantity
+                continue
+            self.effects.append(effect)
+            self.grids[effect.id] = grid
+        for alternative in handling:
+            places = [] if problem.lot.radial else alternative.places(problem.lot)
+            if places and problem.lot.state.time.shape[0] >= alternative.fewest_units:
+                self.handling.append(alternative)
+                self.grids[alternative.id] = places
+
+    @property
+    def looks(self) -> int:
+        """Number of tests made in one pass: every effect at every value, every alternative at every place."""
+        return sum(len(g) for g in self.grids.values())
+
+    def of(self, name: str) -> AnyEffect | Handling:
+        """The candidate of an id."""
+        return next(e for e in (*self.effects, *self.handling) if e.id == name)
+
+    def places(self, name: str) -> int:
+        """How many places an alternative is charged with; one for an effect."""
+        return len(self.grids[name]) if any(a.id == name for a in self.handling) else 1
+
+    def gains(self, space: Space, leave: set[str], *, handling: bool = False) -> dict[str, Gain]:
+        """Gain of every candidate that the model does not hold already."""
+        found: dict[str, Gain] = {}
+        for effect in (*self.effects, *(self.handling if handling else ())):
+            if effect.id not in leave:
+                found[effect.id] = self._gain(space, effect, None)
+        return found
+
+    def _gain(self, space: Space, effect: AnyEffect | Handling, first: int | None) -> Gain:
+        pieces = self.problem.pieces(effect, self.grids[effect.id], first=first)
+        return Gain.joined([space.gain(piece) for piece in pieces])
+
+    def pieces(self) -> Iterator[Candidate]:
+        """Every effect at every value of its nonlinear parameters, in pieces."""
+        for effect in self.effects:
+            yield from self.problem.pieces(effect, self.grids[effect.id])
+
+    def primary_gains(self, space: Space, leave: set[str]) -> dict[str, Gain]:
+        """Gain of the leading column alone, for effects of several columns whose first is an effect of its own."""
+        found: dict[str, Gain] = {}
+        for effect in self.effects:
+            first = effect.primary
+            if effect.id not in leave and first is not None:
+                found[effect.id] = self._gain(space, effect, first)
+        return found

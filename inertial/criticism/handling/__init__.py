@@ -1,0 +1,23 @@
+"""Alternatives to physics that handling makes, one per file; a file that is there takes part."""
+
+from functools import cache
+from importlib import import_module
+from pkgutil import iter_modules
+
+from inertial.criticism.handling.base import Handling
+
+
+@cache
+def alternatives() -> tuple[Handling, ...]:
+    """Every alternative of this package, by its id."""
+    found: dict[str, Handling] = {}
+    for module in iter_modules(__path__):
+        for thing in vars(import_module(f"{__name__}.{module.name}")).values():
+            if isinstance(thing, type) and issubclass(thing, Handling) and hasattr(thing, "id"):
+                found[thing.id] = thing()
+    return tuple(found[name] for name in sorted(found))
+
+
+def named(name: str) -> Handling | None:
+    """The alternative of an id; None where there is none."""
+    return next((a for a in alternatives() if a.id == name), None)

@@ -1,0 +1,136 @@
+"""What handling can do to a run that looks like physics: a unit that moved, a wrong pose, a thermometer that is off in one soak.
+
+Such alternatives have one to three coefficients, and stand in the same search as the effects, which have one for every unit and
+axis. They are of scope "data": no model is extended by them.
+"""
+
+from abc import abstractmethod
+from dataclasses import replace
+from typing import TYPE_CHECKING, ClassVar, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from inertial.effects.base import Effect
+from inertial.state import State
+
+if TYPE_CHECKING:
+    from inertial.criticism.lot import Lot
+
+Array = NDArray[np.float64]
+
+_PLACES = 40
+_EDGE = 3  # dwells at both ends after which, or before which, nothing can be told to have changed
+_SOAK_APART = 3.0  # K
+
+
+class Handling(Effect):
+    """An alternative to physics.
+
+    Attributes
+    ----------
+    fewest_units : below which it cannot be told from the sensor itself, and is not looked for
+    """
+
+    scope: ClassVar[Literal["sensor", "station", "slot", "data"]] = "data"  # pyright: ignore[reportIncompatibleVariableOverride]
+    source: ClassVar[str] = "benchmarks/worlds"
+    typical_ug: ClassVar[tuple[float, float]] = (0.0, float("inf"))
+    simplicity: ClassVar[int] = 0
+    fewest_units: ClassVar[int] = 2
+
+    @abstractmethod
+    def places(self, lot: "Lot") -> list[dict[str, float]]:
+        """Where it is looked for: values of ``unit``, ``dwell``, ``soak`` or ``pose``; units one after the other."""
+
+    @abstractmethod
+    def change(self, lot: "Lot", slope: Array | None, **place: float) -> Array:
+        """Columns of the units it concerns, (units or 1, n, 3, k), g per unit of the coefficient."""
+
+    @abstractmethod
+    def told(self, lot: "Lot", size: Array, **place: float) -> str:
+        """What happened, for people; ``size`` (k,) are the coefficients."""
+
+    def near(self, lot: "Lot", **place: float) -> list[dict[str, float]]:
+        """The place and those between it and its neighbours in :meth:`places`."""
+        if "dwell" not in place:
+            return [place]
+        n, step = lot.state.time.shape[1], stride(lot)
+        low, high = max(1, int(place["dwell"]) - step + 1), min(n - 1, int(place["dwell"]) + step - 1)
+        return [{**place, "dwell": float(k)} for k in range(low, high + 1)]
+
+    def mended(self, lot: "Lot", size: Array, **place: float) -> "Lot | None":
+        """The lot without it; None where nothing but its term in the model takes it out."""
+        del lot, size, place
+        return None
+
+    def dwells(self, lot: "Lot", **place: float) -> list[int]:
+        """Places of the dwells that it concerns: the first after a change, or each one that is wrong."""
+        del lot
+        return [int(place["dwell"])] if "dwell" in place else []
+
+    def columns(self, lot: "Lot", slope: Array | None, **place: float) -> Array:
+        """Columns of all blocks, (blocks, n, k); zero in units that it does not concern."""
+        change = self.change(lot, slope, **place)
+        units, n = lot.state.time.shape
+        whole = np.zeros((units, n, 3, change.shape[-1]))
+        if "unit" in place:
+            whole[int(place["unit"])] = change[0]
+        else:
+            whole[:] = change
+        return by_block(whole)
+
+
+def by_block(change: Array) -> Array:
+    """(units, n, 3, k) as (3·units, n, k)."""
+    units, n, _, k = change.shape
+    return np.swapaxes(change, 1, 2).reshape(3 * units, n, k)
+
+
+def stride(lot: "Lot") -> int:
+    """Dwells between places at which a change is looked for first."""
+    return max(1, int(np.ceil(lot.state.time.shape[1] / _PLACES)))
+
+
+def times(lot: "Lot") -> list[int]:
+    """Dwells from which on something may have changed, ends left out."""
+    n = lot.state.time.shape[1]
+    return list(range(_EDGE, n - _EDGE + 1, stride(lot)))
+
+
+def after(lot: "Lot", dwell: float) -> Array:
+    """One from a dwell on, (n,)."""
+    return (np.arange(lot.state.time.shape[1]) >= dwell).astype(np.float64)
+
+
+def turns(force: Array) -> Array:
+    """What small rotations about x, y, z add to forces (..., n, 3), by axis and rotation: (..., n, 3, 3), g per rad."""
+    return np.stack([np.cross(e, force) for e in np.eye(3)], axis=-1)
+
+
+def tilts(state: State) -> Array:
+    """What small errors of the outer and inner angle add to the forces, (units or 1, n, 3, 2), g per rad."""
+    outer, inner = state.outer, state.inner
+    if outer is None or inner is None:
+        return np.zeros((*state.force.shape, 0))
+    by_outer = np.stack([np.cos(outer) * np.sin(inner), np.cos(outer) * np.cos(inner), -np.sin(outer)], axis=-1)
+    by_inner = np.stack([np.sin(outer) * np.cos(inner), -np.sin(outer) * np.sin(inner), np.zeros_like(outer)], axis=-1)
+    return np.stack([by_outer, by_inner], axis=-1)
+
+
+def soaks(state: State) -> NDArray[np.intp]:
+    """Number of the soak of each dwell, (n,); all zero where the temperature stays."""
+    if state.temperature is None:
+        return np.zeros(state.time.shape[-1], dtype=np.intp)
+    typical = np.median(state.temperature.reshape(-1, state.temperature.shape[-1]), axis=0)
+    found = np.zeros(typical.size, dtype=np.intp)
+    for k in range(1, typical.size):
+        inside = typical[:k][found[:k] == found[k - 1]]
+        found[k] = found[k - 1] + int(abs(typical[k] - float(np.median(inside))) > _SOAK_APART)
+    return found
+
+
+def without(lot: "Lot", dwells: list[int]) -> "Lot":
+    """The lot with some dwells taken out of all units."""
+    error = lot.error.copy()
+    error[:, dwells] = np.inf
+    return replace(lot, error=error)

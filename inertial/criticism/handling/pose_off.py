@@ -1,0 +1,55 @@
+"""The table stood elsewhere than commanded whenever it went to one pose."""
+
+from typing import TYPE_CHECKING, ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from inertial.criticism.handling.base import Array, Handling, tilts, without
+
+if TYPE_CHECKING:
+    from inertial.criticism.lot import Lot
+
+
+class PoseOff(Handling):
+    """A pose that is wrong every time, for all units."""
+
+    id: ClassVar[str] = "pose_off"
+    symbol: ClassVar[str] = "Δα, Δβ"
+    equation: ClassVar[str] = "∂f/∂α·Δα + ∂f/∂β·Δβ in every dwell of one pose"
+    breaker: ClassVar[str] = "check the angles of that pose in the recipe, and measure it again"
+
+    def places(self, lot: "Lot") -> list[dict[str, float]]:
+        """Every pose that comes more than once; none where the angles are not known."""
+        if lot.state.outer is None or lot.state.inner is None:
+            return []
+        number, count = np.unique(_poses(lot), return_counts=True)
+        several = number[count > 1]
+        return [{"pose": float(k)} for k in several] if several.size > 3 * int(count.max() > 1) else []
+
+    def change(self, lot: "Lot", slope: Array | None, **place: float) -> Array:
+        """Errors of the two angles in the dwells of one pose."""
+        del slope
+        return tilts(lot.state) * (_poses(lot) == int(place["pose"]))[:, None, None]
+
+    def told(self, lot: "Lot", size: Array, **place: float) -> str:
+        """The two angles."""
+        del lot, place
+        angles = np.degrees(size)
+        off = f"about {angles[0]:+.3f}° (outer) and {angles[1]:+.3f}° (inner)"
+        return f"the pose was off by {off} every time; its dwells are left out"
+
+    def mended(self, lot: "Lot", size: Array, **place: float) -> "Lot | None":
+        """Without the dwells of the pose."""
+        del size
+        return without(lot, self.dwells(lot, **place))
+
+    def dwells(self, lot: "Lot", **place: float) -> list[int]:
+        """The dwells of the pose."""
+        return np.flatnonzero(_poses(lot) == int(place["pose"])).tolist()
+
+
+def _poses(lot: "Lot") -> NDArray[np.intp]:
+    """Number of the pose of each dwell, (n,)."""
+    force = lot.state.force.reshape(-1, *lot.state.force.shape[-2:])[0]
+    return np.unique(np.round(force, 3), axis=0, return_inverse=True)[1].reshape(-1)

@@ -1,0 +1,61 @@
+"""The thermometers read off by the same in one soak."""
+
+from dataclasses import replace
+from typing import TYPE_CHECKING, ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from inertial.criticism.handling.base import Array, Handling, soaks
+from inertial.state import History
+
+if TYPE_CHECKING:
+    from inertial.criticism.lot import Lot
+
+
+class SoakThermometer(Handling):
+    """A reading of temperature that is off in one soak, for all units."""
+
+    id: ClassVar[str] = "soak_thermometer"
+    symbol: ClassVar[str] = "ΔT"
+    equation: ClassVar[str] = "−∂E/∂T·ΔT in one soak, all units"
+    breaker: ClassVar[str] = "a second thermometer, or a soak at a fourth temperature"
+    hides_behind: ClassVar[tuple[str, ...]] = ("scale_temperature_quadratic", "bias_temperature_quadratic")
+
+    def places(self, lot: "Lot") -> list[dict[str, float]]:
+        """Every soak, where there are more than two."""
+        number = int(soaks(lot.state).max()) + 1
+        return [{"soak": float(k)} for k in range(number)] if number > 2 else []
+
+    def change(self, lot: "Lot", slope: Array | None, **place: float) -> Array:
+        """What an offset of one kelvin adds, by each unit's own coefficients."""
+        if slope is None:
+            return np.zeros((*lot.state.time.shape, 3, 1))
+        return -(slope * (soaks(lot.state) == int(place["soak"]))[:, None])[..., None]
+
+    def told(self, lot: "Lot", size: Array, **place: float) -> str:
+        """The offset."""
+        del lot, place
+        return f"the thermometers read {size[0]:+.2f} K off in this soak; the readings are corrected by it"
+
+    def mended(self, lot: "Lot", size: Array, **place: float) -> "Lot | None":
+        """With the readings of the soak corrected."""
+        return corrected(lot, soaks(lot.state) == int(place["soak"]), float(size[0]), None)
+
+    def dwells(self, lot: "Lot", **place: float) -> list[int]:
+        """The dwells of the soak."""
+        return np.flatnonzero(soaks(lot.state) == int(place["soak"])).tolist()
+
+
+def corrected(lot: "Lot", wrong: NDArray[np.bool_], offset: float, unit: int | None) -> "Lot":
+    """A lot whose readings are lowered by an offset in some dwells (n,), of one unit or of all."""
+    state = lot.state
+    if state.temperature is None:
+        return lot
+    units = np.ones(state.time.shape[0], dtype=bool) if unit is None else np.arange(state.time.shape[0]) == unit
+    temperature = state.temperature - offset * (units[:, None] & wrong)
+    history = state.history
+    if history is not None:
+        during = (history.time >= state.time[0, wrong].min()) & (history.time <= state.time[0, wrong].max())
+        history = History(history.time, history.temperature - offset * (units[:, None] & during))
+    return replace(lot, state=replace(state, temperature=temperature, history=history, memory={}))

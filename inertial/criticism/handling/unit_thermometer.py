@@ -1,0 +1,48 @@
+"""One unit's thermometer reads off in one soak."""
+
+from typing import TYPE_CHECKING, ClassVar
+
+import numpy as np
+
+from inertial.criticism.handling.base import Array, Handling, soaks
+from inertial.criticism.handling.soak_thermometer import corrected
+
+if TYPE_CHECKING:
+    from inertial.criticism.lot import Lot
+
+
+class UnitThermometer(Handling):
+    """A reading of temperature that is off in one soak, for one unit."""
+
+    id: ClassVar[str] = "unit_thermometer"
+    symbol: ClassVar[str] = "ΔT"
+    equation: ClassVar[str] = "−∂E/∂T·ΔT in one soak, one unit"
+    breaker: ClassVar[str] = "a second thermometer, or a soak at a fourth temperature"
+    hides_behind: ClassVar[tuple[str, ...]] = ("scale_temperature_quadratic", "bias_temperature_quadratic")
+    fewest_units: ClassVar[int] = 1
+
+    def places(self, lot: "Lot") -> list[dict[str, float]]:
+        """Every soak of every unit, where there are more than two soaks."""
+        number = int(soaks(lot.state).max()) + 1
+        units = lot.state.time.shape[0]
+        return [{"unit": float(u), "soak": float(k)} for u in range(units) for k in range(number)] if number > 2 else []
+
+    def change(self, lot: "Lot", slope: Array | None, **place: float) -> Array:
+        """What an offset of one kelvin adds in the unit."""
+        if slope is None:
+            return np.zeros((1, lot.state.time.shape[1], 3, 1))
+        own = slope[int(place["unit"])]
+        return -(own * (soaks(lot.state) == int(place["soak"]))[:, None])[None, ..., None]
+
+    def told(self, lot: "Lot", size: Array, **place: float) -> str:
+        """The offset."""
+        del lot, place
+        return f"the thermometer of the unit read {size[0]:+.2f} K off in this soak; its readings are corrected by it"
+
+    def mended(self, lot: "Lot", size: Array, **place: float) -> "Lot | None":
+        """With the readings of the unit corrected in that soak."""
+        return corrected(lot, soaks(lot.state) == int(place["soak"]), float(size[0]), int(place["unit"]))
+
+    def dwells(self, lot: "Lot", **place: float) -> list[int]:
+        """The dwells of the soak."""
+        return np.flatnonzero(soaks(lot.state) == int(place["soak"])).tolist()

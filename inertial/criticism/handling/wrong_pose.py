@@ -1,0 +1,48 @@
+"""The table stood elsewhere than commanded in one dwell."""
+
+from typing import TYPE_CHECKING, ClassVar
+
+import numpy as np
+
+from inertial.criticism.handling.base import Array, Handling, tilts, without
+
+if TYPE_CHECKING:
+    from inertial.criticism.lot import Lot
+
+
+class WrongPose(Handling):
+    """A pose that the table missed once, for all units."""
+
+    id: ClassVar[str] = "wrong_pose"
+    symbol: ClassVar[str] = "Δα, Δβ"
+    equation: ClassVar[str] = "∂f/∂α·Δα + ∂f/∂β·Δβ in one dwell"
+    breaker: ClassVar[str] = "measure that pose again"
+
+    def places(self, lot: "Lot") -> list[dict[str, float]]:
+        """Every dwell; none where the angles are not known."""
+        known = lot.state.outer is not None and lot.state.inner is not None
+        there = np.flatnonzero(np.isfinite(lot.error).all(axis=-1).any(axis=0))
+        return [{"at": float(k)} for k in there] if known else []
+
+    def change(self, lot: "Lot", slope: Array | None, **place: float) -> Array:
+        """Errors of the two angles in one dwell."""
+        del slope
+        here = np.arange(lot.state.time.shape[1]) == int(place["at"])
+        return tilts(lot.state) * here[:, None, None]
+
+    def told(self, lot: "Lot", size: Array, **place: float) -> str:
+        """The two angles."""
+        del lot, place
+        angles = np.degrees(size)
+        off = f"about {angles[0]:+.3f}° (outer) and {angles[1]:+.3f}° (inner)"
+        return f"the pose was off by {off} for all units; the dwell is left out"
+
+    def mended(self, lot: "Lot", size: Array, **place: float) -> "Lot | None":
+        """Without the dwell: two angles find it but do not mend it."""
+        del size
+        return without(lot, [int(place["at"])])
+
+    def dwells(self, lot: "Lot", **place: float) -> list[int]:
+        """The one dwell."""
+        del lot
+        return [int(place["at"])]

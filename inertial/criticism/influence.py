@@ -1,0 +1,70 @@
+"""Dwells that carry a verdict: by what each of them adds to the deviance, and what is left of it without the most telling."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from inertial.criticism.likelihood import along_mean, shared_noise, weighed
+from inertial.criticism.model import Model, Term
+from inertial.criticism.penalty import fall, freedom
+from inertial.criticism.problem import Lot, Problem
+
+Array = NDArray[np.float64]
+
+_MOST = 8
+_CARRY = 0.5
+"""Share of the whole that the dwells named carry at the most; further ones are many small ones."""
+
+
+@dataclass(frozen=True)
+class Influence:
+    """A dwell of a unit, and the share of the verdict's deviance that it carries."""
+
+    unit: int
+    dwell: int
+    share: float
+
+
+def influence(model: Model, term: Term | None) -> tuple[Influence, ...]:
+    """The dwells that carry a verdict, most first.
+
+    Parameters
+    ----------
+    model : beside which the term is judged; term : what was found, None where the model is adequate
+    """
+    before = model.space.residual
+    carried = before**2
+    if term is not None:
+        richer = model.with_term(term)
+        carried = before**2 - richer.at(model.noise).residual ** 2
+    units = model.problem.lot.state.time.shape[0]
+    each = carried.reshape(units, -1, model.problem.n).sum(axis=1)
+    whole = float(np.sum(np.maximum(each, 0.0)))
+    if whole <= 0.0:
+        return ()
+    order = np.argsort(each, axis=None)[::-1][:_MOST]
+    found: list[Influence] = []
+    for place in order.tolist():
+        unit, dwell = divmod(place, model.problem.n)
+        share = float(each[unit, dwell]) / whole
+        if share <= 0.0 or sum(f.share for f in found) > _CARRY:
+            break
+        found.append(Influence(unit, dwell, share))
+    return tuple(found)
+
+
+def log_p_without(model: Model, term: Term, dwells: tuple[Influence, ...]) -> float:
+    """Log probability of a term when the dwells that carry most of it are left out, at the noise that was found."""
+    lot = model.problem.lot
+    error = lot.error.copy()
+    for one in dwells:
+        error[one.unit, one.dwell] = np.inf
+    problem = Problem(Lot(lot.state, lot.output, error, lot.response, lot.radial), slope=model.problem.slope)
+    space = Model(problem, model.terms, near=model.noise).at(model.noise)
+    gain = space.gain(term.candidate(problem))
+    rank = int(gain.rank[0])
+    if rank == 0:
+        return 0.0
+    common = along_mean(model, model.noise, term) * (1.0 - 1.0 / shared_noise(model.with_term(term)))
+    return weighed(float(fall(space, gain)[0]) * (1.0 - common), rank, freedom(term)).log_p

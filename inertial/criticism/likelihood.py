@@ -1,0 +1,123 @@
+"""Likelihood ratio of a term beside a model, with the noise estimated again with the term inside.
+
+Before a term is in the model part of it counts as noise, slow ones as random walk above all. So the covariance of the richer
+model is its own: D = −2[ℓ(V0; H) − ℓ(V1; H, C)], error contrasts of the model's columns H in both, the coefficients of C at
+their best, V1 the better of the model's and the richer one's noise.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import stats
+
+from inertial.criticism import variance
+from inertial.criticism.covariance import Noise
+from inertial.criticism.decisions import TOGETHER
+from inertial.criticism.handling.base import Handling
+from inertial.criticism.model import Model, Term
+from inertial.criticism.penalty import freedom, price
+from inertial.criticism.space import Space
+
+Array = NDArray[np.float64]
+
+_MEDIAN = float(stats.chi2.median(1))
+
+
+@dataclass(frozen=True)
+class Ratio:
+    """A term beside a model.
+
+    deviance : D, what units share of the noise taken out; rank : coefficients that the plan determines
+    price : of them, and of the places looked at; log_p : of the chi-square, one look
+    """
+
+    deviance: float
+    rank: int
+    price: float
+    log_p: float
+
+    @property
+    def score(self) -> float:
+        """What is left of the deviance when everything is paid."""
+        return self.deviance - self.price
+
+
+def likelihood_ratio(model: Model, term: Term, places: int = 1) -> Ratio:
+    """The likelihood ratio of a term beside a model.
+
+    Parameters
+    ----------
+    places : where the term was looked for, for alternatives that have a place and no coefficient of it
+    """
+    richer = model.with_term(term)
+    noises = [model.noise, richer.noise]
+    spaces = [(model.at(noise), richer.at(noise)) for noise in noises]
+    full = [_deviance(space, more) for space, more in spaces]
+    best = int(np.argmin(full))
+    space, more = spaces[best]
+    # the unknown state of a memory before the first dwell has coefficients, too
+    rank = more.local_rank + more.shared_rank - space.local_rank - space.shared_rank
+    if rank <= 0 or not space.gain(term.candidate(model.problem)).rank[0]:
+        return Ratio(0.0, 0, 0.0, 0.0)
+    plain = _deviance(model.space, model.space)
+    dof = max(space.dof, 1)
+    deviance = max(plain - full[best], 0.0) * max(dof - rank, 0) / dof
+    # by what the units share with the term inside: an effect that is alike in all of them is no noise
+    deviance *= 1.0 - along_mean(model, noises[best], term) * (1.0 - 1.0 / shared_noise(richer))
+    return weighed(deviance, rank, freedom(term), places)
+
+
+def weighed(deviance: float, rank: int, nonlinear: int, places: int = 1) -> Ratio:
+    """A deviance with its price and its probability."""
+    coefficients = rank + nonlinear
+    paid = price(deviance, coefficients) + 2.0 * float(np.log(max(places, 1)))
+    return Ratio(deviance, rank, paid, float(stats.chi2.logsf(deviance, coefficients)))
+
+
+def _deviance(contrasts: Space, left: Space) -> float:
+    """−2 log likelihood of the error contrasts of one model, with what another leaves."""
+    return left.logdet + contrasts.information + variance.deviance(left.squares, contrasts.by_block)
+
+
+def shared_noise(model: Model) -> float:
+    """φ: variance, over that of independent units, of the mean over the units of what a model leaves; one where they are alone.
+
+    From the median: one wrong pose does not raise it.
+    """
+    lot = model.problem.lot
+    units = lot.state.time.shape[0]
+    if units < 2 or lot.radial:
+        return 1.0
+    space = model.space
+    there = model.problem.covariance.there.reshape(units, 3, -1)
+    left = space.residual.reshape(units, 3, -1)
+    count = there.sum(axis=0)
+    mean = np.where(count > 1, left.sum(axis=0) / np.sqrt(np.maximum(count, 1)), np.nan)
+    squares = mean[np.isfinite(mean)] ** 2
+    if squares.size < 10:
+        return 1.0
+    lost = space.dof / max(int(model.problem.covariance.count.sum()), 1)
+    found = float(np.median(squares)) / _MEDIAN / max(lost, 0.1)
+    return found if found > 1.0 + TOGETHER * 2.33 / np.sqrt(squares.size) else 1.0
+
+
+def along_mean(model: Model, noise: Noise, term: Term) -> float:
+    """Share of what a term takes off that is the same in all units, 0 … 1."""
+    lot = model.problem.lot
+    units = lot.state.time.shape[0]
+    if units < 2 or lot.radial:
+        return 0.0
+    if isinstance(term.effect, Handling) and "unit" in term.keywords:
+        return 1.0 / units
+    if term.shared:
+        return 1.0
+    space = model.at(noise)
+    columns = space.project(space.whiten(term.candidate(model.problem).columns[:, :, 0, :]))
+    size = np.sqrt(np.einsum("bnp,bnp->bp", columns, columns))
+    unit = columns / np.where(size > 0.0, size, 1.0)[:, None, :]
+    inverse = np.linalg.pinv(np.swapaxes(unit, -1, -2) @ unit, rcond=1e-4, hermitian=True)
+    fitted = (unit @ (inverse @ (np.swapaxes(unit, -1, -2) @ space.residual[..., None])))[..., 0]
+    fitted = fitted.reshape(units, 3, -1)
+    whole = float(np.sum(fitted**2))
+    return float(units * np.sum(fitted.mean(axis=0) ** 2) / whole) if whole > 0.0 else 0.0

@@ -1,0 +1,40 @@
+"""The measurements of a lot, as the diagnosis takes them."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from inertial.state import State
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Lot:
+    """Measurements of a lot in g.
+
+    state : the dwells of all units, (units, n)
+    output : (units, n, 3), output over the nominal scale: g
+    error : (units, n, 3), white standard error of each dwell mean, g; infinite where a dwell is missing
+    response : (units, 3, 3), K over its diagonal: how a change of force shows on each axis
+    radial : only the norm of the force is known; the state's force is then the corrected output's own direction
+    """
+
+    state: State
+    output: Array
+    error: Array
+    response: Array
+    radial: bool = False
+
+    def units(self, index: Sequence[int]) -> "Lot":
+        """The lot of some units only."""
+        pick = np.asarray(index, dtype=np.intp)
+        return replace(
+            self,
+            state=self.state.pick(pick),
+            output=self.output[pick],
+            error=self.error[pick],
+            response=self.response[pick],
+        )

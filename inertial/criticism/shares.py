@@ -1,0 +1,95 @@
+"""The shares of 1/f and of random walk, looked for on a lattice by restricted likelihood."""
+
+from collections.abc import Callable
+
+import numpy as np
+
+from inertial.criticism.covariance import Shares
+from inertial.criticism.decisions import LARGEST_SHARE, LEAST_SHARE, SHARE_STEP
+
+Place = tuple[int | None, int | None]
+
+_STRIDES = (4, 2, 1)
+"""Half decades, quarters, eighths."""
+
+_LEAST = 1e-3
+"""Deviance that a step must bring."""
+
+
+def best_shares(deviance: Callable[[Shares], float], near: Shares | None = None, *, finest: int = 1) -> Shares:
+    """The shares at which a deviance is least, walked to from a start.
+
+    Parameters
+    ----------
+    near : where to begin; 1/f of three times the white variance where None
+    finest : smallest stride, in eighths of a decade
+    """
+    known: dict[Place, float] = {}
+
+    def at(place: Place) -> float:
+        if place not in known:
+            known[place] = deviance(shares_at(place))
+        return known[place]
+
+    here = (4, None) if near is None else place_of(near)
+    for stride in _STRIDES:
+        if stride < finest:
+            break
+        for _ in range(60):
+            best = next((p for p in _around(here, stride) if at(p) < at(here) - _LEAST), None)
+            if best is None:
+                break
+            here = best
+    return shares_at(here)
+
+
+def place_of(shares: Shares) -> Place:
+    """The place of the lattice nearest to shares."""
+    first, second = (
+        None if s <= 10.0 ** ((LEAST_SHARE - 4) / SHARE_STEP) else _inside(round(SHARE_STEP * np.log10(s)))
+        for s in shares
+    )
+    return first, second
+
+
+def shares_at(place: Place) -> Shares:
+    """The shares of a place of the lattice."""
+    flicker, walk = (0.0 if k is None else 10.0 ** (k / SHARE_STEP) for k in place)
+    return Shares(flicker, walk)
+
+
+def _inside(k: int) -> int:
+    return min(max(k, LEAST_SHARE), LARGEST_SHARE)
+
+
+def _around(place: Place, stride: int) -> list[Place]:
+    """Neighbours: each share up or down, one for the other; at the first stride also none, or there at last."""
+    first, second = place
+    near: list[Place] = [*((first, k) for k in _moved(second, stride)), *((k, second) for k in _moved(first, stride))]
+    if first is not None and second is not None:
+        near += [
+            (_inside(first - stride), _inside(second + stride)),
+            (_inside(first + stride), _inside(second - stride)),
+        ]
+        near += [
+            (_inside(first - stride), _inside(second - stride)),
+            (_inside(first + stride), _inside(second + stride)),
+        ]
+    if stride == _STRIDES[0]:
+        near += [(first, None), (None, second)]
+        # a share that is not there yet only shows where it is as large as the other
+        if second is None:
+            near += [
+                (first, LEAST_SHARE + 8),
+                *([] if first is None else [(first, first), (_inside(first - 8), first)]),
+            ]
+        if first is None:
+            near += [
+                (LEAST_SHARE + 8, second),
+                *([] if second is None else [(second, second), (second, _inside(second - 8))]),
+            ]
+    return [p for p in dict.fromkeys(near) if p != place]
+
+
+def _moved(k: int | None, stride: int) -> list[int]:
+    return [] if k is None else [_inside(k + stride), _inside(k - stride)]

@@ -1,0 +1,39 @@
+"""How a unit's output follows temperature by its fitted model: what an error of the thermometer does."""
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from inertial.criticism.comparison import estimate
+from inertial.criticism.model import Model
+from inertial.criticism.problem import Problem
+from inertial.state import History
+
+Array = NDArray[np.float64]
+
+_STEP = 0.5  # K
+
+
+def slope_of(model: Model) -> Array | None:
+    """∂E/∂T of every unit at every dwell, (units, n, 3), g/K; None where no temperature is read or the model has none in it."""
+    lot = model.problem.lot
+    state = lot.state
+    if state.temperature is None or lot.radial:
+        return None
+    found = estimate(model)
+    ends: list[Array] = []
+    for sign in (1.0, -1.0):
+        history = (
+            None if state.history is None else History(state.history.time, state.history.temperature + sign * _STEP)
+        )
+        moved = replace(state, temperature=state.temperature + sign * _STEP, history=history, memory={})
+        problem = Problem(replace(lot, state=moved))
+        local = [t for t in found.terms if not t.shared]
+        columns = [problem.columns(t.effect, t.keywords)[..., : t.first] for t in local]
+        whole = np.concatenate(columns, axis=-1)
+        ends.append(np.einsum("bnp,bp->bn", whole, found.local[:, : whole.shape[-1]]))
+    slope = (ends[0] - ends[1]) / (2.0 * _STEP)
+    if float(np.max(np.abs(slope))) <= 0.0:
+        return None
+    return np.swapaxes(slope.reshape(state.time.shape[0], 3, -1), 1, 2)

@@ -1,0 +1,20 @@
+"""Remarks on the error stream beside what is shown of a run."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from pipelines.cli.options import error_console
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from pipelines.archive import Run
+
+
+def tell_of(run: Run, serials: Sequence[str]) -> None:
+    """Print missing or foreign signatures, and differing library versions, on the error stream."""
+    from pipelines.certificates.handed_out import library_remarks, signature_remarks
+
+    for line in (*signature_remarks(run, serials), *library_remarks(run)):
+        error_console().print(f"show: {line}", markup=False, soft_wrap=True)

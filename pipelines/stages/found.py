@@ -1,0 +1,137 @@
+"""What a diagnosis found, as rows of its document: classes, dwells that carry the verdict, dwells left out."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from schemas.units import MICRO
+
+if TYPE_CHECKING:
+    from inertial.criticism.bad_dwells import BadDwell
+    from inertial.criticism.diagnosis import Diagnosis, Named
+    from inertial.criticism.model import Model
+
+BAD_DWELL = "bad_dwell"
+"""Id of a single dwell of one unit that is off."""
+
+
+@dataclass(frozen=True)
+class Names:
+    """Serial numbers and numbers of dwells, in the order of a diagnosis' arrays."""
+
+    units: tuple[str, ...]
+    dwells: tuple[int, ...]
+
+
+def probability(log_p: float) -> float:
+    """A probability; one below the smallest number is given as that."""
+    return float(max(np.exp(min(log_p, 0.0)), 1e-300))
+
+
+def known(value: float) -> float | None:
+    """A number; None where it is not one."""
+    return float(value) if np.isfinite(value) else None
+
+
+def classes_of(diagnosis: Diagnosis, names: Names) -> list[dict[str, Any]]:
+    """Rows of all classes: what handling did first, as nothing is to be read into a run before it is mended."""
+    rows = [_class(n, names) for n in diagnosis.handled]
+    if not diagnosis.heavy:
+        rows += [_bad_dwell(diagnosis, d, names) for d in diagnosis.removed]
+    return [*rows, *(_class(n, names) for n in diagnosis.named)]
+
+
+def _class(named: Named, names: Names) -> dict[str, Any]:
+    group = named.effects
+    simplest = group.simplest
+    scope = "data" if group.of_data else simplest.effect.scope
+    row: dict[str, Any] = {
+        "effects": list(group.ids),
+        "scope": scope,
+        "rms_after_ug": MICRO * named.rms_after,
+        "heldout_after_ug": known(MICRO * named.heldout_after),
+        "heldout_before_ug": known(MICRO * named.heldout_before),
+        "p_value": probability(group.log_p),
+        "size_ug": MICRO * group.size,
+        "nonlinear": {} if scope == "data" else dict(simplest.values),
+        "plausible": _plausible(group.size, simplest.effect.typical_ug),
+    }
+    if named.told:
+        row |= {
+            "units": [names.units[u] for u in named.units],
+            "dwells": [names.dwells[d] for d in named.dwells],
+            "evidence": named.told,
+        }
+    return row
+
+
+def _bad_dwell(diagnosis: Diagnosis, found: BadDwell, names: Names) -> dict[str, Any]:
+    size = float(np.linalg.norm(found.off))
+    return {
+        "effects": [BAD_DWELL],
+        "scope": "data",
+        "rms_after_ug": MICRO * diagnosis.rms,
+        "heldout_after_ug": None,
+        "p_value": probability(-0.5 * found.deviations**2),
+        "size_ug": MICRO * size,
+        "nonlinear": {},
+        "plausible": True,
+        "units": [names.units[found.unit]],
+        "dwells": [names.dwells[found.dwell]],
+        "evidence": f"{MICRO * size:.0f} µg off, {found.deviations:.1f} standard deviations; the dwell is left out",
+    }
+
+
+def influence_of(diagnosis: Diagnosis, names: Names) -> list[dict[str, Any]]:
+    """Dwells that carry the verdict, most first; those that were left out carry all of theirs."""
+    single = [] if diagnosis.heavy else diagnosis.removed
+    rows = [{"unit": names.units[d.unit], "dwell": names.dwells[d.dwell], "share": 1.0} for d in single]
+    if rows and not diagnosis.named:
+        return rows
+    return [
+        {"unit": names.units[d.unit], "dwell": names.dwells[d.dwell], "share": round(d.share, 4)}
+        for d in diagnosis.influence
+    ]
+
+
+def without_influence(diagnosis: Diagnosis) -> dict[str, Any] | None:
+    """The verdict without the dwells that carry it; None where nothing is named."""
+    if diagnosis.log_p_without is None:
+        return None
+    return {"dwells": len(diagnosis.influence), "p_value": probability(diagnosis.log_p_without)}
+
+
+def removed_of(diagnosis: Diagnosis, names: Names) -> dict[str, Any] | None:
+    """Single dwells that were left out, and whether they are the tails of the noise; None where there are none."""
+    if not diagnosis.removed:
+        return None
+    return {
+        "heavy_tails": diagnosis.heavy,
+        "dwells": [
+            {
+                "unit": names.units[d.unit],
+                "dwell": names.dwells[d.dwell],
+                "off_ug": MICRO * float(np.linalg.norm(d.off)),
+                "deviations": round(d.deviations, 2),
+            }
+            for d in diagnosis.removed
+        ],
+    }
+
+
+def noise_of(model: Model) -> dict[str, Any]:
+    """The noise that was found: shares of 1/f and random walk over the white variance, and by how much units and axes differ."""
+    noise = model.noise
+    return {
+        "wander_share": float(noise.shares.flicker),
+        "walk_share": float(noise.shares.walk),
+        "noise_spread": float(np.max(noise.scale) / np.min(noise.scale)),
+    }
+
+
+def _plausible(size: float, typical: tuple[float, float]) -> bool:
+    """Whether a size in g is what the effect has been seen to reach, within a factor of ten below."""
+    return 0.1 * typical[0] <= MICRO * size <= typical[1]

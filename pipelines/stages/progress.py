@@ -1,0 +1,84 @@
+"""Whether what was added to a model is there: by a fresh run where there is one, else by dwells left out."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from inertial.criticism.came_again import came_again
+from inertial.criticism.comparison import estimate
+from inertial.criticism.decisions import BLOCKS, LEFT_OUT
+from inertial.criticism.left_out import left_out
+from pipelines.stages.found import known
+from schemas.units import MICRO
+
+if TYPE_CHECKING:
+    from inertial.criticism.left_out import LeftOut
+    from inertial.criticism.model import Model
+    from inertial.criticism.problem import Lot
+
+
+def progress(before: Model, after: Model, out: LeftOut, fresh: Lot | None) -> dict[str, Any]:
+    """What is known of the effects by which two models differ.
+
+    Parameters
+    ----------
+    before, after : fitted to the same dwells; out : of ``after``, on dwells left out
+    fresh : the fresh run in the scale of the first; None where there is none
+
+    Returns
+    -------
+    ``judged_by``; ``confirmed``: true, false (evidence against it), or None (not decided); ``fall_ug`` with its standard error
+    ``fall_u_ug``; on a fresh run ``part`` (λ) with ``part_u``; on dwells left out the gain in ``log_density``
+    """
+    if fresh is not None:
+        return _by_fresh(before, after, fresh)
+    return _by_left_out(left_out(before), out)
+
+
+def _by_fresh(before: Model, after: Model, fresh: Lot) -> dict[str, Any]:
+    found = came_again(fresh, estimate(before), estimate(after))
+    return {
+        "judged_by": "fresh run",
+        "confirmed": found.confirmed,
+        "part": known(found.part),
+        "part_u": known(found.error),
+        "fall_ug": MICRO * found.fall,
+        "fall_u_ug": known(MICRO * found.fall_error),
+        "estimated_again": found.again,
+        "log_density": None,
+    }
+
+
+def _by_left_out(before: LeftOut, after: LeftOut) -> dict[str, Any]:
+    kinds = set(before.density) & set(after.density)
+    gains = {kind: after.density[kind] - before.density[kind] for kind in kinds}
+    gain = gains.get("blocks of time")
+    missed = [(before.missed[k], after.missed[k]) for k in sorted(kinds)]
+    falls = [float(np.sqrt(np.nanmean(a**2)) - np.sqrt(np.nanmean(b**2))) for a, b in missed]
+    worst = int(np.argmin(falls)) if falls else 0
+    return {
+        "judged_by": "dwells left out",
+        # absence of evidence is no evidence: without a fresh run nothing is refuted
+        "confirmed": True if gain is not None and gain > LEFT_OUT else None,
+        "part": None,
+        "part_u": None,
+        "fall_ug": MICRO * falls[worst] if falls else None,
+        "fall_u_ug": known(MICRO * _error(*missed[worst])) if falls else None,
+        "estimated_again": None,
+        "log_density": gain,
+    }
+
+
+def _error(before: np.ndarray, after: np.ndarray) -> float:
+    """Standard error of the fall of the RMS, stretches of time left out in turn."""
+    n = before.shape[1]
+    stretch = np.arange(n) * min(BLOCKS, n) // n
+    falls = []
+    for k in range(int(stretch.max()) + 1):
+        rest = stretch != k
+        one, other = (np.sqrt(np.nanmean(v[:, rest] ** 2)) for v in (before, after))
+        falls.append(one - other)
+    count = len(falls)
+    return float(np.sqrt((count - 1) / count * np.sum((np.array(falls) - np.mean(falls)) ** 2)))
