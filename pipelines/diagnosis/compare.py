@@ -17,7 +17,7 @@ from inertial.criticism.refinement import terms_of
 from inertial.effects import StationEffect
 from inertial.errors import InertialError
 from inertial.planning.reasons import drivers_of
-from pipelines.stages.progress import progress
+from pipelines.diagnosis.confirmation import progress
 from pipelines.tables.dwells import Measured, lot_of, measured
 from schemas.errors import DataRejected
 from schemas.units import MICRO

@@ -15,7 +15,7 @@ from inertial.errors import InertialError
 from pipelines.diagnosis.compare import compare, without_history
 from pipelines.diagnosis.condense import condense
 from pipelines.diagnosis.next_measurement import proposed
-from pipelines.stages.found import (
+from pipelines.diagnosis.result_rows import (
     Names,
     classes_of,
     influence_of,

@@ -26,7 +26,11 @@ class ErrorFigures(TypedDict):
     rms_ug: Annotated[float | None, "root mean square residual of the units without a fault, µg"]
     floor_ug: Annotated[float | None, "noise floor, µg"]
     p_value: Annotated[float | None, "probability of such a residual if the model is adequate, at least 1e-300"]
-    wander_share: NotRequired[Annotated[float, "share ρ of the wander that units have in common"]]
+    wander_share: NotRequired[Annotated[float, "variance of the 1/f noise over that of the white noise"]]
+    walk_share: NotRequired[
+        Annotated[float, "variance of the random walk at the end of the run over that of the white noise"]
+    ]
+    noise_spread: NotRequired[Annotated[float, "largest standard deviation of a unit and axis over the smallest"]]
 
 
 class FailingDriver(TypedDict):
@@ -44,11 +48,48 @@ class EffectClassDocument(TypedDict):
     effects: Annotated[list[str], "ids, the simplest first"]
     scope: Literal["sensor", "slot", "station", "data"]
     rms_after_ug: Annotated[float, "residual with the effect added, µg"]
-    heldout_after_ug: Annotated[float, "cross-validated residual with the effect added, µg"]
+    heldout_after_ug: Annotated[
+        float | None, "cross-validated residual with the effect added, µg; null: cannot be judged"
+    ]
+    heldout_before_ug: NotRequired[Annotated[float | None, "the same without the effect, µg"]]
     p_value: float
     size_ug: Annotated[float, "size of the effect, µg"]
     nonlinear: NotRequired[Annotated[dict[str, Any], "estimated time constants, widths, …"]]
     plausible: NotRequired[Annotated[bool, "whether the size is in the usual range of the effect"]]
+    units: NotRequired[Annotated[list[str], "of scope data: the units concerned"]]
+    dwells: NotRequired[Annotated[list[int], "of scope data: the dwells concerned"]]
+    evidence: NotRequired[Annotated[str, "of scope data: what happened"]]
+
+
+class InfluentialDwell(TypedDict):
+    """A dwell that carries the verdict."""
+
+    unit: str
+    dwell: int
+    share: Annotated[float, "share of the evidence that rests on the dwell"]
+
+
+class WithoutInfluence(TypedDict):
+    """The verdict without the dwells that carry it."""
+
+    dwells: Annotated[int, "number of dwells left out"]
+    p_value: float
+
+
+class RemovedDwell(TypedDict):
+    """A dwell that was left out before physics was judged."""
+
+    unit: str
+    dwell: int
+    off_ug: Annotated[float, "distance from the model, µg"]
+    deviations: Annotated[float, "the same in standard deviations"]
+
+
+class RemovedDwells(TypedDict):
+    """The dwells left out."""
+
+    heavy_tails: Annotated[bool, "many dwells: the noise has heavier tails than a normal distribution"]
+    dwells: list[RemovedDwell]
 
 
 class UnexplainedExcess(TypedDict):
@@ -96,6 +137,11 @@ class DiagnosisDocument(TypedDict):
     unexplained: UnexplainedExcess | None
     unseen: Annotated[list[str], "effects that this plan could not have seen"]
     next_measurements: list[NextMeasurement]
+    influence: Annotated[list[InfluentialDwell], "largest share first"]
+    without_influence: NotRequired[WithoutInfluence | None]
+    removed: NotRequired[RemovedDwells | None]
+    warnings: NotRequired[list[str]]
+    history: NotRequired[Annotated[str | None, "file of the temperature history that was read"]]
     effects: NotRequired[Annotated[list[str], "the model that was judged"]]
     units: NotRequired[list[str]]
     breakers: NotRequired[Annotated[dict[str, str], "per unseen effect, a measurement that would show it"]]
@@ -127,6 +173,19 @@ class StationParameter(TypedDict):
     standard_error: float
 
 
+class Confirmation(TypedDict):
+    """Evidence of data that were not fitted for the effects that were added to a model."""
+
+    judged_by: Annotated[str, "`fresh run` or `dwells left out`"]
+    confirmed: Annotated[bool | None, "null: cannot be decided"]
+    part: Annotated[float | None, "share λ of the predicted change that appears in the fresh run"]
+    part_u: Annotated[float | None, "standard uncertainty of λ"]
+    fall_ug: Annotated[float | None, "decrease of the error, µg"]
+    fall_u_ug: Annotated[float | None, "standard uncertainty of the decrease, µg"]
+    estimated_again: Annotated[str | None, "coefficients estimated from the fresh run before it is judged"]
+    log_density: Annotated[float | None, "gain in log predictive density of the dwells left out"]
+
+
 class ComparisonDocument(TypedDict):
     """``compare --json``: error of a model on the run it is fitted to, on poses left out, and on a fresh run."""
 
@@ -143,6 +202,9 @@ class ComparisonDocument(TypedDict):
     nonlinear: NotRequired[Annotated[dict[str, Any], "estimated parameters by effect"]]
     station: NotRequired[list[StationParameter]]
     fresh_by_pose: NotRequired[list[PoseComparison]]
+    heldout: NotRequired[Annotated[dict[str, float], "cross-validated error by what is left out, µg"]]
+    warnings: NotRequired[list[str]]
+    progress: NotRequired[Annotated[Confirmation | None, "null without a version to compare with"]]
 
 
 class VersionDocument(TypedDict):
@@ -156,12 +218,15 @@ class VersionDocument(TypedDict):
     at: Annotated[str, "ISO date and time; empty if the file does not have it"]
     why: str
     run: str
-    rms_ug: Annotated[float | None, "residual of the fit, µg"]
-    heldout_rms_ug: Annotated[float | None, "cross-validated error, µg"]
-    fresh_rms_ug: Annotated[float | None, "error on the fresh run, µg"]
+    fitted_ug: Annotated[float | None, "residual of the fit, µg"]
+    heldout_ug: Annotated[float | None, "worst cross-validated error of poses, soaks and blocks of time, µg"]
+    fresh_ug: Annotated[float | None, "error on the fresh run, µg"]
     floor_ug: Annotated[float | None, "noise floor, µg"]
+    fall_ug: Annotated[float | None, "decrease of the error by what was added, µg"]
+    fall_u_ug: Annotated[float | None, "standard uncertainty of the decrease, µg"]
     confirmed: Annotated[bool | None, "whether data that were not fitted confirm the change; null: cannot be decided"]
-    words: Annotated[str, "`confirmed` as a sentence"]
+    text: Annotated[str, "`confirmed` as a sentence"]
+    warnings: NotRequired[list[str]]
 
 
 class HistoryDocument(TypedDict):

@@ -62,6 +62,15 @@ class PlannedEffect(TypedDict):
     why: NotRequired[Annotated[str, "what hides it; empty if it is seen"]]
 
 
+class PlannedBias(TypedDict):
+    """Expected standard uncertainty of the bias by measurand, of the worst axis."""
+
+    record_u_ug: Annotated[float, "as the mean of the record, µg"]
+    long_u_ug: Annotated[float, "as the mean of the time after the record, µg"]
+    long_s: Annotated[float, "length of that time, s"]
+    switch_on_u_ug: Annotated[float | None, "after the next switch-on, µg; null: not stated"]
+
+
 class PlanDocument(TypedDict):
     """``plan --json``: what a recipe can determine, with its station time and expected uncertainties."""
 
@@ -77,4 +86,5 @@ class PlanDocument(TypedDict):
     dwell_s: NotRequired[DwellTime]
     minutes: NotRequired[StationMinutes]
     coefficients: NotRequired[list[PlannedCoefficient]]
+    bias: NotRequired[Annotated[PlannedBias | None, "null: the model has no bias"]]
     page: NotRequired[Annotated[str, "path of the page that `--page` wrote"]]

@@ -42,7 +42,7 @@ def kept(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("kept")
     with tarfile.open(KEPT) as archive:
         archive.extractall(folder / "archive", filter="data")
-    certify = ["certify", "latest", "--from", "2026-01-01", "--archive", str(folder / "archive")]
+    certify = ["certify", "latest", "--archive", str(folder / "archive")]
     assert CliRunner().invoke(app, certify).exit_code == 0
     model = '[model]\nname = "m"\nversion = 1\neffects = ["bias", "scale", "misalignment"]\n'
     (folder / "model.toml").write_text(model, encoding="utf-8")

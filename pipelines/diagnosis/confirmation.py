@@ -10,7 +10,7 @@ from inertial.criticism.came_again import came_again
 from inertial.criticism.comparison import estimate
 from inertial.criticism.decisions import BLOCKS, LEFT_OUT
 from inertial.criticism.left_out import left_out
-from pipelines.stages.found import known
+from pipelines.diagnosis.result_rows import known
 from schemas.units import MICRO
 
 if TYPE_CHECKING:
