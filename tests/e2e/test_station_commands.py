@@ -16,7 +16,7 @@ from typer.testing import CliRunner
 from pipelines.cli import app
 from pipelines.cli.chart import Line, chart
 from stations.opening import open_station
-from stations.safety.folder import log as machine_log
+from stations.safety.folder import read_log as machine_log
 from stations.self_test import Standard, control_limits, keep, read_history
 
 

@@ -21,7 +21,7 @@ from small_station import lot_of
 from pipelines.archive import Archive
 from pipelines.flows.settings import CLIENT_KEY
 from stations.opening import open_devices
-from stations.safety.folder import log
+from stations.safety.folder import read_log as log
 
 pytestmark = [pytest.mark.slow, pytest.mark.timeout(600)]
 

@@ -398,7 +398,7 @@ def test_noted_events_that_were_edited_are_read_again(root: Path, caplog) -> Non
 
 
 @pytest.mark.parametrize("root", ["unsigned"], indirect=True)
-@pytest.mark.parametrize("name", ["../../../x", "/tmp/x", "a/b", "..", "a\\b"])
+@pytest.mark.parametrize("name", ["../../../x", "/etc/x", "a/b", "..", "a\\b"])
 def test_a_crate_of_a_foreign_archive_stays_in_its_folder(root: Path, tmp_path: Path, name: str) -> None:
     run = runs(root)[0]
     for entry, value in (("recipe", {**run.about["recipe"], "name": name}), ("capture", name), ("parents", [name])):

@@ -11,6 +11,7 @@ from scipy.io import savemat
 from pipelines.importers import exchange, files
 from pipelines.importers.mapping import Mapping, build, pairs
 from pipelines.importers.record import imported
+from pipelines.tables.dwell_table import covariates
 from schemas.errors import DataRejected, RecipeInvalid, WrongUse
 
 CONTENT = {"columns": {"time": "t", "x": "ax", "y": "ay", "z": "az"}, "units": {"output": "g"}, "unit": "A1"}
@@ -178,7 +179,7 @@ def test_dwells_come_back_in_order_with_their_covariates(tmp_path: Path) -> None
     dwells().iloc[::-1].to_parquet(tmp_path / "dwells.parquet")
     frame = exchange.read_dwells(str(tmp_path / "dwells.parquet"))
     assert frame["dwell"].tolist() == [0, 1, 2, 3]
-    assert exchange.covariates(frame) == ["hum"]
+    assert covariates(frame) == ["hum"]
 
 
 def test_a_serial_number_of_digits_stays_text(tmp_path: Path) -> None:

@@ -16,6 +16,7 @@ import pytest
 from scipy.io import savemat
 
 from pipelines.importers import exchange, files
+from pipelines.tables.dwell_table import covariates
 from schemas.errors import DataRejected
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -41,7 +42,7 @@ def test_broken_notes_of_pandas_in_a_parquet_file_do_not_matter(tmp_path: Path) 
 
 def test_an_index_without_a_name_is_no_column(tmp_path: Path) -> None:
     dwells().set_index(pd.Index([5, 6, 7, 9])).to_parquet(tmp_path / "d.parquet")
-    assert exchange.covariates(exchange.read_dwells(tmp_path / "d.parquet")) == []
+    assert covariates(exchange.read_dwells(tmp_path / "d.parquet")) == []
 
 
 @pytest.mark.parametrize("packed", [False, True])

@@ -22,6 +22,7 @@ from pipelines.chain.certify import certify
 from pipelines.cli import app
 from pipelines.jobs.model_change import wanted
 from pipelines.rerun.rerun import again
+from pipelines.stages.figures import UNITS
 from schemas.errors import ArchiveUnusable, RecipeInvalid, WrongUse
 from schemas.limits import VALIDITY_MONTHS, parse_limits
 
@@ -104,12 +105,12 @@ def test_the_limits_file_says_how_long(run: Run, tmp_path: Path) -> None:
 @pytest.mark.parametrize("months", ["0", "121", '"6"', "true", "6.5"])
 def test_the_months_of_a_limits_file_are_bounded(months: str) -> None:
     with pytest.raises(RecipeInvalid, match="validity_months"):
-        parse_limits(LIMITS.replace("= 6", f"= {months}"), "half.toml")
+        parse_limits(LIMITS.replace("= 6", f"= {months}"), "half.toml", UNITS)
 
 
 def test_limits_that_do_not_say_how_long_are_kept_as_before() -> None:
     """A run is named for its limits: those of earlier versions keep their names."""
-    assert "validity_months" not in parse_limits(LIMITS.replace("validity_months = 6\n", ""), "x").model_dump(
+    assert "validity_months" not in parse_limits(LIMITS.replace("validity_months = 6\n", ""), "x", UNITS).model_dump(
         mode="json"
     )
 

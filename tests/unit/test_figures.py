@@ -6,7 +6,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from pipelines.stages.figures import Figure, UnitTables, coefficient_figures, figures_of
+from pipelines.stages.figures import UNITS, Figure, LotCoefficients, UnitTables, figures_of
 from pipelines.stages.grade import Evidence, grade
 from pipelines.tables.frames import ByUnit
 from schemas.limits import parse_limits
@@ -35,9 +35,10 @@ def calibration(values: np.ndarray, errors: np.ndarray) -> SimpleNamespace:
 def test_the_coefficient_nearest_its_limit_with_its_uncertainty_is_judged(
     guard: float, value: float, error: float
 ) -> None:
-    found = coefficient_figures(calibration(np.array([9e-3, -8e-3, 1e-3]), np.array([1e-4, 1e-3, 1e-3])), 0.0, guard)
-    assert abs(found[0][0].value) == pytest.approx(value)
-    assert found[0][0].uncertainty == pytest.approx(error)
+    lot = LotCoefficients(calibration(np.array([9e-3, -8e-3, 1e-3]), np.array([1e-4, 1e-3, 1e-3])), 0.0)
+    found = lot.of(0).nearest("bias", 1e3, guard)
+    assert abs(found.value) == pytest.approx(value)
+    assert found.uncertainty == pytest.approx(error)
 
 
 def noise_rows(*, silent: bool) -> pd.DataFrame:
@@ -69,7 +70,7 @@ def evidence(*, silent: bool) -> Evidence:
 
 
 def test_figures_without_a_limit_carry_the_k_of_the_limits() -> None:
-    tables = grade(evidence(silent=False), parse_limits(LIMITS, "test"))
+    tables = grade(evidence(silent=False), parse_limits(LIMITS, "test", UNITS))
     own = tables["figures"].set_index("figure")
     u = 5.0 / np.sqrt(2.0) / np.sqrt(4.0)
     assert own.loc["residual_rms_ug", "uncertainty"] == pytest.approx(2.5 * u)
@@ -77,12 +78,12 @@ def test_figures_without_a_limit_carry_the_k_of_the_limits() -> None:
 
 
 def test_a_silent_axis_passes_no_limit_and_is_named() -> None:
-    tables = grade(evidence(silent=True), parse_limits(LIMITS, "test"))
+    tables = grade(evidence(silent=True), parse_limits(LIMITS, "test", UNITS))
     row = tables["grades"].iloc[0]
     assert row["outcome"] == "fail"
     assert "velocity_random_walk_ug_rtHz: not determined (axis y: the output never changed)" in row["reasons"]
     assert np.isfinite(tables["figures"]["value"]).all()
-    assert grade(evidence(silent=False), parse_limits(LIMITS, "test"))["grades"].iloc[0]["outcome"] == "pass"
+    assert grade(evidence(silent=False), parse_limits(LIMITS, "test", UNITS))["grades"].iloc[0]["outcome"] == "pass"
 
 
 def test_the_rms_error_carries_the_uncertainty_of_its_covariance_where_the_run_has_it() -> None:
@@ -95,9 +96,10 @@ def test_the_rms_error_carries_the_uncertainty_of_its_covariance_where_the_run_h
     none = pd.DataFrame({"unit": pd.Series(dtype=str)})
 
     def figure(table: pd.DataFrame) -> Figure:
-        tables = UnitTables(*(ByUnit(t).of("A") for t in (residuals, table, poses, none)))
-        return next(f for f in figures_of(tables, [], 2.0) if f.name == "bias_error_ug")
+        without = LotCoefficients(calibration(np.zeros(3), np.zeros(3)), 0.0).of(0)
+        tables = UnitTables(*(ByUnit(t).of("A") for t in (residuals, table, poses, none)), without, 2.0)
+        return next(f for f in figures_of(tables) if f.name == "bias_error_ug")
 
     assert figure(rows).uncertainty == pytest.approx(np.sqrt(1250.0) / 2.0)
     told = rows.assign(rms_uncertainty_x_ug=7.0, rms_uncertainty_y_ug=1.0, rms_uncertainty_z_ug=1.0)
-    assert figure(told) == ("bias_error_ug", pytest.approx(np.sqrt(1250.0)), 7.0, "")
+    assert figure(told) == ("bias_error_ug", "µg", pytest.approx(np.sqrt(1250.0)), 7.0, "")

@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 
 from pipelines.archive import Archive, Run, RunInfo, listing
+from pipelines.archive.run_files import stages_of
 
 LOTS = 40
 
@@ -67,7 +68,7 @@ def test_a_sealed_run_tells_its_stages_from_one_file(tmp_path: Path, monkeypatch
 
     run = small_run(tmp_path)
     run.seal()
-    wanted = listing.stages_of(run)
+    wanted = stages_of(run.path)
     monkeypatch.setattr(listing, "stages_of", lambda *_: pytest.fail("manifests were read"))
     info = listing.info_of(run)
     assert isinstance(info, RunInfo)

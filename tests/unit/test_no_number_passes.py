@@ -13,6 +13,7 @@ from inertial.noise.terms import fit_terms
 from inertial.population.change_points import change_points
 from inertial.population.comparison import holm
 from pipelines.audit.few_units import _fits
+from pipelines.stages.figures import UNITS
 from pipelines.stages.noise import limits_where_unexplained
 from schemas.limits import decide, parse_limits
 
@@ -64,4 +65,4 @@ def test_a_series_with_a_gap_has_no_change() -> None:
 
 @pytest.mark.parametrize(("value", "u"), [(np.nan, 1.0), (10.0, np.nan), (np.inf, 0.0)])
 def test_a_figure_that_is_no_number_does_not_pass(value: float, u: float) -> None:
-    assert not decide(parse_limits(LIMITS, "t"), "bias_error_ug", value, u).passed
+    assert not decide(parse_limits(LIMITS, "t", UNITS), "bias_error_ug", value, u).passed

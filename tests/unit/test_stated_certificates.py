@@ -103,7 +103,7 @@ def test_a_unit_that_is_certified_again_after_a_revocation_is_exported(run: Run,
 
 
 def test_the_report_names_the_certificates_and_follows_the_ledger(run: Run, typed: Typed) -> None:
-    assert "No unit of this run was certified" in run.report.read_text(encoding="utf-8")
+    assert "No unit of this run had a certificate" in run.report.read_text(encoding="utf-8")
     typed("certify", run.id)
     page = re.sub(r"<[^>]*>", " ", run.report.read_text(encoding="utf-8"))
     assert re.search(rf"A1\s+A1/1\s+{day()}\s+{months_after(day(), 12)}\s+valid", page)
