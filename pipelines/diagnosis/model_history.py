@@ -82,7 +82,7 @@ def _by_fresh(progress: dict[str, Any], fall: str) -> str:
     part, error = progress["part"], progress["part_u"]
     if part is None:
         return "not decided: the fresh run's dwells do not show it; measure the same poses and temperatures again"
-    came = f"{part:.2f} ± {2.0 * error:.2f} (k = 2) of the predicted change came again on the fresh run"
+    came = f"{part:.2f} ± {2.0 * error:.2f} (k = 2) of the predicted change appears in the fresh run"
     if progress["confirmed"] is True:
         return f"confirmed: {came}; {fall}"
     if progress["confirmed"] is False:
