@@ -75,6 +75,6 @@ def test_optimise_may_be_spelled_with_a_z(monkeypatch, capsys) -> None:
 def test_an_error_below_the_noise_that_is_no_noise_is_said_to_be_small(rms, told_so) -> None:
     error = {"rms_ug": rms, "floor_ug": 441.0, "p_value": 4e-190}
     document = {"adequate": False, "error": error, "blocked_by": [], "units": ["U1"], "unexplained": None}
-    said = verdict({**document, "classes": [{"effects": ["scale_temperature_quadratic"]}]})
+    said = verdict({**document, "classes": [{"effects": ["scale_temperature_quadratic"], "scope": "sensor"}]})
     assert said.startswith("NOT ADEQUATE")
     assert ("small beside it" in said) == told_so

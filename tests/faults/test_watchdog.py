@@ -32,6 +32,11 @@ def test_a_killed_run_leaves_its_station_safe_and_free():
         config = modbus_station(port, limits=SLOW)
         with driver(config) as process:
             assert look(config)[1:] == (True, HOT, "running")
+            end = time.monotonic() + SOON_S
+            while (
+                look(config)[0] <= 0.0 and time.monotonic() < end
+            ):  # until the encoder shows that the axis is on its way
+                time.sleep(0.05)
             process.kill()
             process.wait()
             assert safe_within(config, SOON_S) < SAFE_WITHIN_S
