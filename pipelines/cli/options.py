@@ -107,6 +107,7 @@ def error_console() -> Console:
 def print_json(document: Any) -> None:
     """One JSON document on standard output; numbers that JSON does not know become null."""
     sys.stdout.write(json.dumps(json_value(document), ensure_ascii=False, indent=1, allow_nan=False) + "\n")
+    sys.stdout.flush()  # a command that goes on, such as a server, has readers that wait for the document
 
 
 def rows(table: pd.DataFrame) -> list[dict[str, Any]]:

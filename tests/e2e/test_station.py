@@ -1,6 +1,7 @@
 """The station end to end: recipe, adapters, Modbus TCP, plant; and a client of another maker."""
 
 import json
+import os
 import shutil
 import subprocess
 import sys
@@ -154,7 +155,8 @@ def served(*options: str):
         "--json",
         *options,
     ]
-    with subprocess.Popen(command, cwd=ROOT, stdout=subprocess.PIPE, text=True) as process:
+    buffered = {name: value for name, value in os.environ.items() if name != "PYTHONUNBUFFERED"}
+    with subprocess.Popen(command, cwd=ROOT, stdout=subprocess.PIPE, text=True, env=buffered) as process:
         try:
             lines = []
             for line in process.stdout:
