@@ -37,7 +37,7 @@ pytest: $(VENV)/.dev $(CRATE)/.done debian
 test-slow: $(VENV)/.dev $(CRATE)/.done debian  ## suites that take minutes
 	$(BIN)/python -m pytest -m slow
 
-bench: $(VENV)/.bench  ## figures of the README
+bench: $(VENV)/.bench  ## figures of docs/reference/measured.md in a short form
 	$(BIN)/python -m benchmarks
 
 debian:  ## programs of other makers that tests talk to: mbpoll, chromium
