@@ -1,8 +1,8 @@
 """The archive's folders: captures, and runs that work on them.
 
-``captures/<id>/<record>/`` holds what the station delivered, ``runs/<id>/<table>.parquet`` what stages made of it, with
-``<table>.json`` beside each. A run is named for its recipe and the hash of all that decides its result, so the
-same command finds the same run.
+``captures/<id>/<record>/`` holds the samples of the station, ``runs/<id>/<table>.parquet`` the tables of the stages, each with
+its manifest ``<table>.json``. The name of a run has the name of its recipe and the hash of everything that decides its result, so
+that the same command finds the same run.
 """
 
 from __future__ import annotations
@@ -34,12 +34,12 @@ PLAIN = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]*")  # a name that cannot lead els
 
 
 def default_root() -> Place:
-    """The archive's place where none is given: the environment's TUMBLELINE_ARCHIVE, else ./archive."""
+    """The default place of the archive: the environment's TUMBLELINE_ARCHIVE, else ./archive."""
     return place_of(os.environ.get("TUMBLELINE_ARCHIVE") or "archive")
 
 
 class Archive:
-    """A folder of captures and runs, or a place in an object store that is used as one."""
+    """A folder of captures and runs, on a disk or in an object store."""
 
     def __init__(self, root: Place | str | None = None) -> None:
         self.root: Place = place_of(root) if root is not None else default_root()
@@ -65,7 +65,7 @@ class Archive:
                 probe.write_bytes(b"")
                 probe.unlink()
             return
-        files.sweep(self.root)  # a first command that was killed leaves a name of ours, not files of others
+        files.sweep(self.root)  # a first command that was killed may have left temporary files of this program
         if self.root.is_dir() and any(self.root.iterdir()):
             raise ArchiveUnusable(f"archive: {self.root} holds other files and no archive; give an empty or new folder")
         files.publish(mark, self.mark)
@@ -80,11 +80,11 @@ class Archive:
         self._refuse_other_format(files.read_json(mark))
 
     def open_run(self, name: str, about: Mapping[str, Any], decisive: object) -> Run:
-        """The run named for ``name`` and the hash of what decides its result: found, or begun.
+        """The run of this name and of the hash of what decides its result; it is created where it does not exist.
 
         Parameters
         ----------
-        about : what is kept for readers in ``run.json``.
+        about : what ``run.json`` says about the run.
         decisive : JSON-able; everything that the result depends on.
         """
         run = Run(self, self.run_name(name, decisive))
@@ -95,11 +95,11 @@ class Archive:
 
     @staticmethod
     def run_name(name: str, decisive: object) -> str:
-        """The id of the run that is named for ``name`` and the hash of what decides its result."""
+        """The id of a run: its name and the hash of what decides its result."""
         return f"{name}-{digest(decisive)[:10]}"
 
     def capture(self, capture_id: str) -> Records:
-        """The records of a capture, to be read or gone on with."""
+        """The records of a capture, for reading or for continuing."""
         return Records(self.root / "captures" / capture_id)
 
     def run(self, name: str) -> Run:
@@ -110,12 +110,12 @@ class Archive:
         if name == "latest" and (infos := self.runs()):
             return Run(self, infos[-1].id)
         ids = [one for one in self.run_ids() if (self.root / "runs" / one / START).is_file()]
-        found = [one for one in ids if name and one.startswith(name)]
-        if len(found) == 1:
-            return Run(self, found[0])
+        matches = [one for one in ids if name and one.startswith(name)]
+        if len(matches) == 1:
+            return Run(self, matches[0])
         where = f"archive {self.root}"
-        if found:
-            message = f"{where}: '{name}' begins {len(found)} runs ({', '.join(found)}); write more of the name"
+        if matches:
+            message = f"{where}: '{name}' begins {len(matches)} runs ({', '.join(matches)}), one is needed; write more of it"
         elif ids:
             message = f"{where}: no run is called '{name}'; {did_you_mean(name, ids)}"
         else:
@@ -127,14 +127,14 @@ class Archive:
         return self.run(run).table(name)
 
     def runs(self) -> list[RunInfo]:
-        """Every run, the one started first first."""
+        """Every run, in the order of their start."""
         from pipelines.archive.listing import infos_of
 
         infos = infos_of(self.root, [Run(self, run_id) for run_id in self.run_ids()])
         return sorted(infos, key=lambda info: (info.started, info.id))
 
     def run_ids(self) -> list[str]:
-        """Names of the runs, in the order of the alphabet; among them may be one that is just being begun."""
+        """Names of the runs in alphabetical order; a run that is being created at the moment may be among them."""
         self._refuse_newer_format()
         folder = self.root / "runs"
         return sorted(place.name for place in folder.iterdir()) if folder.is_dir() else []
@@ -145,7 +145,7 @@ class Archive:
             self._refuse_other_format(files.read_json(mark))
 
     def _refuse_key_within(self) -> None:
-        """Refuse a signing key that lies in the archive: whoever edits the one could use the other."""
+        """Refuse a signing key inside the archive: who can edit the archive could sign with it."""
         key = key_place()
         if key is not None and isinstance(self.root, Path) and key.resolve().is_relative_to(self.root.resolve()):
             raise ArchiveUnusable(

@@ -25,7 +25,7 @@ class Events:
         self.path = capture / FOLDER
 
     def note(self, event: Event) -> None:
-        """Keep an event durably; one that a resumed simulation comes to again is not kept twice."""
+        """Write an event durably; an event that a resumed simulation repeats is written once."""
         known = self._files()
         if any(_event(content) == event for content in map(files.read_json, known)):
             return
@@ -42,7 +42,7 @@ class Events:
         return [files.read_json(path) for path in self._files()]
 
     def table(self) -> pd.DataFrame:
-        """What paused or ended the capture, and what was done about it: the archive's table ``events``."""
+        """Causes of pauses and of the end of the capture, with the action taken: the table ``events`` of the archive."""
         import pandas as pd
 
         rows = [
@@ -53,7 +53,7 @@ class Events:
         return pd.DataFrame(rows, columns=list(columns)).astype(columns)
 
     def soaks(self) -> pd.DataFrame:
-        """How long each soak took, and how far air and devices went beyond its target: the archive's table ``soaks``."""
+        """How long each soak took, and overshoot of air and devices: the table ``soaks`` of the archive."""
         import pandas as pd
 
         rows = [

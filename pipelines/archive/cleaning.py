@@ -1,4 +1,4 @@
-"""Taking away what killed writers left, and finishing what they left out of the chain; never what is being written now."""
+"""Remove the temporary files of killed writers, and add finished runs to the chain; files in use are never touched."""
 
 from __future__ import annotations
 
@@ -29,12 +29,12 @@ AT_ONCE = 1000  # calibrations named by one entry of the chain
 
 @dataclass
 class Cleaned:
-    """What was done.
+    """The result of a cleaning.
 
-    removed : places of what was left under temporary names
-    busy : folders in which something is being written, left alone
-    sealed : runs that were finished and not in the chain
-    anchored : how many calibrations were not in the chain
+    removed : places of the temporary files and folders
+    busy : folders that another process writes to; they were not touched
+    sealed : finished runs that were missing in the chain and are in it now
+    anchored : number of calibrations that were missing in the chain and are in it now
     """
 
     removed: list[str] = field(default_factory=list[str])
@@ -45,11 +45,11 @@ class Cleaned:
 
 
 def clean(archive: Archive, *, only_look: bool = False) -> Cleaned:
-    """What killed writers left in an archive, taken away.
+    """Remove the temporary files of killed writers from an archive.
 
     Parameters
     ----------
-    only_look : take nothing away and write nothing.
+    only_look : remove nothing and write nothing.
     """
     done = Cleaned()
     for place in list(_left(archive.root)):
@@ -61,7 +61,7 @@ def clean(archive: Archive, *, only_look: bool = False) -> Cleaned:
 
 
 def _left(root: Place) -> Iterator[Place]:
-    """What lies under temporary names, and claims of processes that died."""
+    """Temporary files and folders, and claims of dead processes."""
     if isinstance(root, ObjectPath):
         claims = [place for place in root.walk() if place.name.startswith(CLAIM)]
         newest = max((place.stat().st_mtime for place in claims), default=0.0)
@@ -84,14 +84,14 @@ def _remove(archive: Archive, place: Place, done: Cleaned, *, only_look: bool) -
             if not only_look:
                 with files.writing(place):
                     shutil.rmtree(place) if isinstance(place, Path) and place.is_dir() else place.unlink()
-        except FileNotFoundError:  # published, or taken away, in the meantime
+        except FileNotFoundError:  # published or removed by another process
             return
         done.removed.append(str(place))
 
 
 @contextmanager
 def _owned(archive: Archive, place: Place) -> Generator[bool, None, None]:
-    """Whether nobody writes where a place lies: neither a run or capture that is worked on, nor a writer of its folder."""
+    """Whether no other process writes to the run, the capture or the folder of a place."""
     if isinstance(place, ObjectPath):
         yield True
         return
@@ -113,7 +113,7 @@ def _size(place: Place) -> int:
 
 
 def _seal(archive: Archive, done: Cleaned) -> None:
-    """Put finished runs into the chain that a killed writer left out."""
+    """Add finished runs to the chain whose writer was killed before it did so."""
     for name in archive.run_ids():
         run = Run(archive, name)
         if not (run.path / "report.json").is_file() or (run.path / "sealed.json").is_file():
@@ -128,7 +128,7 @@ def _seal(archive: Archive, done: Cleaned) -> None:
 
 
 def _anchor(archive: Archive, done: Cleaned) -> None:
-    """Put calibrations into the chain that a killed writer, or a bulk of them, left out."""
+    """Add calibrations to the chain that are missing there."""
     known: set[str] = set()
     for _, place in hash_chain.entries(archive.root):
         if place.is_file():
@@ -142,7 +142,7 @@ def _anchor(archive: Archive, done: Cleaned) -> None:
 
 def _calibrations(root: Place) -> Iterator[str]:
     top, length = root / "calibrations", len(str(root))
-    found = top.walk() if isinstance(top, ObjectPath) else sorted(top.glob("*/*/*.json"))
-    for place in found:
+    places = top.walk() if isinstance(top, ObjectPath) else sorted(top.glob("*/*/*.json"))
+    for place in places:
         if place.stem.isdigit():
             yield str(place)[length:].lstrip(os.sep).replace(os.sep, "/")

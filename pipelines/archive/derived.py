@@ -1,8 +1,8 @@
-"""What an archive keeps only to be quick, believed only as far as it is sealed: the list, the ledger's events, the audit's index.
+"""Caches of the archive (list of runs, events of the ledger, index of the audit), each with a seal.
 
-A seal holds the hashes of what was derived and is signed where a key is there. What was edited is made again from the files that
-it was derived from, and that is said; where an own key is configured, so is what it did not sign, silently. Who may write an
-unsigned archive can write a seal to match: ``tumbleline verify`` derives everything anew and compares.
+A seal holds the hashes of the cached content and is signed where a key is configured. A cache that does not match its seal is
+made again from the files of the archive, with a warning. A cache that another key signed is made again without one. Who can write
+to an unsigned archive can also forge a seal: ``tumbleline verify`` makes every cache again and compares.
 """
 
 from __future__ import annotations
@@ -24,33 +24,33 @@ LOGGER = logging.getLogger("tumbleline.archive")
 
 
 def seal(hashes: Mapping[str, str]) -> dict[str, Any]:
-    """A seal of what was derived, by the hash of each part of it."""
+    """A seal over the hash of each part of a cache."""
     return signed({"files": dict(hashes)})
 
 
-def standing(found: object, hashes: Mapping[str, str]) -> str:
+def standing(seal: object, hashes: Mapping[str, str]) -> str:
     """``sound``, ``edited``, or ``made by others`` (an own key is configured and did not sign it).
 
     Parameters
     ----------
-    found : the seal as it was read.
-    hashes : of the parts as they are now.
+    seal : the seal in the file.
+    hashes : of the parts of the cache as they are now.
     """
-    if not isinstance(found, dict) or found.get("files") != dict(hashes):
+    if not isinstance(seal, dict) or seal.get("files") != dict(hashes):
         return EDITED
     keys = public_keys()
     if not keys:
         return SOUND
-    return {GOOD: SOUND, BAD: EDITED}.get(check(found, keys), OTHERS)
+    return {GOOD: SOUND, BAD: EDITED}.get(check(seal, keys), OTHERS)
 
 
 def framed(data: bytes) -> bytes:
-    """Bytes behind a first line that seals them."""
+    """Bytes with a first line that holds their seal."""
     return json.dumps(seal({"data": files.hash_of(data)}), sort_keys=True).encode() + b"\n" + data
 
 
 def unframed(place: Place) -> tuple[bytes, str]:
-    """What lies behind the seal of a file, and how it stands; nothing of what is not sound.
+    """The content of a sealed file and the state of its seal; no content where the seal is not sound.
 
     Raises
     ------
@@ -59,15 +59,15 @@ def unframed(place: Place) -> tuple[bytes, str]:
     """
     first, _, data = place.read_bytes().partition(b"\n")
     try:
-        found = json.loads(first)
+        stored = json.loads(first)
     except (ValueError, RecursionError):
-        found = None
-    state = standing(found, {"data": files.hash_of(data)})
+        stored = None
+    state = standing(stored, {"data": files.hash_of(data)})
     return (data if state == SOUND else b""), state
 
 
 def tell_edited(place: Place) -> None:
-    """Say that something derived was edited and is made again."""
+    """Warn that a cache was edited and is made again."""
     LOGGER.warning(
         "archive: %s was edited since it was made from the archive's files; it is not used and is made again, see 'tumbleline "
         "verify'",

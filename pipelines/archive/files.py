@@ -1,7 +1,7 @@
-"""Single files of the archive: durable, atomic writing; reading that trusts nothing.
+"""Single files of the archive: durable and atomic writing, reading with checks.
 
-In a folder everything is written under a temporary name where it will live, fsynced, then renamed; in an object store putting
-is atomic by itself. A reader sees the whole file or none.
+On a disk a file is written under a temporary name in its folder, synchronised, then renamed; in an object store a put is atomic.
+A reader sees the whole file or none.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from pipelines.archive.store import Place
 
 TEMPORARY = ".tmp-"
-WAITING = 8  # files that are written at a time
+WAITING = 8  # files written at the same time
 
 IN_ARCHIVE = "give another with --archive DIR or TUMBLELINE_ARCHIVE"
 ELSEWHERE = "name another place"
@@ -35,12 +35,12 @@ ELSEWHERE = "name another place"
 
 @contextmanager
 def writing(path: Place, what: str = "archive", remedy: str = IN_ARCHIVE) -> Generator[None, None, None]:
-    """A block that writes under ``path``; what the system refuses becomes one message.
+    """A block that writes below ``path``; an error of the system becomes one message.
 
     Parameters
     ----------
-    what : is written, as the message begins.
-    remedy : what the reader can do, as it ends.
+    what : what is written; the message begins with it.
+    remedy : what the user can do; the message ends with it.
     """
     try:
         yield
@@ -72,7 +72,7 @@ def read_json(path: Place) -> dict[str, Any]:
 
 
 def parsed(data: bytes, path: Place) -> dict[str, Any]:
-    """The content of a manifest whose bytes were read, refused where it names a place outside of the archive."""
+    """The content of a manifest from its bytes; refused where it names a place outside the archive."""
     try:
         content = json.loads(data)
     except (ValueError, RecursionError):
@@ -93,16 +93,16 @@ def json_bytes(content: Mapping[str, Any]) -> bytes:
 
 
 def manifest_bytes(content: Mapping[str, Any]) -> bytes:
-    """A manifest's bytes, signed where a key is there."""
+    """The bytes of a manifest, signed where a key is configured."""
     return json_bytes(signed(content))
 
 
 def publish(path: Place, data: bytes, what: str = "archive", remedy: str = IN_ARCHIVE) -> None:
-    """Write a file so that it is there whole or not at all, and stays there after a power cut.
+    """Write a file completely or not at all, so that it survives a power failure.
 
     Parameters
     ----------
-    what, remedy : beginning and end of the message where it cannot be written.
+    what, remedy : beginning and end of the error message.
     """
     with writing(path.parent, what, remedy):
         if isinstance(path, ObjectPath):
@@ -115,20 +115,20 @@ def publish(path: Place, data: bytes, what: str = "archive", remedy: str = IN_AR
 
 
 def publish_all(folder: Path | ObjectPath, contents: Mapping[str, bytes]) -> None:
-    """Write several files of a folder, each there whole or not at all, in their order; cheaper than one by one.
+    """Write several files of a folder in order, each completely or not at all; faster than one by one.
 
-    All are on the disk before the first has its name.
+    All are on the disk before the first one gets its name.
     """
     with writing(folder):
         if isinstance(folder, ObjectPath):
             for name, data in contents.items():
                 (folder / name).write_bytes(data)
             return
-        from concurrent.futures import ThreadPoolExecutor  # slow to import, and most commands do not write so
+        from concurrent.futures import ThreadPoolExecutor  # slow to import, and few commands need it
 
         with _aside(folder) as aside:
             aside.mkdir()
-            # those that wait for the disk together wait for one commit of its journal: a tenth of the time of one by one
+            # threads that synchronise together share one commit of the file system: a tenth of the time of one by one
             with ThreadPoolExecutor(WAITING) as threads:
                 list(threads.map(lambda name: _write_durably(aside / name, contents[name]), contents))
             for name in contents:
@@ -137,9 +137,9 @@ def publish_all(folder: Path | ObjectPath, contents: Mapping[str, bytes]) -> Non
 
 
 def publish_first(path: Place, data: bytes) -> bool:
-    """Write a file that nobody has written yet; whether it was this call that wrote it.
+    """Write a file if it does not exist; true if this call wrote it.
 
-    Of several processes in a folder exactly one is told so. An object store has no such operation: its callers hold a claim.
+    Of several processes exactly one gets true. An object store has no such operation: its callers hold a claim.
     """
     with writing(path.parent):
         if isinstance(path, ObjectPath):
@@ -158,15 +158,15 @@ def publish_first(path: Place, data: bytes) -> bool:
 
 
 def ahead(path: Place) -> Place:
-    """Where files of a folder are written before :func:`publish_folder` publishes them with the rest."""
+    """The temporary folder for files that :func:`publish_folder` publishes later with the rest."""
     return path if isinstance(path, ObjectPath) else path.parent / f"{TEMPORARY}ahead-{path.name}"
 
 
 def publish_folder(path: Place, files: Mapping[str, bytes]) -> None:
-    """Write several files so that they are there together or not at all; a folder that is there already stays.
+    """Write several files together or not at all; an existing folder stays as it is.
 
-    In an object store the last file of the mapping is put last and must be the one by which readers know that all are there.
-    What was written :func:`ahead` is published with them.
+    In an object store the last file of the mapping is put last; it must be the file that shows readers that all are complete.
+    Files that were written :func:`ahead` are published with them.
     """
     with writing(path.parent):
         if isinstance(path, ObjectPath):
@@ -188,7 +188,7 @@ def publish_folder(path: Place, files: Mapping[str, bytes]) -> None:
 
 
 def drop(folder: Place) -> None:
-    """Remove what was written :func:`ahead`."""
+    """Remove the files that were written :func:`ahead`."""
     with writing(folder.parent):
         if isinstance(folder, ObjectPath):
             for one in folder.walk():
@@ -198,7 +198,7 @@ def drop(folder: Place) -> None:
 
 
 def sweep(folder: Place) -> None:
-    """Remove what a killed writer left under temporary names, unless somebody writes into the folder now."""
+    """Remove temporary files of a killed writer, unless another process writes to the folder now."""
     if isinstance(folder, ObjectPath) or not folder.is_dir():  # an object store has no temporary names
         return
     with writing(folder), writers_of(folder, fcntl.LOCK_EX | fcntl.LOCK_NB) as mine:
@@ -208,7 +208,7 @@ def sweep(folder: Place) -> None:
 
 @contextmanager
 def _aside(folder: Path) -> Generator[Path, None, None]:
-    """A name in a folder under which something is written before it is published; nothing is left of it."""
+    """A temporary name in a folder for writing before publishing; it is removed in any case."""
     folder.mkdir(parents=True, exist_ok=True)
     aside = folder / f"{TEMPORARY}{uuid.uuid4().hex}"
     with writers_of(folder, fcntl.LOCK_SH):
@@ -223,9 +223,10 @@ def _aside(folder: Path) -> Generator[Path, None, None]:
 
 @contextmanager
 def writers_of(folder: Path, mode: int) -> Generator[bool, None, None]:
-    """A block known to a folder's other writers: they share it, and who cleans up has it alone.
+    """A block with a lock on a folder: shared among writers, exclusive for cleaning.
 
-    The system ends it when a process dies. Yields whether it was given; a shared one is not waited for where there are no locks.
+    The system releases the lock when a process dies. Yields whether the lock was granted; a file system
+    without locks grants none.
 
     Parameters
     ----------
@@ -236,7 +237,7 @@ def writers_of(folder: Path, mode: int) -> Generator[bool, None, None]:
         try:
             fcntl.flock(handle, mode)
             given = True
-        except OSError:  # held by a writer, or a file system without locks
+        except OSError:  # another process holds it, or the file system has no locks
             given = False
         yield given
     finally:

@@ -1,7 +1,7 @@
 """The archive's chain: numbered entries, each with the hash of the one before and of the manifests that it seals.
 
-``chain/<thousands>/<number>.json``. An entry is created once; of two processes that write the next one, one is told that it is
-there and takes the number after it. Whoever keeps the last entry's hash elsewhere can tell later that nothing before it is gone.
+``chain/<thousands>/<number>.json``. An entry is created once; of two processes that write the next entry, one succeeds and the
+other takes the next number. A copy of the hash of the last entry, kept elsewhere, shows later whether an entry was removed.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ def append(root: Place, kind: str, sealed: Mapping[str, str], about: Mapping[str
     ----------
     kind : ``run`` or ``calibrations``.
     sealed : hashes of files by their place below the archive's root.
-    about : who writes it where and when, and of what.
+    about : who wrote it, where and when, and about what.
     """
     top = root / FOLDER
     with alone(top, wait=True) if isinstance(root, ObjectPath) else nullcontext():

@@ -1,4 +1,4 @@
-"""Keys of stages: a hash of inputs, parameters and code. What varies without changing a result is not in them."""
+"""Keys of stages: a hash of inputs, parameters and code. They do not contain what has no effect on a result."""
 
 from __future__ import annotations
 
@@ -65,7 +65,7 @@ def libraries() -> dict[str, str]:
 OWN = ("inertial", "schemas", "stations", "pipelines")
 
 DISCOVERED = {"inertial.effects": "tumbleline.effects", "pipelines.stages.figures": ""}
-"""Packages whose modules are found and not named, with the entry points under which others add to them, if any."""
+"""Packages whose modules are discovered, with the entry points of extensions, if any."""
 
 
 def sources(modules: Sequence[str]) -> dict[str, Path]:
@@ -76,18 +76,18 @@ def sources(modules: Sequence[str]) -> dict[str, Path]:
     modules : import names
     """
     left = [name for module in modules for name in _with_below(module)]
-    found: dict[str, Path] = {}
+    sources: dict[str, Path] = {}
     while left:
         module = left.pop()
         path = _file(module)
-        if module in found or path is None:
+        if module in sources or path is None:
             continue
-        found[module] = path
+        sources[module] = path
         left += _imports(module, path)
         if module in DISCOVERED:
             left += _with_below(module)
-            found |= _added(DISCOVERED[module]) if DISCOVERED[module] else {}
-    return dict(sorted(found.items()))
+            sources |= _added(DISCOVERED[module]) if DISCOVERED[module] else {}
+    return dict(sorted(sources.items()))
 
 
 def _with_below(module: str) -> list[str]:
@@ -115,14 +115,14 @@ def _file(module: str) -> Path | None:
 @cache
 def _imports(module: str, path: Path) -> list[str]:
     """Names that a module imports, with the packages they lie in; a name inside a module is dropped later."""
-    found: set[str] = set()
+    sources: set[str] = set()
     for node in _running(ast.parse(path.read_text("utf-8"))):
         if isinstance(node, ast.Import):
-            found.update(alias.name for alias in node.names)
+            sources.update(alias.name for alias in node.names)
         elif isinstance(node, ast.ImportFrom) and node.module and not node.level:
-            found.update({node.module, *(f"{node.module}.{alias.name}" for alias in node.names)})
-    parents = {name.rsplit(".", depth)[0] for name in {*found, module} for depth in range(1, name.count(".") + 1)}
-    return sorted(name for name in found | parents if name.split(".", 1)[0] in OWN)
+            sources.update({node.module, *(f"{node.module}.{alias.name}" for alias in node.names)})
+    parents = {name.rsplit(".", depth)[0] for name in {*sources, module} for depth in range(1, name.count(".") + 1)}
+    return sorted(name for name in sources | parents if name.split(".", 1)[0] in OWN)
 
 
 def _running(tree: ast.AST) -> Iterator[ast.AST]:

@@ -1,4 +1,4 @@
-"""The list of an archive's runs: of each what one line tells, from as few files as can be."""
+"""The list of the runs of an archive: one line for each run, read from as few files as possible."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ class RunInfo:
 
 
 def info_of(run: Run) -> RunInfo | None:
-    """The line of a run; None for a folder in which none was begun yet."""
+    """The line of a run; None for a folder without a run."""
     names = names_in(run.path)
     if "run.json" not in names:
         return None
@@ -52,47 +52,47 @@ def info_of(run: Run) -> RunInfo | None:
 
 
 def _sealed_stages(run: Run, names: set[str]) -> list[str]:
-    """The stages as they were noted when the run was sealed; none where it has other manifests by now."""
+    """The stages in the seal of the run; none where the run has other manifests than its seal names."""
     if SEALED not in names:
         return []
-    noted = files.read_json(run.path / SEALED)
+    seal = files.read_json(run.path / SEALED)
     there = {name for name in names if name.endswith(".json") and name != SEALED}
-    named = {name.rpartition("/")[2] for name in noted["files"] if name.startswith("runs/")}
-    return noted.get("stages", []) if there == named else []
+    named = {name.rpartition("/")[2] for name in seal["files"] if name.startswith("runs/")}
+    return seal.get("stages", []) if there == named else []
 
 
-FEWEST_NEW = 32  # fewer are read again sooner than they are written
+FEWEST_NEW = 32  # reading fewer again is faster than writing the list
 TICK_NS = 2_000_000_000
-FINISHED = 1  # the stamp of a finished run where folders have no time
+FINISHED = 1  # stamp of a finished run in an object store, whose folders have no time
 
 
 def infos_of(root: Place, runs: Sequence[Run]) -> list[RunInfo]:
-    """The lines of runs, read from their folders where they are not noted."""
+    """The lines of runs: from the list where it is up to date, else from their folders."""
     place = root / "index" / "list.json"
     known, state = noted_lines(place)
     if state == derived.EDITED:
         derived.tell_edited(place)
-    noted, found, new = dict[str, Any](), list[RunInfo](), 0
+    stored, lines, new = dict[str, Any](), list[RunInfo](), 0
     for run in runs:
         before, stamp = known.get(run.id), stamp_of(run)
         if before is not None and before[0] == stamp:
-            noted[run.id] = before
-            found.append(line_of(before[1]))
+            stored[run.id] = before
+            lines.append(line_of(before[1]))
             continue
         info = info_of(run)
         if info is None:
             continue
-        found.append(info)
+        lines.append(info)
         if stamp is not None and (stamp != FINISHED or info.finished) and time.time_ns() - stamp > TICK_NS:
-            noted[run.id], new = [stamp, astuple(info)], new + 1
+            stored[run.id], new = [stamp, astuple(info)], new + 1
     if new >= FEWEST_NEW or state == derived.EDITED:
-        with suppress(ArchiveUnusable):  # who may only read the archive reads it without
-            files.publish(place, files.json_bytes({"runs": noted, "seal": derived.seal({"runs": digest(noted)})}))
-    return found
+        with suppress(ArchiveUnusable):  # a reader without write permission does without the list
+            files.publish(place, files.json_bytes({"runs": stored, "seal": derived.seal({"runs": digest(stored)})}))
+    return lines
 
 
 def stamp_of(run: Run) -> int | None:
-    """When the run's folder was last written to, ns."""
+    """Time of the last change of the folder of a run, ns."""
     if isinstance(run.path, ObjectPath):
         return FINISHED
     try:
@@ -102,7 +102,7 @@ def stamp_of(run: Run) -> int | None:
 
 
 def noted_lines(place: Place) -> tuple[dict[str, Any], str]:
-    """Stamp and line of every run that was noted, and how their seal stands; nothing of what is not sound."""
+    """Stamp and line of every run in the list, and the state of its seal; no lines where the seal is not sound."""
     if not place.is_file():
         return {}, derived.SOUND
     try:
@@ -110,13 +110,13 @@ def noted_lines(place: Place) -> tuple[dict[str, Any], str]:
     except ArchiveUnusable:
         return {}, derived.EDITED
     lines = content.get("runs")
-    if "seal" not in content or not isinstance(lines, dict):  # an older version sealed nothing
+    if "seal" not in content or not isinstance(lines, dict):  # older versions wrote no seal
         return {}, derived.OTHERS
     state = derived.standing(content["seal"], {"runs": digest(lines)})
     return (lines if state == derived.SOUND else {}), state
 
 
-def line_of(noted: Sequence[Any]) -> RunInfo:
-    """A line as it was noted."""
-    run_id, recipe, device, units, started, finished, stages = noted
+def line_of(values: Sequence[Any]) -> RunInfo:
+    """A line of the list from its stored values."""
+    run_id, recipe, device, units, started, finished, stages = values
     return RunInfo(run_id, recipe, device, tuple(units), started, finished, tuple(stages))

@@ -1,9 +1,9 @@
-"""Working alone: a block in which no other process writes into a place of the archive.
+"""Exclusive access: a block in which no other process writes to a place of the archive.
 
-In a folder the system's file lock does it, and frees it when a process dies. An object store has no lock, but it shows what
-was put to everybody at once; so whoever wants a place puts a claim there, then looks: with another live claim beside its own
-it takes its own away and asks again later. Of two that come together at least one sees the other, so never both go on.
-A claim is put anew from time to time; one that was not is a dead process's. Only the store's own clock is compared.
+On a disk this is a file lock, which the system releases when a process dies. An object store has no lock, but every client sees
+a new object at once. A process that needs a place puts a claim there and then lists the claims: with another live claim beside
+its own it removes its own and tries again later. Of two simultaneous processes at least one sees the other, so they never both
+continue. A claim is renewed at intervals; a claim that is too old belongs to a dead process. Only the clock of the store is used.
 """
 
 from __future__ import annotations
@@ -66,7 +66,7 @@ def _claimed(folder: ObjectPath, *, wait: bool) -> Generator[None, None, None]:
         if not _others(folder, claim):
             break
         claim.unlink(missing_ok=True)
-        if not wait and pause > 20.0 * FIRST_PAUSE_S:  # two that came together both step back: ask a few times
+        if not wait and pause > 20.0 * FIRST_PAUSE_S:  # two simultaneous processes both step back: try a few times
             raise OperatorNeeded(_busy(folder))
         time.sleep(pause * randomly.uniform(0.5, 1.5))
         pause = min(2.0 * pause, LONGEST_PAUSE_S)
@@ -82,26 +82,26 @@ def _claimed(folder: ObjectPath, *, wait: bool) -> Generator[None, None, None]:
 
 
 def _others(folder: ObjectPath, claim: ObjectPath) -> list[ObjectPath]:
-    """Live claims of others; dead ones are taken away."""
+    """Live claims of other processes; dead ones are removed."""
     now = claim.stat().st_mtime
-    found: list[ObjectPath] = []
+    claims: list[ObjectPath] = []
     for other in folder.iterdir():
         if not other.name.startswith(CLAIM) or other == claim:
             continue
         try:
             age = now - other.stat().st_mtime
-        except FileNotFoundError:  # given back in the meantime
+        except FileNotFoundError:  # released in the meantime
             continue
         if age > LEASE_S:
             other.unlink(missing_ok=True)
         else:
-            found.append(other)
-    return found
+            claims.append(other)
+    return claims
 
 
 def _renew(claim: ObjectPath, over: threading.Event) -> None:
     while not over.wait(RENEWAL_S):
-        with suppress(OSError):  # the store may be away for a moment; the next renewal is early enough
+        with suppress(OSError):  # the store may be unreachable for a moment; the next renewal is in time
             claim.write_bytes(b"")
 
 

@@ -1,4 +1,4 @@
-"""Names in manifests: what an archive's files say of other files leads to places in the archive, and nowhere else."""
+"""Names in manifests: a file of the archive may refer to places inside the archive only."""
 
 from __future__ import annotations
 
@@ -22,17 +22,17 @@ class NameLeadsOut(ArchiveUnusable):
 
 
 def is_plain(name: str) -> bool:
-    """Whether a name is that of a file or folder, and no way to another: no separator, no ``..``, not absolute."""
+    """Whether a name is a plain file or folder name: no separator, no ``..``, not absolute."""
     return name not in {"", ".", ".."} and not any(mark in name for mark in "/\\\0")
 
 
 def is_below(name: str) -> bool:
-    """Whether a place with slashes is below the folder that it is told of."""
+    """Whether a path with slashes stays below its folder."""
     return all(is_plain(part) for part in name.split("/"))
 
 
 def refuse_leading_out(content: Mapping[str, Any], where: Place) -> None:
-    """Refuse a manifest that names something by a way that could lead out of the archive.
+    """Refuse a manifest with a name that could lead out of the archive.
 
     Raises
     ------
@@ -43,12 +43,12 @@ def refuse_leading_out(content: Mapping[str, Any], where: Place) -> None:
         if not sound:
             raise NameLeadsOut(
                 f"archive: {where} names {name[:80]!r} under '{entry}', a plain name without '/' and '..' is needed; the file "
-                "was edited, or the archive was made to lead elsewhere: do not use it"
+                "was edited: do not use this archive, restore it from a copy"
             )
 
 
 def _named(content: Mapping[str, Any]) -> Iterator[tuple[str, str, bool]]:
-    """Entries and the names under them, with whether each is sound; values of other kinds name nothing."""
+    """Entries and the names under them, with whether each is sound; values of other types are no names."""
     for entry in ONE:
         name = content.get(entry)
         if isinstance(name, str) and name:

@@ -1,4 +1,4 @@
-"""Tables of the archive as Parquet: equal tables give equal bytes, whatever the host and the hour; reading trusts nothing."""
+"""Tables of the archive as Parquet: equal tables give equal bytes on every host at any time; reading checks everything."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def table_bytes(name: str, frame: pd.DataFrame, version: int) -> bytes:
 
 def columns_of(name: str, frame: pd.DataFrame, version: int) -> pa.Table:
     """The columns of a table with its name and schema version, as they are encoded."""
-    import pyarrow as pa  # a quarter of a second, which commands without a table need not spend
+    import pyarrow as pa  # imports in 0.25 s, which commands without a table do not need
 
     columns = {str(column): pa.array(frame[column], from_pandas=True) for column in frame.columns}
     return pa.table(columns, metadata={TABLE_MARK: name.encode(), SCHEMA_MARK: str(version).encode()})
@@ -46,12 +46,12 @@ def decoded(data: bytes) -> pa.Table:
     import pyarrow as pa
     import pyarrow.parquet as pq
 
-    # one small file: what finds the parts of a data set, and threads, would take longer than reading it
+    # one small file: a data set reader with threads would take longer than the reading itself
     return pq.ParquetFile(pa.BufferReader(data)).read(use_threads=False)
 
 
 def read_table(path: Place, name: str, expected: str | None = None) -> pd.DataFrame:
-    """A table of the archive, checked to be whole, ours and unchanged since it was written.
+    """A table of the archive, checked to be complete, written by this archive and unchanged.
 
     Parameters
     ----------

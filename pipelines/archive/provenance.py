@@ -1,4 +1,4 @@
-"""Who made something, where, when and with what: kept beside results, never inside them nor in keys."""
+"""Provenance: user, host, time and versions; stored in manifests, never in results or keys."""
 
 from __future__ import annotations
 
@@ -25,5 +25,5 @@ def provenance() -> dict[str, Any]:
 
 @cache
 def _software() -> dict[str, str]:
-    """Versions of the product and of what runs it; reading them takes a look into the installation."""
+    """Versions of the product and of what runs it; read from the installed packages."""
     return {"tumbleline": version("tumbleline"), "python": platform.python_version()}

@@ -89,7 +89,7 @@ class Run:
             self._put(f"{name}.json", files.manifest_bytes(manifest))
 
     def adopt(self, other: Run, names: tuple[str, ...]) -> None:
-        """Take tables over from another run of the same archive, byte for byte, with who made them, when and with what."""
+        """Copy tables from another run of the same archive, byte for byte, with their provenance."""
         for name in names:
             path, manifest = other.path / f"{name}.parquet", other.manifest(name)
             data = path.read_bytes()
@@ -100,7 +100,9 @@ class Run:
                 )
             self._put(f"{name}.parquet", data)
             follows = self._manifests(manifest.get("inputs", {}))
-            kept = {key: value for key, value in manifest.items() if key != ENTRY}  # what is told anew is signed anew
+            kept = {
+                key: value for key, value in manifest.items() if key != ENTRY
+            }  # the new manifest gets a new signature
             content = {**kept, "taken_from": manifest.get("taken_from", other.id), "manifests": follows}
             self._put(f"{name}.json", files.manifest_bytes(content))
 
@@ -155,12 +157,12 @@ class Run:
         return sorted(path.stem for path in self.path.glob("*.parquet"))
 
     def _manifests(self, inputs: Mapping[str, str]) -> dict[str, str]:
-        """Hashes of the manifests of a stage's inputs, and of what the run was started with: each names those before it."""
-        found = {name: self._hash_of(f"{name}.json") for name in ("run", *inputs)}
+        """Hashes of the manifests of the inputs of a stage, of the run and of its records: a manifest names those before it."""
+        hashes = {name: self._hash_of(f"{name}.json") for name in ("run", *inputs)}
         records = self.records
         if records is not None and (records.path / COMPLETE).is_file():
-            found["records"] = files.sha256(records.path / COMPLETE)
-        return {name: value for name, value in sorted(found.items()) if value}
+            hashes["records"] = files.sha256(records.path / COMPLETE)
+        return {name: value for name, value in sorted(hashes.items()) if value}
 
     def _put_table(self, name: str, table: pa.Table) -> bytes:
         """The bytes of a table, which is published."""

@@ -23,5 +23,5 @@ def stages_of(folder: Place, names: set[str] | None = None) -> list[str]:
 
 
 def names_in(folder: Place) -> set[str]:
-    """Names of the files in a folder; none where there is no folder."""
+    """Names of the files in a folder; an empty set where the folder does not exist."""
     return {place.name for place in folder.iterdir()} if folder.is_dir() else set()

@@ -26,7 +26,7 @@ GOOD, UNSIGNED, UNKNOWN, BAD = "good", "unsigned", "unknown key", "bad"
 
 
 def key_place() -> Path | None:
-    """Where the private key lies: what the environment names (nothing where that is empty), else the user's own if there."""
+    """The file of the private key: from the environment (none where the variable is empty), else the default file."""
     if VARIABLE in os.environ:
         named = os.environ[VARIABLE].strip()
         return Path(named) if named else None
@@ -35,14 +35,14 @@ def key_place() -> Path | None:
 
 
 def default_key_place() -> Path:
-    """The file of the user's own key."""
+    """The default file of the private key of the user."""
     return Path(os.environ.get("XDG_CONFIG_HOME") or Path.home() / ".config") / "tumbleline" / "signing.key"
 
 
 def signed(content: Mapping[str, Any]) -> dict[str, Any]:
-    """The manifest with its signature, where a key is there; as it is otherwise."""
+    """The manifest with a signature where a key is configured, without one otherwise."""
     place = key_place()
-    plain = {name: value for name, value in content.items() if name != ENTRY}  # a copy is signed by who writes it
+    plain = {name: value for name, value in content.items() if name != ENTRY}  # the writer of a copy signs it anew
     if place is None:
         return plain
     key, name = _private(str(place))
@@ -51,7 +51,7 @@ def signed(content: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def check(content: Mapping[str, Any], keys: Mapping[str, Ed25519PublicKey]) -> str:
-    """``good``, ``unsigned``, ``unknown key`` or ``bad``: how a manifest's signature stands.
+    """State of the signature of a manifest: ``good``, ``unsigned``, ``unknown key`` or ``bad``.
 
     Parameters
     ----------
@@ -75,7 +75,7 @@ def check(content: Mapping[str, Any], keys: Mapping[str, Ed25519PublicKey]) -> s
 
 
 def public_keys(given: Collection[str] = ()) -> dict[str, Ed25519PublicKey]:
-    """The public keys that are trusted, by name: those given, else that of the own private key.
+    """The public keys that are trusted, by name: the given ones, else the one of the configured private key.
 
     Parameters
     ----------
@@ -95,7 +95,7 @@ def name_of(key: Ed25519PublicKey) -> str:
 
 
 def make_key(place: Path) -> Ed25519PublicKey:
-    """The public key of a new private one, which is written to a file that only its owner can read."""
+    """Make a private key, write it to a file that only its owner can read, and return its public key."""
     from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PrivateKey
     from cryptography.hazmat.primitives.serialization import Encoding, NoEncryption, PrivateFormat
 
@@ -107,7 +107,7 @@ def make_key(place: Path) -> Ed25519PublicKey:
             file.write(pem)
     except FileExistsError:
         raise WrongUse(
-            f"archive key: {place} is there already, a new file is needed; keep it, or name another with --output"
+            f"archive key: {place} exists, a new file is needed; keep it, or name another with --output"
         ) from None
     except OSError as problem:
         raise WrongUse(

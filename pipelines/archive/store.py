@@ -119,7 +119,7 @@ class ObjectPath:
 
     def write_bytes(self, data: bytes) -> int:
         """Put the object, whole or not at all; how many bytes it has."""
-        with self.system.open_output_stream(self.key) as stream:  # what the system refuses is told by the writer
+        with self.system.open_output_stream(self.key) as stream:  # the caller reports errors of the system
             stream.write(data)
         return len(data)
 
@@ -156,10 +156,10 @@ class ObjectPath:
         """What lies below and has such a name; every part of the pattern is one level."""
         first, _, rest = pattern.partition("/")
         if not any(mark in first for mark in "*?["):
-            found = [self / first]
+            matches = [self / first]
         else:
-            found = [one for one in self.iterdir() if fnmatchcase(one.name, first)]
-        for one in found:
+            matches = [one for one in self.iterdir() if fnmatchcase(one.name, first)]
+        for one in matches:
             if rest:
                 yield from one.glob(rest)
             elif one.exists():
@@ -177,8 +177,8 @@ class ObjectPath:
 
         with self._reached():
             infos = self.system.get_file_info(FileSelector(self.key, allow_not_found=True, recursive=recursive))
-        wanted = [info for info in infos if not recursive or info.type.name == "File"]
-        return [self._at(PurePosixPath(info.path)) for info in wanted if info.path.rstrip("/") != self.key]
+        selected = [info for info in infos if not recursive or info.type.name == "File"]
+        return [self._at(PurePosixPath(info.path)) for info in selected if info.path.rstrip("/") != self.key]
 
     @contextmanager
     def _reached(self) -> Generator[None, None, None]:

@@ -1,4 +1,4 @@
-"""Checks of an archive: every hash computed anew, every manifest held against those that name it."""
+"""Checks of an archive: every hash is computed again, every manifest is compared with the manifests that refer to it."""
 
 from pipelines.integrity.archive import Report, verify
 from pipelines.integrity.findings import IntegrityFinding

@@ -31,15 +31,15 @@ if TYPE_CHECKING:
 
 NEEDED = "a signature by the own key, or by one given with --key, is needed"
 READERS = min(8, 2 * (os.cpu_count() or 1))
-READERS_OF_OBJECTS = 32  # an object store answers late, and many at once
+READERS_OF_OBJECTS = 32  # an object store answers slowly, but many requests at once
 
 
 @dataclass(frozen=True)
 class Report:
-    """What a verification came to.
+    """Result of a verification.
 
-    head : hash of the chain's last entry; noted elsewhere, it shows later that nothing before it was taken away.
-    trust : in words, who signed.
+    head : hash of the last entry of the chain; a copy of it, kept elsewhere, shows later whether entries were removed.
+    trust : sentence about the signatures.
     """
 
     checked: CheckedPart
@@ -86,15 +86,15 @@ def verify(
     also: Sequence[Callable[[Archive, CheckedPart], None]] = (),
     progress: Callable[[int, int], None] = lambda _done, _total: None,
 ) -> Report:
-    """What is wrong with an archive.
+    """Verify an archive.
 
     Parameters
     ----------
-    runs : only these and their captures; everything where empty.
+    runs : only these runs and their captures; the whole archive where empty.
     keys : public keys that are trusted, by name.
     demanded : whether a manifest without a signature by one of these is wrong.
-    head : hash of an entry of the chain that was noted elsewhere.
-    also : more checks of the whole archive, of what this package does not know.
+    head : hash of an entry of the chain from a copy kept elsewhere.
+    also : further checks of the whole archive, of tables that this package does not know.
     """
     from schemas import tables
 
@@ -115,8 +115,8 @@ def verify(
             progress(done, len(tasks))
     for folder in () if runs else ("", "runs", "captures", *(f"captures/{path.name}" for path in captures)):
         check_strangers(archive.root / folder if folder else archive.root, set(), total)
-    told = check_chain(archive.root, total, only={run.id for run in chosen} if runs else None, head=head)
-    check_seals(archive.root, chosen, told, total, everything=not runs)
+    chain = check_chain(archive.root, total, only={run.id for run in chosen} if runs else None, head=head)
+    check_seals(archive.root, chosen, chain, total, everything=not runs)
     check_mark(archive, total)
     if not runs:
         _check_owners(chosen, captures, total)
@@ -127,9 +127,9 @@ def verify(
             check(archive, total)
     else:
         check_links(archive, [run.path for run in chosen] + captures, total)
-    _tell_untrusted(total, demanded=demanded)
+    _report_untrusted(total, demanded=demanded)
     total.findings = by_cause(total.findings, archive.root)
-    return Report(total, told.head, _trust(total), len(chosen), len(captures), time.perf_counter() - start)
+    return Report(total, chain.head, _trust(total), len(chosen), len(captures), time.perf_counter() - start)
 
 
 def _captures(archive: Archive, runs: Sequence[Run]) -> list[Place]:
@@ -144,11 +144,13 @@ def _check_owners(runs: Sequence[Run], captures: Sequence[Place], total: Checked
     for run in runs:
         try:
             named.add(str(run.about.get("capture") or ""))
-        except ArchiveUnusable:  # told where the run is checked
+        except ArchiveUnusable:  # the check of the run reports it
             return
     for path in captures:
         if path.name not in named:
-            total.wrong(MISSING, path, "has no run in this archive: its run was taken away, or it was copied here")
+            total.wrong(
+                MISSING, path, "has no run in this archive: the run was removed, or the capture was copied here"
+            )
 
 
 def _below(folder: Place) -> list[Place]:
@@ -158,8 +160,8 @@ def _below(folder: Place) -> list[Place]:
     return sorted((place for place in folder.iterdir() if place.is_dir()), key=lambda place: place.name)
 
 
-def _tell_untrusted(total: CheckedPart, *, demanded: bool) -> None:
-    """Name the manifests that nobody known signed: wrong where a signature is demanded, said where others are signed."""
+def _report_untrusted(total: CheckedPart, *, demanded: bool) -> None:
+    """Report manifests without a trusted signature: a finding where a signature is required, a remark where others are signed."""
     for state, names in total.untrusted.items():
         what = "is not signed" if state == UNSIGNED else "is signed with a key that is not known here"
         if demanded and len(names) > SHOWN:
@@ -174,13 +176,19 @@ def _tell_untrusted(total: CheckedPart, *, demanded: bool) -> None:
 
 
 def _trust(total: CheckedPart) -> str:
-    """In words, who signed."""
-    count, found = total.manifests, total.signatures
-    if found[UNSIGNED] == count:
-        return "UNSIGNED: nothing here shows who wrote it; make a key with 'tumbleline archive key'"
-    signed = [f"{found[GOOD]} of {count} manifests signed by {', '.join(sorted(total.keys))}"] if found[GOOD] else []
-    unknown = (
-        [f"{found[UNKNOWN]} signed by a key that is not known here (give it with --key)"] if found[UNKNOWN] else []
+    """Sentence about the signatures."""
+    count, signatures = total.manifests, total.signatures
+    if signatures[UNSIGNED] == count:
+        return "UNSIGNED: nothing shows who wrote this archive; make a key with 'tumbleline archive key'"
+    signed = (
+        [f"{signatures[GOOD]} of {count} manifests signed by {', '.join(sorted(total.keys))}"]
+        if signatures[GOOD]
+        else []
     )
-    unsigned = [f"{found[UNSIGNED]} unsigned"] if found[UNSIGNED] else []
+    unknown = (
+        [f"{signatures[UNKNOWN]} signed by a key that is not known here (give it with --key)"]
+        if signatures[UNKNOWN]
+        else []
+    )
+    unsigned = [f"{signatures[UNSIGNED]} unsigned"] if signatures[UNSIGNED] else []
     return ", ".join([*signed, *unknown, *unsigned])

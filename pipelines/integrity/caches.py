@@ -1,4 +1,4 @@
-"""What was derived from the archive's files to be quick, held against them: the list of runs, and the ledger's noted events."""
+"""Checks of the caches of an archive against its files: the list of runs and the index of the ledger."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ if TYPE_CHECKING:
     from pipelines.archive import Archive
     from pipelines.integrity.findings import CheckedPart
 
-REMEDY = "remove it, it is made again by itself"
+REMEDY = "remove the file, it is made again automatically"
 
 
 def check_list(archive: Archive, checked: CheckedPart) -> None:
-    """The noted lines of runs that were not written to since must be those that the runs tell."""
+    """Lines of the list must agree with the runs, where these were not changed since."""
     place = archive.root / "index" / "list.json"
     lines, state = noted_lines(place)
     if state == derived.EDITED:
@@ -31,21 +31,21 @@ def check_list(archive: Archive, checked: CheckedPart) -> None:
             continue
         try:
             info = info_of(run)
-        except (ArchiveUnusable, KeyError, TypeError):  # told where the run is checked
+        except (ArchiveUnusable, KeyError, TypeError):  # the check of the run reports it
             continue
         if info is None or astuple(info) != astuple(line_of(line)):
-            checked.wrong(CHANGED, place, f"tells otherwise of run {name} than its files: {REMEDY}")
+            checked.wrong(CHANGED, place, f"disagrees with the files of run {name}: {REMEDY}")
 
 
 def check_ledger_index(archive: Archive, checked: CheckedPart) -> None:
-    """The noted events whose files were not written to since must be those that the files tell."""
+    """Events of the index must agree with the files of the ledger, where these were not changed since."""
     stamps = stamps_of(archive.root / FOLDER)
     for digit in DIGITS:
         place = archive.root / NOTED / f"{digit}.noted"
-        noted, state = noted_events(place)
+        stored, state = noted_events(place)
         if state == derived.EDITED:
             checked.wrong(CHANGED, place, f"was edited since it was made: {REMEDY}")
         own = stamps.get(digit, {})
-        held = [name for name, one in noted.items() if own.get(name) == one.stamp]
-        if any(noted[name].event != event for name, event in all_read(archive.root / FOLDER, held).items()):
-            checked.wrong(CHANGED, place, f"tells other events than the ledger's files: {REMEDY}")
+        held = [name for name, one in stored.items() if own.get(name) == one.stamp]
+        if any(stored[name].event != event for name, event in all_read(archive.root / FOLDER, held).items()):
+            checked.wrong(CHANGED, place, f"disagrees with the files of the ledger: {REMEDY}")

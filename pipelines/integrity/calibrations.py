@@ -1,4 +1,4 @@
-"""Checks of the ledger: the chain of every unit's events, and the runs that they rest on."""
+"""Checks of the ledger: the chain of events of every unit, and the runs on which certificates are based."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 
 def check_shard(shard: Place, checked: CheckedPart) -> CheckedPart:
-    """What is wrong with the units of one part of the ledger."""
+    """Check the units of one part of the ledger."""
     known: dict[Place, str] = {}
     for folder in sorted((place for place in shard.iterdir() if place.is_dir()), key=lambda place: place.name):
         before = ""
@@ -24,16 +24,16 @@ def check_shard(shard: Place, checked: CheckedPart) -> CheckedPart:
         for count, name in enumerate(names, 1):
             place = folder / name
             if name != f"{count:06d}.json":
-                checked.wrong(MISSING, folder / f"{count:06d}.json", "is not there, later events of the unit are")
+                checked.wrong(MISSING, folder / f"{count:06d}.json", "is missing, later events of the unit exist")
                 break
-            found = checked.manifest(place, SCHEMA)
-            if found is None:
+            manifest = checked.manifest(place, SCHEMA)
+            if manifest is None:
                 break
-            content, own = found
+            content, own = manifest
             if content.get("previous") != before and count > 1:
-                checked.wrong(EDITED, folder / names[count - 2], f"is not the event that {name} followed")
+                checked.wrong(EDITED, folder / names[count - 2], f"is not the event that {name} refers to")
             if folder_of(str(content.get("serial"))) != checked.name(folder).replace("\\", "/"):
-                checked.wrong(EDITED, place, f"names unit {content.get('serial')!r}, whose folder is another")
+                checked.wrong(EDITED, place, f"names unit {content.get('serial')!r}, which has another folder")
             if content.get("sequence") != count:
                 checked.wrong(EDITED, place, f"says that it is event {content.get('sequence')!r} of its unit")
             _check_evidence(place, content, known, checked)
@@ -42,24 +42,24 @@ def check_shard(shard: Place, checked: CheckedPart) -> CheckedPart:
 
 
 def _check_evidence(place: Place, content: dict[str, Any], known: dict[Place, str], checked: CheckedPart) -> None:
-    """Hold what a certificate rests on against the run as it is."""
+    """Compare the evidence of a certificate with the files of its run."""
     if content.get("action") == "revoke":
         return
     run = checked.root / "runs" / Path(str(content.get("run"))).name
-    for name, wanted in checked.named(content, "evidence", place).items():
+    for name, expected in checked.named(content, "evidence", place).items():
         manifest = run / f"{name}.json"
-        found = _hash(manifest, known)
-        if not found:
-            checked.wrong(MISSING, manifest, f"is not there, certificate {checked.name(place)} rests on it")
-        elif found != wanted:
-            checked.wrong(EDITED, manifest, f"is not the manifest that certificate {checked.name(place)} rests on")
+        actual = _hash(manifest, known)
+        if not actual:
+            checked.wrong(MISSING, manifest, f"is missing, certificate {checked.name(place)} is based on it")
+        elif actual != expected:
+            checked.wrong(EDITED, manifest, f"is not the manifest that certificate {checked.name(place)} is based on")
     table = run / "coefficients.json"
     try:
         there = files.read_json(table).get("sha256") if _hash(table, known) else content.get("coefficients")
-    except ArchiveUnusable:  # told where the run is checked
+    except ArchiveUnusable:  # the check of the run reports it
         return
     if there != content.get("coefficients"):
-        checked.wrong(CHANGED, table, f"names other coefficients than certificate {checked.name(place)} was given for")
+        checked.wrong(CHANGED, table, f"names other coefficients than certificate {checked.name(place)}")
 
 
 def _hash(place: Place, known: dict[Place, str]) -> str:

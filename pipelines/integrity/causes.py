@@ -1,7 +1,7 @@
-"""One finding per cause: what follows from a file that was edited or is gone stands under it, not beside it.
+"""One finding for each cause: the consequences of an edited or missing file are listed under it.
 
-One edited manifest is told by its signature, by its key, by the chain and by each manifest that was made from it; a folder that
-is gone is told file by file.
+One edited manifest fails the check of its signature, of its key, of the chain and of each manifest that refers to it; a missing
+folder gives one finding for each file.
 """
 
 from __future__ import annotations
@@ -17,19 +17,19 @@ if TYPE_CHECKING:
 
     from pipelines.archive.store import Place
 
-FEWEST_GONE = 2  # files of a folder that is not there, before the folder is told in their place
+FEWEST_GONE = 2  # missing files of a missing folder from which on the folder is reported instead
 
 
 def by_cause(findings: Iterable[IntegrityFinding], root: Place) -> list[IntegrityFinding]:
-    """The findings with those that follow from another one among its consequences; every path once."""
+    """The findings by cause; each path occurs once, and consequences are listed in the finding that caused them."""
     by_path: dict[str, list[IntegrityFinding]] = {}
     for finding in dict.fromkeys(findings):
         by_path.setdefault(finding.path, []).append(finding)
-    causes = {path: _one(found) for path, found in by_path.items()}
+    causes = {path: _one(group) for path, group in by_path.items()}
     for folder, paths in _gone(causes, root).items():
         if len(paths) >= FEWEST_GONE:
-            told = IntegrityFinding(MISSING, folder, f"is not there, {len(paths)} files of it are named elsewhere")
-            causes[folder] = _with(told, [causes.pop(path) for path in paths])
+            cause = IntegrityFinding(MISSING, folder, f"is missing, {len(paths)} of its files are named elsewhere")
+            causes[folder] = _with(cause, [causes.pop(path) for path in paths])
     for path in list(causes):
         over = _manifest_of(path)
         if over in causes and causes[path].kind == CHANGED and causes[over].kind in {EDITED, SIGNATURE}:
@@ -37,10 +37,10 @@ def by_cause(findings: Iterable[IntegrityFinding], root: Place) -> list[Integrit
     return list(causes.values())
 
 
-def _one(found: list[IntegrityFinding]) -> IntegrityFinding:
-    """The findings of one path as one: a false signature says most, then what was said first."""
-    first = min(found, key=lambda one: one.kind != SIGNATURE)
-    return _with(first, [one for one in found if one is not first])
+def _one(findings: list[IntegrityFinding]) -> IntegrityFinding:
+    """The findings of one path as one: an invalid signature first, then the first finding."""
+    first = min(findings, key=lambda one: one.kind != SIGNATURE)
+    return _with(first, [one for one in findings if one is not first])
 
 
 def _with(cause: IntegrityFinding, more: Iterable[IntegrityFinding]) -> IntegrityFinding:
@@ -49,7 +49,7 @@ def _with(cause: IntegrityFinding, more: Iterable[IntegrityFinding]) -> Integrit
 
 
 def _gone(causes: Mapping[str, IntegrityFinding], root: Place) -> dict[str, list[str]]:
-    """Missing files by the topmost folder that is gone with them."""
+    """Missing files by the topmost folder that is missing with them."""
     out: dict[str, list[str]] = {}
     there: dict[str, bool] = {}
     for path, finding in causes.items():
@@ -69,7 +69,7 @@ TOPS = ("runs", "captures", "calibrations", "chain")
 
 
 def _manifest_of(path: str) -> str:
-    """The manifest that a table is told in."""
+    """The manifest of a table."""
     place = PurePosixPath(path)
     if place.suffix not in {".parquet", ".html"}:
         return ""

@@ -1,4 +1,4 @@
-"""Checks of the archive's chain: no entry is missing or edited, and what they seal is there as it was."""
+"""Checks of the chain of an archive: no entry is missing or edited, and the files that they seal are unchanged."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 @dataclass
 class Chain:
-    """What the chain says.
+    """Content of the chain.
 
     Parameters
     ----------
@@ -30,60 +30,62 @@ class Chain:
 
 
 def check_chain(root: Place, checked: CheckedPart, *, only: set[str] | None = None, head: str = "") -> Chain:
-    """What the chain says; what is wrong goes into ``checked``.
+    """Read and check the chain; findings go into ``checked``.
 
     Parameters
     ----------
-    only : runs whose sealed files are looked at; all where None.
-    head : hash of an entry that was noted elsewhere; it must be there.
+    only : runs whose sealed files are checked; all where None.
+    head : hash of an entry from a copy kept elsewhere; it must exist.
     """
-    before, seen, told, latest = "", set[str](), Chain(), ""
+    before, seen, chain, latest = "", set[str](), Chain(), ""
     for number, place in hash_chain.entries(root):
         part = checked.blank()
-        found = part.manifest(place, 1)
-        if only is not None and (found is None or found[0].get("run") not in only):
-            part.untrusted = {state: [] for state in part.untrusted}  # who signed entries of other runs is not asked
+        manifest = part.manifest(place, 1)
+        if only is not None and (manifest is None or manifest[0].get("run") not in only):
+            part.untrusted = {
+                state: [] for state in part.untrusted
+            }  # signatures of entries of other runs are not checked
         checked.add(part)
-        if found is None:
+        if manifest is None:
             before = ""
             continue
-        content, own = found
+        content, own = manifest
         if content.get("number") != number:
             checked.wrong(EDITED, place, f"says that it is entry {content.get('number')!r}")
         if before and content.get("previous") != before:
             earlier = hash_chain.place_of_entry(root, number - 1)
-            checked.wrong(EDITED, earlier, f"is not the entry that number {number} followed")
-        told.entries[number] = _files(checked.named(content, "files", place))
+            checked.wrong(EDITED, earlier, f"is not the entry that number {number} refers to")
+        chain.entries[number] = _files(checked.named(content, "files", place))
         if only is None or content.get("run") in only:
-            told.sealed |= told.entries[number]
+            chain.sealed |= chain.entries[number]
         when = str(content.get("when", ""))
         if when < latest:
             checked.remarks.append(
-                f"entry {number} of the chain says {when}, one before it {latest}: a clock went backwards"
+                f"entry {number} of the chain says {when}, one before it {latest}: a clock was set back"
             )
         before, latest = own, max(when, latest)
         seen.add(own)
     if head and head not in seen:
         checked.wrong(
-            MISSING, root / hash_chain.FOLDER, f"has no entry with hash {head}: entries were taken away or written anew"
+            MISSING, root / hash_chain.FOLDER, f"has no entry with hash {head}: entries were removed or written again"
         )
-    for name, wanted in told.sealed.items():
-        _check_sealed(root, name, wanted, checked)
-    told.head = before
-    return told
+    for name, expected in chain.sealed.items():
+        _check_sealed(root, name, expected, checked)
+    chain.head = before
+    return chain
 
 
 def _files(named: dict[str, str]) -> dict[str, str]:
-    """What an entry seals; names that lead out of the archive do not count."""
+    """What an entry seals; names that lead out of the archive are ignored."""
     return {k: v for k, v in named.items() if ".." not in PurePosixPath(k).parts and not k.startswith("/")}
 
 
-def _check_sealed(root: Place, name: str, wanted: str, checked: CheckedPart) -> None:
+def _check_sealed(root: Place, name: str, expected: str, checked: CheckedPart) -> None:
     place = root / name
     try:
-        found = files.sha256(place)
+        actual = files.sha256(place)
     except OSError:
-        checked.wrong(MISSING, place, "is not there, the archive's chain names it")
+        checked.wrong(MISSING, place, "is missing, the chain of the archive names it")
         return
-    if found != wanted:
-        checked.wrong(EDITED, place, "is not as the archive's chain sealed it")
+    if actual != expected:
+        checked.wrong(EDITED, place, "differs from what the chain of the archive sealed")

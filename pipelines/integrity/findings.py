@@ -1,4 +1,4 @@
-"""What a check finds, and what it went through."""
+"""Findings of the checks, and counts of what was checked."""
 
 from __future__ import annotations
 
@@ -26,13 +26,13 @@ CHANGED, MISSING, EDITED, FOREIGN, NEWER, UNREADABLE, SIGNATURE, UNCHAINED = (
 
 @dataclass(frozen=True)
 class IntegrityFinding:
-    """Something that is wrong.
+    """A difference between the archive and what was written.
 
     Parameters
     ----------
     kind : ``changed``, ``missing``, ``edited``, ``foreign``, ``newer``, ``unreadable``, ``signature`` or ``unchained``.
     path : the file, below the archive's root.
-    consequences : in words, what else was found because of it.
+    consequences : sentences about further findings with this cause.
     """
 
     kind: str
@@ -43,13 +43,13 @@ class IntegrityFinding:
 
 @dataclass
 class CheckedPart:
-    """What was found in a part of the archive, and how much of it was read.
+    """Findings in a part of the archive, and the amount of data read.
 
     Parameters
     ----------
-    remarks : what a reader should know and is not wrong.
-    signatures : how many manifests have a signature that is good, unknown, bad or not there.
-    untrusted : names of the manifests whose signature is unknown or not there, by which of the two.
+    remarks : information that is no finding.
+    signatures : number of manifests by state of the signature (good, unknown key, bad, unsigned).
+    untrusted : names of the manifests without a signature or with that of an unknown key, by state.
     """
 
     root: Place
@@ -64,11 +64,11 @@ class CheckedPart:
     bytes: int = 0
 
     def blank(self) -> CheckedPart:
-        """One of the same archive and keys in which nothing was found yet."""
+        """A new part of the same archive with the same keys, without findings."""
         return CheckedPart(self.root, self.keys)
 
     def add(self, other: CheckedPart) -> None:
-        """Take in what was found elsewhere."""
+        """Add the findings and counts of another part."""
         self.findings += other.findings
         self.remarks += other.remarks
         self.signatures += other.signatures
@@ -78,26 +78,26 @@ class CheckedPart:
             setattr(self, name, getattr(self, name) + getattr(other, name))
 
     def name(self, place: Place) -> str:
-        """A place's name below the archive's root."""
+        """The name of a place relative to the root of the archive."""
         return str(place)[len(str(self.root)) :].lstrip("/\\")
 
     def wrong(self, kind: str, place: Place, message: str) -> None:
-        """Note something that is wrong."""
+        """Add a finding."""
         self.findings.append(IntegrityFinding(kind, self.name(place), message))
 
     def manifest(self, place: Place, known_schema: int) -> tuple[dict[str, Any], str] | None:
-        """A manifest's content and the hash of its file, its signature checked; None where it cannot be used."""
+        """Content of a manifest and hash of its file, with the signature checked; None where the manifest is unusable."""
         try:
             data = place.read_bytes()
             content = files.parsed(data, place)
         except OSError as problem:
-            self.wrong(MISSING, place, f"is not there or cannot be read ({first_line(problem)})")
+            self.wrong(MISSING, place, f"is missing or cannot be read ({first_line(problem)})")
             return None
         except NameLeadsOut as problem:
             self.wrong(EDITED, place, str(problem).partition(f"{place} ")[2])
             return None
         except ArchiveUnusable:
-            self.wrong(UNREADABLE, place, "is no manifest that can be read")
+            self.wrong(UNREADABLE, place, "is not a readable manifest")
             return None
         self.manifests += 1
         self.bytes += len(data)
@@ -112,23 +112,23 @@ class CheckedPart:
         if state in self.untrusted:
             self.untrusted[state].append(self.name(place))
         if state == BAD:
-            self.wrong(SIGNATURE, place, "was edited after it was signed, or signed with another key than it names")
+            self.wrong(SIGNATURE, place, "was edited after signing, or was signed with another key than it names")
         return content, files.hash_of(data)
 
     def named(self, content: Mapping[str, Any], entry: str, place: Place) -> dict[str, str]:
-        """What an entry of a manifest names, with a hash each; one of another shape was edited."""
-        found = content.get(entry, {})
-        if isinstance(found, dict) and all(isinstance(value, str) for value in found.values()):
-            return found
-        self.wrong(EDITED, place, f"was edited: '{entry}' are no names with a hash each")
+        """Names and hashes in an entry of a manifest; any other type shows that the manifest was edited."""
+        names = content.get(entry, {})
+        if isinstance(names, dict) and all(isinstance(value, str) for value in names.values()):
+            return names
+        self.wrong(EDITED, place, f"was edited: '{entry}' is not a table of names and hashes")
         return {}
 
-    def table(self, place: Place, wanted: str, rows: int | None = None) -> None:
-        """Hold a table's bytes against a hash, and its rows against a count."""
+    def table(self, place: Place, expected: str, rows: int | None = None) -> None:
+        """Compare the bytes of a table with a hash, and its rows with a count."""
         try:
-            found, count, size = _read(place)
+            actual, count, size = _read(place)
         except (FileNotFoundError, NotADirectoryError):
-            self.wrong(MISSING, place, "is not there, its manifest is")
+            self.wrong(MISSING, place, "is missing, its manifest exists")
             return
         except OSError as problem:
             self.wrong(UNREADABLE, place, f"cannot be read ({first_line(problem)})")
@@ -136,26 +136,28 @@ class CheckedPart:
         self.tables += 1
         self.rows += count or 0
         self.bytes += size
-        if found != wanted:
+        if actual != expected:
             self.wrong(
-                CHANGED, place, f"is not as it was written: hash {found[:12]}…, its manifest says {str(wanted)[:12]}…"
+                CHANGED,
+                place,
+                f"has changed since it was written: hash {actual[:12]}…, its manifest says {str(expected)[:12]}…",
             )
         elif rows is not None and count != rows:
             self.wrong(EDITED, place, f"has {count} rows, its manifest says {rows}")
 
 
 def _read(place: Place) -> tuple[str, int | None, int]:
-    """Hash, rows (of a Parquet file that is whole) and size of a file."""
+    """Hash, rows (of a complete Parquet file) and size of a file."""
     import pyarrow as pa
     import pyarrow.parquet as pq
 
     data = place.read_bytes() if isinstance(place, ObjectPath) else b""
-    found = files.hash_of(data) if isinstance(place, ObjectPath) else files.sha256(place)
+    actual = files.hash_of(data) if isinstance(place, ObjectPath) else files.sha256(place)
     size = len(data) if isinstance(place, ObjectPath) else place.stat().st_size
     if place.suffix != ".parquet":
-        return found, None, size
+        return actual, None, size
     source = pa.BufferReader(data) if isinstance(place, ObjectPath) else str(place)
     try:
-        return found, pq.read_metadata(source).num_rows, size
-    except (pa.ArrowInvalid, OSError):  # told by the hash
-        return found, None, size
+        return actual, pq.read_metadata(source).num_rows, size
+    except (pa.ArrowInvalid, OSError):  # the hash shows it
+        return actual, None, size

@@ -1,4 +1,4 @@
-"""Checks of one run: its tables, their manifests, and the chain from one to the next."""
+"""Checks of one run: its tables, their manifests, and the links between the manifests."""
 
 from __future__ import annotations
 
@@ -21,13 +21,13 @@ KEYED = ("stage", "inputs", "parameters", "code", "key")
 
 
 def check_run(run: Run, checked: CheckedPart, schema: int) -> CheckedPart:
-    """What is wrong with a run."""
+    """Check a run."""
     names = {place.name: place for place in run.path.iterdir()}
     left = any(name.startswith(files.TEMPORARY) for name in names)
     begun = any(name != "lock" and not name.startswith(files.TEMPORARY) for name in names)
-    # a re-run publishes all of its files at once, this one last: a killed one left it under a temporary name
+    # a re-run publishes all files at once, this one last: a killed re-run left it under a temporary name
     if not begun or (left and not names.keys() & {START, "report.json", SEALED}):
-        checked.remarks.append(f"{checked.name(run.path)} holds no run: its writer was killed, or has just begun")
+        checked.remarks.append(f"{checked.name(run.path)} holds no run: its writer was killed, or has just started")
         return checked
     start = checked.manifest(run.path / "run.json", schema)
     if start is None:
@@ -36,14 +36,14 @@ def check_run(run: Run, checked: CheckedPart, schema: int) -> CheckedPart:
     manifests: dict[str, dict[str, Any]] = {}
     for name, place in sorted(names.items()):
         if place.suffix == ".json" and name not in OURS and not name.startswith(files.TEMPORARY):
-            found = checked.manifest(place, schema)
-            if found is not None:
-                manifests[place.stem], hashes[place.stem] = found
+            manifest = checked.manifest(place, schema)
+            if manifest is not None:
+                manifests[place.stem], hashes[place.stem] = manifest
     for name, content in manifests.items():
         data = run.path / ("report.html" if name == "report" else f"{name}.parquet")
         checked.table(data, str(content.get("sha256")), content.get("rows"))
         if name != "report" and "stage" not in content:
-            checked.wrong(EDITED, run.path / f"{name}.json", "was edited: it does not say which stage made its table")
+            checked.wrong(EDITED, run.path / f"{name}.json", "was edited: the stage that made its table is missing")
         _check_links(run.path / f"{name}.json", content, manifests, hashes, checked)
     capture = str(about.get("capture") or "")
     _check_capture_link(run, capture, manifests, checked)
@@ -51,7 +51,7 @@ def check_run(run: Run, checked: CheckedPart, schema: int) -> CheckedPart:
     checked.remarks += differing_libraries(run.id, manifests)
     if not names.keys() & {"report.json", SEALED} and capture:
         command = "'tumbleline rerun'" if about.get("rerun_of") else "its command"
-        checked.remarks.append(f"run {run.id} is not finished: give {command} again and it goes on")
+        checked.remarks.append(f"run {run.id} is not finished: give {command} again to continue it")
     return checked
 
 
@@ -62,51 +62,53 @@ def _check_links(
     hashes: dict[str, str],
     checked: CheckedPart,
 ) -> None:
-    """Hold a manifest against its own key, and against the manifests that it names."""
+    """Compare a manifest with its own key, and with the manifests that it names."""
     if all(name in content for name in KEYED) and all(
         isinstance(content[name], dict) for name in ("inputs", "parameters")
     ):
         key = stage_key(*(content[name] for name in KEYED[:4]))
         if key != content["key"]:
-            checked.wrong(EDITED, place, "was edited: stage, inputs, parameters and code do not make its key")
+            checked.wrong(
+                EDITED, place, "was edited: its key does not agree with its stage, inputs, parameters and code"
+            )
     elif not isinstance(content.get("parameters", {}), dict):
-        checked.wrong(EDITED, place, "was edited: its parameters are no names with values")
-    for name, wanted in checked.named(content, "inputs", place).items():
-        if name in manifests and manifests[name].get("sha256") != wanted:
-            checked.wrong(EDITED, place, f"names another table {name} than the run has")
-    for name, wanted in checked.named(content, "manifests", place).items():
-        if name in hashes and hashes[name] != wanted:
+        checked.wrong(EDITED, place, "was edited: its parameters are not a table of names and values")
+    for name, expected in checked.named(content, "inputs", place).items():
+        if name in manifests and manifests[name].get("sha256") != expected:
+            checked.wrong(EDITED, place, f"names another table {name} than the one in the run")
+    for name, expected in checked.named(content, "manifests", place).items():
+        if name in hashes and hashes[name] != expected:
             edited = place.parent / f"{name}.json"
             checked.wrong(
-                EDITED, edited, f"is not the manifest that {place.stem} was made from: edited, or written anew"
+                EDITED, edited, f"is not the manifest that {place.stem} was made from: it was edited or written again"
             )
         elif name not in hashes and name != "records":
-            checked.wrong(MISSING, place.parent / f"{name}.json", f"is not there, {place.stem} was made from it")
+            checked.wrong(MISSING, place.parent / f"{name}.json", f"is missing, {place.stem} was made from it")
 
 
 def _check_capture_link(run: Run, capture: str, manifests: dict[str, dict[str, Any]], checked: CheckedPart) -> None:
-    """Hold the capture's end against what the run's tables were made from."""
+    """Compare the capture with the one from which the tables of the run were made."""
     if not capture:
         return
     end = run.archive.root / "captures" / capture / COMPLETE
     if not end.is_file():
         if manifests:
-            checked.wrong(MISSING, end, f"is not there, run {run.id} was made from this capture")
+            checked.wrong(MISSING, end, f"is missing, run {run.id} was made from this capture")
         return
-    found = files.sha256(end)
+    actual = files.sha256(end)
     for name, content in manifests.items():
         named = content.get("manifests", {})
-        if isinstance(named, dict) and named.get("records", found) != found:
+        if isinstance(named, dict) and named.get("records", actual) != actual:
             checked.wrong(EDITED, end, f"is not the end of the capture that {name} of run {run.id} was made from")
             return
 
 
 def _check_others(run: Run, names: dict[str, Place], manifests: dict[str, Any], checked: CheckedPart) -> None:
-    """Files of the run's folder that no manifest names."""
+    """Files in the folder of a run that no manifest names."""
     for name, place in sorted(names.items()):
         if name.startswith(files.TEMPORARY):
             checked.remarks.append(
-                f"{checked.name(place)} was left by a killed writer, or is being written; see 'archive clean'"
+                f"{checked.name(place)} is a temporary file of a killed or active writer; see 'archive clean'"
             )
         elif (
             place.suffix == ".parquet"
@@ -116,13 +118,13 @@ def _check_others(run: Run, names: dict[str, Place], manifests: dict[str, Any], 
             mark = table_mark(place)
             if mark != place.stem:
                 what = f"holds table '{mark}'" if mark else "was not written by this archive"
-                checked.wrong(FOREIGN, place, f"{what}: take it out; import foreign files with 'tumbleline import'")
+                checked.wrong(FOREIGN, place, f"{what}: remove it; import foreign files with 'tumbleline import'")
             elif "report.json" in names:
-                checked.wrong(MISSING, run.path / f"{place.stem}.json", "is not there, its table is")
+                checked.wrong(MISSING, run.path / f"{place.stem}.json", "is missing, its table exists")
 
 
 def table_mark(place: Place) -> str:
-    """The table's name that a Parquet file bears; empty for a foreign or broken one."""
+    """Name of the table in the metadata of a Parquet file; empty for a foreign or damaged file."""
     import pyarrow as pa
     import pyarrow.parquet as pq
 

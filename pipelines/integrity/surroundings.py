@@ -1,4 +1,4 @@
-"""What lies in an archive and nothing of it put there: links that lead elsewhere, keys that sign, files of others."""
+"""Checks for foreign content in an archive: links, private keys, files that the archive did not write."""
 
 from __future__ import annotations
 
@@ -29,23 +29,23 @@ SHOWN = 10
 
 
 def check_mark(archive: Archive, checked: CheckedPart) -> None:
-    """The file that makes a folder an archive, which no chain names, is always the same."""
-    place, wanted = archive.root / "archive.json", archive.mark
+    """The file ``archive.json``, which the chain does not name, must have its constant content."""
+    place, expected = archive.root / "archive.json", archive.mark
     try:
-        found = place.read_bytes()
+        content = place.read_bytes()
     except FileNotFoundError:
-        checked.wrong(MISSING, place, "is not there, an archive begins with it")
+        checked.wrong(MISSING, place, "is missing, every archive has it")
         return
     except OSError:
         checked.wrong(UNREADABLE, place, "cannot be read")
         return
-    if found != wanted:
-        checked.wrong(CHANGED, place, f"is not as every archive begins; its content is {wanted.decode().split()}")
+    if content != expected:
+        checked.wrong(CHANGED, place, f"is not the content of every archive, which is {expected.decode().split()}")
 
 
 def check_surroundings(archive: Archive, checked: CheckedPart) -> None:
     """Every file and link of a local archive that is not the archive's own."""
-    if not isinstance(archive.root, Path):  # an object store has no links, and lists slowly
+    if not isinstance(archive.root, Path):  # an object store has no links, and its listing is slow
         return
     strangers: list[str] = []
     for name, place in _all(archive.root):
@@ -54,16 +54,16 @@ def check_surroundings(archive: Archive, checked: CheckedPart) -> None:
         elif not OURS.fullmatch(name) and files.TEMPORARY not in name:
             if _is_key(place):
                 checked.wrong(
-                    SIGNATURE, place, "is a private key: whoever edits the archive could sign with it; move it out"
+                    SIGNATURE, place, "is a private key: who can edit the archive could sign with it; move it out"
                 )
             strangers.append(name)
     if strangers:
         more = f" and {len(strangers) - SHOWN} more" if len(strangers) > SHOWN else ""
-        checked.remarks.append(f"{', '.join(strangers[:SHOWN])}{more}: nothing of the archive put that there")
+        checked.remarks.append(f"{', '.join(strangers[:SHOWN])}{more}: not written by the archive")
 
 
 def check_links(archive: Archive, folders: Iterable[Place], checked: CheckedPart) -> None:
-    """Links in place of folders of a local archive, and in them: for checks that do not look at the whole archive."""
+    """Links in the given folders of a local archive: for checks of a part of the archive."""
     for folder in folders:
         if isinstance(folder, Path) and isinstance(archive.root, Path):
             for place in (folder, *folder.rglob("*")):
@@ -80,9 +80,9 @@ def _all(root: Path) -> Iterator[tuple[str, Path]]:
 
 
 def _check_link(name: str, place: Path, checked: CheckedPart) -> None:
-    """A link is no file of the archive: what it leads to can be changed elsewhere. Whole top folders may lie on another disk."""
+    """A link is no file of the archive: its target can be changed elsewhere. Top folders may be links to another disk."""
     if "/" in name:
-        what = f"is a link to {os.readlink(place)}: put there what it leads to"  # noqa: PTH115 - as it was written
+        what = f"is a link to {os.readlink(place)}: replace it by the content"  # noqa: PTH115 - as it was written
         checked.wrong(FOREIGN, place, what)
 
 
