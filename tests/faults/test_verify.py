@@ -265,7 +265,7 @@ def test_a_key_is_made_once_and_for_its_owner_only(tmp_path: Path) -> None:
     place = tmp_path / "deep" / "signing.key"
     make_key(place)
     assert place.stat().st_mode & 0o777 == 0o600
-    with pytest.raises(WrongUse, match="is there already"):
+    with pytest.raises(WrongUse, match="exists, a new file is needed"):
         make_key(place)
 
 
@@ -357,7 +357,7 @@ def test_a_writer_that_is_at_work_is_not_accused(copy: Path) -> None:
     max(copy.glob("chain/*/*.json")).unlink()
     report = verified(copy)
     assert report.whole
-    assert any("is not in the chain yet: its writer is at work" in remark for remark in report.checked.remarks)
+    assert any("is not in the chain yet: its writer is still active" in remark for remark in report.checked.remarks)
 
 
 @pytest.mark.parametrize("marked", [True, False])
@@ -406,7 +406,7 @@ def test_a_key_in_the_archive_is_named_and_none_is_made_there(copy: Path, key: P
     shutil.copy(key, run_of(copy).path / "notes.txt")
     report = verified(copy)
     assert [(f.kind, Path(f.path).name) for f in report.checked.findings] == [("signature", "notes.txt")]
-    assert "nothing of the archive put that there" in report.checked.remarks[0]
+    assert "not written by the archive" in report.checked.remarks[0]
     result = CliRunner().invoke(app, ["archive", "key", "--output", str(copy / "runs" / "signing.key")])
     assert "lies in archive" in str(result.exception)
 

@@ -34,7 +34,7 @@ sys.path[:0] = [{tests!r}, {root!r}]
 from capture_double import CaptureDouble, small_job
 from ledger_events import day
 from pipelines.archive import Archive
-from pipelines.chain import ORDER
+from pipelines.chain.chain import ORDER
 from pipelines.runner import Runner
 from pipelines.trace import Ledger
 
