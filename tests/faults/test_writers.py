@@ -35,8 +35,9 @@ from capture_double import CaptureDouble, small_job
 from ledger_events import day
 from pipelines.archive import Archive
 from pipelines.chain.chain import ORDER
-from pipelines.runner import Runner
-from pipelines.trace import Ledger
+from pipelines.chain.runner import Runner
+from pipelines.certificates import Ledger
+from pipelines.chain.certify import certify
 
 folder, archive, number = Path(sys.argv[1]), Archive(sys.argv[2]), int(sys.argv[3])
 folder.mkdir()
