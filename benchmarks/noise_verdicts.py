@@ -108,15 +108,21 @@ def verification(records: int, seed: int) -> None:
 
 
 def bias(records: int, seed: int) -> None:
-    """Six faces at one temperature: what the stated uncertainties of the bias hold."""
+    """Six faces at one temperature, and three rounds of 24 poses: what the stated uncertainties of the bias hold."""
+    rounds = {"plan": "fibonacci", "temperatures": (25.0, 25.0, 25.0), "move_s": 20}
     rng = np.random.default_rng(seed)
     for name, world in (
-        ("ADXL355: 25 µg/√Hz, B 300 µg", {"flicker": 300.0}),
-        ("25 µg/√Hz, B 30 µg", {"flicker": 30.0}),
-        ("280 µg/√Hz, B 30 µg", {"flicker": 30.0, "density": 280.0}),
+        ("six faces, ADXL355: 25 µg/√Hz, B 300 µg", {"flicker": 300.0}),
+        ("six faces, 25 µg/√Hz, B 30 µg", {"flicker": 30.0}),
+        ("six faces, 280 µg/√Hz, B 30 µg", {"flicker": 30.0, "density": 280.0}),
+        ("six faces, 25 µg/√Hz, B 30 µg, K 1 µg/√s", {"flicker": 30.0, "walk": 1.0}),
+        ("six faces, 25 µg/√Hz, B 30 µg, K 4 µg/√s", {"flicker": 30.0, "walk": 4.0}),
+        ("24 poses, three rounds, 25 µg/√Hz, B 30 µg", {"flicker": 30.0, **rounds}),
+        ("24 poses, three rounds, 25 µg/√Hz, B 30 µg, K 1 µg/√s", {"flicker": 30.0, "walk": 1.0, **rounds}),
+        ("24 poses, three rounds, 25 µg/√Hz, B 30 µg, K 4 µg/√s", {"flicker": 30.0, "walk": 4.0, **rounds}),
     ):
         sums: dict[str, int] = {}
-        total, ratio = 0, []
+        total, ratio, day = 0, [], []
         for _ in range(records):
             one = lots.world(rng, units=4, **world)
             found = fit(one.dwells, lots.NO_HISTORY, ["bias", "scale", "misalignment"])
@@ -132,7 +138,10 @@ def bias(records: int, seed: int) -> None:
                     sums[key] = sums.get(key, 0) + int(np.sum(np.abs(value - truth) <= 2.0 * u))
             total += value.size
             ratio.append(np.mean(stated["standard error"]))
-        print(f"six faces, one temperature, 4 units, {name}; standard error {np.mean(ratio):.1f} µg")
+            day.append(np.mean(stated["bias_long_u_ug"]))
+        print(
+            f"4 units, one temperature, {name}; u of the record {np.mean(ratio):.1f}, of the day {np.mean(day):.1f} µg"
+        )
         for key, held in sums.items():
             print(made.told(key, held, total))
 

@@ -19,8 +19,8 @@ COVERAGE = 2.0
 def e_n(new: Array, old: Array, new_error: Array, old_error: Array, dof: Array | float = np.inf) -> Array:
     """The E_n number of two results: their difference over the root sum of squares of their expanded uncertainties.
 
-    |E_n| ≤ 1 agrees (ISO/IEC 17043:2010, B.3.1.3; ISO 13528:2015, 9.7). Standard uncertainties are given. Their coverage factor is
-    2, or larger where they are known from few values: Student's for the same 95.45 % (JCGM 100, G.4).
+    |E_n| ≤ 1 agrees (ISO/IEC 17043:2010, B.3.1.3; ISO 13528:2015, 9.7). Standard uncertainties are given. Their coverage factor
+    is 2, or larger where they are known from few values: Student's for the same 95.45 % (JCGM 100, G.4).
 
     Parameters
     ----------

@@ -20,10 +20,10 @@ LIKELY = 7.35  # −2·ln(1 − √0.95): twice the log-likelihood within which 
 DRAWN_IN = 4.0
 DOF_OF_DIFFERENCES = 1.3
 PLACES, GROWTH = 0.65, 0.68
-"""Degrees of freedom per difference of neighbours, and number of independent places, 0.65·n^0.68, of the largest statistic of a white
-series whose wild values are drawn in, by simulation: the 99, 99.9 and 99.99 % quantiles of 10 000 series each of 20, 40, 100 and
-250 points (3.2 … 3.5, 4.0 … 4.2, 4.6 … 5.2) are those of Student's distribution with 0.47·n^0.68 places; a third more for safety.
-All places by themselves (Bonferroni) made a p-value of a white series ten times too large."""
+"""Degrees of freedom per difference of neighbours, and number of independent places, 0.65·n^0.68, of the largest statistic of a
+white series whose wild values are drawn in, by simulation: the 99, 99.9 and 99.99 % quantiles of 10 000 series each of 20, 40,
+100 and 250 points (3.2 … 3.5, 4.0 … 4.2, 4.6 … 5.2) are those of Student's distribution with 0.47·n^0.68 places; a third more
+for safety. All places by themselves (Bonferroni) made a p-value of a white series ten times too large."""
 TO_SIGMA = 1.4826  # σ over the median absolute deviation of a normal value
 
 
@@ -48,10 +48,11 @@ class ChangePoint:
 def change_points(values: Array, level: float = 1e-3) -> list[ChangePoint]:
     """The changes of level of a series (n,), found by binary segmentation, each then placed between its neighbours.
 
-    Judged are the innovations of the series, its wild values drawn in: of neighbours that agree by ρ only what is new in each counts,
-    so that n of them are worth n·(1 − ρ)/(1 + ρ) white ones. ρ is estimated, too: the p-value is the mean over what it may be
-    (:func:`~inertial.population.memory.memories_of`). σ is that of the differences of neighbours, by their median, so that neither
-    changes nor single outliers widen it.
+    Judged are the innovations of the series, its wild values drawn in: of neighbours that agree by ρ only what is new in each
+    counts, so that n of them are worth n·(1 − ρ)/(1 + ρ) white ones. ρ is estimated, too: the p-value is the mean over what it
+    may be
+    (:func:`~inertial.population.memory.memories_of`). σ is that of the differences of neighbours, by their median, so that
+    neither changes nor single outliers widen it.
 
     Parameters
     ----------

@@ -72,7 +72,7 @@ def memories_of(values: Array) -> Array:
 
 
 def innovations(values: Array, memory: float) -> Array:
-    """What is new in every value of a series (n,), (x₍k₎ − ρ·x₍k−1₎)/(1 − ρ): white, with the level of the series; (n,) or (n − 1,)."""
+    """What is new in every value of a series (n,), (xₖ − ρ·xₖ₋₁)/(1 − ρ): white, with the series' level; (n,) or (n − 1,)."""
     return (values[1:] - memory * values[:-1]) / (1.0 - memory) if memory > 0.0 else values
 
 

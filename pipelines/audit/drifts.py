@@ -39,9 +39,9 @@ MONTH_D = YEAR_D / 12.0
 OWN = tuple(name for name in NAMES if FAMILIES[FAMILY_OF[name]].own)
 FEWEST_PAIRS = 8
 PAIRS_A_DOF = 6.0
-"""Pairs for each degree of freedom of the mounting's variance: three variances are taken apart from the same pairs. By simulation of
-units that stand still, 20 units of three calibrations whose stated uncertainty is a fifth of their scatter: |E_n| > 1 in 4.4 % (8.3 %
-with a coverage factor of 2)."""
+"""Pairs for each degree of freedom of the mounting's variance: three variances are taken apart from the same pairs. By
+simulation of units that stand still, 20 units of three calibrations whose stated uncertainty is a fifth of their scatter: |E_n|
+> 1 in 4.4 % (8.3 % with a coverage factor of 2)."""
 AHEAD = np.arange(0.0, 10.0 + 1e-9, 1.0 / 24.0)  # years, in steps of half a month
 
 

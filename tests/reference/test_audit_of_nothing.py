@@ -132,6 +132,7 @@ def test_units_that_stand_still_agree_in_nineteen_of_twenty(rng, stated):
     assert len(beyond) == 8 * len(OWN)
     assert np.mean(beyond) < 0.062
 
+
 FIGURES, LIMIT = 7, 4.0  # as many figures, normal with σ = 1 and limits of ± 4: Ppk is 4/3
 
 
