@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.stats import t as student
 
-from inertial.population.memory import drawn_in, innovations, memories_of, memory_of
+from inertial.population.memory import TO_SIGMA, drawn_in, innovations, memories_of, memory_of
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -24,7 +24,6 @@ PLACES, GROWTH = 0.65, 0.68
 white series whose wild values are drawn in, by simulation: the 99, 99.9 and 99.99 % quantiles of 10 000 series each of 20, 40,
 100 and 250 points (3.2 … 3.5, 4.0 … 4.2, 4.6 … 5.2) are those of Student's distribution with 0.47·n^0.68 places; a third more
 for safety. All places by themselves (Bonferroni) made a p-value of a white series ten times too large."""
-TO_SIGMA = 1.4826  # σ over the median absolute deviation of a normal value
 
 
 @dataclass(frozen=True)

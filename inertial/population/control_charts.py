@@ -29,7 +29,10 @@ IN_CONTROL_RUN_LENGTH = (
 )
 CHARTS_SIMULATED = 6000
 IN_THE_TAIL = 0.02  # share of the simulated charts that the tail is known from
-STEP = 0.15  # between correlations of neighbours that charts are simulated with
+SURELY_BELOW = 0.8
+"""Of the correlations that a series may have, the share below that which its chart is judged by. By simulation (500 series of
+40, 100 and 150 points): of those with ρ = 0.6 that are in control 1.4 % at most have p < 0.01, and none p < 0.0003. The mean over
+all correlations kept this, too, but told a check standard that moved by 1.5 σ half as often."""
 EWMA_WEIGHT, EWMA_WIDTH = 0.2, 2.962
 EWMA_RUN_LENGTH = 500.0  # of these two (Lucas and Saccucci 1990; Montgomery, table 9.11)
 
@@ -85,37 +88,18 @@ class FalseAlarms:
         return float(beyond.size / self.numbers.size * (excess / (1.0 + excess)) ** (number - max(edge, 1)))
 
 
-@dataclass(frozen=True)
-class ChanceOfAlarms:
-    """False alarms of charts as correlated as one series may be: parts, and how likely each is."""
-
-    parts: tuple[FalseAlarms, ...]
-    weights: tuple[float, ...]
-
-    @property
-    def mean(self) -> float:
-        """Expected number of alarms."""
-        return sum(w * part.mean for w, part in zip(self.weights, self.parts, strict=True))
-
-    def p_value(self, number: int) -> float:
-        """Probability of as many alarms by chance."""
-        return sum(w * part.p_value(number) for w, part in zip(self.weights, self.parts, strict=True))
-
-
-def chance_of_alarms(values: Array, first: int, counted: int) -> ChanceOfAlarms:
+def chance_of_alarms(values: Array, first: int, counted: int) -> FalseAlarms:
     """What the alarms of a series (n,) are held against: charts in control whose points are as correlated and as heavy-tailed.
 
-    The correlation of neighbours is known from the series alone, so the probability is the mean over what it may be.
+    The correlation of neighbours is known from the series alone; taken is what it stays below with a probability of 0.8.
 
     Parameters
     ----------
     first : points that make the centre; counted : the last so many count
     """
     plain = drawn_in(values)
-    tail = tail_of(values, memory_of(plain))
-    memories, counts = np.unique(np.minimum(np.round(memories_of(plain) / STEP) * STEP, MOST), return_counts=True)
-    parts = tuple(false_alarms(values.size, first, counted, float(m), float(tail)) for m in memories)
-    return ChanceOfAlarms(parts, tuple((counts / counts.sum()).tolist()))
+    memory = min(round(float(np.quantile(memories_of(plain), SURELY_BELOW)), 1), MOST)
+    return false_alarms(values.size, first, counted, memory, float(tail_of(values, memory_of(plain))))
 
 
 @cache
