@@ -1,6 +1,4 @@
-"""Every kind of audit finding has a function that yields it, somebody who must act, evidence, and a row in the guide.
-"""
-reachable caller."""
+"""Every kind of audit finding has a function that yields it, somebody who must act, evidence, and a row in the guide."""
 
 from __future__ import annotations
 
