@@ -230,8 +230,8 @@ def _bias_of(lot: LotArrays, found: _Noisy, scale: Array) -> dict[str, Array]:
     walk = found.walk if carried else np.zeros_like(found.walk)
     wander = np.sqrt(found.flicker**2 + np.maximum(found.white**2 - own, 0.0) + 0.5 * (found.walk**2 - walk**2))
     widened = student(max(int(np.sum(found.fit.dof)) - 2, 1))
-    parts = (MICRO * part / scale for part in (record, wander, walk))
-    return bias_measurands(*parts, time, widened)
+    record, wander, walk = (MICRO * part / scale for part in (record, wander, walk))
+    return bias_measurands(record, wander, walk, time, widened)
 
 
 def _nothing() -> dict[str, pd.DataFrame]:

@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from pandera.errors import SchemaError
 
@@ -71,6 +71,7 @@ def test_rows_said_to_be_different_are(rows: list[tuple[str, int, float, bool]])
 ODD = st.sampled_from(["A1", "", "x", "w"])
 
 
+@settings(deadline=None)
 @given(
     st.lists(st.tuples(ODD, ODD, st.integers(-1, 3), st.sampled_from([0.0, 1.5, float("nan")])), min_size=1, max_size=6)
 )
