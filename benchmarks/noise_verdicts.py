@@ -27,8 +27,7 @@ from inertial.noise.allan import overlapping  # noqa: E402
 from inertial.noise.measurands import of_a_day  # noqa: E402
 from inertial.noise.terms import fit_terms  # noqa: E402
 from inertial.population.change_points import change_points  # noqa: E402
-from inertial.population.control_charts import FalseAlarms, alarms, baseline, false_alarms, signals  # noqa: E402
-from inertial.population.memory import drawn_in, memory_of, tail_of  # noqa: E402
+from inertial.population.control_charts import alarms, baseline, chance_of_alarms, signals  # noqa: E402
 from pipelines.stages.fit import fit  # noqa: E402
 from pipelines.stages.noise import noise  # noqa: E402
 from pipelines.stages.verify import verify  # noqa: E402
@@ -109,15 +108,21 @@ def verification(records: int, seed: int) -> None:
 
 
 def bias(records: int, seed: int) -> None:
-    """Six faces at one temperature: what the stated uncertainties of the bias hold."""
+    """Six faces at one temperature, and three rounds of 24 poses: what the stated uncertainties of the bias hold."""
+    rounds = {"plan": "fibonacci", "temperatures": (25.0, 25.0, 25.0), "move_s": 20}
     rng = np.random.default_rng(seed)
     for name, world in (
-        ("ADXL355: 25 µg/√Hz, B 300 µg", {"flicker": 300.0}),
-        ("25 µg/√Hz, B 30 µg", {"flicker": 30.0}),
-        ("280 µg/√Hz, B 30 µg", {"flicker": 30.0, "density": 280.0}),
+        ("six faces, ADXL355: 25 µg/√Hz, B 300 µg", {"flicker": 300.0}),
+        ("six faces, 25 µg/√Hz, B 30 µg", {"flicker": 30.0}),
+        ("six faces, 280 µg/√Hz, B 30 µg", {"flicker": 30.0, "density": 280.0}),
+        ("six faces, 25 µg/√Hz, B 30 µg, K 1 µg/√s", {"flicker": 30.0, "walk": 1.0}),
+        ("six faces, 25 µg/√Hz, B 30 µg, K 4 µg/√s", {"flicker": 30.0, "walk": 4.0}),
+        ("24 poses, three rounds, 25 µg/√Hz, B 30 µg", {"flicker": 30.0, **rounds}),
+        ("24 poses, three rounds, 25 µg/√Hz, B 30 µg, K 1 µg/√s", {"flicker": 30.0, "walk": 1.0, **rounds}),
+        ("24 poses, three rounds, 25 µg/√Hz, B 30 µg, K 4 µg/√s", {"flicker": 30.0, "walk": 4.0, **rounds}),
     ):
         sums: dict[str, int] = {}
-        total, ratio = 0, []
+        total, ratio, day = 0, [], []
         for _ in range(records):
             one = lots.world(rng, units=4, **world)
             found = fit(one.dwells, lots.NO_HISTORY, ["bias", "scale", "misalignment"])
@@ -133,7 +138,10 @@ def bias(records: int, seed: int) -> None:
                     sums[key] = sums.get(key, 0) + int(np.sum(np.abs(value - truth) <= 2.0 * u))
             total += value.size
             ratio.append(np.mean(stated["standard error"]))
-        print(f"six faces, one temperature, 4 units, {name}; standard error {np.mean(ratio):.1f} µg")
+            day.append(np.mean(stated["bias_long_u_ug"]))
+        print(
+            f"4 units, one temperature, {name}; u of the record {np.mean(ratio):.1f}, of the day {np.mean(day):.1f} µg"
+        )
         for key, held in sums.items():
             print(made.told(key, held, total))
 
@@ -173,7 +181,10 @@ def sphere(records: int, seed: int) -> None:
 
 
 def series(records: int, seed: int) -> None:
-    """Series of a level that stands still: change points and control charts that say that it moved; and a step that is there."""
+    """Series of a level that stands still: change points and control charts that say that it moved; and a step that is there.
+
+    Of the changes found at p ≤ 0.01, those below 0.001 and 0.0001 are counted.
+    """
     rng = np.random.default_rng(seed)
     kinds = (
         ("white", 0.0, None),
@@ -181,35 +192,32 @@ def series(records: int, seed: int) -> None:
         ("Student's t, 3 dof", 0.0, 3.0),
         ("ρ = 0.6, t 3 dof", 0.6, 3.0),
     )
-    for n in (40, 100, 250):
+    for n in (20, 40, 100):
         for name, memory, dof in kinds:
             made_ = made.autoregressive(rng, records, n, memory, dof=dof)
-            print(
-                made.told(
-                    f"{n} points, {name}: a change at p ≤ 0.001", sum(bool(change_points(v)) for v in made_), records
-                )
-            )
+            p = np.array([min((c.p_value for c in change_points(v, 1e-2)), default=1.0) for v in made_])
+            for level in (1e-2, 1e-3, 1e-4):
+                print(made.told(f"{n} points, {name}: a change at p < {level:g}", int(np.sum(p < level)), records))
             for step in (2.0, 4.0):
                 moved = made_ + step * (np.arange(n) >= n // 2)
                 found = sum(any(abs(c.first - n // 2) <= 3 for c in change_points(v)) for v in moved)
                 print(made.told(f"    a step of {step:g} σ half-way is found", found, records))
-    for name, memory, dof in kinds:
-        bad = {0.01: 0, 0.001: 0}
-        for v in made.autoregressive(rng, records, 100, memory, dof=dof):
-            chart = baseline(v, 40)
-            signalled, moving = signals(v, chart)
-            counted = np.arange(v.size) >= 40
-            p = chance(v, 40, 60).p_value(alarms(signalled, moving.outside, counted))
-            for level in bad:
-                bad[level] += int(p < level)
-        for level, count in bad.items():
-            print(made.told(f"control chart, 40 + 60 points, {name}: out of control at p < {level:g}", count, records))
+    for first, n in ((10, 20), (20, 40), (40, 100)):
+        for name, memory, dof in kinds:
+            made_ = made.autoregressive(rng, records, n, memory, dof=dof)
+            title = f"control chart, {first} + {n - first} points, {name}"
+            p = np.array([p_of_alarms(v, first) for v in made_])
+            for level in (0.01, 0.001):
+                print(made.told(f"{title}: out of control at p < {level:g}", int(np.sum(p < level)), records))
+            found = sum(p_of_alarms(v + 2.0 * (np.arange(n) >= first), first) < 0.01 for v in made_)
+            print(made.told("    2 σ off after the baseline is found", found, records))
 
 
-def chance(values: np.ndarray, first: int, counted: int) -> FalseAlarms:
-    """What alarms are held against, as the audit takes it."""
-    memory = float(np.ceil(10.0 * memory_of(drawn_in(values))) / 10.0)
-    return false_alarms(values.size, first, counted, memory, float(tail_of(values, memory)))
+def p_of_alarms(values: np.ndarray, first: int) -> float:
+    """Probability of a chart's alarms by chance, as the audit takes it."""
+    rules, moving = signals(values, baseline(values, first))
+    number = alarms(rules, moving.outside, np.arange(values.size) >= first)
+    return chance_of_alarms(values, first, values.size - first).p_value(number)
 
 
 def record(records: int, seed: int) -> None:

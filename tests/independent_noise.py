@@ -5,16 +5,15 @@ noise is drawn frequency by frequency, so that neither a filter nor a set of tim
 """
 
 import numpy as np
-from scipy.stats import beta
+from scipy.stats import binomtest
 
 Array = np.ndarray
 
 
 def share(count: int, total: int) -> tuple[float, float, float]:
     """Share of a count with the exact 95 % interval (Clopper and Pearson 1934)."""
-    low = float(beta.ppf(0.025, count, total - count + 1)) if count else 0.0
-    high = float(beta.ppf(0.975, count + 1, total - count)) if count < total else 1.0
-    return count / total, low, high
+    found = binomtest(count, total).proportion_ci(0.95, "exact")
+    return count / total, float(found.low), float(found.high)
 
 
 def told(name: str, count: int, total: int) -> str:

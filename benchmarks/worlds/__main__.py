@@ -36,9 +36,8 @@ DATA = {"data"}
 
 def interval(hits: int, runs: int) -> str:
     """A rate with its Clopper-Pearson interval."""
-    low = float(stats.beta.ppf(0.025, hits, runs - hits + 1)) if hits else 0.0
-    high = float(stats.beta.ppf(0.975, hits + 1, runs - hits)) if hits < runs else 1.0
-    return f"{hits}/{runs} [{low:.2f}, {high:.2f}]"
+    found = stats.binomtest(hits, runs).proportion_ci(0.95, "exact")
+    return f"{hits}/{runs} [{found.low:.2f}, {found.high:.2f}]"
 
 
 def diagnosed(task: tuple[str, str, int]) -> tuple[str, dict[str, Any]]:

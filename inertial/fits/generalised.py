@@ -17,7 +17,7 @@ from inertial.fits.restricted import Restricted
 Array = NDArray[np.float64]
 
 _STEP = 10.0
-_SHARES = (0.0, *(0.1 * _STEP ** np.arange(7)).tolist())
+SHARES = (0.0, *(0.1 * _STEP ** np.arange(7)).tolist())
 _FINE = 12
 _FAR = 12.0
 """Deviance above the lowest at which a pair of shares is out of the question."""
@@ -142,7 +142,7 @@ class Series:
         A slow drift within one record may be either, and the likelihood is flat between the two: its peak jumps from one
         answer to the other, its mean does not.
         """
-        shares, deviances = np.array(_SHARES), self._likelihood()
+        shares, deviances = np.array(SHARES), self._likelihood()
         coarse = deviances(shares, shares)
         if coarse[0, 0] - coarse.min() < _CHARGE:
             return 0.0, 0.0
@@ -161,7 +161,7 @@ class Series:
 
 def _around(shares: Array) -> Array:
     """Standard deviations (_FINE,) to look at, one coarse step beyond those that are likely."""
-    low, high = float(shares.min()) / _STEP, max(float(shares.max()), _SHARES[1]) * _STEP
+    low, high = float(shares.min()) / _STEP, max(float(shares.max()), SHARES[1]) * _STEP
     return np.linspace(low**0.5, high**0.5, _FINE)
 
 

@@ -17,7 +17,7 @@ from scipy import stats
 from inertial import design
 from inertial.design import Values
 from inertial.errors import NotIdentified
-from inertial.fits.generalised import Series, Solved
+from inertial.fits.generalised import SHARES, Series, Solved
 from inertial.fits.linear import LotFit, fit_lot
 from inertial.noise.flicker import SLOWEST_FITTED, flicker_kernel
 from inertial.state import State
@@ -62,6 +62,8 @@ class WanderFit:
     predicted: Array
     lack_of_fit: Array
     nonlinear_error: dict[str, dict[str, float]]
+    walk_shown: bool
+    """Whether the record shows the walk: no flicker alone explains it as well."""
 
     @property
     def flicker(self) -> float:
@@ -164,6 +166,7 @@ def fit_lot_with_wander(
         predicted=left.predicted() * (known * wide[..., None]) ** 2,
         lack_of_fit=stretch,
         nonlinear_error=columns.errors(solved),
+        walk_shown=_shown(series, shares[1]),
     )
 
 
@@ -188,6 +191,14 @@ def _solve(series: Series) -> tuple[tuple[float, float], Solved]:
         shares = (0.0, 0.0)
         solved = replace(series.solve(shares), variance=1.0)
     return shares, solved
+
+
+def _shown(series: Series, walk: float) -> bool:
+    """Whether flicker alone is worse than with this share of a walk by what refutes it."""
+    if walk <= 0.0:
+        return False
+    without, with_walk = np.min(series.deviances(np.array(SHARES), np.array([0.0, walk])), axis=0)
+    return bool(without - with_walk >= _REFUTED)
 
 
 def _prudent(series: Series, shares: tuple[float, float]) -> tuple[tuple[float, float], Solved]:

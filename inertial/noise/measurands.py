@@ -49,20 +49,51 @@ def instability(deviation: Array, time: Array, *, slowest: float = 1.0) -> Array
     return deviation * np.sqrt(np.pi / (octaves * _OCTAVE))
 
 
-def of_a_day(record: Array, wander: Array, time: Array, *, slowest: float = 1.0, widened: float = 1.0) -> Array:
-    """Standard uncertainty of a bias as the mean of the day after its record; the shape and unit of ``record``.
+def walked(record: float, later: float = 0.0) -> float:
+    """Variance, for a random walk of K = 1, of its mean over some time against its value at the start of a record.
 
-    Flicker between the record and that day is added to the uncertainty of the record's mean. A walk is not carried beyond
-    its record.
+    The coefficient of a fit is the bias at its first dwell: its walk is zero there. Its mean over the record is a/3 off that;
+    its mean over a time b that follows, a + b/3.
 
     Parameters
     ----------
-    record : standard error of the bias as the mean of its record; wander : standard deviation of the 1/f wander between dwells
+    record, later : lengths a and b, s; the mean is that over the record where ``later`` is zero
+    """
+    return record + later / 3.0 if later > 0.0 else record / 3.0
+
+
+def of_the_record(error: Array, walk: Array) -> Array:
+    """Standard uncertainty of a bias as the mean of its record, from that of its value at the first dwell.
+
+    Parameters
+    ----------
+    error : standard error of the coefficient; walk : standard deviation of the random walk at the last dwell
+    """
+    return np.hypot(error, walk * np.sqrt(walked(1.0)))
+
+
+def of_a_day(
+    record: Array,
+    wander: Array,
+    time: Array,
+    *,
+    walk: Array | float = 0.0,
+    slowest: float = 1.0,
+    widened: float = 1.0,
+) -> Array:
+    """Standard uncertainty of a bias as the mean of the day after its record; the shape and unit of ``record``.
+
+    Flicker between the record and that day, and the random walk since the first dwell, are added to the coefficient's error.
+
+    Parameters
+    ----------
+    record : standard error of the coefficient; wander : standard deviation of the 1/f wander between dwells
+    walk : standard deviation of the random walk at the end of the record
     time : (n,), s, of the dwells; slowest : as in :func:`instability`
     widened : factor of the wander's share, as it is known from few degrees of freedom
     """
     span = float(np.ptp(time))
     if not span > 0.0:
         return np.full_like(record, np.nan)
-    apart = widened * instability(wander, time, slowest=slowest) * np.sqrt(between_means(span, DAY_S))
-    return np.hypot(record, apart)
+    flicker = instability(wander, time, slowest=slowest) * np.sqrt(between_means(span, DAY_S))
+    return np.hypot(record, widened * np.hypot(flicker, walk * np.sqrt(walked(span, DAY_S) / span)))

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.stats import beta, chi2, norm
+from scipy.stats import binomtest, chi2, norm
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -83,7 +83,5 @@ def independent(values: Array, groups: Codes) -> tuple[float, float]:
 
 def fraction_interval(count: int, total: int) -> Index:
     """Share of a count with the exact interval of Clopper and Pearson (e-Handbook 7.2.4.1)."""
-    tail = 0.5 * (1.0 - CONFIDENCE)
-    low = float(beta.ppf(tail, count, total - count + 1)) if count else 0.0
-    high = float(beta.ppf(1.0 - tail, count + 1, total - count)) if count < total else 1.0
-    return Index(count / total, low, high)
+    found = binomtest(count, total).proportion_ci(CONFIDENCE, "exact")
+    return Index(count / total, float(found.low), float(found.high))

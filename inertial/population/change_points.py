@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.stats import t as student
 
-from inertial.population.memory import drawn_in, memory_of
+from inertial.population.memory import TO_SIGMA, drawn_in, innovations, memories_of, memory_of
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -18,10 +18,12 @@ if TYPE_CHECKING:
 FEWEST = 4  # points on either side
 LIKELY = 7.35  # −2·ln(1 − √0.95): twice the log-likelihood within which the place lies with 95 % (Hansen 2000, table 1)
 DRAWN_IN = 4.0
-DOF_OF_DIFFERENCES = (
-    2.0 / 3.0
-)  # degrees of freedom per difference of neighbours (von Neumann 1941, Ann. Math. Stat. 12, 367)
-TO_SIGMA = 1.4826  # σ over the median absolute deviation of a normal value
+DOF_OF_DIFFERENCES = 1.3
+PLACES, GROWTH = 0.65, 0.68
+"""Degrees of freedom per difference of neighbours, and number of independent places, 0.65·n^0.68, of the largest statistic of a
+white series whose wild values are drawn in, by simulation: the 99, 99.9 and 99.99 % quantiles of 10 000 series each of 20, 40,
+100 and 250 points (3.2 … 3.5, 4.0 … 4.2, 4.6 … 5.2) are those of Student's distribution with 0.47·n^0.68 places; a third more
+for safety. All places by themselves (Bonferroni) made a p-value of a white series ten times too large."""
 
 
 @dataclass(frozen=True)
@@ -29,9 +31,9 @@ class ChangePoint:
     """One change of level.
 
     first : index of the first point after it; low, high : earliest and latest that ``first`` may be, 95 %
-    shift, error : level after minus level before and its standard error, the values' unit
-    p_value : that noise of this length, as correlated as the series itself, shows as large a change anywhere (Bonferroni over the
-        places), σ known as from the series' own differences
+    shift, error : level after minus level before and its standard error with the correlation found, the values' unit
+    p_value : that noise of this length shows as large a change anywhere, averaged over the correlations of neighbours that the
+        series may have
     """
 
     first: int
@@ -45,29 +47,27 @@ class ChangePoint:
 def change_points(values: Array, level: float = 1e-3) -> list[ChangePoint]:
     """The changes of level of a series (n,), found by binary segmentation, each then placed between its neighbours.
 
-    σ is that of the differences of neighbours, by their median, so that neither changes nor single outliers widen it. A
-    series whose
-    neighbours agree by ρ has means that scatter √((1 + ρ)/(1 − ρ)) more than white ones, and is worth (1 − ρ)/(1 + ρ) of its
-    points; wild values are drawn in first. White noise assumed, a series of ρ = 0.6 had a "change" in six of ten cases.
+    Judged are the innovations of the series, its wild values drawn in: of neighbours that agree by ρ only what is new in each
+    counts, so that n of them are worth n·(1 − ρ)/(1 + ρ) white ones. ρ is estimated, too: the p-value is the mean over what it
+    may be
+    (:func:`~inertial.population.memory.memories_of`). σ is that of the differences of neighbours, by their median, so that
+    neither changes nor single outliers widen it.
 
     Parameters
     ----------
     level : largest p-value of a change that is reported.
     """
-    n, values = values.size, drawn_in(values)
     noise = _Noise.of(values)
-    if n < 2 * FEWEST or not noise.sigma > 0.0:
+    left, skipped = noise.left, values.size - noise.left.size
+    if left.size < 2 * FEWEST or not noise.sigma > 0.0:
         return []
-    places = sorted(_segment(values, (0, n), noise, level))
+    places = sorted(_segment(left, (0, left.size), noise, level))
     out: list[ChangePoint] = []
     for number, place in enumerate(places):
         low = places[number - 1] if number else 0
-        high = places[number + 1] if number + 1 < len(places) else n
-        found = _best(values[low:high])
-        if found is not None:
-            out.append(_described(values[low:high], low, found, noise))
-        else:
-            out.append(_described(values[low:high], low, place - low, noise))
+        high = places[number + 1] if number + 1 < len(places) else left.size
+        found = _best(left[low:high])
+        out.append(_described(left[low:high], low + skipped, place - low if found is None else found, noise))
     return out
 
 
@@ -75,19 +75,21 @@ def change_points(values: Array, level: float = 1e-3) -> list[ChangePoint]:
 class _Noise:
     """Noise of a series.
 
-    sigma : what means of its values scatter by as if it were white; worth : independent points that it is worth
+    left : innovations of the series, (m,), with its level; sigma : their standard deviation
+    wider : (25,), what the mean of innovations scatters by over what it would if the correlation found were the true one
     """
 
+    left: Array
     sigma: float
-    worth: float
+    wider: Array
 
     @classmethod
     def of(cls, values: Array) -> _Noise:
-        memory = memory_of(values)
-        # differences of neighbours have the variance 2·σ²·(1 − ρ)
-        own = noise_of(values) / np.sqrt(1.0 - memory)
-        stretch = (1.0 + memory) / (1.0 - memory)
-        return cls(float(own * np.sqrt(stretch)), values.size / stretch)
+        plain = drawn_in(values)
+        memory = memory_of(plain)
+        left = drawn_in(innovations(values, memory))
+        # a mean of the series scatters as 1/(1 − ρ), and its innovations here are divided by 1 − ρ of the estimate
+        return cls(left, noise_of(left), (1.0 - memory) / (1.0 - memories_of(plain)))
 
 
 def noise_of(values: Array) -> float:
@@ -134,8 +136,9 @@ def _best(values: Array) -> int | None:
 
 def _p_value(statistic: float, n: int, noise: _Noise) -> float:
     """Of a statistic in n values; σ comes from the differences of the whole series."""
-    places = max(n - 2 * FEWEST + 1, 1)
-    return float(min(1.0, 2.0 * student.sf(statistic, max(DOF_OF_DIFFERENCES * (noise.worth - 1.0), 1.0)) * places))
+    dof = max(DOF_OF_DIFFERENCES * (noise.left.size - 1), 1.0)
+    chance = float(np.mean(2.0 * student.sf(statistic / noise.wider, dof)))
+    return min(1.0, PLACES * n**GROWTH * chance)
 
 
 def _described(values: Array, offset: int, place: int, noise: _Noise) -> ChangePoint:

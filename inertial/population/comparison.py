@@ -6,9 +6,11 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.stats import chi2, norm, rankdata
+from scipy.stats import chi2, median_abs_deviation, norm, rankdata, tiecorrect
 from scipy.stats import f as f_distribution
 from scipy.stats import t as student
+
+from inertial.population.memory import TO_SIGMA
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -17,7 +19,6 @@ if TYPE_CHECKING:
     Codes = NDArray[np.int64]
     Flags = NDArray[np.bool_]
 
-TO_SIGMA = 1.4826
 MAD_EFFICIENCY = 0.37  # Rousseeuw and Croux 1993, J. Am. Stat. Assoc. 88, 1273
 
 
@@ -61,8 +62,7 @@ def _rank_p(values: Array, groups: Codes, counts: Codes, k: int) -> float:
     sums = np.bincount(groups, ranks)
     used = counts > 0
     h = 12.0 / (n * (n + 1.0)) * float(np.sum(sums[used] ** 2 / counts[used])) - 3.0 * (n + 1.0)
-    _, ties = np.unique(values, return_counts=True)
-    correction = 1.0 - float(np.sum(ties.astype(float) ** 3 - ties)) / (float(n) ** 3 - n)
+    correction = tiecorrect(ranks)
     return float(chi2.sf(h / correction, k - 1)) if correction > 0.0 else 1.0
 
 
@@ -79,10 +79,15 @@ def holm(p_values: Array) -> Array:
     return out
 
 
+def sigma_of(values: Array) -> Array:
+    """σ by the median absolute deviation along the first axis of values (n, …); NaN is left out."""
+    return np.asarray(median_abs_deviation(values, axis=0, scale=1.0 / TO_SIGMA, nan_policy="omit"))
+
+
 def robust_z(values: Array) -> Array:
     """Distance of every value from the median, in σ by the median absolute deviation; (n, …) along the first axis."""
     middle = np.nanmedian(values, axis=0)
-    spread = TO_SIGMA * np.nanmedian(np.abs(values - middle), axis=0)
+    spread = sigma_of(values)
     return (values - middle) / np.where(spread > 0.0, spread, np.inf)
 
 
@@ -92,7 +97,7 @@ def unlike(values: Array, errors: Array) -> Array:
     Averages of many scatter less than those of few only by their errors: what lots differ by does not shrink with their size.
     """
     middle = np.nanmedian(values, axis=0)
-    spread2 = (TO_SIGMA * np.nanmedian(np.abs(values - middle), axis=0)) ** 2
+    spread2 = sigma_of(values) ** 2
     sigma2 = np.maximum(spread2 - np.nanmedian(errors**2, axis=0), 0.0) + errors**2
     return (values - middle) / np.sqrt(np.where(sigma2 > 0.0, sigma2, np.inf))
 

@@ -8,13 +8,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.stats import chi2
 
+from inertial.population.comparison import sigma_of
+
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     Array = NDArray[np.float64]
     Index = NDArray[np.int64]
 
-TO_SIGMA = 1.4826
 FEWEST = 10  # pairs of calibrations that a usual change is known from
 FOREIGN_P = 1e-9  # probability of a distance at which a calibration counts as not of its unit
 ALIKE_P = 1e-3  # … and above which another unit's earlier calibration fits it
@@ -66,15 +67,11 @@ def change_scale(
     """
     time = np.zeros(len(values)) if years is None else years
     parts = _octaves(time)
-    change = np.maximum.accumulate([_spread((values - before)[part]) for part in parts], axis=0)
-    between = _spread(values if population is None else population)
+    change = np.maximum.accumulate([sigma_of((values - before)[part]) for part in parts], axis=0)
+    between = sigma_of(values if population is None else population)
     telling = np.all(change > 0.0, axis=0) & (between > TELLING * change[-1])
     knots = np.array([float(np.median(time[part])) for part in parts])
     return ChangeScale(knots, change, telling)
-
-
-def _spread(values: Array) -> Array:
-    return TO_SIGMA * np.median(np.abs(values - np.median(values, axis=0)), axis=0)
 
 
 def _octaves(years: Array) -> list[Index]:

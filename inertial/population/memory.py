@@ -15,20 +15,26 @@ if TYPE_CHECKING:
     Array = NDArray[np.float64]
 
 MOST = 0.9  # correlation of neighbours beyond which a level and a wander are the same thing
+LARGEST = 0.97  # correlation that is considered at all
+KNOWN_TO, OF_FEW = 1.3, 12.0
+"""Error of the inverse hyperbolic tangent of the correlation as :func:`memory_of` finds it, times √(n − 3): 1.3 + 12/n. Fisher's
+is one for a level that is known; here a change of level was taken out first. Root mean square of 5000 series each of 20, 40 and
+100 points with ρ = 0.6: 1.9, 1.7 and 1.5."""
+NODES = norm.ppf((np.arange(25) + 0.5) / 25)
 LOCAL = 9  # points of the running median that wild values are drawn in to
 DRAWN_IN = 3.0  # σ about it
 FEWEST = 4  # points on either side of a change
 TAILS = (np.inf, 8.0, 5.0, 3.0)
 """Degrees of freedom of Student's distribution that innovations are compared with."""
 SURELY = 2.0  # by which the log-likelihood of a heavier tail must be better
-TO_SIGMA = 1.4826
+TO_SIGMA = 1.4826  # σ over the median absolute deviation of a normal value
 
 
 def drawn_in(values: Array) -> Array:
     """The series (n,) with wild values drawn in to three σ about its running median, which follows a change of level."""
     if values.size < LOCAL:
         return values
-    level = median_filter(values, LOCAL, mode="nearest")
+    level = _running_median(values)
     left = values - level
     sigma = TO_SIGMA * float(np.median(np.abs(left)))
     return level + np.clip(left, -DRAWN_IN * sigma, DRAWN_IN * sigma) if sigma > 0.0 else values
@@ -55,6 +61,30 @@ def memory_of(values: Array) -> float:
     return float(np.clip(min(raw + (2.0 + 4.0 * max(raw, 0.0)) / n, most), 0.0, MOST))
 
 
+def memories_of(values: Array) -> Array:
+    """Correlations (25,) that a series (n,) may have, equally likely, by what :func:`memory_of` finds and how well that is known.
+
+    A verdict that takes the one value found for the truth is wrong far too often in a short series: at 40 points with ρ = 0.6 one
+    estimate in ten lies below 0.27.
+    """
+    n = values.size
+    spread = (KNOWN_TO + OF_FEW / n) / np.sqrt(max(n - 3, 1))
+    return np.clip(np.tanh(np.arctanh(memory_of(values)) + spread * NODES), 0.0, LARGEST)
+
+
+def innovations(values: Array, memory: float) -> Array:
+    """What is new in every value of a series (n,), (xₖ − ρ·xₖ₋₁)/(1 − ρ): white, with the series' level; (n,) or (n − 1,)."""
+    return (values[1:] - memory * values[:-1]) / (1.0 - memory) if memory > 0.0 else values
+
+
+def _running_median(values: Array) -> Array:
+    """Running median (n,), the series mirrored at its ends.
+
+    With the end value itself repeated it would be its own median: a wild first value then stood for a level of its own.
+    """
+    return median_filter(values, LOCAL, mode="mirror")
+
+
 def _neighbours(left: Array) -> float:
     square = float(np.sum(left**2))
     return float(np.sum(left[1:] * left[:-1])) / square if square > 0.0 else 0.0
@@ -62,11 +92,7 @@ def _neighbours(left: Array) -> float:
 
 def tail_of(values: Array, memory: float) -> float:
     """Degrees of freedom of the innovations of a series (n,): infinite unless heavier tails are surely better."""
-    level = (
-        median_filter(values, LOCAL, mode="nearest")
-        if values.size >= LOCAL
-        else np.full_like(values, np.median(values))
-    )
+    level = _running_median(values) if values.size >= LOCAL else np.full_like(values, np.median(values))
     left = values - level if memory == 0.0 else np.diff(values)
     sigma = TO_SIGMA * float(np.median(np.abs(left)))
     if not sigma > 0.0:

@@ -9,7 +9,8 @@ import numpy as np
 
 from inertial.population.capability import Index as Capability
 from inertial.population.capability import cpk, fraction_interval, independent, sigma_within
-from inertial.population.comparison import TO_SIGMA, Comparison, compare, holm, outlier_limit, robust_z, unlike
+from inertial.population.comparison import Comparison, compare, holm, outlier_limit, robust_z, unlike
+from inertial.population.memory import TO_SIGMA
 from inertial.population.two_way import group_medians
 from pipelines.audit.calibrations import codes, date_of
 from pipelines.audit.drifts import OWN

@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from inertial.population.change_points import ChangePoint, change_points, noise_of
-from inertial.population.control_charts import Baseline, alarms, baseline, false_alarms, signals
-from inertial.population.memory import drawn_in, memory_of, tail_of
+from inertial.population.control_charts import Baseline, alarms, baseline, chance_of_alarms, signals
 from inertial.population.two_way import unit_and_place
 from pipelines.audit.calibrations import codes
 from pipelines.audit.drifts import OWN
@@ -161,9 +160,7 @@ def _chart(
     day = all_.day[own]
     counted = (np.arange(values.size) >= rules.baseline_points) & (day >= since)
     number = alarms(found, moving.outside, counted)
-    memory = np.ceil(10.0 * memory_of(drawn_in(values))) / 10.0
-    tail = tail_of(values, memory)
-    chance = false_alarms(values.size, rules.baseline_points, int(counted.sum()), float(memory), float(tail))
+    chance = chance_of_alarms(values, rules.baseline_points, int(counted.sum()))
     return Chart(
         *key, unit_text(key[2]), day, values, all_.run[own], chart, found & counted, moving.average, moving.half_width,
         moving.outside & counted, number, chance.mean, chance.p_value(number), in_control=True,

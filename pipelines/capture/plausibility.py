@@ -1,7 +1,6 @@
 """Plausibility of a record before it is stored, while it can still be measured again.
 
-Means come from the summaries that validation and reduction use. Outliers are judged against percentiles of the samples, which
-no summary of several tables can give.
+Means and outliers come from the one module that decodes samples, which validation and reduction use, too.
 """
 
 from __future__ import annotations

@@ -10,6 +10,7 @@ import numpy as np
 import pandas as pd
 
 from inertial.quantities import BY_ATTRIBUTE
+from pipelines.tables.summaries import first_outlier
 from schemas.units import AXES
 
 if TYPE_CHECKING:
@@ -23,9 +24,6 @@ if TYPE_CHECKING:
 
 POWER_OFF = BY_ATTRIBUTE["power_off"].column
 INSTRUMENTS = tuple(BY_ATTRIBUTE[name].column for name in ("chamber", "temperature", "supply", "vibration"))
-OUTLIER_SIGMA = 20.0
-OUTLIER_PART = 1e-3  # of the full scale: a smaller outlier changes a mean of a hundred samples by at most 1e-5 of it
-FEWEST_FOR_OUTLIERS = 20
 SHARED = 4  # values of an observation that all slots share: two angles, air, vibration
 
 
@@ -126,18 +124,12 @@ class Record:
 
         In a static dwell an outlier was changed in transmission, or the unit was knocked.
         """
-        output = self._outputs(serial)
-        if len(output) < FEWEST_FOR_OUTLIERS:
+        found = first_outlier(self._outputs(serial), lsb, full_scale)
+        if found is None:
             return ""
-        low, middle, high = np.percentile(output, (15.87, 50.0, 84.13), axis=0)
-        allowed = np.maximum(OUTLIER_SIGMA * np.maximum(0.5 * (high - low), lsb), OUTLIER_PART * full_scale)
-        far = np.argwhere(~(np.abs(output - middle) <= allowed))
-        if not len(far):
-            return ""
-        row, axis = far[0].tolist()
         return (
-            f"sample {self.stored.get(serial, 0) + row} is {output[row, axis]:g} on {AXES[axis]}, the median of the dwell is "
-            f"{middle[axis]:g}"
+            f"sample {self.stored.get(serial, 0) + found.row} is {found.value:g} on {AXES[found.axis]}, the median of the dwell "
+            f"is {found.median:g}"
         )
 
     def _outputs(self, serial: str) -> NDArray[np.float64]:

@@ -175,48 +175,6 @@ class ShowValidityDocument(TypedDict):
     history: Annotated[list[CalibrationDocument], "every calibration of the unit, oldest first"]
 
 
-class RerunOutcome(TypedDict):
-    """What became of one run."""
-
-    run: str
-    new: Annotated[str, "id of the re-run; the run's own if nothing changed, empty if it failed"]
-    because: Annotated[list[dict[str, str]], "what changed: data, model, limits, code, library"]
-    stages: Annotated[dict[str, str], "`computed` or `reused` by stage"]
-    seconds: float
-    error: str
-
-
-class RerunDocument(TypedDict):
-    """``rerun --json``: the re-runs of the selected runs."""
-
-    archive: str
-    runs: list[RerunOutcome]
-    selected: int
-    rerun: int
-    failed: int
-    unchanged: NotRequired[int]
-
-
-class ReproducedRun(TypedDict):
-    """Whether the tables of one run are reproduced."""
-
-    run: str
-    same: bool
-    tables: NotRequired[Annotated[dict[str, str], "`same bytes`, `other bytes` or `not checked` by table"]]
-    differences: NotRequired[Annotated[list[str], "what differs and by how much, one sentence per table"]]
-    changed: NotRequired[Annotated[list[str], "code and libraries that changed since the run"]]
-    error: NotRequired[str]
-
-
-class RerunCheckDocument(TypedDict):
-    """``rerun --check --json``: whether every table is reproduced byte for byte."""
-
-    selected: int
-    same: int
-    runs: list[ReproducedRun]
-    archive: NotRequired[str]
-
-
 class SlotStatus(TypedDict):
     """A slot of the fixture."""
 
@@ -257,3 +215,77 @@ class StationStatusDocument(TypedDict):
     chamber: NotRequired[str]
     vibration_g: NotRequired[Annotated[float | None, "rms"]]
     time_s: NotRequired[Annotated[float, "clock of the station"]]
+
+
+class WaitingRun(TypedDict):
+    """A run that waits for the operator."""
+
+    id: str
+    name: str
+    question: str
+
+
+class OperatorDocument(TypedDict):
+    """``operator --json``: the runs that wait for the operator, and the answer that was given."""
+
+    waiting: list[WaitingRun]
+    answered: Annotated[Literal["go", "stop"] | None, "null: none was answered"]
+
+
+class QueryDocument(TypedDict):
+    """``query --json``: the rows of a question to the archive in SQL."""
+
+    columns: list[str]
+    rows: Annotated[list[dict[str, Any]], "value by column"]
+
+
+class RegisterReading(TypedDict):
+    """A register as it reads now."""
+
+    device: str
+    device_id: int
+    register: str
+    address: int
+    value: str
+    unit: str
+    fault: Annotated[str, "why it does not read; empty if it does"]
+
+
+class CheckedPart(TypedDict):
+    """One thing that was tested."""
+
+    check: str
+    part: str
+    ok: bool
+    value: float | str
+    unit: str
+    low: Annotated[float | None, "smallest value allowed"]
+    high: Annotated[float | None, "largest value allowed"]
+    message: Annotated[str, "empty if it is good"]
+
+
+class StationCheckDocument(TypedDict):
+    """``station check --json``: the self-test of a station."""
+
+    ok: bool
+    failed: Annotated[list[str], "a sentence for each failure"]
+    registers: list[RegisterReading]
+    checks: NotRequired[Annotated[list[CheckedPart], "missing with `--registers`"]]
+
+
+class StationEvent(TypedDict):
+    """Something that happened to a run or a station."""
+
+    when: Annotated[str, "ISO date and time, UTC"]
+    where: Annotated[str, "run or station"]
+    kind: str
+    reason: str
+    action: str
+    record: NotRequired[Annotated[int, "−1: none"]]
+    time_s: NotRequired[Annotated[float, "clock of the station"]]
+
+
+class StationLogDocument(TypedDict):
+    """``station log --json``: what paused or ended runs, and what became of the stations, in order of time."""
+
+    events: list[StationEvent]

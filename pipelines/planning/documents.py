@@ -69,6 +69,7 @@ class PlannedBias(TypedDict):
     long_u_ug: Annotated[float, "as the mean of the time after the record, µg"]
     long_s: Annotated[float, "length of that time, s"]
     switch_on_u_ug: Annotated[float | None, "after the next switch-on, µg; null: not stated"]
+    switch_on_why: NotRequired[Annotated[str, "why that is not stated"]]
 
 
 class PlanDocument(TypedDict):

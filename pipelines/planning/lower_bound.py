@@ -15,9 +15,9 @@ import numpy as np
 
 from inertial import design
 from inertial.noise.dwells import dwell_covariance
-from inertial.state import State
 from pipelines.planning.soak_orders import orders
 from pipelines.planning.timed_design import soak_waits
+from pipelines.schedule.planned_state import settled_state
 from pipelines.schedule.timing import spent
 
 if TYPE_CHECKING:
@@ -31,6 +31,7 @@ if TYPE_CHECKING:
 
     Array = NDArray[np.float64]
 
+RESTED_S = 1e4  # s at rest before a dwell: nothing of the last move is left
 PIECE_S = 120.0
 """Length of the dwells that fill the time between soaks, s."""
 
@@ -129,17 +130,7 @@ class _BoundSearch:
 
     def _rows(self, time: Array, heat: Array) -> Array:
         """Columns (3, n, p) at zero force, in units of the required errors."""
-        angle = np.zeros(time.size)
-        state = State(
-            force=np.zeros((time.size, 3)),
-            time=time,
-            temperature=heat,
-            chamber=heat,
-            since_power=time,
-            since_move=np.full(time.size, 1e4),
-            outer=angle,
-            inner=angle,
-        )
+        state = settled_state(np.zeros((time.size, 3)), time, heat, np.zeros((time.size, 2)), RESTED_S)
         columns = design.local_columns(self.sensor, state, design.starting_values(self.sensor, state))
         return columns * self.requirement.errors[:, None, :]
 

@@ -11,7 +11,7 @@ from inertial import effects as catalogue
 from inertial.effects import SensorEffect
 from inertial.errors import NotIdentified
 from inertial.noise.dwells import dwell_covariance
-from inertial.noise.measurands import DAY_S, between_means
+from inertial.noise.measurands import DAY_S, between_means, walked
 from inertial.planning.expected import expected_errors
 from inertial.planning.reasons import reason
 from inertial.planning.visibility import SEEN, visibilities
@@ -33,6 +33,8 @@ if TYPE_CHECKING:
     from pipelines.schedule.timing import Activity
     from schemas.recipe import Recipe
     from schemas.station import StationConfig
+
+NO_SWITCH_ON = "no repeatability of switching on is stated for this device"
 
 
 @dataclass(frozen=True)
@@ -95,7 +97,7 @@ def _of_record(context: PlanContext) -> NDArray[np.float64]:
     return dwell_covariance(time, length, context.noise, since=float(time.min()) - 0.5 * length)
 
 
-def _bias(context: PlanContext, expected: Expected) -> dict[str, float | None] | None:
+def _bias(context: PlanContext, expected: Expected) -> dict[str, float | str | None] | None:
     """Standard uncertainty of the bias by measurand, of the worst axis, as the fit will state it; None for a model without one.
 
     See :func:`pipelines.stages.bias_measurands.bias_measurands`.
@@ -109,12 +111,16 @@ def _bias(context: PlanContext, expected: Expected) -> dict[str, float | None] |
     if not own:
         return None
     span = float(np.ptp(context.state.time))
-    apart = context.noise.instability * np.sqrt(between_means(span, DAY_S)) if span > 0.0 else 0.0
+    noise, apart = context.noise, 0.0
+    if span > 0.0:
+        flicker = noise.instability * np.sqrt(between_means(span, DAY_S))
+        apart = float(np.hypot(flicker, noise.walk * np.sqrt(walked(span, DAY_S))))
     return {
-        "record_u_ug": MICRO * max(own),
+        "record_u_ug": MICRO * float(np.hypot(max(own), noise.walk * np.sqrt(walked(span)))),
         "long_u_ug": MICRO * float(np.hypot(max(own), apart)),
         "long_s": DAY_S,
         "switch_on_u_ug": None,
+        "switch_on_why": NO_SWITCH_ON,
     }
 
 

@@ -14,8 +14,8 @@ from inertial.frames import force_from_angles
 from inertial.noise.dwells import dwell_covariance
 from inertial.noise.flicker import flicker_of_means
 from inertial.planning.pose_exchange import PlanSlots
-from inertial.state import State
 from pipelines.planning.verification_poses import numbered, turns
+from pipelines.schedule.planned_state import settled_state
 from pipelines.schedule.timing import StationPose, move_seconds, soaked
 from schemas.recipe import FEWEST_SAMPLES
 from schemas.units import STANDARD_GRAVITY_M_S2
@@ -181,16 +181,7 @@ class TimedDesign:
         """Design columns (3, n, p) in units of the required errors."""
         angles = np.radians(self.requirement.candidates[choice])
         gravity = self.recipe.local_gravity_m_s2 / STANDARD_GRAVITY_M_S2
-        state = State(
-            force=gravity * force,
-            time=time,
-            temperature=heat,
-            chamber=heat,
-            since_power=time,
-            since_move=np.full(time.size, self.recipe.settle_s),
-            outer=angles[:, 0],
-            inner=angles[:, 1],
-        )
+        state = settled_state(gravity * force, time, heat, angles, self.recipe.settle_s)
         columns = design.local_columns(self._sensor, state, design.starting_values(self._sensor, state))
         return columns * self.requirement.errors[:, None, :]
 

@@ -92,6 +92,26 @@ def state_of(
     )
 
 
+def settled_state(force: Array, time: Array, temperature: Array, angles: Array, since_move_s: float) -> State:
+    """Dwells of a device that was switched on at time zero and has settled to every temperature: what a search of plans looks at.
+
+    Parameters
+    ----------
+    force : (n, 3), g; time : (n,), s; temperature : (n,), °C, of the device and of the air
+    angles : (n, 2), rad, outer and inner; since_move_s : s, time at rest before every dwell
+    """
+    return State(
+        force=force,
+        time=time,
+        temperature=temperature,
+        chamber=temperature,
+        since_power=time,
+        since_move=np.full(time.size, since_move_s),
+        outer=angles[:, 0],
+        inner=angles[:, 1],
+    )
+
+
 def _recorded(columns: Iterable[str], count: int) -> dict[str, Array]:
     """Recorded columns that nobody sets, each on its own way about its usual value."""
     rng = np.random.default_rng(1)

@@ -29,6 +29,8 @@ if TYPE_CHECKING:
 
 FEWEST_TO_SPARE = 4  # degrees of freedom of the lot, below which nothing can be said of the kind of its noise
 
+LONG_S = 3600.0  # record from which on its walk is carried over a day: it then grows three times at most
+
 
 @dataclass(frozen=True)
 class _Noisy:
@@ -36,7 +38,7 @@ class _Noisy:
 
     noise, expected : (units, n, 3), standard deviations of one dwell's noise, and of its residual
     predicted : (units, 3, m, m), covariance of what is left of the m dwells for verification
-    flicker, walk, white : (units, 3), standard deviations; walk at the end of the record
+    flicker, walk, white : (units, 3), standard deviations; walk at the end of the record; walk_shown : that it is no flicker
     lack_of_fit : (units, 3), variance over that of the noise, one where it is no larger
     """
 
@@ -50,6 +52,7 @@ class _Noisy:
     walk: Array
     lack_of_fit: Array
     nonlinear_error: dict[str, dict[str, float]]
+    walk_shown: bool = False
 
 
 def fit(dwells: pd.DataFrame, history: pd.DataFrame, effects: Sequence[str]) -> dict[str, pd.DataFrame]:
@@ -116,6 +119,7 @@ def _by_wander(lot: LotArrays, found: WanderFit, used: NDArray[np.bool_]) -> _No
         walk=level * found.walk,
         lack_of_fit=found.lack_of_fit,
         nonlinear_error=found.nonlinear_error,
+        walk_shown=found.walk_shown,
     )
 
 
@@ -211,7 +215,8 @@ def _bias_of(lot: LotArrays, found: _Noisy, scale: Array) -> dict[str, Array]:
     """Uncertainties of the bias by measurand, (units, 3), µg; none for a model without a bias.
 
     Scatter that the dwells' own samples do not show counts as flicker here: few dwells do not tell the kind of it, and white
-    noise would not reach beyond the record.
+    noise would not reach beyond the record. So does the walk of a short record that flicker explains as well: one of two minutes,
+    carried on over a day, would grow fifteen times.
     """
     places = [[name for name, _ in names].index("bias") if ("bias", "K0") in names else -1 for names in found.fit.names]
     if min(places) < 0:
@@ -220,10 +225,13 @@ def _bias_of(lot: LotArrays, found: _Noisy, scale: Array) -> dict[str, Array]:
     errors = np.sqrt(np.diagonal(found.fit.covariance, axis1=-2, axis2=-1))
     record = np.stack([errors[:, axis, place] for axis, place in enumerate(places)], axis=1)
     own = np.mean(lot.standard_error[:, used] ** 2, axis=1)
-    wander = np.sqrt(found.flicker**2 + np.maximum(found.white**2 - own, 0.0))
-    widened = student(max(int(np.sum(found.fit.dof)) - 2, 1))
     time = np.broadcast_to(lot.state.time, (len(lot.units), used.size))[0, used]
-    return bias_measurands(MICRO * record / scale, MICRO * wander / scale, time, widened)
+    carried = found.walk_shown or np.ptp(time) >= LONG_S
+    walk = found.walk if carried else np.zeros_like(found.walk)
+    wander = np.sqrt(found.flicker**2 + np.maximum(found.white**2 - own, 0.0) + 0.5 * (found.walk**2 - walk**2))
+    widened = student(max(int(np.sum(found.fit.dof)) - 2, 1))
+    record, wander, walk = (MICRO * part / scale for part in (record, wander, walk))
+    return bias_measurands(record, wander, walk, time, widened)
 
 
 def _nothing() -> dict[str, pd.DataFrame]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 import pandas as pd
@@ -19,6 +19,9 @@ if TYPE_CHECKING:
 
 MEANS, SPREADS, LOWS, HIGHS = (tuple(f"{name}_{axis}" for axis in AXES) for name in ("out", "sd", "low", "high"))
 NUMBERS = (*MEANS, *SPREADS, *LOWS, *HIGHS, "wild_value")
+OUTLIER_SIGMA = 20.0
+OUTLIER_PART = 1e-3  # of the full scale: a smaller outlier changes a mean of a hundred samples by at most 1e-5 of it
+FEWEST_FOR_OUTLIERS = 20
 WHOLE = ("record", "n", "wild_count", "wild_axis", "wild_row", "clipped", "clipped_axis")
 
 
@@ -118,6 +121,36 @@ def _joined(one: dict[str, Any], more: dict[str, Any]) -> dict[str, Any]:
         "clipped": one["clipped"] + more["clipped"],
         "clipped_axis": first_clipped["clipped_axis"],
     }
+
+
+class Outlier(NamedTuple):
+    """A sample that cannot be the unit's: its row and axis, its value and the median of its record, the output's unit."""
+
+    row: int
+    axis: int
+    value: float
+    median: float
+
+
+def first_outlier(output: Array, lsb: float, full_scale: float) -> Outlier | None:
+    """The first sample that lies too far from the median of the samples (n, 3) of one record; None without one, or for a small n.
+
+    The spread is half the width of the middle 68 %, which no outlier widens. It takes all samples at once: percentiles of several
+    tables do not follow from those of each, so it is no column of :func:`summarised`.
+
+    Parameters
+    ----------
+    lsb, full_scale : of the output, its unit
+    """
+    if len(output) < FEWEST_FOR_OUTLIERS:
+        return None
+    low, middle, high = np.percentile(output, (15.87, 50.0, 84.13), axis=0)
+    allowed = np.maximum(OUTLIER_SIGMA * np.maximum(0.5 * (high - low), lsb), OUTLIER_PART * full_scale)
+    far = np.argwhere(~(np.abs(output - middle) <= allowed))
+    if not len(far):
+        return None
+    row, axis = far[0].tolist()
+    return Outlier(row, axis, float(output[row, axis]), float(middle[axis]))
 
 
 def means(summaries: pd.DataFrame, kinds_but: Sequence[str] = ()) -> pd.DataFrame:

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from scipy.sparse import csr_matrix
 from scipy.sparse.csgraph import maximum_bipartite_matching
-from scipy.stats import norm
+from scipy.stats import binomtest
 from truth import Truth
 
 Document = Mapping[str, Any]
@@ -135,11 +135,8 @@ def wilson(hits: int, count: int, level: float = 0.95) -> tuple[float, float]:
     """Wilson's score interval of a share (Wilson, JASA 22, 1927, p. 209)."""
     if count == 0:
         return 0.0, 1.0
-    z = float(norm.ppf(0.5 + level / 2.0))
-    share = hits / count
-    middle = (share + z**2 / (2 * count)) / (1 + z**2 / count)
-    half = z / (1 + z**2 / count) * np.sqrt(share * (1 - share) / count + z**2 / (4 * count**2))
-    return float(max(0.0, middle - half)), float(min(1.0, middle + half))
+    found = binomtest(hits, count).proportion_ci(level, "wilson")
+    return float(found.low), float(found.high)
 
 
 @dataclass(frozen=True)

@@ -10,10 +10,13 @@ from pathlib import Path
 import inquiries
 import numpy as np
 import pytest
+from pydantic import TypeAdapter
 from typer.testing import CliRunner
 
 from pipelines.archive import Archive
 from pipelines.cli import app
+from pipelines.cli.documents import OperatorDocument
+from pipelines.inquiry.documents import InquiryDocument
 from pipelines.inquiry.inquiry import FollowUp, Inquiry, JointDiagnosis
 from pipelines.inquiry.loop import Consent, Participants, Settings, run_inquiry
 from pipelines.rerun.selection import selected
@@ -174,6 +177,7 @@ def test_at_no_terminal_the_proposal_is_printed_with_the_command_that_goes_on(tm
     done = CliRunner().invoke(app, [*given, "--yes", "--json"])
     assert done.exit_code == 0, done.output
     document = json.loads(done.stdout)
+    TypeAdapter(InquiryDocument).validate_json(done.stdout, strict=True, extra="forbid")
     assert document["recommended"] == ["third_order"]
     assert document["command"] is None
 
@@ -217,6 +221,8 @@ def _asked(operator: list[str], process: subprocess.Popen, environment: dict[str
         done = subprocess.run(
             operator, cwd=ROOT, env=environment, capture_output=True, text=True, check=False, timeout=60
         )
+        if done.returncode == 0:
+            TypeAdapter(OperatorDocument).validate_json(done.stdout, strict=True, extra="forbid")
         waiting = json.loads(done.stdout)["waiting"] if done.returncode == 0 else []
         if waiting:
             return waiting[0]["question"]

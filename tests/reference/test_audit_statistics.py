@@ -6,7 +6,7 @@ from scipy import stats
 
 from inertial.population.agreement import e_n
 from inertial.population.capability import cp, cpk, fraction_interval
-from inertial.population.comparison import compare, holm
+from inertial.population.comparison import compare, holm, sigma_of
 from inertial.population.control_charts import (
     EWMA_RUN_LENGTH,
     EWMA_WEIGHT,
@@ -129,6 +129,10 @@ def test_share_of_the_handbook_has_the_exact_interval():
     found = fraction_interval(4, 20)
     assert stats.binom.sf(3, 20, found.low) == pytest.approx(0.025)
     assert stats.binom.cdf(4, 20, found.high) == pytest.approx(0.025)
+    for count, total in ((4, 20), (1, 3), (999, 1000)):
+        ends = stats.beta.ppf([0.025, 0.975], [count, count + 1], [total - count + 1, total - count])
+        own = fraction_interval(count, total)
+        assert (own.low, own.high) == pytest.approx(ends, rel=1e-9)
     assert fraction_interval(0, 10).low == 0.0
     assert fraction_interval(10, 10).high == 1.0
 
@@ -141,6 +145,13 @@ def test_groups_are_compared_as_scipy_does(rng):
     assert found is not None
     assert found.f_p == pytest.approx(stats.f_oneway(*parts).pvalue)
     assert found.rank_p == pytest.approx(stats.kruskal(*parts).pvalue)
+
+
+def test_sigma_is_that_of_the_median_absolute_deviation(rng):
+    values = rng.standard_normal((40, 3))
+    values[5, 1] = np.nan
+    plain = 1.4826 * np.nanmedian(np.abs(values - np.nanmedian(values, axis=0)), axis=0)
+    assert sigma_of(values) == pytest.approx(plain, rel=1e-12)
 
 
 def test_holm_s_steps():

@@ -59,7 +59,7 @@ def test_a_check_standard_that_moves_is_out_of_control_and_one_that_stands_is_no
             rows.append((f"CS-{station}", station, 3, 7.0 * week))
             values.append(rng.standard_normal(len(NAMES)))
             if station == "line-2" and week >= 100:
-                values[-1][NAMES.index("bias_x")] += 1.5
+                values[-1][NAMES.index("bias_x")] += 2.0
     found = charts(calibrations(rows, np.array(values)), load_rules(), START)
     out = [(chart.station, chart.parameter) for chart in found if not chart.in_control]
     assert out == [("line-2", "bias_x")]

@@ -5,8 +5,9 @@ from typing import Any
 import numpy as np
 import pandas as pd
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
+from pandera.errors import SchemaError
 
 from schemas import tables
 from schemas.columns import Seen, all_different
@@ -65,3 +66,22 @@ def test_rows_said_to_be_different_are(rows: list[tuple[str, int, float, bool]])
             assert not (said and frame.duplicated(names).any())
         else:
             assert said == (not frame.duplicated(names).any())
+
+
+ODD = st.sampled_from(["A1", "", "x", "w"])
+
+
+@settings(deadline=None)
+@given(
+    st.lists(st.tuples(ODD, ODD, st.integers(-1, 3), st.sampled_from([0.0, 1.5, float("nan")])), min_size=1, max_size=6)
+)
+def test_what_the_look_accepts_the_schema_accepts(rows: list[tuple[str, str, int, float]]) -> None:
+    frame = pd.DataFrame(rows, columns=["unit", "axis", "row", "value"]).assign(column=np.arange(len(rows)))
+    frame = frame.astype({"unit": "str", "axis": "str", "row": "int64", "column": "int64"})
+    accepted = True
+    try:
+        tables.TABLES["covariance"].schema.validate(frame)
+    except SchemaError:
+        accepted = False
+    whole = bool(np.isfinite(frame["value"]).all())
+    assert right(frame) == (accepted and whole)

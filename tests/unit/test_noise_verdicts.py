@@ -10,9 +10,7 @@ from inertial.noise.allan import overlapping
 from inertial.noise.measurands import between_means
 from inertial.noise.terms import fit_terms
 from inertial.population.change_points import change_points
-from inertial.population.control_charts import alarms, baseline, false_alarms, signals
 from inertial.population.drift import kind_of, standing
-from inertial.population.memory import drawn_in, memory_of, tail_of
 from pipelines.stages.fit import fit
 from pipelines.stages.rms_error import rms_uncertainty
 from pipelines.stages.verify import verify
@@ -110,20 +108,6 @@ def test_a_sphere_fit_holds_the_bias_under_flicker() -> None:
             held, plain = (held + int(inside.sum()), plain) if found.wander else (held, plain + int(inside.sum()))
     assert held >= 26  # of 30
     assert held >= plain
-
-
-@pytest.mark.parametrize(("memory", "dof"), [(0.0, None), (0.6, None), (0.0, 3.0), (0.6, 3.0)])
-def test_a_level_that_stands_still_has_no_change_and_no_alarm(memory: float, dof: float | None) -> None:
-    rng = np.random.default_rng(7_310_007)
-    series = made.autoregressive(rng, 60, 100, memory, dof=dof)
-    assert sum(bool(change_points(one)) for one in series) <= 2  # ρ = 0.6: 33 of 60 before
-    bad = 0
-    for one in series[:30]:
-        rules, moving = signals(one, baseline(one, 40))
-        m = float(np.ceil(10.0 * memory_of(drawn_in(one))) / 10.0)
-        expected = false_alarms(100, 40, 60, m, float(tail_of(one, m)))
-        bad += expected.p_value(alarms(rules, moving.outside, np.arange(100) >= 40)) < 0.01
-    assert bad <= 3  # ρ = 0.6: 28 of 30 before
 
 
 def test_a_level_that_moved_is_still_told() -> None:

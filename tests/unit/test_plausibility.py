@@ -6,7 +6,7 @@ import pytest
 
 from inertial.pointing import force_from_angles
 from pipelines.capture.plausibility import TURNED, Plausibility
-from pipelines.tables.summaries import MEANS, summarised
+from pipelines.tables.summaries import MEANS, first_outlier, summarised
 from schemas.errors import OperatorNeeded
 
 ANGLES = [(outer, inner) for inner in (0.0, 40.0, -70.0) for outer in (-150.0, -90.0, -30.0, 30.0, 90.0, 150.0)]
@@ -63,3 +63,15 @@ def test_a_record_whose_samples_are_all_stored_already_adds_no_dwell():
     samples, readings = tables(ANGLES[0])
     checks.refuse_contradiction(0, samples.iloc[:0], readings)
     assert checks.pointing.means == []
+
+
+def test_the_first_sample_that_cannot_be_the_unit_s_is_told_with_the_median():
+    output = np.random.default_rng(4).standard_normal((200, 3))
+    assert first_outlier(output, 1.0, 1000.0) is None
+    output[[70, 120], 1] = 40.0
+    found = first_outlier(output, 1.0, 1000.0)
+    assert (found.row, found.axis, found.value) == (70, 1, 40.0)
+    assert abs(found.median) < 0.5
+    assert first_outlier(output[:19], 1.0, 1000.0) is None  # too few to say
+    output[3, 2] = np.nan
+    assert first_outlier(output, 1.0, 1000.0) is not None  # nothing can be said to lie inside

@@ -27,8 +27,8 @@ TEMPLATE = """\
 <tr><td>{{ line.name }}</td>{% for axis in ["x", "y", "z"] %}<td class="n">{{ line.cells[axis] }}</td>{% endfor %}<td>µg</td></tr>
 {% endfor %}
 </table>
-<p class="note">U with k = {{ coverage }}. The coefficient is the same for all; flicker between the record and the later time is added. Not stated: no repeatability of
-switching on is known; a walk is not carried beyond its record.</p>
+<p class="note">U with k = {{ coverage }}. The coefficient is the same for all; flicker and random walk between the record and the later time are added. Not stated: no
+repeatability of switching on is known for this device.</p>
 """
 
 
