@@ -66,9 +66,16 @@ class Run:
     beside: list[Term] = field(default_factory=list[Term])
     handled: list[Named] = field(default_factory=list[Named])
     removed: list[BadDwell] = field(default_factory=list[BadDwell])
+    _made: tuple[list[object], Model] | None = None
 
     def model(self) -> Model:
-        """The model that is judged, in the lot without its bad dwells."""
+        """The model that is judged, in the lot without its bad dwells; the same object as long as nothing of it changes."""
+        parts: list[object] = [self.lot, *self.removed, *self.beside]
+        if self._made is None or list(map(id, self._made[0])) != list(map(id, parts)):
+            self._made = parts, self._new_model()
+        return self._made[1]
+
+    def _new_model(self) -> Model:
         lot = without(self.lot, self.removed) if self.removed else self.lot
         problem = Problem(lot)
         base = Model(problem, with_turn_on(lot.state, terms_of(catalogue.get_all(self.effects), problem)))
@@ -136,7 +143,7 @@ def _mend(run: Run, fields: Candidates, found: SearchResult, term: Term) -> None
     before, after = left_out(found.model), left_out(model)
     errors = fit_rms(problem, model.terms), *worst(before, after)
     run.handled.append(Named(group, *errors, units, dwells, told))
-    lot = alternative.mended(run.lot, size, **place)
+    lot = alternative.settled(found.model, term, run.lot, size, **place)
     if lot is None:
         run.beside.append(term)
     else:

@@ -83,11 +83,13 @@ class _Parts:
         space = model.space
         blocks, n = space.residual.shape
         self.there, self.level = space.covariance.there, space.covariance.level * space.noise.scale
-        self.p = np.empty((blocks, n, n))
-        for b in range(blocks):
-            eye = space.covariance.whiten(np.eye(n)[None], space.noise.shares, np.array([b])) / space.noise.scale[b]
-            roots = space.project(eye, np.array([b]))[0]
-            self.p[b] = roots.T @ roots
+        self.p, self.precision = np.empty((blocks, n, n)), np.empty((blocks, n))
+        for members, whitener in space.covariance.whiteners(space.noise.shares):
+            inverse = whitener.T @ whitener
+            for b in members.tolist():
+                along = space.q[b].T @ whitener
+                self.p[b] = (inverse - along.T @ along) / self.level[b] ** 2
+                self.precision[b] = np.diagonal(inverse) / self.level[b] ** 2
         self.py = np.einsum("bij,bj->bi", self.p, model.problem.y)
         z = model.shared
         size = np.sqrt(np.einsum("bnq,bnq->q", z, z))
@@ -97,11 +99,6 @@ class _Parts:
         if z.shape[-1]:
             beta = np.linalg.lstsq(self.inner, np.einsum("bnq,bn->q", z, self.py), rcond=1e-10)[0]
             self.py = self.py - self.pz @ beta
-        white = (
-            model.at(space.noise).covariance.whiten(np.broadcast_to(np.eye(n), (blocks, n, n)), space.noise.shares)
-            / space.noise.scale[:, None, None]
-        )
-        self.precision = np.einsum("bti,bti->bi", white, white)
         self.typical = [self._spread(b) for b in range(blocks)]
 
     def predicted(self, out: NDArray[np.bool_]) -> tuple[Array, float] | None:

@@ -16,6 +16,7 @@ from inertial.state import State
 
 if TYPE_CHECKING:
     from inertial.criticism.lot import Lot
+    from inertial.criticism.model import Model, Term
 
 Array = NDArray[np.float64]
 
@@ -30,6 +31,7 @@ class Handling(Effect):
     Attributes
     ----------
     fewest_units : below which it cannot be told from the sensor itself, and is not looked for
+    single : whether each of its places is one dwell, ``at``; then :meth:`every_dwell` has the columns of all of them
     """
 
     scope: ClassVar[Literal["sensor", "station", "slot", "data"]] = "data"  # pyright: ignore[reportIncompatibleVariableOverride]
@@ -37,6 +39,7 @@ class Handling(Effect):
     typical_ug: ClassVar[tuple[float, float]] = (0.0, float("inf"))
     simplicity: ClassVar[int] = 0
     fewest_units: ClassVar[int] = 2
+    single: ClassVar[bool] = False
 
     @abstractmethod
     def places(self, lot: "Lot") -> list[dict[str, float]]:
@@ -50,6 +53,10 @@ class Handling(Effect):
     def told(self, lot: "Lot", size: Array, **place: float) -> str:
         """What happened, for people; ``size`` (k,) are the coefficients."""
 
+    def every_dwell(self, lot: "Lot") -> Array:
+        """Columns (units or 1, n, 3, k) of an alternative of one dwell, for each dwell as if it were the one."""
+        raise NotImplementedError(self.id)
+
     def near(self, lot: "Lot", **place: float) -> list[dict[str, float]]:
         """The place and those between it and its neighbours in :meth:`places`."""
         if "dwell" not in place:
@@ -62,6 +69,11 @@ class Handling(Effect):
         """The lot without it; None where nothing but its term in the model takes it out."""
         del lot, size, place
         return None
+
+    def settled(self, model: "Model", term: "Term", lot: "Lot", size: Array, **place: float) -> "Lot | None":
+        """The same where the model that the term was found beside is needed for it."""
+        del model, term
+        return self.mended(lot, size, **place)
 
     def dwells(self, lot: "Lot", **place: float) -> list[int]:
         """Places of the dwells that it concerns: the first after a change, or each one that is wrong."""
@@ -119,6 +131,10 @@ def tilts(state: State) -> Array:
 
 def soaks(state: State) -> NDArray[np.intp]:
     """Number of the soak of each dwell, (n,); all zero where the temperature stays."""
+    return state.remember(("soaks",), lambda: _soaks(state).astype(np.float64)).astype(np.intp)
+
+
+def _soaks(state: State) -> NDArray[np.intp]:
     if state.temperature is None:
         return np.zeros(state.time.shape[-1], dtype=np.intp)
     typical = np.median(state.temperature.reshape(-1, state.temperature.shape[-1]), axis=0)
