@@ -8,7 +8,7 @@ from numpy.random import Generator
 
 from inertial import effects as catalogue
 from inertial.criticism.adequacy import adequacy
-from inertial.criticism.bad_dwells import BadDwell, heavy_tails
+from inertial.criticism.bad_dwells import BadDwell
 from inertial.criticism.classes import EffectClass, class_of
 from inertial.criticism.decisions import ADEQUATE_ABOVE, NAMED_BELOW
 from inertial.criticism.drivers import Driver, Misfit, drivers_of, places
@@ -23,6 +23,7 @@ from inertial.criticism.model import Model
 from inertial.criticism.penalty import PER_COEFFICIENT, log_p_value
 from inertial.criticism.problem import Lot, Problem
 from inertial.criticism.search import Rival, SearchResult
+from inertial.criticism.tails import with_tails
 from inertial.criticism.unknown import better_curve
 from inertial.effects.base import AnyEffect
 from inertial.effects.covariate import Covariate
@@ -46,7 +47,7 @@ class Diagnosis:
 
     problem, base, final : the series without what handling spoilt, the model judged, the model with everything that was found
     rms : of the base model's residuals; floor : of the noise that is there
-    handled : what handling did; removed : single dwells that were left out; heavy : whether these are tails of the noise
+    handled : what handling did; removed : single dwells that were left out, those marked that are tails of the noise
     influence : dwells that carry the verdict; log_p_without : of its first class when these are left out
     """
 
@@ -64,7 +65,6 @@ class Diagnosis:
     ladder: tuple[Rival, ...]
     handled: tuple[Named, ...] = ()
     removed: tuple[BadDwell, ...] = ()
-    heavy: bool = False
     influence: tuple[Influence, ...] = ()
     log_p_without: float | None = None
 
@@ -88,8 +88,8 @@ def _told(run: Run, search_: Search, rng: Generator) -> Diagnosis:
     problem = base.problem
     drivers = drivers_of(problem)
     log_p = adequacy(fields, drivers, base, rng)
-    heavy = bool(run.removed) and heavy_tails(base)
-    named_data = bool(run.handled) or (bool(run.removed) and not heavy)
+    removed = tuple(with_tails(found.model, run.removed)) if run.removed else ()
+    named_data = bool(run.handled) or any(not d.tail for d in removed)
     sound = log_p >= np.log(ADEQUATE_ABOVE) and not found.added
     final, unexplained = (found.model, None) if sound else _beyond(search_.part, base, found, drivers)
     classes = _classes(fields, base, final)
@@ -113,8 +113,7 @@ def _told(run: Run, search_: Search, rng: Generator) -> Diagnosis:
         unseen=_unseen(fields, base, [e for e in catalogue.catalogue().values() if e.id not in set(run.effects)]),
         ladder=found.ladder,
         handled=tuple(run.handled),
-        removed=tuple(run.removed),
-        heavy=heavy,
+        removed=removed,
         influence=carried,
         log_p_without=log_without,
     )

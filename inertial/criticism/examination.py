@@ -5,11 +5,12 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
+from numpy.typing import NDArray
 
 from inertial import effects as catalogue
 from inertial.criticism.bad_dwells import BadDwell, bad_dwells, without
 from inertial.criticism.classes import EffectClass, class_of
-from inertial.criticism.decisions import RISES
+from inertial.criticism.decisions import RISES, TOLD_APART
 from inertial.criticism.drivers import varies
 from inertial.criticism.field import Candidates
 from inertial.criticism.handling import alternatives
@@ -20,16 +21,19 @@ from inertial.criticism.model import Model, Term, refuse_without_freedom
 from inertial.criticism.penalty import cost_of_model
 from inertial.criticism.problem import Lot, Problem
 from inertial.criticism.refinement import terms_of
-from inertial.criticism.search import SearchResult, anything, search
+from inertial.criticism.search import SearchResult, anything, judge, search
 from inertial.criticism.slope import slope_of
 from inertial.criticism.turn_on import with_turn_on
 from inertial.criticism.unknown import Suspect, better_curve, suspects
 from inertial.effects.base import AnyEffect
 from inertial.effects.covariate import COVARIATE_PREFIX, Covariate
 
+Array = NDArray[np.float64]
+
 _MANY = 32  # units of a lot that is searched whole
 _ENOUGH = 24  # units, spread over the lot, that a larger one is searched in
 _MENDED = 6  # alternatives that are told of one run at the most
+_TURNS = 3  # searches after which single dwells are looked at no more
 
 DECISIVE = 0.2
 """Share of what a curve brings by which it must beat the effects chosen so far to end the search for more."""
@@ -89,13 +93,16 @@ def examined(lot: Lot, effects: Sequence[str]) -> "tuple[Run, Search]":
     run = Run(lot, tuple(effects))
     run.removed = bad_dwells(run.model())
     found = mended(run)
-    if run.removed and found.found.added:
-        # what physics explains is no bad dwell
+    for _ in range(_TURNS):
+        if not run.handled and not found.found.added:
+            break
+        # what physics or handling explains is no bad dwell, and beside it others show that its size had covered
         whole = Problem(run.lot, slope=found.base.problem.slope)
         kept = bad_dwells(Model(whole, found.model.terms, near=found.model.noise))
-        if {(d.unit, d.dwell) for d in kept} != {(d.unit, d.dwell) for d in run.removed}:
-            run.removed = kept
-            found = mended(run)
+        if {(d.unit, d.dwell) for d in kept} == {(d.unit, d.dwell) for d in run.removed}:
+            break
+        run.removed = kept
+        found = mended(run)
     return run, found
 
 
@@ -138,8 +145,7 @@ def _mend(run: Run, fields: Candidates, found: SearchResult, term: Term) -> None
         raise TypeError(term.effect.id)
     size = model.shared_sizes(term)
     units = (int(place["unit"]),) if "unit" in place else ()
-    told = alternative.told(problem.lot, size, **place)
-    dwells = tuple(alternative.dwells(problem.lot, **place))
+    told, dwells = _happened(fields, found.model, term, alternative, size)
     before, after = left_out(found.model), left_out(model)
     errors = fit_rms(problem, model.terms), *worst(before, after)
     run.handled.append(Named(group, *errors, units, dwells, told))
@@ -148,6 +154,24 @@ def _mend(run: Run, fields: Candidates, found: SearchResult, term: Term) -> None
         run.beside.append(term)
     else:
         run.lot = lot
+
+
+def _happened(
+    fields: Candidates, beside: Model, term: Term, alternative: Handling, size: Array
+) -> tuple[str, tuple[int, ...]]:
+    """What an alternative did, in words, and the dwells it concerns: at each place that explains the run as well."""
+    lot, place = fields.problem.lot, {k: v for k, v in term.keywords.items() if isinstance(v, float)}
+    best = judge(fields, beside, term).cost
+    words: list[str] = []
+    dwells = list(alternative.dwells(lot, **place))
+    for other in alternative.instead(lot, **place):
+        rival = judge(fields, beside, Term(alternative, tuple(other.items())))
+        if rival.cost < best + TOLD_APART:
+            words.append(alternative.short(beside.with_term(rival.term).shared_sizes(rival.term), **other))
+            dwells += alternative.dwells(lot, **other)
+    told = alternative.told(lot, size, **place)
+    told += f"; these dwells cannot tell it from {' or '.join(words)}" if words else ""
+    return told, tuple(sorted(dwells))
 
 
 def candidates_of(base: Model, held: Sequence[str]) -> list[AnyEffect]:

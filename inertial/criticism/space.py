@@ -169,8 +169,8 @@ class Space:
     def gain_of_dwells(self, columns: Array, places: NDArray[np.intp]) -> Gain:
         """What columns explain that are of one dwell each, for every dwell by itself; all blocks share their coefficients.
 
-        With P as in :mod:`inertial.criticism.left_out` a column t at dwell k has the product t²·P_kk with itself and t·(Py)_k with
-        the measurements: no column is whitened.
+        With P as in :mod:`inertial.criticism.left_out` a column t at dwell k has the product t²·P_kk with itself and t·(Py)_k
+        with the measurements: no column is whitened.
 
         Parameters
         ----------

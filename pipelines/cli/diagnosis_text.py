@@ -47,7 +47,7 @@ def _dwells(document: dict[str, Any]) -> None:
     """Dwells that were left out as tails of the noise, and those that carry the verdict."""
     removed, out = document.get("removed"), console()
     if removed and removed["heavy_tails"]:
-        count = len(removed["dwells"])
+        count = sum(d.get("tail", True) for d in removed["dwells"])
         out.print(
             f"{count} dwells left out: the noise has heavier tails than a normal one", style="dim", soft_wrap=True
         )
@@ -77,7 +77,9 @@ def verdict(document: dict[str, Any]) -> str:
     """The verdict in one sentence with its numbers."""
     error, faulty = document["error"], {u for f in document["blocked_by"] for u in f["units"]}
     if error["rms_ug"] is None:
-        return f"BLOCKED: every unit ({len(faulty)}) has a data fault; no physics is diagnosed until it is mended."
+        return (
+            f"CANNOT BE JUDGED: every unit ({len(faulty)}) has a data fault; no physics is judged until it is mended."
+        )
     sound = len(document["units"]) - len(faulty)
     floor = f"the noise that is there is {short(error['floor_ug'])} µg (p {equal(error['p_value'])})"
     left = f"{short(error['rms_ug'])} µg rms are left in {sound} unit{'s' if sound != 1 else ''}, {floor}"

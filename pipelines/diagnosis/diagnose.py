@@ -104,7 +104,8 @@ def document(
     blocked = [_fault(found, f) for f in faults]
     if diagnosis is None:
         return {
-            "adequate": False,
+            "adequate": None,
+            "reason": f"every unit ({len({f.unit for f in faults})}) has a data fault; no physics is judged until it is mended",
             "blocked_by": blocked,
             "error": {"rms_ug": None, "floor_ug": None, "p_value": None},
             "where": [],

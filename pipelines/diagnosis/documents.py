@@ -83,12 +83,15 @@ class RemovedDwell(TypedDict):
     dwell: int
     off_ug: Annotated[float, "distance from the model, µg"]
     deviations: Annotated[float, "the same in standard deviations"]
+    tail: NotRequired[Annotated[bool, "whether the tails of the noise reach as far; no fault then"]]
 
 
 class RemovedDwells(TypedDict):
     """The dwells left out."""
 
-    heavy_tails: Annotated[bool, "many dwells: the noise has heavier tails than a normal distribution"]
+    heavy_tails: Annotated[
+        bool, "the noise has heavier tails than a normal distribution, and reaches some of the dwells"
+    ]
     dwells: list[RemovedDwell]
 
 
@@ -128,7 +131,8 @@ class SuggestedFormula(TypedDict):
 class DiagnosisDocument(TypedDict):
     """``diagnose --json``: adequacy of a model, where it fails, and which effects are missing."""
 
-    adequate: Annotated[bool | None, "null: cannot be judged"]
+    adequate: Annotated[bool | None, "null: cannot be judged, because every unit has a data fault"]
+    reason: NotRequired[Annotated[str, "why `adequate` is null; missing otherwise"]]
     blocked_by: list[BlockingFault]
     error: ErrorFigures
     where: Annotated[list[FailingDriver], "most significant first"]

@@ -39,8 +39,7 @@ def known(value: float) -> float | None:
 def classes_of(diagnosis: Diagnosis, names: Names) -> list[dict[str, Any]]:
     """Rows of all classes: what handling did first, as nothing is to be read into a run before it is mended."""
     rows = [_class(n, names) for n in diagnosis.handled]
-    if not diagnosis.heavy:
-        rows += [_bad_dwell(diagnosis, d, names) for d in diagnosis.removed]
+    rows += [_bad_dwell(diagnosis, d, names) for d in diagnosis.removed if not d.tail]
     return [*rows, *(_class(n, names) for n in diagnosis.named)]
 
 
@@ -87,7 +86,7 @@ def _bad_dwell(diagnosis: Diagnosis, found: BadDwell, names: Names) -> dict[str,
 
 def influence_of(diagnosis: Diagnosis, names: Names) -> list[dict[str, Any]]:
     """Dwells that carry the verdict, most first; those that were left out carry all of theirs."""
-    single = [] if diagnosis.heavy else diagnosis.removed
+    single = [d for d in diagnosis.removed if not d.tail]
     rows = [{"unit": names.units[d.unit], "dwell": names.dwells[d.dwell], "share": 1.0} for d in single]
     if rows and not diagnosis.named:
         return rows
@@ -109,13 +108,14 @@ def removed_of(diagnosis: Diagnosis, names: Names) -> dict[str, Any] | None:
     if not diagnosis.removed:
         return None
     return {
-        "heavy_tails": diagnosis.heavy,
+        "heavy_tails": any(d.tail for d in diagnosis.removed),
         "dwells": [
             {
                 "unit": names.units[d.unit],
                 "dwell": names.dwells[d.dwell],
                 "off_ug": MICRO * float(np.linalg.norm(d.off)),
                 "deviations": round(d.deviations, 2),
+                "tail": d.tail,
             }
             for d in diagnosis.removed
         ],

@@ -57,6 +57,15 @@ class Handling(Effect):
         """Columns (units or 1, n, 3, k) of an alternative of one dwell, for each dwell as if it were the one."""
         raise NotImplementedError(self.id)
 
+    def instead(self, lot: "Lot", **place: float) -> list[dict[str, float]]:
+        """Other places that may explain the same dwells as well."""
+        del lot, place
+        return []
+
+    def short(self, size: Array, **place: float) -> str:
+        """One of :meth:`instead` in a few words."""
+        raise NotImplementedError(self.id)
+
     def near(self, lot: "Lot", **place: float) -> list[dict[str, float]]:
         """The place and those between it and its neighbours in :meth:`places`."""
         if "dwell" not in place:

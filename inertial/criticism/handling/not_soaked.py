@@ -31,6 +31,7 @@ class NotSoaked(Handling):
     equation: ClassVar[str] = "E(T_d) − E(T), T_d′ = (T − T_d)/τ, all units"
     breaker: ClassVar[str] = "soaks until the outputs stand still, or the devices' own thermometers"
     hides_behind: ClassVar[tuple[str, ...]] = ("thermal_lag",)
+    fewest_units: ClassVar[int] = 1
 
     def places(self, lot: "Lot") -> list[dict[str, float]]:
         """Time constants, where the temperature changes."""
@@ -57,9 +58,11 @@ class NotSoaked(Handling):
         """The time constant."""
         del size
         behind = np.abs(_temperature(lot.state, place["tau"]) - _temperature(lot.state, 0.0))
+        alone = "unit" in place
+        behind = behind[int(place["unit"])] if alone else behind
         return (
-            f"the devices follow the temperature that was read with a time constant of {place['tau']:.0f} s and were up to "
-            f"{float(behind.max()):.1f} K behind it; soak longer, or read the devices' own temperature"
+            f"{'the unit follows' if alone else 'the devices follow'} the temperature that was read with a time constant of "
+            f"{place['tau']:.0f} s, up to {float(behind.max()):.1f} K behind it; soak longer, or measure the device's temperature"
         )
 
     def settled(self, model: "Model", term: "Term", lot: "Lot", size: Array, **place: float) -> "Lot | None":
@@ -67,8 +70,8 @@ class NotSoaked(Handling):
         del size
         problem, noise = model.problem, model.with_term(term).noise
         local = [t for t in model.terms if not t.shared]
-        each: list[float] = []
-        for unit in range(lot.state.time.shape[0]):
+        each = np.zeros(lot.state.time.shape[0])
+        for unit in [int(place["unit"])] if "unit" in place else range(each.size):
             own, blocks = problem.lot.units([unit]), [3 * unit + axis for axis in range(3)]
             there = noise.pick(blocks)
 
@@ -82,12 +85,12 @@ class NotSoaked(Handling):
             found = minimize_scalar(
                 left, bounds=(middle - reach, middle + reach), method="bounded", options={"xatol": _EXACT}
             )
-            each.append(float(np.exp(found.x)))
-        return replace(lot, state=delayed(lot.state, np.array(each)))
+            each[unit] = float(np.exp(found.x))
+        return replace(lot, state=delayed(lot.state, each))
 
 
 def delayed(state: State, tau: Array) -> State:
-    """A state whose temperatures are a first-order lag behind those that were read, by time constants (units,) in s."""
+    """A state whose temperatures are a first-order lag behind those that were read, by time constants (units,), s; 0: as read."""
     if state.temperature is None:
         return state
     history = state.history
@@ -100,7 +103,8 @@ def delayed(state: State, tau: Array) -> State:
 
 
 def _lag(time: Array, temperature: Array, tau: Array) -> Array:
-    return np.stack([operators.first_order_lag(t, v, s) for t, v, s in zip(time, temperature, tau, strict=True)])
+    each = zip(time, temperature, tau.tolist(), strict=True)
+    return np.stack([operators.first_order_lag(t, v, s) if s > 0.0 else v for t, v, s in each])
 
 
 def _temperature(state: State, tau: float) -> Array:
