@@ -79,6 +79,7 @@ def judged(world: World, made: Made, document: dict[str, Any]) -> dict[str, Any]
         "held": all(any(name in g["effects"] for g in groups) for name in own) if own else None,
         "alone": len(physics) == len(own) and not any(g.get("scope") in DATA for g in groups) if own else None,
         "p": document["error"]["p_value"],
+        "hidden": [list(own)],
         "first_p": [g["p_value"] for g in groups],
         "said": [(sorted(a), b, c) for a, b, c in said],
         "truth": [(told.names, told.units, told.dwells) for told in made.faults],
@@ -185,7 +186,8 @@ def _line(name: str, rows: list[dict[str, Any]]) -> str:
 def _other(row: dict[str, Any]) -> list[Any]:
     """Faults that were told and not made."""
     physics = {name for group in row["stray"] for name in group}
-    return [one for one in row["false"] if not set(one[0]) & physics]
+    own = {name for group in row["hidden"] for name in group}
+    return [one for one in row["false"] if not set(one[0]) & (physics | own)]
 
 
 def _loop_line(name: str, rows: list[dict[str, Any]]) -> str:

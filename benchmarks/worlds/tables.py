@@ -73,6 +73,7 @@ HIDDEN |= {
     f"{name}_2_K4": World(hidden=((name, 2.0),), noise=Noise(walk=4.0)) for name in ("third_order", "cross_coupling")
 }
 HIDDEN |= {f"{name}_2_one_unit": World(units=1, hidden=((name, 2.0),)) for name in ("third_order", "cross_coupling")}
+HIDDEN |= {f"adc_nonlinearity_{size:g}": World(hidden=(("adc_nonlinearity", size),)) for size in (1.0, 2.0, 5.0)}
 HIDDEN["third_order_and_dwell"] = World(hidden=(("third_order", 2.0),), fault="bad_dwell", amount=1.0)
 HIDDEN["cubic_and_moved"] = World(hidden=(("third_order", 2.0),), fault="unit_moved", amount=0.3)
 TABLES = {"nulls": NULLS, "faults": FAULTS, "hidden": HIDDEN}

@@ -49,6 +49,7 @@ class Scene:
 
     start, duration : of each dwell, s; soak : its place in the plan
     temperature : true, of the sensors; chamber : air
+    output : (units, n, 3), g, of the devices without noise and without what is hidden
     """
 
     outer: Floats
@@ -63,6 +64,7 @@ class Scene:
     fine_temperature: Floats
     fine_air: Floats
     powered: float
+    output: Floats
 
     @property
     def force(self) -> Floats:
@@ -97,7 +99,7 @@ def make(world: World, seed: int) -> Made:
     plan, device, first, second, third = (np.random.default_rng(s) for s in np.random.SeedSequence(seed).spawn(5))
     scene = _scene(world, plan, first)
     lot = _Lot.drawn(device, world.units)
-    again = _with_heat(scene, world, second)
+    scene, again = (replace(s, output=lot.output(s)) for s in (scene, _with_heat(scene, world, second)))
     noises = [
         1e-6 * dwell_noise(world.noise, s.start, s.duration, world.units, g)
         for s, g in ((scene, first), (again, second))
@@ -186,7 +188,7 @@ def _scene(world: World, rng: np.random.Generator, heat: np.random.Generator) ->
     empty = np.zeros((world.units, 0))
     scene = Scene(
         np.array(outer), np.array(inner), np.array(start), duration, np.array(place), empty, empty, np.array(wait),
-        np.zeros(0), empty, np.zeros(0), 1800.0,
+        np.zeros(0), empty, np.zeros(0), 1800.0, empty,
     )  # fmt: skip
     return _with_heat(scene, world, heat)
 

@@ -1,7 +1,7 @@
 """The diagnosis of a lot: adequacy, where the model fails, classes of missing effects, what is left unexplained."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.random import Generator
@@ -16,10 +16,10 @@ from inertial.criticism.examination import Named, Part, Run, Search, examined, w
 from inertial.criticism.field import Candidates
 from inertial.criticism.handling.base import Handling
 from inertial.criticism.heldout import fit_rms
-from inertial.criticism.influence import Influence, influence, log_p_without
+from inertial.criticism.influence import Carried, carried_by, influence
 from inertial.criticism.left_out import left_out
 from inertial.criticism.likelihood import shared_noise
-from inertial.criticism.model import Model
+from inertial.criticism.model import Model, Term
 from inertial.criticism.penalty import PER_COEFFICIENT, log_p_value
 from inertial.criticism.problem import Lot, Problem
 from inertial.criticism.search import Rival, SearchResult
@@ -48,7 +48,7 @@ class Diagnosis:
     problem, base, final : the series without what handling spoilt, the model judged, the model with everything that was found
     rms : of the base model's residuals; floor : of the noise that is there
     handled : what handling did; removed : single dwells that were left out, those marked that are tails of the noise
-    influence : dwells that carry the verdict; log_p_without : of its first class when these are left out
+    carried : dwells that carry the verdict: of its first class, or the largest of what is left where nothing is named
     """
 
     problem: Problem
@@ -65,8 +65,7 @@ class Diagnosis:
     ladder: tuple[Rival, ...]
     handled: tuple[Named, ...] = ()
     removed: tuple[BadDwell, ...] = ()
-    influence: tuple[Influence, ...] = ()
-    log_p_without: float | None = None
+    carried: Carried = field(default_factory=Carried)
 
 
 def diagnose(lot: Lot, effects: Sequence[str], rng: Generator) -> Diagnosis:
@@ -98,7 +97,7 @@ def _told(run: Run, search_: Search, rng: Generator) -> Diagnosis:
         unexplained = _covariate(classes)
     where = places(problem, drivers, base.at(final.noise), final.space.variance)
     charged = tuple(p for p in where if p.log_p + np.log(len(drivers)) < np.log(ADEQUATE_ABOVE))
-    carried, log_without = _influence(base, named)
+    every = [*run.handled, *named]
     return Diagnosis(
         problem=problem,
         base=base,
@@ -114,19 +113,8 @@ def _told(run: Run, search_: Search, rng: Generator) -> Diagnosis:
         ladder=found.ladder,
         handled=tuple(run.handled),
         removed=removed,
-        influence=carried,
-        log_p_without=log_without,
+        carried=every[0].carried if every else Carried(influence(base, None)),
     )
-
-
-def _influence(base: Model, named: Sequence[Named]) -> tuple[tuple[Influence, ...], float | None]:
-    """Dwells that carry the verdict on the largest class beside the others, and its probability without them."""
-    if not named:
-        return influence(base, None), None
-    terms = [n.effects.members[0].term for n in named]
-    rest = Model(base.problem, [*base.terms, *terms[1:]], near=base.noise)
-    carried = influence(rest, terms[0])
-    return carried, log_p_without(rest, terms[0], carried) if carried else None
 
 
 def _unseen(field: Candidates, base: Model, candidates: Sequence[AnyEffect]) -> tuple[str, ...]:
@@ -158,14 +146,20 @@ def _named(problem: Problem, base: Model, classes: Sequence[EffectClass]) -> tup
     found: list[Named] = []
     model = base
     before = left_out(base) if classes else None
-    for group in classes:
-        first = next((m.term for m in group.members if not isinstance(m.term.effect, Handling)), group.members[0].term)
+    terms = [_first(group) for group in classes]
+    for group, first in zip(classes, terms, strict=True):
         model = model.with_term(first)
         after = left_out(model)
         errors = worst(before, after) if before is not None else (float("nan"), float("nan"))
-        found.append(Named(group, fit_rms(problem, model.terms), *errors))
+        rest = Model(problem, [*base.terms, *(t for t in terms if t is not first)], near=base.noise)
+        found.append(Named(group, fit_rms(problem, model.terms), *errors, carried=carried_by(rest, first)))
         before = after
     return tuple(found)
+
+
+def _first(group: EffectClass) -> Term:
+    """The best effect of a class, what handling does only where there is none."""
+    return next((m.term for m in group.members if not isinstance(m.term.effect, Handling)), group.members[0].term)
 
 
 def _covariate(classes: Sequence[EffectClass]) -> Unexplained | None:

@@ -16,6 +16,7 @@ from inertial.criticism.field import Candidates
 from inertial.criticism.handling import alternatives
 from inertial.criticism.handling.base import Handling
 from inertial.criticism.heldout import fit_rms
+from inertial.criticism.influence import Carried, carried_by
 from inertial.criticism.left_out import LeftOut, left_out
 from inertial.criticism.model import Model, Term, refuse_without_freedom
 from inertial.criticism.penalty import cost_of_model
@@ -45,6 +46,7 @@ class Named:
 
     heldout_before, heldout_after : on dwells left out, the worst of the kinds that can judge both; NaN where none can
     units, dwells : that an alternative of scope "data" concerns, none for all units; told : what it did, in words
+    carried : the dwells that carry the verdict
     """
 
     effects: EffectClass
@@ -54,6 +56,7 @@ class Named:
     units: tuple[int, ...] = ()
     dwells: tuple[int, ...] = ()
     told: str = ""
+    carried: Carried = field(default_factory=Carried)
 
     @property
     def predicts(self) -> bool:
@@ -148,7 +151,7 @@ def _mend(run: Run, fields: Candidates, found: SearchResult, term: Term) -> None
     told, dwells = _happened(fields, found.model, term, alternative, size)
     before, after = left_out(found.model), left_out(model)
     errors = fit_rms(problem, model.terms), *worst(before, after)
-    run.handled.append(Named(group, *errors, units, dwells, told))
+    run.handled.append(Named(group, *errors, units, dwells, told, carried_by(found.model, term)))
     lot = alternative.settled(found.model, term, run.lot, size, **place)
     if lot is None:
         run.beside.append(term)

@@ -12,6 +12,8 @@ if TYPE_CHECKING:
     from rich.console import Console
 
 
+BAD_DWELL = "bad_dwell"
+
 SMALL = 1.1
 """Errors below so many times the floor look like noise to whoever compares the two numbers."""
 
@@ -51,15 +53,23 @@ def _dwells(document: dict[str, Any]) -> None:
         out.print(
             f"{count} dwells left out: the noise has heavier tails than a normal one", style="dim", soft_wrap=True
         )
-    carried, without = document.get("influence") or [], document.get("without_influence")
-    if carried and without and not document["adequate"]:
-        dwells = ", ".join(f"{d['unit']} {d['dwell']} ({100.0 * d['share']:.0f} %)" for d in carried[:5])
-        out.print(
-            f"dwells that carry most of it: {dwells}; without {without['dwells']} of them p {equal(without['p_value'])}",
-            style="dim",
-            markup=False,
-            soft_wrap=True,
-        )
+    if document["adequate"]:
+        return
+    for group in document["classes"]:
+        if group["effects"] != [BAD_DWELL]:
+            text = f"dwells that carry {' or '.join(group['effects'])}: {_carried(group['influence'])}"
+            without = group["without_influence"]
+            if without:
+                text += f"; without these {without['dwells']} p {equal(without['p_value'])}"
+            out.print(text, style="dim", markup=False, soft_wrap=True)
+    if not document["classes"] and document["influence"]:
+        text = f"largest residuals, share of all: {_carried(document['influence'])}"
+        out.print(text, style="dim", markup=False, soft_wrap=True)
+
+
+def _carried(rows: list[dict[str, Any]]) -> str:
+    """Dwells with their shares, the first few of them."""
+    return ", ".join(f"{d['unit']} dwell {d['dwell']} ({100.0 * d['share']:.0f} %)" for d in rows[:5]) or "none alone"
 
 
 def symbol_of(name: str) -> str:

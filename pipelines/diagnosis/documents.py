@@ -42,6 +42,21 @@ class FailingDriver(TypedDict):
     p_value: float
 
 
+class InfluentialDwell(TypedDict):
+    """A dwell that carries the verdict."""
+
+    unit: str
+    dwell: int
+    share: Annotated[float, "share of the evidence that rests on the dwell"]
+
+
+class WithoutInfluence(TypedDict):
+    """The verdict without the dwells that carry it."""
+
+    dwells: Annotated[int, "number of dwells left out"]
+    p_value: float
+
+
 class EffectClassDocument(TypedDict):
     """Effects that this plan cannot separate; one effect if it is identified."""
 
@@ -59,21 +74,8 @@ class EffectClassDocument(TypedDict):
     units: NotRequired[Annotated[list[str], "of scope data: the units concerned"]]
     dwells: NotRequired[Annotated[list[int], "of scope data: the dwells concerned"]]
     evidence: NotRequired[Annotated[str, "of scope data: what happened"]]
-
-
-class InfluentialDwell(TypedDict):
-    """A dwell that carries the verdict."""
-
-    unit: str
-    dwell: int
-    share: Annotated[float, "share of the evidence that rests on the dwell"]
-
-
-class WithoutInfluence(TypedDict):
-    """The verdict without the dwells that carry it."""
-
-    dwells: Annotated[int, "number of dwells left out"]
-    p_value: float
+    influence: NotRequired[Annotated[list[InfluentialDwell], "dwells that carry the verdict on this class"]]
+    without_influence: NotRequired[Annotated[WithoutInfluence | None, "the verdict on this class without these dwells"]]
 
 
 class RemovedDwell(TypedDict):
