@@ -97,7 +97,11 @@ class _Draws:
         covariance = self.model.problem.covariance
         shape = (self.model.problem.blocks, self.model.problem.n, count)
         # heavy tails: what the model itself leaves, in another order
-        white = self.rng.choice(self._values, shape) if self.heavy else self.rng.standard_normal(shape)
+        white = (
+            self._values[self.rng.integers(self._values.size, size=shape)]
+            if self.heavy
+            else self.rng.standard_normal(shape)
+        )
         series = covariance.coloured(self.model.noise, white)
         deviances = np.stack([self._deviances(shares, series) for shares in self.places])
         chosen = np.argmin(deviances, axis=0)

@@ -22,7 +22,7 @@ from inertial.noise.flicker import flicker_kernel
 Array = NDArray[np.float64]
 
 _factor, _invert = get_lapack_funcs(("potrf", "trtri"), dtype=np.float64)
-_times = get_blas_funcs("trmm", dtype=np.float64)
+_times = get_blas_funcs(("trmm",), dtype=np.float64)[0]
 
 _FEW = 16
 """Columns of a block up to which a triangular product, with the transposing that it needs, is faster than a plain one."""

@@ -7,6 +7,7 @@ import numpy as np
 from numpy.random import Generator
 
 from inertial import effects as catalogue
+from inertial.criticism import decisions
 from inertial.criticism.adequacy import adequacy
 from inertial.criticism.bad_dwells import BadDwell
 from inertial.criticism.classes import EffectClass, class_of
@@ -27,9 +28,6 @@ from inertial.criticism.tails import with_tails
 from inertial.criticism.unknown import better_curve
 from inertial.effects.base import AnyEffect
 from inertial.effects.covariate import Covariate
-
-UNEXPLAINED = 0.5
-"""Share of the floor below which a smooth dependence is left alone."""
 
 
 @dataclass(frozen=True)
@@ -191,7 +189,7 @@ def _beyond(part: Part, base: Model, found: SearchResult, drivers: list[Driver])
 
 def _convincing(model: Model, driver: Driver, looks: int) -> bool:
     """Whether a driver is significant and large, the wander estimated with it inside: slow drivers and wander look alike."""
-    if model.explained(driver.candidate, model.floor()) < UNEXPLAINED * model.floor():
+    if model.explained(driver.candidate, model.floor()) < decisions.UNEXPLAINED * model.floor():
         return False
     return _driver_log_p(model, driver) + np.log(looks) < np.log(NAMED_BELOW)
 

@@ -8,13 +8,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inertial import effects as catalogue
+from inertial.criticism import decisions
 from inertial.criticism.bad_dwells import BadDwell, bad_dwells, without
 from inertial.criticism.classes import EffectClass, class_of
 from inertial.criticism.decisions import RISES, TOLD_APART
 from inertial.criticism.drivers import varies
 from inertial.criticism.field import Candidates
 from inertial.criticism.handling import alternatives
-from inertial.criticism.handling.base import Handling
+from inertial.criticism.handling.base import Handling, Misfit
 from inertial.criticism.heldout import fit_rms
 from inertial.criticism.influence import Carried, carried_by
 from inertial.criticism.left_out import LeftOut, left_out
@@ -35,9 +36,6 @@ _MANY = 32  # units of a lot that is searched whole
 _ENOUGH = 24  # units, spread over the lot, that a larger one is searched in
 _MENDED = 6  # alternatives that are told of one run at the most
 _TURNS = 3  # searches after which single dwells are looked at no more
-
-DECISIVE = 0.2
-"""Share of what a curve brings by which it must beat the effects chosen so far to end the search for more."""
 
 
 @dataclass(frozen=True)
@@ -152,11 +150,26 @@ def _mend(run: Run, fields: Candidates, found: SearchResult, term: Term) -> None
     before, after = left_out(found.model), left_out(model)
     errors = fit_rms(problem, model.terms), *worst(before, after)
     run.handled.append(Named(group, *errors, units, dwells, told, carried_by(found.model, term)))
-    lot = alternative.settled(found.model, term, run.lot, size, **place)
+    lot = alternative.settled(run.lot, size, _misfit(found.model, model), **place)
     if lot is None:
         run.beside.append(term)
     else:
         run.lot = lot
+
+
+def _misfit(model: Model, richer: Model) -> Misfit:
+    """How well a model fits the dwells of some units, at the noise of a richer one."""
+    local = [t for t in model.terms if not t.shared]
+
+    def left(lot: Lot, units: tuple[int, ...]) -> float:
+        # dwells that were taken out stay out
+        error = model.problem.lot.error[list(units)]
+        problem = Problem(replace(lot, error=error))
+        blocks = [3 * unit + axis for unit in units for axis in range(3)]
+        noise = problem.covariance.taken(richer.noise.pick(blocks), model.problem.covariance)
+        return Model(problem, local).at(noise).rss
+
+    return left
 
 
 def _happened(
@@ -205,7 +218,7 @@ class Part:
         fit = instead[0]
         problem = self.field.problem
         effects = cost_of_model(Model(problem, [*self.base.terms, *chosen], near=fit.model.noise))
-        by_far = effects - fit.cost > DECISIVE * (cost_of_model(self.base) - fit.cost)
+        by_far = effects - fit.cost > decisions.DECISIVE * (cost_of_model(self.base) - fit.cost)
         return by_far or not anything(self.field, fit.model)
 
 

@@ -11,6 +11,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from inertial.criticism import decisions
 from inertial.criticism.decisions import BLOCKS
 from inertial.criticism.handling.base import soaks
 from inertial.criticism.heldout import residuals
@@ -22,10 +23,6 @@ Array = NDArray[np.float64]
 Kind = Literal["poses", "soaks", "blocks of time"]
 
 _POSES = 6
-_BLIND = 4.0
-"""Factor by which the errors that a fold's prediction should have may exceed those of a prediction from the neighbours alone.
-
-Beyond, the other dwells do not determine the model: with one of three soaks left out no function of temperature is bent."""
 
 
 @dataclass(frozen=True)
@@ -146,7 +143,7 @@ class _Parts:
         expected = np.sqrt(np.mean(np.diagonal(inverse)))
         alone = np.sqrt(np.mean(1.0 / self.precision[block, places]))
         wander = np.sqrt(self.typical[block])
-        return bool(expected < _BLIND * max(float(alone), float(wander)))
+        return bool(expected < decisions.FOLD_BLIND * max(float(alone), float(wander)))
 
     def _spread(self, block: int) -> float:
         """Variance of what the model leaves of a block: nothing that it predicts should be much worse."""

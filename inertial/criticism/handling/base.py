@@ -5,6 +5,7 @@ axis. They are of scope "data": no model is extended by them.
 """
 
 from abc import abstractmethod
+from collections.abc import Callable
 from dataclasses import replace
 from typing import TYPE_CHECKING, ClassVar, Literal
 
@@ -16,9 +17,10 @@ from inertial.state import State
 
 if TYPE_CHECKING:
     from inertial.criticism.lot import Lot
-    from inertial.criticism.model import Model, Term
 
 Array = NDArray[np.float64]
+Misfit = Callable[["Lot", tuple[int, ...]], float]
+"""Whitened sum of squares that the model leaves of a lot of some units, by their numbers in the whole lot."""
 
 _PLACES = 40
 _EDGE = 3  # dwells at both ends after which, or before which, nothing can be told to have changed
@@ -79,9 +81,9 @@ class Handling(Effect):
         del lot, size, place
         return None
 
-    def settled(self, model: "Model", term: "Term", lot: "Lot", size: Array, **place: float) -> "Lot | None":
-        """The same where the model that the term was found beside is needed for it."""
-        del model, term
+    def settled(self, lot: "Lot", size: Array, misfit: Misfit, **place: float) -> "Lot | None":
+        """The same where it takes more than the coefficients: ``misfit`` tells how well the model fits a lot of some units."""
+        del misfit
         return self.mended(lot, size, **place)
 
     def dwells(self, lot: "Lot", **place: float) -> list[int]:

@@ -7,12 +7,11 @@ import numpy as np
 from scipy.optimize import minimize_scalar
 
 from inertial import operators
-from inertial.criticism.handling.base import Array, Handling
+from inertial.criticism.handling.base import Array, Handling, Misfit
 from inertial.state import History, State
 
 if TYPE_CHECKING:
     from inertial.criticism.lot import Lot
-    from inertial.criticism.model import Model, Term
 
 _FASTEST, _SLOWEST, _GRID = 30.0, 3000.0, 12  # s, s, values of the time constant
 _BETWEEN = 9  # values between two of the grid
@@ -65,26 +64,19 @@ class NotSoaked(Handling):
             f"{place['tau']:.0f} s, up to {float(behind.max()):.1f} K behind it; soak longer, or measure the device's temperature"
         )
 
-    def settled(self, model: "Model", term: "Term", lot: "Lot", size: Array, **place: float) -> "Lot | None":
+    def settled(self, lot: "Lot", size: Array, misfit: Misfit, **place: float) -> "Lot | None":
         """With the temperatures of the devices in place of the readings, each unit's time constant found by its own dwells."""
         del size
-        problem, noise = model.problem, model.with_term(term).noise
-        local = [t for t in model.terms if not t.shared]
         each = np.zeros(lot.state.time.shape[0])
+        middle, reach = float(np.log(place["tau"])), float(np.log(_SPREAD))
         for unit in [int(place["unit"])] if "unit" in place else range(each.size):
-            own, blocks = problem.lot.units([unit]), [3 * unit + axis for axis in range(3)]
-            there = noise.pick(blocks)
+            own = lot.units([unit])
 
-            def left(log_tau: float, own: "Lot" = own, there: object = there) -> float:
-                moved = type(problem)(replace(own, state=delayed(own.state, np.array([np.exp(log_tau)]))))
-                again = type(model)(moved, local)
-                return again.at(problem.covariance.taken(there, moved.covariance)).rss
+            def left(log_tau: float, own: "Lot" = own, unit: int = unit) -> float:
+                return misfit(replace(own, state=delayed(own.state, np.array([np.exp(log_tau)]))), (unit,))
 
-            middle = float(np.log(place["tau"]))
-            reach = float(np.log(_SPREAD))
-            found = minimize_scalar(
-                left, bounds=(middle - reach, middle + reach), method="bounded", options={"xatol": _EXACT}
-            )
+            bounds = (middle - reach, middle + reach)
+            found = minimize_scalar(left, bounds=bounds, method="bounded", options={"xatol": _EXACT})
             each[unit] = float(np.exp(found.x))
         return replace(lot, state=delayed(lot.state, each))
 
