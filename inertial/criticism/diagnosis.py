@@ -26,7 +26,7 @@ from inertial.criticism.problem import Lot, Problem
 from inertial.criticism.search import Rival, SearchResult
 from inertial.criticism.tails import with_tails
 from inertial.criticism.unknown import better_curve
-from inertial.effects.base import AnyEffect
+from inertial.criticism.unseen import UnseenRange, unseen, unseen_ranges
 from inertial.effects.covariate import Covariate
 
 
@@ -63,6 +63,7 @@ class Diagnosis:
     ladder: tuple[Rival, ...]
     handled: tuple[Named, ...] = ()
     removed: tuple[BadDwell, ...] = ()
+    unseen_ranges: tuple[UnseenRange, ...] = ()
     carried: Carried = field(default_factory=Carried)
 
 
@@ -96,6 +97,7 @@ def _told(run: Run, search_: Search, rng: Generator) -> Diagnosis:
     where = places(problem, drivers, base.at(final.noise), final.space.variance)
     charged = tuple(p for p in where if p.log_p + np.log(len(drivers)) < np.log(ADEQUATE_ABOVE))
     every = [*run.handled, *named]
+    blind = unseen(fields, base, [e for e in catalogue.catalogue().values() if e.id not in set(run.effects)])
     return Diagnosis(
         problem=problem,
         base=base,
@@ -107,20 +109,13 @@ def _told(run: Run, search_: Search, rng: Generator) -> Diagnosis:
         where=() if sound else charged,
         named=named,
         unexplained=unexplained,
-        unseen=_unseen(fields, base, [e for e in catalogue.catalogue().values() if e.id not in set(run.effects)]),
+        unseen=blind,
+        unseen_ranges=unseen_ranges(fields, base, blind),
         ladder=found.ladder,
         handled=tuple(run.handled),
         removed=removed,
         carried=every[0].carried if every else Carried(influence(base, None)),
     )
-
-
-def _unseen(field: Candidates, base: Model, candidates: Sequence[AnyEffect]) -> tuple[str, ...]:
-    """Effects whose columns the plan leaves empty, makes one with the model's, or does not carry the quantities for."""
-    gains = field.gains(base.at(base.problem.covariance.white_noise()), {t.effect.id for t in base.terms})
-    blind = [name for name, gain in gains.items() if not gain.rank.any()]
-    order = [e.id for e in candidates]
-    return tuple(sorted({*blind, *field.lacking} & set(order), key=order.index))
 
 
 def _classes(field: Candidates, base: Model, final: Model) -> list[EffectClass]:

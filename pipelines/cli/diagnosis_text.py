@@ -32,6 +32,7 @@ def print_diagnosis(document: dict[str, Any], *, source: str, model: Path | None
     _unexplained(out, document, model)
     _next_command(out, document, source, model)
     _unseen(document)
+    _unseen_ranges(document)
     measurements_table(document["next_measurements"])
 
 
@@ -244,6 +245,14 @@ def _unseen(document: dict[str, Any]) -> None:
         reasons = document.get("reasons", {})
         lines = [[name, reasons.get(name) or document["breakers"][name]] for name in document["unseen"]]
         print_table(["effect", "why, and what would show it"], lines, title="This plan could not have seen", whole=1)
+
+
+def _unseen_ranges(document: dict[str, Any]) -> None:
+    """Effects that the plan shows for a part of their range only."""
+    for one in document.get("unseen_ranges", ()):
+        values = f"{short(one['low'])} … {short(one['high'])} {one['unit']}"
+        text = f"{one['effect']} with {one['parameter']} in {values} could not have been seen: the plan does not undo its memory"
+        console().print(text, style="dim", markup=False, soft_wrap=True)
 
 
 def measurements_table(proposed: list[dict[str, Any]], out: Console | None = None) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -148,6 +149,7 @@ def document(
             "p_value": probability(diagnosis.unexplained.log_p),
         },
         "unseen": list(diagnosis.unseen),
+        "unseen_ranges": [asdict(one) for one in diagnosis.unseen_ranges],
         "next_measurements": (proposed(diagnosis) if following is None else following).rows(),
     }
 

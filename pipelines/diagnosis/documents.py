@@ -121,6 +121,16 @@ class NextMeasurement(TypedDict):
     separation_after: NotRequired[Annotated[float, "the same with these rows measured"]]
 
 
+class UnseenRangeDocument(TypedDict):
+    """A part of an effect's range that this plan could not have seen."""
+
+    effect: str
+    parameter: str
+    unit: str
+    low: float
+    high: float
+
+
 class SuggestedFormula(TypedDict):
     """A formula for a model file that follows the unexplained quantity."""
 
@@ -142,6 +152,9 @@ class DiagnosisDocument(TypedDict):
     recommended: Annotated[list[str], "one effect per class; empty if the model is adequate or the cause unknown"]
     unexplained: UnexplainedExcess | None
     unseen: Annotated[list[str], "effects that this plan could not have seen"]
+    unseen_ranges: NotRequired[
+        Annotated[list[UnseenRangeDocument], "effects that this plan shows only outside this range of a parameter"]
+    ]
     next_measurements: list[NextMeasurement]
     influence: Annotated[list[InfluentialDwell], "largest share first"]
     without_influence: NotRequired[WithoutInfluence | None]

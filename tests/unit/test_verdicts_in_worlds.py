@@ -42,6 +42,10 @@ def test_a_random_walk_is_no_physics():
     assert document["adequate"] is True
     assert names(document) == []
     assert document["error"]["walk_share"] > 100.0
+    # soaks that only climb hide any hysteresis that is narrower than their steps
+    (dark,) = (row for row in document["unseen_ranges"] if row["effect"] == "thermal_hysteresis")
+    assert (dark["parameter"], dark["low"]) == ("half_width", pytest.approx(1.0))
+    assert 15.0 < dark["high"] < 35.0
 
 
 @pytest.mark.slow
