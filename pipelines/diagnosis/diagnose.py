@@ -115,6 +115,7 @@ def document(
             "recommended": [],
             "unexplained": None,
             "unseen": [],
+            "unseen_ranges": [],
             "next_measurements": [],
         }
     faulty = {f.unit for f in faults}
