@@ -26,7 +26,7 @@ from tables import FAULTS, HIDDEN, NULLS  # noqa: E402
 from world import World, make  # noqa: E402
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Generator
 
 SEED = 63_000_000
 
@@ -76,7 +76,7 @@ MATTERS: dict[str, tuple[str, ...]] = {
 
 
 @contextmanager
-def changed(name: str, factor: float) -> Iterator[None]:
+def changed(name: str, factor: float) -> Generator[None, None, None]:
     """A number of the decisions at another value, wherever it was imported to."""
     import inertial.criticism.diagnosis  # noqa: F401  # everything that imports one
     from inertial.criticism import decisions
