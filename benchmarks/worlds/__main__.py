@@ -57,13 +57,12 @@ def diagnosed(task: tuple[str, str, int]) -> tuple[str, dict[str, Any]]:
 
 def judged(world: World, made: Made, document: dict[str, Any]) -> dict[str, Any]:
     """The verdict on a document."""
-    told = made.told
     groups = document["classes"]
     physics = [g for g in groups if g.get("scope") not in DATA]
     own = {name for name, _ in world.hidden}
     stray = [g["effects"] for g in physics if not own & set(g["effects"])]
     # a fault that stands in a class with physics is told, and physics alone is not
-    if told is not None:
+    for told in made.faults:
         stray = [effects for effects in stray if not set(told.names) & set(effects)]
     said = [(set(g["effects"]), g.get("units") or [], g.get("dwells") or []) for g in groups]
     said += [({b["fault"]}, b["units"], b["dwells"]) for b in document["blocked_by"]]
@@ -73,13 +72,16 @@ def judged(world: World, made: Made, document: dict[str, Any]) -> dict[str, Any]
         "stray": stray,
         "unexplained": document["unexplained"] is not None,
         "blocked": [(b["fault"], b["units"], b["dwells"]) for b in document["blocked_by"]],
-        "found": None if told is None else any(_agrees(told, *one) for one in said),
+        "found": all(any(_agrees(told, *one) for one in said) for told in made.faults) if made.faults else None,
+        "false": [(sorted(one[0]), *one[1:]) for one in said if not any(_agrees(told, *one) for told in made.faults)],
         "first": bool(groups) and bool(own & set(groups[0]["effects"])),
         "held": all(any(name in g["effects"] for g in groups) for name in own) if own else None,
         "alone": len(physics) == len(own) and not any(g.get("scope") in DATA for g in groups) if own else None,
         "p": document["error"]["p_value"],
+        "hidden": [list(own)],
+        "first_p": [g["p_value"] for g in groups],
         "said": [(sorted(a), b, c) for a, b, c in said],
-        "truth": None if told is None else (told.names, told.units, told.dwells),
+        "truth": [(told.names, told.units, told.dwells) for told in made.faults],
     }
 
 
@@ -166,6 +168,7 @@ def _line(name: str, rows: list[dict[str, Any]]) -> str:
     parts.append(f"names physics beside the truth {interval(sum(bool(r['stray']) for r in whole), n)}")
     if whole[0]["found"] is not None:
         parts.append(f"fault told {interval(sum(r['found'] for r in whole), n)}")
+        parts.append(f"another fault told {sum(bool(_other(r)) for r in whole)}")
     if whole[0]["held"] is not None:
         parts.append(
             f"in class {interval(sum(r['held'] for r in whole), n)}, exact {sum(r['held'] and r['alone'] for r in whole)}"
@@ -177,6 +180,13 @@ def _line(name: str, rows: list[dict[str, Any]]) -> str:
         f"{sum(r['seconds'] for r in whole) / n:.1f} s" + (f", {len(rows) - n} broken" if n < len(rows) else "")
     )
     return " · ".join(parts)
+
+
+def _other(row: dict[str, Any]) -> list[Any]:
+    """Faults that were told and not made."""
+    physics = {name for group in row["stray"] for name in group}
+    own = {name for group in row["hidden"] for name in group}
+    return [one for one in row["false"] if not set(one[0]) & (physics | own)]
 
 
 def _loop_line(name: str, rows: list[dict[str, Any]]) -> str:

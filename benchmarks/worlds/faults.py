@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 Floats = np.ndarray
-Done = tuple[Any, Floats | None, Floats, Floats, "Told | None"]
+Done = tuple[Any, Floats | None, Floats, Floats, "Told | tuple[Told, ...] | None"]
 
 
 @dataclass(frozen=True)
@@ -28,6 +28,27 @@ def bad_dwell(scene: Any, readings: Floats, noise: Floats, amount: float, rng: n
     noise = noise.copy()
     noise[unit, dwell] += 1e-3 * amount * way / np.linalg.norm(way)
     return scene, None, readings, noise, Told(("bad_dwell",), (f"W{unit + 1:03d}",), (dwell,))
+
+
+def two_dwells(scene: Any, readings: Floats, noise: Floats, amount: float, rng: np.random.Generator) -> Done:
+    """Two dwells of one unit are off by ``amount`` mg in random directions."""
+    unit = int(rng.integers(len(noise)))
+    noise, told = noise.copy(), []
+    for dwell in rng.choice(np.arange(2, noise.shape[1] - 2), 2, replace=False).tolist():
+        way = rng.standard_normal(3)
+        noise[unit, dwell] += 1e-3 * amount * way / np.linalg.norm(way)
+        told.append(Told(("bad_dwell",), (f"W{unit + 1:03d}",), (dwell,)))
+    return scene, None, readings, noise, tuple(told)
+
+
+def dwell_of_moved(scene: Any, readings: Floats, noise: Floats, amount: float, rng: np.random.Generator) -> Done:
+    """A unit turns by 0.2 mrad, and a dwell of the same unit is off by ``amount`` mg."""
+    _, turned, _, noise, moved = unit_moved(scene, readings, noise, 0.2, rng)
+    assert isinstance(moved, Told)
+    unit, dwell, way = int(moved.units[0][1:]) - 1, int(rng.integers(2, noise.shape[1] - 2)), rng.standard_normal(3)
+    noise = noise.copy()
+    noise[unit, dwell] += 1e-3 * amount * way / np.linalg.norm(way)
+    return scene, turned, readings, noise, (moved, Told(("bad_dwell",), moved.units, (dwell,)))
 
 
 def unit_moved(scene: Any, readings: Floats, noise: Floats, amount: float, rng: np.random.Generator) -> Done:
@@ -73,8 +94,20 @@ def unsoaked(scene: Any, readings: Floats, noise: Floats, amount: float, rng: np
     return scene, None, scene.chamber + 1.0, noise, Told(("thermal_lag", "device_not_soaked"), (), ())
 
 
+def unit_unsoaked(scene: Any, readings: Floats, noise: Floats, amount: float, rng: np.random.Generator) -> Done:
+    """The reading of one unit is the chamber's, and its soaks were too short for it; the others read their own."""
+    del amount
+    unit = int(rng.integers(len(noise)))
+    readings = readings.copy()
+    readings[unit] = scene.chamber[unit] + 1.0
+    return scene, None, readings, noise, Told(("unit_not_soaked",), (f"W{unit + 1:03d}",), ())
+
+
 FAULTS: dict[str, Callable[..., Done]] = {
     "bad_dwell": bad_dwell,
+    "two_dwells": two_dwells,
+    "dwell_of_moved": dwell_of_moved,
+    "unit_unsoaked": unit_unsoaked,
     "unit_moved": unit_moved,
     "thermometer": thermometer,
     "wrong_pose": wrong_pose,

@@ -120,6 +120,17 @@ def level_error(rng: np.random.Generator, units: int, scene: Any) -> Effect:
     return effect
 
 
+def converter(rng: np.random.Generator, units: int, scene: Any) -> Effect:
+    """Integral nonlinearity of a converter of equal segments: a period of the design, a phase of each part.
+
+    What it converts is the output of the axis, with offset, misalignment and its run with temperature.
+    """
+    del scene
+    period, size = float(rng.uniform(0.15, 0.6)), 1.0 + 0.2 * rng.standard_normal((units, 1, 3))
+    phase = rng.uniform(0.0, 2.0 * np.pi, (units, 1, 3))
+    return lambda s: size * np.sin(2.0 * np.pi * s.output / period + phase)
+
+
 PHYSICS: dict[str, Callable[..., Effect]] = {
     "third_order": _of_force(lambda f: f**3),
     "odd_quadratic": _of_force(lambda f: f * np.abs(f)),
@@ -134,4 +145,5 @@ PHYSICS: dict[str, Callable[..., Effect]] = {
     "step_change": step_change,
     "thermal_hysteresis": thermal_hysteresis,
     "level_error": level_error,
+    "adc_nonlinearity": converter,
 }

@@ -27,6 +27,9 @@ NULLS: dict[str, World] = {
     "axis_slow_x3": World(noise=Noise(axis_slow=(1.0, 1.0, 3.0))),
     "units_slow_spread": World(noise=Noise(unit_slow=(0.5, 2.0, 1.0, 0.7, 1.4, 0.6, 1.7, 1.0))),
     "t3": World(noise=Noise(white=100.0, tails=3)),
+    "t3_one_unit": World(units=1, noise=Noise(white=100.0, tails=3)),
+    "t3_two_units": World(units=2, noise=Noise(white=100.0, tails=3)),
+    "t5": World(noise=Noise(white=200.0, tails=5)),
     "lengths": World(durations=(2.0, 60.0)),
     "rest20": World(rest=20.0),
     "lsb5": World(noise=Noise(white=50.0, flicker=5.0), lsb=5.0),
@@ -45,6 +48,20 @@ FAULTS: dict[str, World] = {
     "moved_one_unit": World(units=1, fault="unit_moved", amount=0.2),
     "dwell_one_unit": World(units=1, fault="bad_dwell", amount=0.5),
 }
+FAULTS |= {
+    "unit_unsoaked": World(fault="unit_unsoaked"),
+    "unsoaked_K4": World(fault="unsoaked", noise=Noise(walk=4.0)),
+    "unsoaked_one_unit": World(units=1, fault="unsoaked"),
+    "two_dwells_1mg": World(fault="two_dwells", amount=1.0),
+    "dwell_and_moved": World(fault="bad_dwell", amount=1.0, beside=(("unit_moved", 0.2),)),
+    "dwell_of_moved": World(fault="dwell_of_moved", amount=1.0),
+    "dwell_and_pose": World(fault="bad_dwell", amount=1.0, beside=(("wrong_pose", 0.1),)),
+    "dwell_and_thermometer": World(fault="bad_dwell", amount=1.0, beside=(("thermometer", 0.5),)),
+    "moved_and_thermometer": World(fault="unit_moved", amount=0.2, beside=(("thermometer", 0.5),)),
+    "pose_and_moved": World(fault="wrong_pose", amount=0.1, beside=(("unit_moved", 0.2),)),
+}
+"""What goes wrong, one at a time and two at once."""
+
 _HIDDEN = (
     "third_order", "second_order", "cross_coupling", "bias_temperature_quadratic", "scale_temperature_quadratic",
     "misalignment_temperature", "aging_linear", "warm_up", "step_change", "level_error",
@@ -56,6 +73,7 @@ HIDDEN |= {
     f"{name}_2_K4": World(hidden=((name, 2.0),), noise=Noise(walk=4.0)) for name in ("third_order", "cross_coupling")
 }
 HIDDEN |= {f"{name}_2_one_unit": World(units=1, hidden=((name, 2.0),)) for name in ("third_order", "cross_coupling")}
+HIDDEN |= {f"adc_nonlinearity_{size:g}": World(hidden=(("adc_nonlinearity", size),)) for size in (1.0, 2.0, 5.0)}
 HIDDEN["third_order_and_dwell"] = World(hidden=(("third_order", 2.0),), fault="bad_dwell", amount=1.0)
 HIDDEN["cubic_and_moved"] = World(hidden=(("third_order", 2.0),), fault="unit_moved", amount=0.3)
 TABLES = {"nulls": NULLS, "faults": FAULTS, "hidden": HIDDEN}

@@ -12,6 +12,7 @@ from noise import Floats, Noise, dwell_noise
 from physics import PHYSICS
 
 RATE_HZ = 100.0
+_UNSOAKED = {"device_not_soaked", "unit_not_soaked"}
 NDArray = np.ndarray
 
 
@@ -21,6 +22,7 @@ class World:
 
     durations : shortest and longest dwell, s; hidden : (effect, size), size = RMS that the plain model leaves of it over the
     noise of a dwell; fault, amount : what goes wrong and by how much
+    beside : further faults and their amounts
     rest : RMS of the table's rest position, µrad, alike for all; lsb : resolution over the noise of a dwell's samples
     turn_on : RMS of the bias shift between the run and the fresh one, µg; unsoaked : dwells begin when the chamber arrives
     """
@@ -33,6 +35,7 @@ class World:
     hidden: tuple[tuple[str, float], ...] = ()
     fault: str = ""
     amount: float = 0.0
+    beside: tuple[tuple[str, float], ...] = ()
     rest: float = 0.0
     lsb: float = 0.0
     turn_on: float = 0.0
@@ -46,6 +49,7 @@ class Scene:
 
     start, duration : of each dwell, s; soak : its place in the plan
     temperature : true, of the sensors; chamber : air
+    output : (units, n, 3), g, of the devices without noise and without what is hidden
     """
 
     outer: Floats
@@ -60,6 +64,7 @@ class Scene:
     fine_temperature: Floats
     fine_air: Floats
     powered: float
+    output: Floats
 
     @property
     def force(self) -> Floats:
@@ -75,8 +80,13 @@ class Made:
     history: pd.DataFrame
     fresh: pd.DataFrame
     fresh_history: pd.DataFrame
-    told: Told | None
+    faults: tuple[Told, ...]
     floor_ug: float
+
+    @property
+    def told(self) -> Told | None:
+        """The fault, or the first of them."""
+        return self.faults[0] if self.faults else None
 
 
 def force_of(outer: Floats, inner: Floats) -> Floats:
@@ -89,25 +99,35 @@ def make(world: World, seed: int) -> Made:
     plan, device, first, second, third = (np.random.default_rng(s) for s in np.random.SeedSequence(seed).spawn(5))
     scene = _scene(world, plan, first)
     lot = _Lot.drawn(device, world.units)
-    again = _with_heat(scene, world, second)
+    scene, again = (replace(s, output=lot.output(s)) for s in (scene, _with_heat(scene, world, second)))
     noises = [
         1e-6 * dwell_noise(world.noise, s.start, s.duration, world.units, g)
         for s, g in ((scene, first), (again, second))
     ]
     floor = float(np.sqrt(np.mean((noises[0] - noises[0].mean(axis=1, keepdims=True)) ** 2)))
     extra = _hidden(world, scene, again, floor, third)
-    told = None
+    told: tuple[Told, ...] = ()
     tables = []
     shift = 1e-6 * world.turn_on * second.standard_normal((world.units, 1, 3))
     for k, (s, drawn, rng) in enumerate(((scene, noises[0], first), (again, noises[1], second))):
         rest = 1e-6 * world.rest * rng.standard_normal((2, len(s.start)))
         true = replace(s, outer=s.outer + rest[0], inner=s.inner + rest[1])
         noise, turned, readings = drawn, None, s.temperature + 0.003 * rng.standard_normal(s.temperature.shape)
-        if k == 0 and world.fault:
-            true, turned, readings, noise, told = FAULTS[world.fault](true, readings, noise, world.amount, third)
+        if k == 0:
+            for fault, amount in ((world.fault, world.amount), *world.beside) if world.fault else ():
+                true, more, readings, noise, one = FAULTS[fault](true, readings, noise, amount, third)
+                turned = more if turned is None else turned if more is None else turned + more
+                told += one if isinstance(one, tuple) else () if one is None else (one,)
         output = lot.output(true, turned) + extra[k] + noise + k * shift
-        tables.append((_table(world, s, readings, output, rng), _history(s, rng, air=world.fault == "unsoaked")))
+        tables.append((_table(world, s, readings, output, rng), _history(s, rng, air=_of_air(world, told))))
     return Made(tables[0][0], tables[0][1], tables[1][0], tables[1][1], told, 1e6 * floor)
+
+
+def _of_air(world: World, told: tuple[Told, ...]) -> NDArray:
+    """Which units have the chamber's air in place of their own temperature, (units,)."""
+    whole = [not t.units for t in told if set(t.names) & _UNSOAKED] or [False]
+    own = {u for t in told if set(t.names) & _UNSOAKED for u in t.units}
+    return np.array([any(whole) or f"W{unit + 1:03d}" in own for unit in range(world.units)])
 
 
 @dataclass(frozen=True)
@@ -168,7 +188,7 @@ def _scene(world: World, rng: np.random.Generator, heat: np.random.Generator) ->
     empty = np.zeros((world.units, 0))
     scene = Scene(
         np.array(outer), np.array(inner), np.array(start), duration, np.array(place), empty, empty, np.array(wait),
-        np.zeros(0), empty, np.zeros(0), 1800.0,
+        np.zeros(0), empty, np.zeros(0), 1800.0, empty,
     )  # fmt: skip
     return _with_heat(scene, world, heat)
 
@@ -181,7 +201,9 @@ def _with_heat(scene: Scene, world: World, rng: np.random.Generator) -> Scene:
     air = np.full(fine.size, world.soaks[0])
     for s in range(1, len(world.soaks)):
         ramp = 60.0 * abs(world.soaks[s] - world.soaks[s - 1]) / 3.0  # 3 K/min
-        begin = arrives[s] - ramp - 30.0 if world.fault == "unsoaked" else min(ends[s - 1] + 5.0, arrives[s] - 30.0)
+        begin = (
+            arrives[s] - ramp - 30.0 if world.fault.endswith("unsoaked") else min(ends[s - 1] + 5.0, arrives[s] - 30.0)
+        )
         gone = np.clip((fine - begin) / ramp, 0.0, 1.0)
         air = np.where(fine >= begin, world.soaks[s - 1] + gone * (world.soaks[s] - world.soaks[s - 1]), air)
     tau = 300.0 * (1.0 + 0.03 * rng.standard_normal(world.units))[:, None]
@@ -259,13 +281,13 @@ def _quantised(
     return mean, spread
 
 
-def _history(scene: Scene, rng: np.random.Generator, *, air: bool) -> pd.DataFrame:
-    """The units' temperatures against time; the chamber's air where nothing else is read."""
+def _history(scene: Scene, rng: np.random.Generator, *, air: NDArray) -> pd.DataFrame:
+    """The units' temperatures against time; the chamber's air in the units (units,) of which nothing else is read."""
     every = slice(None, None, 6)
     rows = [
         pd.DataFrame({
             "unit": f"W{unit + 1:03d}", "time_s": scene.fine[every],
-            "unit_C": (scene.fine_air + 1.0 if air else body)[every] + 0.003 * rng.standard_normal(scene.fine[every].size),
+            "unit_C": (scene.fine_air + 1.0 if air[unit] else body)[every] + 0.003 * rng.standard_normal(scene.fine[every].size),
         })
         for unit, body in enumerate(scene.fine_temperature)
     ]  # fmt: skip

@@ -16,6 +16,7 @@ from inertial.criticism.model import Model
 from inertial.criticism.penalty import log_p_value
 from inertial.criticism.shares import place_of, shares_at
 from inertial.criticism.space import SEEN, Candidate, Space
+from inertial.criticism.tails import heavy
 
 Array = NDArray[np.float64]
 
@@ -31,11 +32,12 @@ def adequacy(field: Candidates, drivers: list[Driver], model: Model, rng: Genera
     """Natural logarithm of the probability that an adequate model fits as badly somewhere, over all looks together.
 
     The look that fails most is compared with the most failing look of noise drawn from the fitted covariance, whose own noise
-    is estimated again; a failure far beyond what draws can show is charged with the number of looks instead.
+    is estimated again (of the model's own residuals where their tails are heavy); a failure far beyond what draws can show is
+    charged with the number of looks instead.
     """
     space = model.space
     common = shared_noise(model)
-    worst, looks = 0.0, 0
+    worst, looks, draws = 0.0, 0, _Draws(model, rng)
     for candidate in _everything(field, drivers):
         gain = space.gain(candidate)
         looks += gain.drop.size
@@ -45,9 +47,10 @@ def adequacy(field: Candidates, drivers: list[Driver], model: Model, rng: Genera
                 found = log_p_value(space, drop * _own_part(space, candidate, place, common), rank)
             worst = min(worst, found)
     charged = worst + np.log(max(looks, 1))
-    if charged < np.log(CERTAIN_BELOW):
+    certain = CERTAIN_BELOW**2 if draws.heavy else CERTAIN_BELOW
+    if charged < np.log(certain):
         return float(charged)
-    return _against_draws(_Draws(model, rng), lambda: _everything(field, drivers), worst)
+    return _against_draws(draws, lambda: _everything(field, drivers), worst)
 
 
 def _against_draws(draws: "_Draws", looks: Callable[[], Iterable[Candidate]], worst: float) -> float:
@@ -85,12 +88,21 @@ class _Draws:
     def __init__(self, model: Model, rng: Generator) -> None:
         self.model, self.rng = model, rng
         self.places = _lattice(model.noise.shares)
+        left = model.space.residual[model.problem.covariance.there]
+        self.heavy = heavy(left)
+        self._values = left / np.sqrt(np.mean(left**2))
 
     def worst(self, looks: Iterable[Candidate], count: int) -> Array:
         """Smallest log p over all looks for each of so many draws."""
         covariance = self.model.problem.covariance
         shape = (self.model.problem.blocks, self.model.problem.n, count)
-        series = covariance.coloured(self.model.noise, self.rng.standard_normal(shape))
+        # heavy tails: what the model itself leaves, in another order
+        white = (
+            self._values[self.rng.integers(self._values.size, size=shape)]
+            if self.heavy
+            else self.rng.standard_normal(shape)
+        )
+        series = covariance.coloured(self.model.noise, white)
         deviances = np.stack([self._deviances(shares, series) for shares in self.places])
         chosen = np.argmin(deviances, axis=0)
         spaces = {int(k): _At(self.model, self.places[k], series[:, :, chosen == k]) for k in np.unique(chosen)}

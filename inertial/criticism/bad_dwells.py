@@ -1,4 +1,4 @@
-"""Single dwells that are off, by what is left when each is deleted; and tails that are heavier than normal.
+"""Single dwells that are off, by what is left when each is deleted.
 
 With P = V⁻¹ − V⁻¹H(HᵀV⁻¹H)⁻¹HᵀV⁻¹ a dwell deleted from its series is off by (Py)_i/P_ii, and (Py)_i²/P_ii over its variance is
 chi-square: no fit is needed to know it. Deleting says which dwell; weights that fall off with the size change all, and name none.
@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import stats
 
-from inertial.criticism.decisions import BAD_DWELL, COMMON, HEAVY, MOST_BAD
+from inertial.criticism.decisions import BAD_DWELL, COMMON, MOST_BAD
 from inertial.criticism.model import Model
 from inertial.criticism.problem import Lot, Problem
 from inertial.criticism.space import Space
@@ -21,21 +21,22 @@ _ROUNDS = 8
 _ALIKE = 0.6
 """Of the largest deviation: dwells that are less far off are looked at again when the noise is known without the largest."""
 
-_TELLS = 100
-"""Values from which on tails are told from a normal distribution's."""
-
 _LEAST_DOF = 6
 """Degrees of freedom of a unit below which none of its dwells is told from the others."""
 
 
 @dataclass(frozen=True)
 class BadDwell:
-    """A dwell of one unit: how far it is off its neighbours in time and the model, (axes,) g, in standard deviations."""
+    """A dwell of one unit: how far it is off its neighbours in time and the model.
+
+    off : (axes,), g; deviations : standard deviations; tail : whether the noise of the run reaches as far
+    """
 
     unit: int
     dwell: int
     off: Array
     deviations: float
+    tail: bool = False
 
 
 def without(lot: Lot, found: list[BadDwell]) -> Lot:
@@ -156,17 +157,10 @@ class _Deletion:
         return first * float(first[dwell] / max(first[gone], 1e-300))
 
 
-def heavy_tails(model: Model) -> bool:
-    """Whether what a model leaves has more large values than a normal distribution: no fault of single dwells then.
-
-    By the kurtosis of the deletion residuals: whitening spreads what one dwell is off over those that follow.
-    """
+def deletion_residuals(model: Model) -> Array:
+    """How far each dwell is off when it is deleted, axis by axis, in standard deviations, (m,); without those left out."""
     space = model.space
     looked = _Deletion(space, 1 if model.problem.lot.radial else 3)
     known = looked.there & (looked.size > 1e-9 * looked.size.max())
     scaled = looked.left / np.sqrt(np.where(known, looked.size, 1.0)) / space.noise.scale[:, None]
-    white = scaled[known]
-    if white.size < _TELLS:
-        return False
-    excess = float(np.mean(white**4) / np.mean(white**2) ** 2) - 3.0
-    return bool(excess > HEAVY * np.sqrt(24.0 / white.size))
+    return scaled[known]

@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 
+from inertial.criticism import decisions
 from inertial.criticism.decisions import TOLD_APART
 from inertial.criticism.field import Candidates
 from inertial.criticism.handling.base import Handling
@@ -11,8 +12,6 @@ from inertial.criticism.search import judge, scanned, size_of
 
 __all__ = ["TOLD_APART", "EffectClass", "Member", "class_of"]
 
-_NEAR = 60.0
-"""Rivals further off at the noise of the best are not looked at with their own."""
 
 _MOST = 9
 """Rivals whose own noise is estimated."""
@@ -64,7 +63,7 @@ def class_of(field: Candidates, model: Model, term: Term) -> EffectClass:
     rest = model.without_term(term)
     leave = {t.effect.id for t in rest.terms if not isinstance(t.effect, Handling)}
     looked = scanned(field, rest.at(model.noise), leave)
-    least = max((score for _, score in looked), default=0.0) - _NEAR
+    least = max((score for _, score in looked), default=0.0) - decisions.RIVAL_NEAR
     near = [t for t, score in looked[:_MOST] if score > least and t.effect.id != term.effect.id]
     near = [t for t in near if term.effect.id not in t.effect.after]
     judged = [judge(field, rest, refine(rest, t, model.noise)) for t in near]

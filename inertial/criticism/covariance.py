@@ -6,13 +6,14 @@ the same times and about the same white noise share a whitener; a missing dwell 
 """
 
 from collections import OrderedDict
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import get_lapack_funcs, solve_triangular
+from scipy.linalg import get_blas_funcs, get_lapack_funcs, solve_triangular
 
 from inertial.criticism.decisions import SHARE_STEP
 from inertial.criticism.noise import LONGEST, walk_kernel
@@ -20,7 +21,11 @@ from inertial.noise.flicker import flicker_kernel
 
 Array = NDArray[np.float64]
 
-_invert = get_lapack_funcs(("trtri",), dtype=np.float64)[0]
+_factor, _invert = get_lapack_funcs(("potrf", "trtri"), dtype=np.float64)
+_times = get_blas_funcs(("trmm",), dtype=np.float64)[0]
+
+_FEW = 16
+"""Columns of a block up to which a triangular product, with the transposing that it needs, is faster than a plain one."""
 
 _EVEN = 1.5
 """White standard errors of a block that differ by less than this factor are taken as equal."""
@@ -68,6 +73,12 @@ class _Kernel:
         alike = bool(np.array_equal(there, self.there)) and bool(np.all(np.abs(time - self.time) < 1.0))
         ratio = np.where(there, profile / self.profile, 1.0)
         return alike and float(ratio.max()) < _EVEN and float(ratio.min()) > 1.0 / _EVEN
+
+
+def _applied(lower: Array, series: Array) -> Array:
+    """Series (blocks, m, n) times a lower triangle (n, n), by the half of the products that a triangle needs."""
+    flat = np.ascontiguousarray(series).reshape(-1, lower.shape[0])
+    return _times(1.0, lower.T, flat.T, side=0, lower=0, trans_a=1).T.reshape(series.shape)
 
 
 class Covariance:
@@ -154,11 +165,17 @@ class Covariance:
         for i, wander in zip(index, self._wander or (), strict=True):
             if i is not None:
                 covariance += 10.0 ** (i / SHARE_STEP) * wander[place][np.ix_(there, there)]
-        lower = np.linalg.cholesky(covariance)
-        inverse = _invert(lower, lower=1)[0]
+        # of the transpose, which is Fortran's order: nothing is copied
+        upper, failed = _factor(covariance.T, lower=0, clean=1, overwrite_a=1)
+        if failed:
+            raise np.linalg.LinAlgError("the covariance of the noise is not positive definite")
+        logdet = 2.0 * float(np.sum(np.log(np.diagonal(upper))))
+        inverse = _invert(upper, lower=0, overwrite_c=1)[0].T
+        if there.all():
+            return inverse, logdet
         whole = np.zeros((there.size, there.size))
-        whole[np.ix_(there, there)] = np.tril(inverse)
-        return whole, 2.0 * float(np.sum(np.log(np.diagonal(lower))))
+        whole[np.ix_(there, there)] = inverse
+        return whole, logdet
 
     def whiten(self, columns: Array, shares: Shares, blocks: NDArray[np.intp] | None = None) -> Array:
         """Columns (blocks, n, m) of all or some blocks with white noise of variance s² in them; zero where a dwell is missing."""
@@ -167,7 +184,10 @@ class Covariance:
             level = self.level if blocks is None else self.level[blocks]
             found = self._whitener(place, steps, shares)
             if found is not None:
-                return np.matmul(found[0], columns / level[:, None, None])
+                own = columns / level[:, None, None]
+                if columns.shape[-1] > _FEW:
+                    return np.matmul(found[0], own)
+                return np.swapaxes(_applied(found[0], np.swapaxes(own, -1, -2)), -1, -2)
         place_of = np.arange(len(self.level)) if blocks is None else blocks
         where = np.full(len(self.level), -1)
         where[place_of] = np.arange(place_of.size)
@@ -186,6 +206,13 @@ class Covariance:
                     flat = found[0] @ own.transpose(1, 0, 2).reshape(n, -1)
                     out[rows] = flat.reshape(n, rows.size, m).transpose(1, 0, 2)
         return out
+
+    def whiteners(self, shares: Shares) -> Iterator[tuple[NDArray[np.intp], Array]]:
+        """Blocks that share a whitener, and the whitener (n, n), lower triangle, for white noise of variance one."""
+        for place, steps, members in self._groups:
+            found = self._whitener(place, steps, shares)
+            kernel = self._kernels[place]
+            yield members, np.diag(np.where(kernel.there, 1.0 / kernel.profile, 0.0)) if found is None else found[0]
 
     def coloured(self, noise: Noise, drawn: Array) -> Array:
         """Series (blocks, n, m), g, with this noise, from independent normal numbers; zero where a dwell is missing."""

@@ -1,14 +1,15 @@
 """The diagnosis of a lot: adequacy, where the model fails, classes of missing effects, what is left unexplained."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.random import Generator
 
 from inertial import effects as catalogue
+from inertial.criticism import decisions
 from inertial.criticism.adequacy import adequacy
-from inertial.criticism.bad_dwells import BadDwell, heavy_tails
+from inertial.criticism.bad_dwells import BadDwell
 from inertial.criticism.classes import EffectClass, class_of
 from inertial.criticism.decisions import ADEQUATE_ABOVE, NAMED_BELOW
 from inertial.criticism.drivers import Driver, Misfit, drivers_of, places
@@ -16,19 +17,17 @@ from inertial.criticism.examination import Named, Part, Run, Search, examined, w
 from inertial.criticism.field import Candidates
 from inertial.criticism.handling.base import Handling
 from inertial.criticism.heldout import fit_rms
-from inertial.criticism.influence import Influence, influence, log_p_without
+from inertial.criticism.influence import Carried, carried_by, influence
 from inertial.criticism.left_out import left_out
 from inertial.criticism.likelihood import shared_noise
-from inertial.criticism.model import Model
+from inertial.criticism.model import Model, Term
 from inertial.criticism.penalty import PER_COEFFICIENT, log_p_value
 from inertial.criticism.problem import Lot, Problem
 from inertial.criticism.search import Rival, SearchResult
+from inertial.criticism.tails import with_tails
 from inertial.criticism.unknown import better_curve
-from inertial.effects.base import AnyEffect
+from inertial.criticism.unseen import UnseenRange, unseen, unseen_ranges
 from inertial.effects.covariate import Covariate
-
-UNEXPLAINED = 0.5
-"""Share of the floor below which a smooth dependence is left alone."""
 
 
 @dataclass(frozen=True)
@@ -46,8 +45,8 @@ class Diagnosis:
 
     problem, base, final : the series without what handling spoilt, the model judged, the model with everything that was found
     rms : of the base model's residuals; floor : of the noise that is there
-    handled : what handling did; removed : single dwells that were left out; heavy : whether these are tails of the noise
-    influence : dwells that carry the verdict; log_p_without : of its first class when these are left out
+    handled : what handling did; removed : single dwells that were left out, those marked that are tails of the noise
+    carried : dwells that carry the verdict: of its first class, or the largest of what is left where nothing is named
     """
 
     problem: Problem
@@ -64,9 +63,8 @@ class Diagnosis:
     ladder: tuple[Rival, ...]
     handled: tuple[Named, ...] = ()
     removed: tuple[BadDwell, ...] = ()
-    heavy: bool = False
-    influence: tuple[Influence, ...] = ()
-    log_p_without: float | None = None
+    unseen_ranges: tuple[UnseenRange, ...] = ()
+    carried: Carried = field(default_factory=Carried)
 
 
 def diagnose(lot: Lot, effects: Sequence[str], rng: Generator) -> Diagnosis:
@@ -88,8 +86,8 @@ def _told(run: Run, search_: Search, rng: Generator) -> Diagnosis:
     problem = base.problem
     drivers = drivers_of(problem)
     log_p = adequacy(fields, drivers, base, rng)
-    heavy = bool(run.removed) and heavy_tails(base)
-    named_data = bool(run.handled) or (bool(run.removed) and not heavy)
+    removed = tuple(with_tails(found.model, run.removed)) if run.removed else ()
+    named_data = bool(run.handled) or any(not d.tail for d in removed)
     sound = log_p >= np.log(ADEQUATE_ABOVE) and not found.added
     final, unexplained = (found.model, None) if sound else _beyond(search_.part, base, found, drivers)
     classes = _classes(fields, base, final)
@@ -98,7 +96,8 @@ def _told(run: Run, search_: Search, rng: Generator) -> Diagnosis:
         unexplained = _covariate(classes)
     where = places(problem, drivers, base.at(final.noise), final.space.variance)
     charged = tuple(p for p in where if p.log_p + np.log(len(drivers)) < np.log(ADEQUATE_ABOVE))
-    carried, log_without = _influence(base, named)
+    every = [*run.handled, *named]
+    blind = unseen(fields, base, [e for e in catalogue.catalogue().values() if e.id not in set(run.effects)])
     return Diagnosis(
         problem=problem,
         base=base,
@@ -110,32 +109,13 @@ def _told(run: Run, search_: Search, rng: Generator) -> Diagnosis:
         where=() if sound else charged,
         named=named,
         unexplained=unexplained,
-        unseen=_unseen(fields, base, [e for e in catalogue.catalogue().values() if e.id not in set(run.effects)]),
+        unseen=blind,
+        unseen_ranges=unseen_ranges(fields, base, blind),
         ladder=found.ladder,
         handled=tuple(run.handled),
-        removed=tuple(run.removed),
-        heavy=heavy,
-        influence=carried,
-        log_p_without=log_without,
+        removed=removed,
+        carried=every[0].carried if every else Carried(influence(base, None)),
     )
-
-
-def _influence(base: Model, named: Sequence[Named]) -> tuple[tuple[Influence, ...], float | None]:
-    """Dwells that carry the verdict on the largest class beside the others, and its probability without them."""
-    if not named:
-        return influence(base, None), None
-    terms = [n.effects.members[0].term for n in named]
-    rest = Model(base.problem, [*base.terms, *terms[1:]], near=base.noise)
-    carried = influence(rest, terms[0])
-    return carried, log_p_without(rest, terms[0], carried) if carried else None
-
-
-def _unseen(field: Candidates, base: Model, candidates: Sequence[AnyEffect]) -> tuple[str, ...]:
-    """Effects whose columns the plan leaves empty, makes one with the model's, or does not carry the quantities for."""
-    gains = field.gains(base.at(base.problem.covariance.white_noise()), {t.effect.id for t in base.terms})
-    blind = [name for name, gain in gains.items() if not gain.rank.any()]
-    order = [e.id for e in candidates]
-    return tuple(sorted({*blind, *field.lacking} & set(order), key=order.index))
 
 
 def _classes(field: Candidates, base: Model, final: Model) -> list[EffectClass]:
@@ -159,14 +139,20 @@ def _named(problem: Problem, base: Model, classes: Sequence[EffectClass]) -> tup
     found: list[Named] = []
     model = base
     before = left_out(base) if classes else None
-    for group in classes:
-        first = next((m.term for m in group.members if not isinstance(m.term.effect, Handling)), group.members[0].term)
+    terms = [_first(group) for group in classes]
+    for group, first in zip(classes, terms, strict=True):
         model = model.with_term(first)
         after = left_out(model)
         errors = worst(before, after) if before is not None else (float("nan"), float("nan"))
-        found.append(Named(group, fit_rms(problem, model.terms), *errors))
+        rest = Model(problem, [*base.terms, *(t for t in terms if t is not first)], near=base.noise)
+        found.append(Named(group, fit_rms(problem, model.terms), *errors, carried=carried_by(rest, first)))
         before = after
     return tuple(found)
+
+
+def _first(group: EffectClass) -> Term:
+    """The best effect of a class, what handling does only where there is none."""
+    return next((m.term for m in group.members if not isinstance(m.term.effect, Handling)), group.members[0].term)
 
 
 def _covariate(classes: Sequence[EffectClass]) -> Unexplained | None:
@@ -198,7 +184,7 @@ def _beyond(part: Part, base: Model, found: SearchResult, drivers: list[Driver])
 
 def _convincing(model: Model, driver: Driver, looks: int) -> bool:
     """Whether a driver is significant and large, the wander estimated with it inside: slow drivers and wander look alike."""
-    if model.explained(driver.candidate, model.floor()) < UNEXPLAINED * model.floor():
+    if model.explained(driver.candidate, model.floor()) < decisions.UNEXPLAINED * model.floor():
         return False
     return _driver_log_p(model, driver) + np.log(looks) < np.log(NAMED_BELOW)
 

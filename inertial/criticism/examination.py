@@ -5,34 +5,37 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
+from numpy.typing import NDArray
 
 from inertial import effects as catalogue
+from inertial.criticism import decisions
 from inertial.criticism.bad_dwells import BadDwell, bad_dwells, without
 from inertial.criticism.classes import EffectClass, class_of
-from inertial.criticism.decisions import RISES
+from inertial.criticism.decisions import RISES, TOLD_APART
 from inertial.criticism.drivers import varies
 from inertial.criticism.field import Candidates
 from inertial.criticism.handling import alternatives
-from inertial.criticism.handling.base import Handling
+from inertial.criticism.handling.base import Handling, Misfit
 from inertial.criticism.heldout import fit_rms
+from inertial.criticism.influence import Carried, carried_by
 from inertial.criticism.left_out import LeftOut, left_out
 from inertial.criticism.model import Model, Term, refuse_without_freedom
 from inertial.criticism.penalty import cost_of_model
 from inertial.criticism.problem import Lot, Problem
 from inertial.criticism.refinement import terms_of
-from inertial.criticism.search import SearchResult, anything, search
+from inertial.criticism.search import SearchResult, anything, judge, search
 from inertial.criticism.slope import slope_of
 from inertial.criticism.turn_on import with_turn_on
 from inertial.criticism.unknown import Suspect, better_curve, suspects
 from inertial.effects.base import AnyEffect
 from inertial.effects.covariate import COVARIATE_PREFIX, Covariate
 
+Array = NDArray[np.float64]
+
 _MANY = 32  # units of a lot that is searched whole
 _ENOUGH = 24  # units, spread over the lot, that a larger one is searched in
 _MENDED = 6  # alternatives that are told of one run at the most
-
-DECISIVE = 0.2
-"""Share of what a curve brings by which it must beat the effects chosen so far to end the search for more."""
+_TURNS = 3  # searches after which single dwells are looked at no more
 
 
 @dataclass(frozen=True)
@@ -41,6 +44,7 @@ class Named:
 
     heldout_before, heldout_after : on dwells left out, the worst of the kinds that can judge both; NaN where none can
     units, dwells : that an alternative of scope "data" concerns, none for all units; told : what it did, in words
+    carried : the dwells that carry the verdict
     """
 
     effects: EffectClass
@@ -50,6 +54,7 @@ class Named:
     units: tuple[int, ...] = ()
     dwells: tuple[int, ...] = ()
     told: str = ""
+    carried: Carried = field(default_factory=Carried)
 
     @property
     def predicts(self) -> bool:
@@ -66,9 +71,16 @@ class Run:
     beside: list[Term] = field(default_factory=list[Term])
     handled: list[Named] = field(default_factory=list[Named])
     removed: list[BadDwell] = field(default_factory=list[BadDwell])
+    _made: tuple[list[object], Model] | None = None
 
     def model(self) -> Model:
-        """The model that is judged, in the lot without its bad dwells."""
+        """The model that is judged, in the lot without its bad dwells; the same object as long as nothing of it changes."""
+        parts: list[object] = [self.lot, *self.removed, *self.beside]
+        if self._made is None or list(map(id, self._made[0])) != list(map(id, parts)):
+            self._made = parts, self._new_model()
+        return self._made[1]
+
+    def _new_model(self) -> Model:
         lot = without(self.lot, self.removed) if self.removed else self.lot
         problem = Problem(lot)
         base = Model(problem, with_turn_on(lot.state, terms_of(catalogue.get_all(self.effects), problem)))
@@ -82,13 +94,16 @@ def examined(lot: Lot, effects: Sequence[str]) -> "tuple[Run, Search]":
     run = Run(lot, tuple(effects))
     run.removed = bad_dwells(run.model())
     found = mended(run)
-    if run.removed and found.found.added:
-        # what physics explains is no bad dwell
+    for _ in range(_TURNS):
+        if not run.handled and not found.found.added:
+            break
+        # what physics or handling explains is no bad dwell, and beside it others show that its size had covered
         whole = Problem(run.lot, slope=found.base.problem.slope)
         kept = bad_dwells(Model(whole, found.model.terms, near=found.model.noise))
-        if {(d.unit, d.dwell) for d in kept} != {(d.unit, d.dwell) for d in run.removed}:
-            run.removed = kept
-            found = mended(run)
+        if {(d.unit, d.dwell) for d in kept} == {(d.unit, d.dwell) for d in run.removed}:
+            break
+        run.removed = kept
+        found = mended(run)
     return run, found
 
 
@@ -131,16 +146,48 @@ def _mend(run: Run, fields: Candidates, found: SearchResult, term: Term) -> None
         raise TypeError(term.effect.id)
     size = model.shared_sizes(term)
     units = (int(place["unit"]),) if "unit" in place else ()
-    told = alternative.told(problem.lot, size, **place)
-    dwells = tuple(alternative.dwells(problem.lot, **place))
+    told, dwells = _happened(fields, found.model, term, alternative, size)
     before, after = left_out(found.model), left_out(model)
     errors = fit_rms(problem, model.terms), *worst(before, after)
-    run.handled.append(Named(group, *errors, units, dwells, told))
-    lot = alternative.mended(run.lot, size, **place)
+    run.handled.append(Named(group, *errors, units, dwells, told, carried_by(found.model, term)))
+    lot = alternative.settled(run.lot, size, _misfit(found.model, model), **place)
     if lot is None:
         run.beside.append(term)
     else:
         run.lot = lot
+
+
+def _misfit(model: Model, richer: Model) -> Misfit:
+    """How well a model fits the dwells of some units, at the noise of a richer one."""
+    local = [t for t in model.terms if not t.shared]
+
+    def left(lot: Lot, units: tuple[int, ...]) -> float:
+        # dwells that were taken out stay out
+        error = model.problem.lot.error[list(units)]
+        problem = Problem(replace(lot, error=error))
+        blocks = [3 * unit + axis for unit in units for axis in range(3)]
+        noise = problem.covariance.taken(richer.noise.pick(blocks), model.problem.covariance)
+        return Model(problem, local).at(noise).rss
+
+    return left
+
+
+def _happened(
+    fields: Candidates, beside: Model, term: Term, alternative: Handling, size: Array
+) -> tuple[str, tuple[int, ...]]:
+    """What an alternative did, in words, and the dwells it concerns: at each place that explains the run as well."""
+    lot, place = fields.problem.lot, {k: v for k, v in term.keywords.items() if isinstance(v, float)}
+    best = judge(fields, beside, term).cost
+    words: list[str] = []
+    dwells = list(alternative.dwells(lot, **place))
+    for other in alternative.instead(lot, **place):
+        rival = judge(fields, beside, Term(alternative, tuple(other.items())))
+        if rival.cost < best + TOLD_APART:
+            words.append(alternative.short(beside.with_term(rival.term).shared_sizes(rival.term), **other))
+            dwells += alternative.dwells(lot, **other)
+    told = alternative.told(lot, size, **place)
+    told += f"; these dwells cannot tell it from {' or '.join(words)}" if words else ""
+    return told, tuple(sorted(dwells))
 
 
 def candidates_of(base: Model, held: Sequence[str]) -> list[AnyEffect]:
@@ -171,7 +218,7 @@ class Part:
         fit = instead[0]
         problem = self.field.problem
         effects = cost_of_model(Model(problem, [*self.base.terms, *chosen], near=fit.model.noise))
-        by_far = effects - fit.cost > DECISIVE * (cost_of_model(self.base) - fit.cost)
+        by_far = effects - fit.cost > decisions.DECISIVE * (cost_of_model(self.base) - fit.cost)
         return by_far or not anything(self.field, fit.model)
 
 

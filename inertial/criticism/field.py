@@ -2,12 +2,17 @@
 
 from collections.abc import Iterable, Iterator
 
-from inertial.criticism.handling.base import Handling
+import numpy as np
+from numpy.typing import NDArray
+
+from inertial.criticism.handling.base import Handling, by_block
 from inertial.criticism.problem import Problem
 from inertial.criticism.space import Candidate, Gain, Space
 from inertial.design import grid_of
 from inertial.effects.base import AnyEffect
 from inertial.errors import MissingInput
+
+Array = NDArray[np.float64]
 
 
 class Candidates:
@@ -25,6 +30,7 @@ class Candidates:
         self.handling: list[Handling] = []
         self.grids: dict[str, list[dict[str, float]]] = {}
         self.lacking: dict[str, str] = {}
+        self._single: dict[str, Array] = {}
         for effect in effects:
             try:
                 grid = grid_of(effect, problem.lot.state)
@@ -62,8 +68,19 @@ class Candidates:
         return found
 
     def _gain(self, space: Space, effect: AnyEffect | Handling, first: int | None) -> Gain:
+        if isinstance(effect, Handling) and effect.single and not self.problem.lot.radial:
+            places = np.array([int(place["at"]) for place in self.grids[effect.id]])
+            return space.gain_of_dwells(self._every_dwell(effect), places)
         pieces = self.problem.pieces(effect, self.grids[effect.id], first=first)
         return Gain.joined([space.gain(piece) for piece in pieces])
+
+    def _every_dwell(self, effect: Handling) -> Array:
+        """Columns (blocks, n, p) of an alternative of one dwell, each dwell as if it were the one."""
+        if effect.id not in self._single:
+            units, n = self.problem.lot.state.time.shape
+            change = effect.every_dwell(self.problem.lot)
+            self._single[effect.id] = by_block(np.broadcast_to(change, (units, n, 3, change.shape[-1])))
+        return self._single[effect.id]
 
     def pieces(self) -> Iterator[Candidate]:
         """Every effect at every value of its nonlinear parameters, in pieces."""

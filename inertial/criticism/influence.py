@@ -54,6 +54,20 @@ def influence(model: Model, term: Term | None) -> tuple[Influence, ...]:
     return tuple(found)
 
 
+@dataclass(frozen=True)
+class Carried:
+    """Dwells that carry the verdict on a term, and the log probability of the term when they are left out."""
+
+    dwells: tuple[Influence, ...] = ()
+    log_p_without: float | None = None
+
+
+def carried_by(model: Model, term: Term) -> Carried:
+    """The dwells that carry the verdict on a term beside a model, and what it is without them."""
+    dwells = influence(model, term)
+    return Carried(dwells, log_p_without(model, term, dwells) if dwells else None)
+
+
 def log_p_without(model: Model, term: Term, dwells: tuple[Influence, ...]) -> float:
     """Log probability of a term when the dwells that carry most of it are left out, at the noise that was found."""
     lot = model.problem.lot

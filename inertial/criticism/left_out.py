@@ -11,6 +11,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from inertial.criticism import decisions
 from inertial.criticism.decisions import BLOCKS
 from inertial.criticism.handling.base import soaks
 from inertial.criticism.heldout import residuals
@@ -22,10 +23,6 @@ Array = NDArray[np.float64]
 Kind = Literal["poses", "soaks", "blocks of time"]
 
 _POSES = 6
-_BLIND = 4.0
-"""Factor by which the errors that a fold's prediction should have may exceed those of a prediction from the neighbours alone.
-
-Beyond, the other dwells do not determine the model: with one of three soaks left out no function of temperature is bent."""
 
 
 @dataclass(frozen=True)
@@ -83,11 +80,13 @@ class _Parts:
         space = model.space
         blocks, n = space.residual.shape
         self.there, self.level = space.covariance.there, space.covariance.level * space.noise.scale
-        self.p = np.empty((blocks, n, n))
-        for b in range(blocks):
-            eye = space.covariance.whiten(np.eye(n)[None], space.noise.shares, np.array([b])) / space.noise.scale[b]
-            roots = space.project(eye, np.array([b]))[0]
-            self.p[b] = roots.T @ roots
+        self.p, self.precision = np.empty((blocks, n, n)), np.empty((blocks, n))
+        for members, whitener in space.covariance.whiteners(space.noise.shares):
+            inverse = whitener.T @ whitener
+            for b in members.tolist():
+                along = space.q[b].T @ whitener
+                self.p[b] = (inverse - along.T @ along) / self.level[b] ** 2
+                self.precision[b] = np.diagonal(inverse) / self.level[b] ** 2
         self.py = np.einsum("bij,bj->bi", self.p, model.problem.y)
         z = model.shared
         size = np.sqrt(np.einsum("bnq,bnq->q", z, z))
@@ -97,11 +96,6 @@ class _Parts:
         if z.shape[-1]:
             beta = np.linalg.lstsq(self.inner, np.einsum("bnq,bn->q", z, self.py), rcond=1e-10)[0]
             self.py = self.py - self.pz @ beta
-        white = (
-            model.at(space.noise).covariance.whiten(np.broadcast_to(np.eye(n), (blocks, n, n)), space.noise.shares)
-            / space.noise.scale[:, None, None]
-        )
-        self.precision = np.einsum("bti,bti->bi", white, white)
         self.typical = [self._spread(b) for b in range(blocks)]
 
     def predicted(self, out: NDArray[np.bool_]) -> tuple[Array, float] | None:
@@ -149,7 +143,7 @@ class _Parts:
         expected = np.sqrt(np.mean(np.diagonal(inverse)))
         alone = np.sqrt(np.mean(1.0 / self.precision[block, places]))
         wander = np.sqrt(self.typical[block])
-        return bool(expected < _BLIND * max(float(alone), float(wander)))
+        return bool(expected < decisions.FOLD_BLIND * max(float(alone), float(wander)))
 
     def _spread(self, block: int) -> float:
         """Variance of what the model leaves of a block: nothing that it predicts should be much worse."""

@@ -5,6 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from inertial.criticism import decisions
 from inertial.criticism.covariance import Noise
 from inertial.criticism.handling.base import Handling
 from inertial.criticism.model import Model, Term
@@ -14,9 +15,6 @@ from inertial.design import grid_of
 from inertial.effects.base import AnyEffect, Nonlinear
 
 Array = NDArray[np.float64]
-
-AXES_DIFFER = 30.0
-"""Chi-square that one value per axis must take off beyond one value for all."""
 
 
 def refine(model: Model, term: Term, noise: Noise, *, axes: bool = True) -> Term:
@@ -76,7 +74,7 @@ def _per_axis(space: Space, problem: Problem, term: Term, parameter: Nonlinear) 
             values, width = _around(parameter, _on_scale(parameter, found), width), 0.4 * width
         best.append(found)
         total += taken
-    if total - common < AXES_DIFFER * space.variance:
+    if total - common < decisions.AXES_DIFFER * space.variance:
         return term
     return _with_value(term, parameter, tuple(best))
 

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from inertial.criticism import decisions
 from inertial.criticism.covariance import Shares
 from inertial.criticism.decisions import MATERIAL, NAMED_BELOW
 from inertial.criticism.field import Candidates
@@ -22,8 +23,6 @@ _FINALISTS = 5  # of each look at the noise, for which the noise is estimated an
 _AGAIN = 3  # the same where an effect is examined again
 _MOST = 6  # effects that one search may add
 _REFINED, _SAME = 3, 0.05  # turns of refinement, and the change of a nonlinear parameter that ends them
-_LESS = Shares(0.25, 1.0 / 30.0)
-"""Parts of 1/f and of random walk at which the candidates are looked at once more: a drift hidden in the walk comes up there."""
 
 
 @dataclass(frozen=True)
@@ -120,7 +119,7 @@ def contest(field: Candidates, model: Model, barred: str = "", finalists: int = 
     leave = {*(t.effect.id for t in model.terms if not isinstance(t.effect, Handling)), barred}
     chosen: dict[str, Term] = {}
     noise = model.noise
-    less = Shares(noise.shares.flicker * _LESS.flicker, noise.shares.walk * _LESS.walk)
+    less = Shares(noise.shares.flicker * decisions.LESS_FLICKER, noise.shares.walk * decisions.LESS_WALK)
     for other in [noise] if less == noise.shares else [noise, model.noise_at(less)]:
         looked = scanned(field, model.at(other), leave)
         for term, _ in looked[:finalists]:

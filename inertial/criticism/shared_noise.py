@@ -7,14 +7,12 @@ difference of chi-square between two effects that are alike in all units scatter
 import numpy as np
 from numpy.typing import NDArray
 
+from inertial.criticism import decisions
 from inertial.criticism.comparison import estimate
 from inertial.criticism.heldout import residuals
 from inertial.criticism.model import Model, Term
 
 Array = NDArray[np.float64]
-
-_SURE = 3.0
-"""Standard errors by which units must go together before they are taken to."""
 
 
 def shared_factor(model: Model, term: Term) -> float:
@@ -40,7 +38,7 @@ def _together(model: Model, units: int) -> float:
     left = np.nan_to_num(residuals(problem, model.terms, np.ones(problem.n, dtype=bool)) / problem.error)
     found = _pairwise(left.reshape(units, -1))
     chance = 1.0 / np.sqrt(left.size / units * units * (units - 1) / 2.0)
-    return found if found > _SURE * chance else 0.0
+    return found if found > decisions.UNITS_TOGETHER * chance else 0.0
 
 
 def _alike(model: Model, term: Term, units: int) -> float:

@@ -166,6 +166,34 @@ class Space:
         left = (left / safe[:, None, :]).reshape(blocks, n, grid, p)
         return self._gain_local(left)
 
+    def gain_of_dwells(self, columns: Array, places: NDArray[np.intp]) -> Gain:
+        """What columns explain that are of one dwell each, for every dwell by itself; all blocks share their coefficients.
+
+        With P as in :mod:`inertial.criticism.left_out` a column t at dwell k has the product t²·P_kk with itself and t·(Py)_k
+        with the measurements: no column is whitened.
+
+        Parameters
+        ----------
+        columns : (blocks, n, p), of every dwell; places : (grid,), the dwells
+        """
+        blocks, n, p = columns.shape
+        inside, own = np.zeros((n, p, self.targets.shape[-1])), np.zeros((n, p, p))
+        size = np.zeros((n, p))
+        for members, whitener in self.covariance.whiteners(self.noise.shares):
+            scale = (self.covariance.level * self.noise.scale)[members, None]
+            # rows of Pᵀ from the left: what the local columns explain is taken off
+            back = np.swapaxes(self.targets[members], -1, -2) @ whitener
+            along = np.swapaxes(self.q[members], -1, -2) @ whitener
+            whole = np.sum(whitener**2, axis=0) / scale**2
+            diagonal = np.maximum(whole - np.einsum("brn,brn->bn", along, along) / scale**2, 0.0)
+            inside += np.einsum("bnp,btn->npt", columns[members], back / scale[..., None])
+            own += np.einsum("bnp,bnr,bn->npr", columns[members], columns[members], diagonal)
+            size += np.einsum("bnp,bn->np", columns[members] ** 2, whole)
+        size = np.sqrt(np.where(size > 0.0, size, 1.0))
+        return self._solved(
+            (own / size[:, :, None] / size[:, None, :])[places], (inside / size[..., None])[places], blocks
+        )
+
     def _gain_local(self, left: Array) -> Gain:
         inside = np.einsum("bngp,bnt->bgpt", left, self.targets)
         if left.shape[-1] == 1:
@@ -198,6 +226,10 @@ class Space:
         by_value = columns.transpose(2, 3, 0, 1).reshape(grid, p, blocks * n)
         own = by_value @ np.swapaxes(by_value, -1, -2)
         inside = by_value @ targets.reshape(blocks * n, -1)  # (grid, p, t)
+        return self._solved(own, inside, self.targets.shape[0])
+
+    def _solved(self, own: Array, inside: Array, blocks: int) -> Gain:
+        """Gain from products (grid, p, p) of common columns with each other and (grid, p, t) with the targets."""
         along = inside[..., 0]
         if self.targets.shape[-1] > 1:
             inner = np.linalg.pinv(self.gram[1:, 1:], rcond=1e-10, hermitian=True)
@@ -207,7 +239,7 @@ class Space:
         seen = values > SEEN**2
         onto = np.einsum("gpr,gp->gr", vectors, along)
         drop = np.sum(np.where(seen, onto**2 / np.where(seen, values, 1.0), 0.0), axis=1)
-        return Gain(drop, seen.sum(axis=1), np.zeros((self.targets.shape[0], grid)))
+        return Gain(drop, seen.sum(axis=1), np.zeros((blocks, len(own))))
 
 
 def _orthonormal(columns: Array) -> tuple[Array, NDArray[np.intp]]:

@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inertial import frames
+from inertial.criticism import decisions
 from inertial.criticism.curves import CurveFit, fit_curve
 from inertial.criticism.drivers import curve, quantities, varies
 from inertial.criticism.model import Model, Term
@@ -27,21 +28,6 @@ _VISITS = 1.5  # how often each level is met at least, in the mean
 _CENTRES = np.linspace(0.0, 1.0, 21)  # of bumps and hinges, over the driver's range
 _WIDTHS = (0.02, 0.05, 0.1)  # of bumps, of that range
 _SHARPEST = 3  # suspects that are tried with bumps and hinges
-
-OTHERS = 60.0
-"""Penalised chi-square that an effect must bring beside a curve to stay."""
-
-OTHERS_SHARE = 0.1
-"""Share of what the curve brings that an effect beside it must bring as well."""
-
-DOUBT = {0: 0.0, 1: 40.0, 2: 20.0}
-"""Penalised chi-square by which a curve must beat so many effects: physics that is known is believed first."""
-
-DOUBT_MEMORY = 0.5
-"""The same for an effect with memory: a curve over time follows any memory of one run, and the catalogue's form is simple."""
-
-DOUBT_SHARE = 0.15
-"""Share of what a curve explains that one effect must leave over before the curve is believed instead."""
 
 
 @dataclass(frozen=True)
@@ -90,11 +76,15 @@ def better_curve(base: Model, chosen: Sequence[Term], field: Sequence[Suspect]) 
     best = min(fits, key=lambda f: f.cost)
     kept: list[Term] = []
     if len(chosen) > 1:
-        best, kept = _with_others(base, chosen, field, best, max(OTHERS, OTHERS_SHARE * (bare - best.cost)))
+        best, kept = _with_others(
+            base, chosen, field, best, max(decisions.OTHERS, decisions.OTHERS_SHARE * (bare - best.cost))
+        )
     replaced = len(chosen) - len(kept)
-    doubt = DOUBT.get(replaced, 0.0)
+    doubt = decisions.DOUBT.get(replaced, 0.0)
     if replaced == 1:
-        share = DOUBT_MEMORY if any(t.effect.memory for t in chosen if t not in kept) else DOUBT_SHARE
+        share = (
+            decisions.DOUBT_MEMORY if any(t.effect.memory for t in chosen if t not in kept) else decisions.DOUBT_SHARE
+        )
         doubt = max(doubt, share * (bare - best.cost))
     return (best, kept) if replaced and best.cost + doubt < whole else None
 

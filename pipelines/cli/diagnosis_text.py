@@ -12,6 +12,8 @@ if TYPE_CHECKING:
     from rich.console import Console
 
 
+BAD_DWELL = "bad_dwell"
+
 SMALL = 1.1
 """Errors below so many times the floor look like noise to whoever compares the two numbers."""
 
@@ -30,6 +32,7 @@ def print_diagnosis(document: dict[str, Any], *, source: str, model: Path | None
     _unexplained(out, document, model)
     _next_command(out, document, source, model)
     _unseen(document)
+    _unseen_ranges(document)
     measurements_table(document["next_measurements"])
 
 
@@ -47,19 +50,27 @@ def _dwells(document: dict[str, Any]) -> None:
     """Dwells that were left out as tails of the noise, and those that carry the verdict."""
     removed, out = document.get("removed"), console()
     if removed and removed["heavy_tails"]:
-        count = len(removed["dwells"])
+        count = sum(d.get("tail", True) for d in removed["dwells"])
         out.print(
             f"{count} dwells left out: the noise has heavier tails than a normal one", style="dim", soft_wrap=True
         )
-    carried, without = document.get("influence") or [], document.get("without_influence")
-    if carried and without and not document["adequate"]:
-        dwells = ", ".join(f"{d['unit']} {d['dwell']} ({100.0 * d['share']:.0f} %)" for d in carried[:5])
-        out.print(
-            f"dwells that carry most of it: {dwells}; without {without['dwells']} of them p {equal(without['p_value'])}",
-            style="dim",
-            markup=False,
-            soft_wrap=True,
-        )
+    if document["adequate"]:
+        return
+    for group in document["classes"]:
+        if group["effects"] != [BAD_DWELL]:
+            text = f"dwells that carry {' or '.join(group['effects'])}: {_carried(group['influence'])}"
+            without = group["without_influence"]
+            if without:
+                text += f"; without these {without['dwells']} p {equal(without['p_value'])}"
+            out.print(text, style="dim", markup=False, soft_wrap=True)
+    if not document["classes"] and document["influence"]:
+        text = f"largest residuals, share of all: {_carried(document['influence'])}"
+        out.print(text, style="dim", markup=False, soft_wrap=True)
+
+
+def _carried(rows: list[dict[str, Any]]) -> str:
+    """Dwells with their shares, the first few of them."""
+    return ", ".join(f"{d['unit']} dwell {d['dwell']} ({100.0 * d['share']:.0f} %)" for d in rows[:5]) or "none alone"
 
 
 def symbol_of(name: str) -> str:
@@ -77,7 +88,9 @@ def verdict(document: dict[str, Any]) -> str:
     """The verdict in one sentence with its numbers."""
     error, faulty = document["error"], {u for f in document["blocked_by"] for u in f["units"]}
     if error["rms_ug"] is None:
-        return f"BLOCKED: every unit ({len(faulty)}) has a data fault; no physics is diagnosed until it is mended."
+        return (
+            f"CANNOT BE JUDGED: every unit ({len(faulty)}) has a data fault; no physics is judged until it is mended."
+        )
     sound = len(document["units"]) - len(faulty)
     floor = f"the noise that is there is {short(error['floor_ug'])} µg (p {equal(error['p_value'])})"
     left = f"{short(error['rms_ug'])} µg rms are left in {sound} unit{'s' if sound != 1 else ''}, {floor}"
@@ -232,6 +245,14 @@ def _unseen(document: dict[str, Any]) -> None:
         reasons = document.get("reasons", {})
         lines = [[name, reasons.get(name) or document["breakers"][name]] for name in document["unseen"]]
         print_table(["effect", "why, and what would show it"], lines, title="This plan could not have seen", whole=1)
+
+
+def _unseen_ranges(document: dict[str, Any]) -> None:
+    """Effects that the plan shows for a part of their range only."""
+    for one in document.get("unseen_ranges", ()):
+        values = f"{short(one['low'])} … {short(one['high'])} {one['unit']}"
+        text = f"{one['effect']} with {one['parameter']} in {values} could not have been seen: the plan does not undo its memory"
+        console().print(text, style="dim", markup=False, soft_wrap=True)
 
 
 def measurements_table(proposed: list[dict[str, Any]], out: Console | None = None) -> None:

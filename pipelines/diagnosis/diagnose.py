@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -104,7 +105,8 @@ def document(
     blocked = [_fault(found, f) for f in faults]
     if diagnosis is None:
         return {
-            "adequate": False,
+            "adequate": None,
+            "reason": f"every unit ({len({f.unit for f in faults})}) has a data fault; no physics is judged until it is mended",
             "blocked_by": blocked,
             "error": {"rms_ug": None, "floor_ug": None, "p_value": None},
             "where": [],
@@ -113,6 +115,7 @@ def document(
             "recommended": [],
             "unexplained": None,
             "unseen": [],
+            "unseen_ranges": [],
             "next_measurements": [],
         }
     faulty = {f.unit for f in faults}
@@ -147,6 +150,7 @@ def document(
             "p_value": probability(diagnosis.unexplained.log_p),
         },
         "unseen": list(diagnosis.unseen),
+        "unseen_ranges": [asdict(one) for one in diagnosis.unseen_ranges],
         "next_measurements": (proposed(diagnosis) if following is None else following).rows(),
     }
 

@@ -42,6 +42,21 @@ class FailingDriver(TypedDict):
     p_value: float
 
 
+class InfluentialDwell(TypedDict):
+    """A dwell that carries the verdict."""
+
+    unit: str
+    dwell: int
+    share: Annotated[float, "share of the evidence that rests on the dwell"]
+
+
+class WithoutInfluence(TypedDict):
+    """The verdict without the dwells that carry it."""
+
+    dwells: Annotated[int, "number of dwells left out"]
+    p_value: float
+
+
 class EffectClassDocument(TypedDict):
     """Effects that this plan cannot separate; one effect if it is identified."""
 
@@ -59,21 +74,8 @@ class EffectClassDocument(TypedDict):
     units: NotRequired[Annotated[list[str], "of scope data: the units concerned"]]
     dwells: NotRequired[Annotated[list[int], "of scope data: the dwells concerned"]]
     evidence: NotRequired[Annotated[str, "of scope data: what happened"]]
-
-
-class InfluentialDwell(TypedDict):
-    """A dwell that carries the verdict."""
-
-    unit: str
-    dwell: int
-    share: Annotated[float, "share of the evidence that rests on the dwell"]
-
-
-class WithoutInfluence(TypedDict):
-    """The verdict without the dwells that carry it."""
-
-    dwells: Annotated[int, "number of dwells left out"]
-    p_value: float
+    influence: NotRequired[Annotated[list[InfluentialDwell], "dwells that carry the verdict on this class"]]
+    without_influence: NotRequired[Annotated[WithoutInfluence | None, "the verdict on this class without these dwells"]]
 
 
 class RemovedDwell(TypedDict):
@@ -83,12 +85,15 @@ class RemovedDwell(TypedDict):
     dwell: int
     off_ug: Annotated[float, "distance from the model, µg"]
     deviations: Annotated[float, "the same in standard deviations"]
+    tail: NotRequired[Annotated[bool, "whether the tails of the noise reach as far; no fault then"]]
 
 
 class RemovedDwells(TypedDict):
     """The dwells left out."""
 
-    heavy_tails: Annotated[bool, "many dwells: the noise has heavier tails than a normal distribution"]
+    heavy_tails: Annotated[
+        bool, "the noise has heavier tails than a normal distribution, and reaches some of the dwells"
+    ]
     dwells: list[RemovedDwell]
 
 
@@ -116,6 +121,16 @@ class NextMeasurement(TypedDict):
     separation_after: NotRequired[Annotated[float, "the same with these rows measured"]]
 
 
+class UnseenRangeDocument(TypedDict):
+    """A part of an effect's range that this plan could not have seen."""
+
+    effect: str
+    parameter: str
+    unit: str
+    low: float
+    high: float
+
+
 class SuggestedFormula(TypedDict):
     """A formula for a model file that follows the unexplained quantity."""
 
@@ -128,7 +143,8 @@ class SuggestedFormula(TypedDict):
 class DiagnosisDocument(TypedDict):
     """``diagnose --json``: adequacy of a model, where it fails, and which effects are missing."""
 
-    adequate: Annotated[bool | None, "null: cannot be judged"]
+    adequate: Annotated[bool | None, "null: cannot be judged, because every unit has a data fault"]
+    reason: NotRequired[Annotated[str, "why `adequate` is null; missing otherwise"]]
     blocked_by: list[BlockingFault]
     error: ErrorFigures
     where: Annotated[list[FailingDriver], "most significant first"]
@@ -136,6 +152,9 @@ class DiagnosisDocument(TypedDict):
     recommended: Annotated[list[str], "one effect per class; empty if the model is adequate or the cause unknown"]
     unexplained: UnexplainedExcess | None
     unseen: Annotated[list[str], "effects that this plan could not have seen"]
+    unseen_ranges: NotRequired[
+        Annotated[list[UnseenRangeDocument], "effects that this plan shows only outside this range of a parameter"]
+    ]
     next_measurements: list[NextMeasurement]
     influence: Annotated[list[InfluentialDwell], "largest share first"]
     without_influence: NotRequired[WithoutInfluence | None]

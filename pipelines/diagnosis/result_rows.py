@@ -12,6 +12,7 @@ from schemas.units import MICRO
 if TYPE_CHECKING:
     from inertial.criticism.bad_dwells import BadDwell
     from inertial.criticism.diagnosis import Diagnosis, Named
+    from inertial.criticism.influence import Carried
     from inertial.criticism.model import Model
 
 BAD_DWELL = "bad_dwell"
@@ -39,8 +40,7 @@ def known(value: float) -> float | None:
 def classes_of(diagnosis: Diagnosis, names: Names) -> list[dict[str, Any]]:
     """Rows of all classes: what handling did first, as nothing is to be read into a run before it is mended."""
     rows = [_class(n, names) for n in diagnosis.handled]
-    if not diagnosis.heavy:
-        rows += [_bad_dwell(diagnosis, d, names) for d in diagnosis.removed]
+    rows += [_bad_dwell(diagnosis, d, names) for d in diagnosis.removed if not d.tail]
     return [*rows, *(_class(n, names) for n in diagnosis.named)]
 
 
@@ -59,6 +59,7 @@ def _class(named: Named, names: Names) -> dict[str, Any]:
         "nonlinear": {} if scope == "data" else dict(simplest.values),
         "plausible": _plausible(group.size, simplest.effect.typical_ug),
     }
+    row |= _carried(named.carried, names)
     if named.told:
         row |= {
             "units": [names.units[u] for u in named.units],
@@ -81,27 +82,42 @@ def _bad_dwell(diagnosis: Diagnosis, found: BadDwell, names: Names) -> dict[str,
         "plausible": True,
         "units": [names.units[found.unit]],
         "dwells": [names.dwells[found.dwell]],
+        "influence": [{"unit": names.units[found.unit], "dwell": names.dwells[found.dwell], "share": 1.0}],
+        "without_influence": {"dwells": 1, "p_value": 1.0},
         "evidence": f"{MICRO * size:.0f} µg off, {found.deviations:.1f} standard deviations; the dwell is left out",
     }
 
 
 def influence_of(diagnosis: Diagnosis, names: Names) -> list[dict[str, Any]]:
     """Dwells that carry the verdict, most first; those that were left out carry all of theirs."""
-    single = [] if diagnosis.heavy else diagnosis.removed
+    single = [d for d in diagnosis.removed if not d.tail]
     rows = [{"unit": names.units[d.unit], "dwell": names.dwells[d.dwell], "share": 1.0} for d in single]
-    if rows and not diagnosis.named:
+    if rows and not (diagnosis.named or diagnosis.handled):
         return rows
+    return _dwells(diagnosis.carried, names)
+
+
+def _dwells(carried: Carried, names: Names) -> list[dict[str, Any]]:
     return [
         {"unit": names.units[d.unit], "dwell": names.dwells[d.dwell], "share": round(d.share, 4)}
-        for d in diagnosis.influence
+        for d in carried.dwells
     ]
+
+
+def _carried(carried: Carried, names: Names) -> dict[str, Any]:
+    """The dwells that carry the verdict on a class, and the verdict without them."""
+    return {"influence": _dwells(carried, names), "without_influence": _without(carried)}
+
+
+def _without(carried: Carried) -> dict[str, Any] | None:
+    if carried.log_p_without is None:
+        return None
+    return {"dwells": len(carried.dwells), "p_value": probability(carried.log_p_without)}
 
 
 def without_influence(diagnosis: Diagnosis) -> dict[str, Any] | None:
     """The verdict without the dwells that carry it; None where nothing is named."""
-    if diagnosis.log_p_without is None:
-        return None
-    return {"dwells": len(diagnosis.influence), "p_value": probability(diagnosis.log_p_without)}
+    return _without(diagnosis.carried)
 
 
 def removed_of(diagnosis: Diagnosis, names: Names) -> dict[str, Any] | None:
@@ -109,13 +125,14 @@ def removed_of(diagnosis: Diagnosis, names: Names) -> dict[str, Any] | None:
     if not diagnosis.removed:
         return None
     return {
-        "heavy_tails": diagnosis.heavy,
+        "heavy_tails": any(d.tail for d in diagnosis.removed),
         "dwells": [
             {
                 "unit": names.units[d.unit],
                 "dwell": names.dwells[d.dwell],
                 "off_ug": MICRO * float(np.linalg.norm(d.off)),
                 "deviations": round(d.deviations, 2),
+                "tail": d.tail,
             }
             for d in diagnosis.removed
         ],

@@ -176,9 +176,33 @@ def lot_of(found: Measured, like: Measured | None = None, *, square: bool = Fals
     output = readings.output / scale[:, None, :]
     there = readings.there
     error = np.where(there[..., None], _white_error(readings, scale, output), np.inf)
-    felt = np.einsum("uij,unj->uni", response, found.state.force)
+    felt = np.einsum("uij,unj->uni", response, found.state.force) + _run_with_temperature(found, scale)
     state = replace(found.state, felt=felt, memory={})
     return Lot(state, np.where(there[..., None], output, 0.0), error, response)
+
+
+_WARM = 5.0
+"""Range of temperature, K, from which on its linear terms are worth to be taken out of the force that a sensor answers to."""
+
+
+def _run_with_temperature(found: Measured, scale: Array) -> Array:
+    """What bias and scale add to the output by their run with temperature, (units, n, 3), g.
+
+    A sharp nonlinearity answers to the whole output: a converter's steps stand elsewhere in a warm unit.
+    """
+    state, readings = found.state, found.readings
+    run = np.zeros(readings.output.shape)
+    if state.theta is None or float(np.ptp(state.theta)) < _WARM:
+        return run
+    force = np.broadcast_to(state.force, run.shape)
+    for unit, theta in enumerate(np.broadcast_to(state.theta, run.shape[:2])):
+        there = readings.there[unit]
+        for axis in range(3):
+            linear = np.stack([theta, theta * force[unit, :, axis]], axis=-1)
+            x = np.concatenate([np.ones((len(theta), 1)), force[unit], linear], axis=-1)
+            coefficients = np.linalg.lstsq(x[there], readings.output[unit, there, axis], rcond=1e-9)[0]
+            run[unit, :, axis] = linear @ coefficients[-2:] / scale[unit, axis]
+    return run
 
 
 def _white_error(readings: Readings, scale: Array, output: Array) -> Array:

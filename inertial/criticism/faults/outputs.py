@@ -5,6 +5,7 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
+from inertial.criticism import decisions
 from inertial.criticism.faults.fault import Fault, dwells_of
 from inertial.criticism.readings import Array, Readings
 
@@ -80,13 +81,6 @@ def quantised(readings: Readings) -> Iterator[Fault]:
                 break
 
 
-_UNEVEN = 5.0
-"""Times the spread of a scatter from so many samples, beyond which scatters of dwells differ for another reason."""
-
-_FOLLOWS = 0.7
-"""Share of the variances' own variance that the place between two steps explains, from which on it is the steps."""
-
-
 def _coarse_step(readings: Readings, unit: int, axis: int) -> float | None:
     """Step of a converter that is coarser than the noise of a sample; None where there is none.
 
@@ -100,7 +94,11 @@ def _coarse_step(readings: Readings, unit: int, axis: int) -> float | None:
         a[there] for a in (readings.output[unit, :, axis], readings.spread[unit, :, axis], readings.count[unit])
     )
     typical = float(np.median(spread))
-    if mean.size < 16 or typical <= 0.0 or np.std(spread) / typical < _UNEVEN / np.sqrt(2.0 * float(np.median(count))):
+    if (
+        mean.size < 16
+        or typical <= 0.0
+        or np.std(spread) / typical < decisions.STEPS_UNEVEN / np.sqrt(2.0 * float(np.median(count)))
+    ):
         return None
     square = spread**2 - np.mean(spread**2)
     whole, reach = float(np.sum(square**2)), float(np.ptp(mean))
@@ -120,7 +118,7 @@ def _coarse_step(readings: Readings, unit: int, axis: int) -> float | None:
         place = int(np.argmax(explained))
         if explained[place] > best:
             best, step = float(explained[place]), 1.0 / float(part[place])
-    return step if best > _FOLLOWS else None
+    return step if best > decisions.STEPS_FOLLOW else None
 
 
 _MOST_STEPS = 20_000

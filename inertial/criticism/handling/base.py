@@ -5,6 +5,7 @@ axis. They are of scope "data": no model is extended by them.
 """
 
 from abc import abstractmethod
+from collections.abc import Callable
 from dataclasses import replace
 from typing import TYPE_CHECKING, ClassVar, Literal
 
@@ -18,6 +19,8 @@ if TYPE_CHECKING:
     from inertial.criticism.lot import Lot
 
 Array = NDArray[np.float64]
+Misfit = Callable[["Lot", tuple[int, ...]], float]
+"""Whitened sum of squares that the model leaves of a lot of some units, by their numbers in the whole lot."""
 
 _PLACES = 40
 _EDGE = 3  # dwells at both ends after which, or before which, nothing can be told to have changed
@@ -30,6 +33,7 @@ class Handling(Effect):
     Attributes
     ----------
     fewest_units : below which it cannot be told from the sensor itself, and is not looked for
+    single : whether each of its places is one dwell, ``at``; then :meth:`every_dwell` has the columns of all of them
     """
 
     scope: ClassVar[Literal["sensor", "station", "slot", "data"]] = "data"  # pyright: ignore[reportIncompatibleVariableOverride]
@@ -37,6 +41,7 @@ class Handling(Effect):
     typical_ug: ClassVar[tuple[float, float]] = (0.0, float("inf"))
     simplicity: ClassVar[int] = 0
     fewest_units: ClassVar[int] = 2
+    single: ClassVar[bool] = False
 
     @abstractmethod
     def places(self, lot: "Lot") -> list[dict[str, float]]:
@@ -50,6 +55,19 @@ class Handling(Effect):
     def told(self, lot: "Lot", size: Array, **place: float) -> str:
         """What happened, for people; ``size`` (k,) are the coefficients."""
 
+    def every_dwell(self, lot: "Lot") -> Array:
+        """Columns (units or 1, n, 3, k) of an alternative of one dwell, for each dwell as if it were the one."""
+        raise NotImplementedError(self.id)
+
+    def instead(self, lot: "Lot", **place: float) -> list[dict[str, float]]:
+        """Other places that may explain the same dwells as well."""
+        del lot, place
+        return []
+
+    def short(self, size: Array, **place: float) -> str:
+        """One of :meth:`instead` in a few words."""
+        raise NotImplementedError(self.id)
+
     def near(self, lot: "Lot", **place: float) -> list[dict[str, float]]:
         """The place and those between it and its neighbours in :meth:`places`."""
         if "dwell" not in place:
@@ -62,6 +80,11 @@ class Handling(Effect):
         """The lot without it; None where nothing but its term in the model takes it out."""
         del lot, size, place
         return None
+
+    def settled(self, lot: "Lot", size: Array, misfit: Misfit, **place: float) -> "Lot | None":
+        """The same where it takes more than the coefficients: ``misfit`` tells how well the model fits a lot of some units."""
+        del misfit
+        return self.mended(lot, size, **place)
 
     def dwells(self, lot: "Lot", **place: float) -> list[int]:
         """Places of the dwells that it concerns: the first after a change, or each one that is wrong."""
@@ -119,6 +142,10 @@ def tilts(state: State) -> Array:
 
 def soaks(state: State) -> NDArray[np.intp]:
     """Number of the soak of each dwell, (n,); all zero where the temperature stays."""
+    return state.remember(("soaks",), lambda: _soaks(state).astype(np.float64)).astype(np.intp)
+
+
+def _soaks(state: State) -> NDArray[np.intp]:
     if state.temperature is None:
         return np.zeros(state.time.shape[-1], dtype=np.intp)
     typical = np.median(state.temperature.reshape(-1, state.temperature.shape[-1]), axis=0)

@@ -35,8 +35,17 @@ class SoakThermometer(Handling):
 
     def told(self, lot: "Lot", size: Array, **place: float) -> str:
         """The offset."""
-        del lot, place
-        return f"the thermometers read {size[0]:+.2f} K off in this soak; the readings are corrected by it"
+        del lot
+        return f"the thermometers read {self.short(size, **place)}; the readings are corrected by it"
+
+    def instead(self, lot: "Lot", **place: float) -> list[dict[str, float]]:
+        """The other soaks: with three, an offset of one is one of another beside coefficients that are linear in temperature."""
+        number = int(soaks(lot.state).max()) + 1
+        return [{**place, "soak": float(k)} for k in range(number) if k != int(place["soak"])]
+
+    def short(self, size: Array, **place: float) -> str:
+        """The offset and the soak."""
+        return f"{size[0]:+.2f} K off in soak {int(place['soak']) + 1}"
 
     def mended(self, lot: "Lot", size: Array, **place: float) -> "Lot | None":
         """With the readings of the soak corrected."""

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, ClassVar
 import numpy as np
 
 from inertial.criticism.handling.base import Array, Handling, soaks
-from inertial.criticism.handling.soak_thermometer import corrected
+from inertial.criticism.handling.soak_thermometer import SoakThermometer, corrected
 
 if TYPE_CHECKING:
     from inertial.criticism.lot import Lot
@@ -36,8 +36,16 @@ class UnitThermometer(Handling):
 
     def told(self, lot: "Lot", size: Array, **place: float) -> str:
         """The offset."""
-        del lot, place
-        return f"the thermometer of the unit read {size[0]:+.2f} K off in this soak; its readings are corrected by it"
+        del lot
+        return f"the thermometer of the unit reads {self.short(size, **place)}; its readings are corrected by it"
+
+    def instead(self, lot: "Lot", **place: float) -> list[dict[str, float]]:
+        """The other soaks."""
+        return SoakThermometer().instead(lot, **place)
+
+    def short(self, size: Array, **place: float) -> str:
+        """The offset and the soak."""
+        return SoakThermometer().short(size, **place)
 
     def mended(self, lot: "Lot", size: Array, **place: float) -> "Lot | None":
         """With the readings of the unit corrected in that soak."""

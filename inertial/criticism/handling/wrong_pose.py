@@ -17,6 +17,7 @@ class WrongPose(Handling):
     symbol: ClassVar[str] = "Δα, Δβ"
     equation: ClassVar[str] = "∂f/∂α·Δα + ∂f/∂β·Δβ in one dwell"
     breaker: ClassVar[str] = "measure that pose again"
+    single: ClassVar[bool] = True
 
     def places(self, lot: "Lot") -> list[dict[str, float]]:
         """Every dwell; none where the angles are not known."""
@@ -29,6 +30,10 @@ class WrongPose(Handling):
         del slope
         here = np.arange(lot.state.time.shape[1]) == int(place["at"])
         return tilts(lot.state) * here[:, None, None]
+
+    def every_dwell(self, lot: "Lot") -> Array:
+        """Errors of the two angles in each dwell."""
+        return tilts(lot.state)
 
     def told(self, lot: "Lot", size: Array, **place: float) -> str:
         """The two angles."""
