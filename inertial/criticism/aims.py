@@ -81,8 +81,12 @@ class RivalDiscrimination:
 
     least = 0.03
 
-    def __init__(self, rivals: Rivals, scores: Array, every: Rivals | None = None) -> None:
+    def __init__(
+        self, rivals: Rivals, scores: Array, every: Rivals | None = None, never: NDArray[np.bool_] | None = None
+    ) -> None:
         self.rivals, self.every = rivals, every or rivals
+        # (r, r): of a pair that no measurement parts nothing is wanted
+        self.never = np.eye(len(scores), dtype=bool) if never is None else never | np.eye(len(scores), dtype=bool)
         self.weight = np.maximum(np.exp(-0.5 * scores), LEAST_WEIGHT)
         self.needed = _needed(rivals, apart(rivals, fine=False))
         self._begun: dict[bool, Array] = {}
@@ -100,13 +104,10 @@ class RivalDiscrimination:
     def worth(self, steps: Sequence[SequenceStep], pace: StationPace, *, fine: bool = False) -> float:
         """Share of the separations wanted that is there after these steps."""
         gap, needed = self.expected(steps, pace, fine=fine)
-        off = ~np.eye(len(gap), dtype=bool)
-        share = np.clip(gap / needed, 0.0, 1.0) * off
-        return float(np.sum(self.weight[:, None] * share) / np.sum(self.weight[:, None] * off))
+        wanted = self.weight[:, None] * ~self.never
+        return float(np.sum(wanted * np.clip(gap / needed, 0.0, 1.0)) / max(float(np.sum(wanted)), 1e-12))
 
-    def expected(
-        self, steps: Sequence[SequenceStep], pace: StationPace, *, fine: bool = True
-    ) -> tuple[Array, Array]:
+    def expected(self, steps: Sequence[SequenceStep], pace: StationPace, *, fine: bool = True) -> tuple[Array, Array]:
         """Chi-square (r, r) expected for the truth of a row against that of a column, and how much is needed.
 
         What was measured already says what it says, whatever could be expected of it; what is new is expected to add its own.
@@ -136,7 +137,7 @@ class RivalDiscrimination:
             for column, fit in enumerate(fits):
                 left = fit.left(truths, train)[:, n:] / error
                 gained = np.sum(left**2, axis=0) * rivals.weight / rivals.variance  # (grid, truths)
-                gained[:, column] = 0.0
+                gained[:, self.never[:, column]] = 0.0
                 total += np.minimum(gained / self.needed[:, column], 1.0) @ self.weight
             return total
 

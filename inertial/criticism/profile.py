@@ -115,7 +115,9 @@ class Profile:
             left = left / np.where(size > 0.0, size, 1.0)
             flat = self.targets.reshape(blocks * n, -1)
             shared = self.shared.reshape(blocks * n, -1)
-            found = [_after(np.concatenate([shared, left[:, :, k].reshape(blocks * n, p)], axis=1), flat) for k in range(g)]
+            found = [
+                _after(np.concatenate([shared, left[:, :, k].reshape(blocks * n, p)], axis=1), flat) for k in range(g)
+            ]
             return np.array(found), None
         left = left / np.where(size > 0.0, size, 1.0)[:, None]
         return self._local(left)

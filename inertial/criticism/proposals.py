@@ -12,6 +12,7 @@ from inertial.criticism.handling.base import Handling
 from inertial.criticism.menus import Kind, Reach, StepSequence, courses, pose_grid, present, reach_of, temperatures
 from inertial.criticism.model import Model, Term
 from inertial.criticism.separation import FEW, MANY, Rivals, rivals_of
+from inertial.criticism.twins import never_apart, twins_of
 from inertial.design import grid_of
 from inertial.errors import MissingInput
 from inertial.planning.reasons import drivers_of
@@ -91,10 +92,21 @@ def proposal(
     rivals, every = rivals_in(model, group), rivals_in(model, group, MANY)
     if rivals is None or every is None:
         return None
+    around = around or Circumstances()
+    never = never_apart(rivals, around.reach, around.pace)
+    if never[0, 1:].all():
+        return None
     scores = np.array([m.score for m in group.members[:_MEMBERS]])
-    found = ProposalSearch(RivalDiscrimination(rivals, scores, every), around or Circumstances(), already).best()
+    found = ProposalSearch(RivalDiscrimination(rivals, scores, every, never), around, already).best()
     # a measurement that may well tell nothing apart is not worth its station time
     return None if found is None or len(found.remaining) == len(rivals.terms) - 1 else replace(found, ids=rivals.ids)
+
+
+def twins(model: Model, group: EffectClass, around: Circumstances | None = None) -> tuple[str, ...]:
+    """The best member of a class and those that no measurement of the station parts from it; empty where there is none."""
+    rivals = rivals_in(model, group)
+    around = around or Circumstances()
+    return () if rivals is None else twins_of(rivals, never_apart(rivals, around.reach, around.pace))
 
 
 def sighting(

@@ -123,7 +123,9 @@ def separations(
     return apart(rivals, steps, pace, fine=fine).left
 
 
-def apart(rivals: Rivals, steps: Sequence[SequenceStep] = (), pace: StationPace | None = None, *, fine: bool = True) -> Apart:
+def apart(
+    rivals: Rivals, steps: Sequence[SequenceStep] = (), pace: StationPace | None = None, *, fine: bool = True
+) -> Apart:
     """How far rivals lie apart with steps taken after what was measured; parameters as :func:`separations`."""
     problem = widened(rivals, steps, pace) if steps else Problem(rivals.lot)
     noise = problem.covariance.taken(rivals.noise, rivals.covariance)

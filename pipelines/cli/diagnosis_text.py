@@ -79,23 +79,23 @@ def verdict(document: dict[str, Any]) -> str:
     if error["rms_ug"] is None:
         return f"BLOCKED: every unit ({len(faulty)}) has a data fault; no physics is diagnosed until it is mended."
     sound = len(document["units"]) - len(faulty)
-    floor = f"the noise that is there is {short(error['floor_ug'])} µg (p {equal(error['p_value'])})"
-    left = f"{short(error['rms_ug'])} µg rms are left in {sound} unit{'s' if sound != 1 else ''}, {floor}"
+    left = f"residual {short(error['rms_ug'])} µg rms over {sound} unit{'s' if sound != 1 else ''}"
+    left += f"; noise of the measurement {short(error['floor_ug'])} µg rms (p {equal(error['p_value'])})"
     if document["adequate"]:
         return f"ADEQUATE: {left}."
     if error["rms_ug"] < SMALL * error["floor_ug"]:
-        left += "; what is wrong is small beside it, but no noise"
+        left += "; the misfit is smaller than the noise, but significant"
     spoilt = [told_of(group) for group in document["classes"] if group["scope"] == "data"]
     named = [" or ".join(group["effects"]) for group in document["classes"] if group["scope"] != "data"]
     if spoilt:
-        rest = f"; missing beside it: {', and '.join(named)}" if named else ""
+        rest = f"; also missing: {', and '.join(named)}" if named else ""
         return f"NOT ADEQUATE: {left}; the data: {'; '.join(spoilt)}{rest}."
     if named:
         return f"NOT ADEQUATE: {left}; missing: {', and '.join(named)}."
     if document["unexplained"]:
         driver = document["unexplained"]["driver"]
-        return f"NOT ADEQUATE: {left}; the rest follows {driver}, and no effect of the catalogue explains it."
-    return f"NOT ADEQUATE: {left}; nothing that was recorded explains the rest."
+        return f"NOT ADEQUATE: {left}; the residual follows {driver}, and no effect of the catalogue explains it."
+    return f"NOT ADEQUATE: {left}; nothing that was recorded explains the residual."
 
 
 def told_of(group: dict[str, Any]) -> str:
@@ -241,8 +241,7 @@ def measurements_table(proposed: list[dict[str, Any]], out: Console | None = Non
     ----------
     out : standard output where None
     """
-    if not proposed:
-        return
+    steps = [p for p in proposed if p.get("measurable", True)]
     lines = [
         [
             short(p["outer_deg"]),
@@ -252,15 +251,27 @@ def measurements_table(proposed: list[dict[str, Any]], out: Console | None = Non
             str(p.get("repeats", 1)),
             p["why"],
         ]
-        for p in proposed
+        for p in steps
     ]
-    title = "Measure next, in this order"
-    print_table(
-        ["outer\n°", "inner\n°", "chamber\n°C", "wait\ns", "times", "decides between"], lines, title=title, out=out
-    )
-    for row in {p["why"]: p for p in proposed if "minutes" in p}.values():
-        text = (
-            f"{row['why']}: {short(row['minutes'])} min of station time; χ² between the best and its nearest rival "
-            f"{row['separation_before']:.1f} now, {row['separation_after']:.0f} expected then"
+    where = out or console()
+    if lines:
+        columns = ["outer\n°", "inner\n°", "chamber\n°C", "wait\ns", "times", "decides between"]
+        print_table(columns, lines, title="Measure next, in this order", out=out)
+    for row in {p["why"]: p for p in steps if "minutes" in p}.values():
+        where.print(brings(row), style="dim", markup=False, soft_wrap=True)
+    for row in proposed:
+        if not row.get("measurable", True):
+            where.print(row["why"], markup=False, soft_wrap=True)
+
+
+def brings(row: dict[str, Any]) -> str:
+    """What the steps of a row's measurement cost and bring."""
+    text = f"{row['why']}: {short(row['minutes'])} min of station time; "
+    expected = row.get("separation_if")
+    if not expected:
+        return text + (
+            f"χ² of a coefficient of typical size {row['separation_before']:.1f} now, {row['separation_after']:.0f} expected"
         )
-        (out or console()).print(text, style="dim", markup=False, soft_wrap=True)
+    after = ", ".join(f"{chi:.0f} if {name} is true" for name, chi in expected.items())
+    text += f"χ² between the two {row['separation_before']:.1f} now, expected {after}"
+    return text + (f"; not told from the first by it: {', '.join(row['not_parted'])}" if row.get("not_parted") else "")

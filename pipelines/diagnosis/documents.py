@@ -112,8 +112,13 @@ class NextMeasurement(TypedDict):
     off_s: NotRequired[Annotated[float, "time with the devices switched off before the step, s"]]
     repeats: NotRequired[Annotated[int, "dwells in a row"]]
     minutes: NotRequired[Annotated[float, "station time of all rows with the same `why`"]]
-    separation_before: NotRequired[Annotated[float, "χ² between the best effect and its nearest rival so far"]]
-    separation_after: NotRequired[Annotated[float, "the same with these rows measured"]]
+    separation_before: NotRequired[Annotated[float, "χ² so far between the two effects of `why`"]]
+    separation_after: NotRequired[
+        Annotated[float, "χ² expected with these rows measured, whichever of the two is true"]
+    ]
+    separation_if: NotRequired[Annotated[dict[str, float], "the same by which of the two is true"]]
+    not_parted: NotRequired[Annotated[list[str], "effects of the class that these rows do not tell from the best"]]
+    measurable: NotRequired[Annotated[bool, "false: no steps; `why` says what is needed"]]
 
 
 class SuggestedFormula(TypedDict):
