@@ -96,10 +96,11 @@ class Continued:
         size = blind.size * floor / _remaining(first, shape, thermal=len(blind.soaks) > 1)
         self.effect: Callable[[Any], Floats] = lambda s: size * drawn(s)
 
-    def tables(self, further: list[Step] | None = None) -> tuple[pd.DataFrame, pd.DataFrame]:
-        """Dwells and temperatures of the run, and of further steps where there are any."""
+    def tables(self, further: list[Step] | None = None, *, quiet: bool = False) -> tuple[pd.DataFrame, pd.DataFrame]:
+        """Dwells and temperatures of the run, and of further steps where there are any; ``quiet`` without the noise."""
         scene = self._scene([*self.steps, *(further or [])])
-        output = self.lot.output(scene) + self.effect(scene) + self._noise(scene)
+        noise = self._noise(scene)
+        output = self.lot.output(scene) + self.effect(scene) + (0.0 if quiet else noise)
         rng = np.random.default_rng([len(scene.start), int(1e6 * self.tau[0])])
         world = World(units=self.blind.units, noise=self.blind.noise)
         readings = scene.temperature + 0.003 * rng.standard_normal(scene.temperature.shape)
@@ -258,11 +259,11 @@ def _followed(blind: Blind, seed: int) -> dict[str, Any]:
                 answer["ended"] = "no proposal"
                 continue
             steps = [Step(s.outer, s.inner, round(s.temperature, 2), s.wait, s.soaked, 900.0) for s in wanted.steps]
-            answer["proposals"].append(_measured(run, blind.effect, wanted, steps))
+            answer["proposals"].append(_measured(run, blind.effect, wanted, steps, diagnosis))
     return answer
 
 
-def _measured(run: Continued, truth: str, wanted: Any, steps: list[Step]) -> dict[str, Any]:
+def _measured(run: Continued, truth: str, wanted: Any, steps: list[Step], before: Any) -> dict[str, Any]:
     """What a proposal parted, and by how much, when it was measured."""
     from pipelines.diagnosis.diagnose import examined
 
@@ -271,9 +272,17 @@ def _measured(run: Continued, truth: str, wanted: Any, steps: list[Step]) -> dic
     groups = [list(n.effects.ids) for n in after.named] if after is not None else []
     wrong = other if truth == one else one
     promised = dict(wanted.if_true).get(truth)
-    found = None if after is None or promised is None else separation(after, truth, wrong)
+    found = added = None
+    if after is not None and promised is not None:
+        found = separation(after, truth, wrong)
+        # of what the steps add, luck apart: the devices without their noise, judged by the noise that was there
+        expected = promised - separation(before, truth, wrong)
+        clean = separation(after, truth, wrong, run.tables(steps, quiet=True))
+        clean -= separation(before, truth, wrong, run.tables(quiet=True))
+        added = clean / max(expected, 1e-9)
     return {
-        "pair": list(wanted.pair), "minutes": wanted.minutes, "steps": len(steps), "promised": promised, "measured": found,
+        "pair": list(wanted.pair), "minutes": wanted.minutes, "steps": len(steps), "promised": promised,
+        "measured": found, "added": added,
         "after": groups, "kinds": list(wanted.kinds),
         # of a pair without the truth neither is right: parted is what leaves neither with the truth
         "parted": any(truth in g for g in groups) and not any(truth in g and wrong in g for g in groups)
@@ -281,15 +290,22 @@ def _measured(run: Continued, truth: str, wanted: Any, steps: list[Step]) -> dic
     }  # fmt: skip
 
 
-def separation(diagnosis: Any, truth: str, wrong: str) -> float:
-    """Chi-square by which the wrong one of two leaves more than the true one, both fitted to everything measured."""
+def separation(diagnosis: Any, truth: str, wrong: str, instead: Any = None) -> float:
+    """Chi-square by which the wrong one of two leaves more than the true one, both fitted to everything measured.
+
+    ``instead`` are tables of the same dwells to be fitted in place of those of the diagnosis, at its noise.
+    """
     from inertial import effects as catalogue
     from inertial.criticism.model import Model, Term
+    from inertial.criticism.problem import Problem
     from inertial.criticism.refinement import refine
     from inertial.design import grid_of
+    from pipelines.tables.dwells import lot_of, measured
 
-    problem, rest = diagnosis.problem, diagnosis.base.terms
-    noise = diagnosis.final.noise
+    problem, rest, noise = diagnosis.problem, diagnosis.base.terms, diagnosis.final.noise
+    if instead is not None:
+        problem = Problem(lot_of(measured(*instead)))
+        noise = problem.covariance.taken(noise, diagnosis.problem.covariance)
     base = Model(problem, rest)
     left = []
     for name in (wrong, truth):

@@ -26,6 +26,9 @@ _PICKS = 12
 _SIZES = (3, 6, 12)
 _REPEATS = (1, 2, 4)
 _ROUNDS = 4
+_ALL = 0.999
+"""Share of all that is wanted that counts as all of it."""
+
 Minutes = Callable[[Sequence[SequenceStep]], float]
 
 
@@ -185,21 +188,21 @@ class ProposalSearch:
         now = self.aim.worth(self.already, self.pace)
         whole: _Offer | None = None
         for turn in range(_ROUNDS):
-            if now > 1.0 - self.aim.least:
+            if now >= _ALL:
                 break
             offers = self._weighed(chosen, now)
             if turn == 0:
                 whole = min(
-                    (o for o in offers if o.worth > 1.0 - self.aim.least), key=lambda o: o.minutes, default=None
+                    (o for o in offers if o.worth >= _ALL), key=lambda o: o.minutes, default=None
                 )
             if not offers:
                 break
             best = max(offers, key=lambda o: o.rate)
             chosen.append(best.course)
             now = self._promised(chosen)  # on the grid alone the wrong rivals look further away than they are
-        if whole is not None and (now <= 1.0 - self.aim.least or self._minutes(chosen) > whole.minutes):
+        if whole is not None and (now < _ALL or self._minutes(chosen) > whole.minutes):
             promised = self._promised([whole.course])
-            if promised >= min(now, 1.0 - self.aim.least):
+            if promised >= min(now, _ALL):
                 chosen, now = [whole.course], promised
         return self._told(chosen, now) if chosen else None
 
@@ -220,7 +223,7 @@ class ProposalSearch:
             if minutes > self.around.budget:
                 continue
             worth = self.aim.worth([*held, *course.steps], self.pace)
-            if worth - now >= self.aim.least:
+            if worth - now >= min(self.aim.least, 0.5 * (1.0 - now)):
                 rate = (worth - now) / (minutes - spent + 1.0)  # a minute goes by for the follow-up itself
                 found.append(_Offer(course, worth, minutes, rate))
         return found

@@ -213,10 +213,13 @@ def _next_command(out: Console, document: dict[str, Any], source: str, model: Pa
         markup=False,
         soft_wrap=True,
     )
-    several = [group["effects"] for group in document["classes"] if len(group["effects"]) > 1]
+    added = set(document["recommended"])
+    several = [g["effects"] for g in document["classes"] if len(g["effects"]) > 1 and added & set(g["effects"])]
     if several:
         told = "; ".join(" or ".join(effects) for effects in several)
-        out.print(f"These data do not tell apart: {told}. What is added is one of them.", style="dim", soft_wrap=True)
+        out.print(
+            f"These data do not tell apart: {told}. What is added is one of the class.", style="dim", soft_wrap=True
+        )
 
 
 def _free_name() -> str:
