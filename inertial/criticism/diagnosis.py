@@ -26,6 +26,7 @@ from inertial.criticism.search import Rival, SearchResult
 from inertial.criticism.unknown import better_curve
 from inertial.effects.base import AnyEffect
 from inertial.effects.covariate import Covariate
+from inertial.planning.ranges import UnseenRange, unseen_ranges
 
 UNEXPLAINED = 0.5
 """Share of the floor below which a smooth dependence is left alone."""
@@ -47,6 +48,7 @@ class Diagnosis:
     problem, base, final : the series without what handling spoilt, the model judged, the model with everything that was found
     rms : of the base model's residuals; floor : of the noise that is there
     handled : what handling did; removed : single dwells that were left out; heavy : whether these are tails of the noise
+    unseen_in_part : effects that the plan cannot see at some values of their nonlinear parameters, with these
     influence : dwells that carry the verdict; log_p_without : of its first class when these are left out
     """
 
@@ -67,6 +69,7 @@ class Diagnosis:
     heavy: bool = False
     influence: tuple[Influence, ...] = ()
     log_p_without: float | None = None
+    unseen_in_part: tuple[tuple[str, tuple[UnseenRange, ...]], ...] = ()
 
 
 def diagnose(lot: Lot, effects: Sequence[str], rng: Generator) -> Diagnosis:
@@ -99,6 +102,7 @@ def _told(run: Run, search_: Search, rng: Generator) -> Diagnosis:
     where = places(problem, drivers, base.at(final.noise), final.space.variance)
     charged = tuple(p for p in where if p.log_p + np.log(len(drivers)) < np.log(ADEQUATE_ABOVE))
     carried, log_without = _influence(base, named)
+    unseen, in_part = _unseen(fields, base, [e for e in catalogue.catalogue().values() if e.id not in set(run.effects)])
     return Diagnosis(
         problem=problem,
         base=base,
@@ -110,7 +114,8 @@ def _told(run: Run, search_: Search, rng: Generator) -> Diagnosis:
         where=() if sound else charged,
         named=named,
         unexplained=unexplained,
-        unseen=_unseen(fields, base, [e for e in catalogue.catalogue().values() if e.id not in set(run.effects)]),
+        unseen=unseen,
+        unseen_in_part=in_part,
         ladder=found.ladder,
         handled=tuple(run.handled),
         removed=tuple(run.removed),
@@ -130,12 +135,20 @@ def _influence(base: Model, named: Sequence[Named]) -> tuple[tuple[Influence, ..
     return carried, log_p_without(rest, terms[0], carried) if carried else None
 
 
-def _unseen(field: Candidates, base: Model, candidates: Sequence[AnyEffect]) -> tuple[str, ...]:
-    """Effects whose columns the plan leaves empty, makes one with the model's, or does not carry the quantities for."""
+Unseen = tuple[tuple[str, ...], tuple[tuple[str, tuple[UnseenRange, ...]], ...]]
+
+
+def _unseen(field: Candidates, base: Model, candidates: Sequence[AnyEffect]) -> Unseen:
+    """Effects whose columns the plan leaves empty, makes one with the model's, or does not carry the quantities for.
+
+    Then those for which that holds at some values of their nonlinear parameters, with these.
+    """
     gains = field.gains(base.at(base.problem.covariance.white_noise()), {t.effect.id for t in base.terms})
     blind = [name for name, gain in gains.items() if not gain.rank.any()]
     order = [e.id for e in candidates]
-    return tuple(sorted({*blind, *field.lacking} & set(order), key=order.index))
+    state = base.problem.lot.state
+    ranges = [(e.id, unseen_ranges(e, state, (gains[e.id].rank > 0).tolist())) for e in candidates if e.id in gains]
+    return tuple(sorted({*blind, *field.lacking} & set(order), key=order.index)), tuple(r for r in ranges if r[1])
 
 
 def _classes(field: Candidates, base: Model, final: Model) -> list[EffectClass]:

@@ -235,6 +235,12 @@ def _unseen(document: dict[str, Any]) -> None:
         reasons = document.get("reasons", {})
         lines = [[name, reasons.get(name) or document["breakers"][name]] for name in document["unseen"]]
         print_table(["effect", "why, and what would show it"], lines, title="This plan could not have seen", whole=1)
+    parts: dict[str, list[str]] = {}
+    for row in document.get("unseen_in_part", ()):
+        parts.setdefault(row["effect"], []).append(row["text"])
+    if parts:
+        lines = [[name, "; ".join(texts)] for name, texts in parts.items()]
+        print_table(["effect", "not visible for"], lines, title="This plan could have seen only in part", whole=1)
 
 
 def measurements_table(proposed: list[dict[str, Any]], out: Console | None = None) -> None:

@@ -339,6 +339,9 @@ def _print(document: dict[str, Any]) -> None:
         "contribution to a dwell (3σ, RMS), and its coefficient; =: identical under this plan",
         style="dim",
     )
+    in_part = [[row["effect"], "; ".join(r["text"] for r in row["unseen_ranges"])] for row in seen if row["unseen_ranges"]]
+    if in_part:
+        print_table(["effect visible in part", "not visible for"], in_part)
     invisible = [row for row in document["effects"] if not row["seen"]]
     print_table(
         ["effect not visible", "reason; what to add"], [[r["effect"], r["why"] or r["breaker"]] for r in invisible]

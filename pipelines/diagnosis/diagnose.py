@@ -18,6 +18,7 @@ from pipelines.diagnosis.next_measurement import proposed
 from pipelines.diagnosis.result_rows import (
     Names,
     classes_of,
+    in_part_of,
     influence_of,
     noise_of,
     probability,
@@ -113,6 +114,7 @@ def document(
             "recommended": [],
             "unexplained": None,
             "unseen": [],
+            "unseen_in_part": [],
             "next_measurements": [],
         }
     faulty = {f.unit for f in faults}
@@ -147,6 +149,7 @@ def document(
             "p_value": probability(diagnosis.unexplained.log_p),
         },
         "unseen": list(diagnosis.unseen),
+        "unseen_in_part": in_part_of(diagnosis),
         "next_measurements": (proposed(diagnosis) if following is None else following).rows(),
     }
 

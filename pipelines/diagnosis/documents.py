@@ -121,6 +121,21 @@ class NextMeasurement(TypedDict):
     measurable: NotRequired[Annotated[bool, "false: no steps; `why` says what is needed"]]
 
 
+UnseenInPart = TypedDict(
+    "UnseenInPart",
+    {
+        "effect": str,
+        "parameter": str,
+        "unit": str,
+        "from": Annotated[float, "lowest value at which the plan cannot see the effect"],
+        "to": float,
+        "text": Annotated[str, "the range in words"],
+        "breaker": Annotated[str, "a measurement that would show it"],
+    },
+)
+"""Values of a parameter at which this plan could not have seen an effect that it sees at others."""
+
+
 class SuggestedFormula(TypedDict):
     """A formula for a model file that follows the unexplained quantity."""
 
@@ -141,6 +156,7 @@ class DiagnosisDocument(TypedDict):
     recommended: Annotated[list[str], "one effect per class; empty if the model is adequate or the cause unknown"]
     unexplained: UnexplainedExcess | None
     unseen: Annotated[list[str], "effects that this plan could not have seen"]
+    unseen_in_part: list[UnseenInPart]
     next_measurements: list[NextMeasurement]
     influence: Annotated[list[InfluentialDwell], "largest share first"]
     without_influence: NotRequired[WithoutInfluence | None]

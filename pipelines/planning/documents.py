@@ -43,6 +43,12 @@ class PlannedCoefficient(TypedDict):
     unit: str
 
 
+UnseenRange = TypedDict(
+    "UnseenRange",
+    {"parameter": str, "unit": str, "from": float, "to": float, "text": Annotated[str, "the same in words"]},
+)
+
+
 class PlannedEffect(TypedDict):
     """What the plan can see of one effect of the catalogue."""
 
@@ -60,6 +66,7 @@ class PlannedEffect(TypedDict):
     faint: NotRequired[Annotated[bool, "whether its usual size is below the smallest detected one"]]
     alias_exact: NotRequired[list[str]]
     why: NotRequired[Annotated[str, "what hides it; empty if it is seen"]]
+    unseen_ranges: NotRequired[Annotated[list[UnseenRange], "values of its parameters at which it is not seen"]]
 
 
 class PlannedBias(TypedDict):

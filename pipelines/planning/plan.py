@@ -198,5 +198,9 @@ def _row(visibility: Visibility, state: State, model: Sequence[str]) -> dict[str
         "alias": list(visibility.alias),
         "alias_exact": list(visibility.exact),
         "breaker": visibility.breaker,
+        "unseen_ranges": [
+            {"parameter": r.parameter, "unit": r.unit, "from": r.low, "to": r.high, "text": str(r)}
+            for r in visibility.unseen_ranges
+        ],
         "why": "" if visibility.seen else reason(state, visibility.effect, model),
     }
