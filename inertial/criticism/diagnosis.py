@@ -23,6 +23,7 @@ from inertial.criticism.model import Model
 from inertial.criticism.penalty import PER_COEFFICIENT, log_p_value
 from inertial.criticism.problem import Lot, Problem
 from inertial.criticism.search import Rival, SearchResult
+from inertial.criticism.smallest import Smallest, smallest_named
 from inertial.criticism.unknown import better_curve
 from inertial.effects.base import AnyEffect
 from inertial.effects.covariate import Covariate
@@ -49,6 +50,7 @@ class Diagnosis:
     rms : of the base model's residuals; floor : of the noise that is there
     handled : what handling did; removed : single dwells that were left out; heavy : whether these are tails of the noise
     unseen_in_part : effects that the plan cannot see at some values of their nonlinear parameters, with these
+    smallest : the size from which each effect would have been named, those first that slow noise hides most
     influence : dwells that carry the verdict; log_p_without : of its first class when these are left out
     """
 
@@ -70,6 +72,7 @@ class Diagnosis:
     influence: tuple[Influence, ...] = ()
     log_p_without: float | None = None
     unseen_in_part: tuple[tuple[str, tuple[UnseenRange, ...]], ...] = ()
+    smallest: tuple[Smallest, ...] = ()
 
 
 def diagnose(lot: Lot, effects: Sequence[str], rng: Generator) -> Diagnosis:
@@ -116,6 +119,7 @@ def _told(run: Run, search_: Search, rng: Generator) -> Diagnosis:
         unexplained=unexplained,
         unseen=unseen,
         unseen_in_part=in_part,
+        smallest=tuple(smallest_named(fields, final)),
         ladder=found.ladder,
         handled=tuple(run.handled),
         removed=tuple(run.removed),

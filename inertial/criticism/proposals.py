@@ -192,9 +192,7 @@ class ProposalSearch:
                 break
             offers = self._weighed(chosen, now)
             if turn == 0:
-                whole = min(
-                    (o for o in offers if o.worth >= _ALL), key=lambda o: o.minutes, default=None
-                )
+                whole = min((o for o in offers if o.worth >= _ALL), key=lambda o: o.minutes, default=None)
             if not offers:
                 break
             best = max(offers, key=lambda o: o.rate)

@@ -12,6 +12,9 @@ if TYPE_CHECKING:
     from rich.console import Console
 
 
+HIDDEN, SHOWN = 3.0, 4
+"""Factor by which slow noise must raise the smallest size that is named for an effect to be listed, and how many are."""
+
 SMALL = 1.1
 """Errors below so many times the floor look like noise to whoever compares the two numbers."""
 
@@ -241,6 +244,26 @@ def _unseen(document: dict[str, Any]) -> None:
     if parts:
         lines = [[name, "; ".join(texts)] for name, texts in parts.items()]
         print_table(["effect", "not visible for"], lines, title="This plan could have seen only in part", whole=1)
+    _hidden_by_noise(document.get("smallest_named", ()))
+
+
+def _hidden_by_noise(rows: list[dict[str, Any]]) -> None:
+    """Effects that 1/f or random walk of this size imitates, up to what size, and what would show smaller ones."""
+    from inertial import effects
+
+    raised = [row for row in rows if row["size_ug"] > HIDDEN * row["without_slow_noise_ug"]][:SHOWN]
+    if raised:
+        lines = [
+            [
+                r["effect"],
+                short(r["size_ug"], 2),
+                short(r["without_slow_noise_ug"], 2),
+                effects.get(r["effect"]).breaker,
+            ]
+            for r in raised
+        ]
+        columns = ["effect", "named from\nµg rms", "with white noise only\nµg rms", "what would show less"]
+        print_table(columns, lines, title="Slow noise (1/f, random walk) imitates these effects", whole=1)
 
 
 def measurements_table(proposed: list[dict[str, Any]], out: Console | None = None) -> None:

@@ -31,6 +31,9 @@ PART = "Measure"
 ORDER = 120
 SUMMARY = "Show what a recipe can and cannot determine, before anything is measured."
 
+RAISED = 3.0
+"""Factor by which 1/f and random walk must raise a floor to be listed."""
+
 RECIPE = "recipe"
 MICRO = 1e-6
 
@@ -339,7 +342,9 @@ def _print(document: dict[str, Any]) -> None:
         "contribution to a dwell (3σ, RMS), and its coefficient; =: identical under this plan",
         style="dim",
     )
-    in_part = [[row["effect"], "; ".join(r["text"] for r in row["unseen_ranges"])] for row in seen if row["unseen_ranges"]]
+    in_part = [
+        [row["effect"], "; ".join(r["text"] for r in row["unseen_ranges"])] for row in seen if row["unseen_ranges"]
+    ]
     if in_part:
         print_table(["effect visible in part", "not visible for"], in_part)
     invisible = [row for row in document["effects"] if not row["seen"]]

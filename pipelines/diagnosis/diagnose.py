@@ -23,6 +23,7 @@ from pipelines.diagnosis.result_rows import (
     noise_of,
     probability,
     removed_of,
+    smallest_of,
     without_influence,
 )
 from pipelines.tables.dwells import Measured, lot_of, measured
@@ -115,6 +116,7 @@ def document(
             "unexplained": None,
             "unseen": [],
             "unseen_in_part": [],
+            "smallest_named": [],
             "next_measurements": [],
         }
     faulty = {f.unit for f in faults}
@@ -150,6 +152,7 @@ def document(
         },
         "unseen": list(diagnosis.unseen),
         "unseen_in_part": in_part_of(diagnosis),
+        "smallest_named": smallest_of(diagnosis),
         "next_measurements": (proposed(diagnosis) if following is None else following).rows(),
     }
 

@@ -136,6 +136,14 @@ UnseenInPart = TypedDict(
 """Values of a parameter at which this plan could not have seen an effect that it sees at others."""
 
 
+class SmallestNamed(TypedDict):
+    """The size from which an effect would have been named, RMS over the dwells."""
+
+    effect: str
+    size_ug: Annotated[float, "beside the noise of this measurement, µg"]
+    without_slow_noise_ug: Annotated[float, "beside its white part alone, µg"]
+
+
 class SuggestedFormula(TypedDict):
     """A formula for a model file that follows the unexplained quantity."""
 
@@ -157,6 +165,7 @@ class DiagnosisDocument(TypedDict):
     unexplained: UnexplainedExcess | None
     unseen: Annotated[list[str], "effects that this plan could not have seen"]
     unseen_in_part: list[UnseenInPart]
+    smallest_named: Annotated[list[SmallestNamed], "most hidden by slow noise first"]
     next_measurements: list[NextMeasurement]
     influence: Annotated[list[InfluentialDwell], "largest share first"]
     without_influence: NotRequired[WithoutInfluence | None]

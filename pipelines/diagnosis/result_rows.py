@@ -103,6 +103,14 @@ def in_part_of(diagnosis: Diagnosis) -> list[dict[str, Any]]:
     ]
 
 
+def smallest_of(diagnosis: Diagnosis) -> list[dict[str, Any]]:
+    """Sizes from which effects would have been named, those first that slow noise hides most."""
+    return [
+        {"effect": s.effect, "size_ug": MICRO * s.size, "without_slow_noise_ug": MICRO * s.without_slow}
+        for s in diagnosis.smallest
+    ]
+
+
 def influence_of(diagnosis: Diagnosis, names: Names) -> list[dict[str, Any]]:
     """Dwells that carry the verdict, most first; those that were left out carry all of theirs."""
     single = [] if diagnosis.heavy else diagnosis.removed

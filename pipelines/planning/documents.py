@@ -62,6 +62,9 @@ class PlannedEffect(TypedDict):
     left_by_axis: NotRequired[list[float]]
     floor_unit: NotRequired[str | None]
     floor_size_ug: NotRequired[Annotated[float | None, "the same as a specific force, µg"]]
+    floor_white_ug: NotRequired[
+        Annotated[float | None, "`floor_size_ug` with white noise only, without 1/f and random walk"]
+    ]
     typical_ug: NotRequired[Annotated[list[float], "usual size, from and to, µg"]]
     faint: NotRequired[Annotated[bool, "whether its usual size is below the smallest detected one"]]
     alias_exact: NotRequired[list[str]]
