@@ -342,6 +342,12 @@ def _print(document: dict[str, Any]) -> None:
         "contribution to a dwell (3σ, RMS), and its coefficient; =: identical under this plan",
         style="dim",
     )
+    raised = [r for r in seen if r["floor_white_ug"] and r["floor_size_ug"] > RAISED * r["floor_white_ug"]]
+    if raised:
+        raised.sort(key=lambda r: -r["floor_size_ug"] / r["floor_white_ug"])
+        lines = [[r["effect"], short(r["floor_size_ug"]), short(r["floor_white_ug"]), r["breaker"]] for r in raised[:5]]
+        heads = ["raised by slow noise", "floor\nµg", "white only\nµg", "what lowers it"]
+        print_table(heads, lines)
     in_part = [
         [row["effect"], "; ".join(r["text"] for r in row["unseen_ranges"])] for row in seen if row["unseen_ranges"]
     ]
