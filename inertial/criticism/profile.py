@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inertial.criticism.covariance import Noise
+from inertial.criticism.handling.base import Handling
 from inertial.criticism.model import Model, Term
 from inertial.criticism.problem import Values
 from inertial.criticism.refinement import AXES_DIFFER, around, cell, on_scale
@@ -59,6 +60,8 @@ class Profile:
         ----------
         fine : whether values between those of the grid are tried, too
         """
+        if isinstance(wrong.effect, Handling):
+            raise TypeError(f"{wrong.effect.id}: what handling did has no parameters to fit again")
         state = self.problem.lot.state
         grid: list[Values] = [dict(v) for v in grid_of(wrong.effect, state)]
         parameters = [p for p in wrong.effect.parameters(state) if not p.choices]

@@ -218,7 +218,7 @@ class _Game:
 
     def _one_of_a_class(self, document: dict[str, Any], named: str) -> None:
         """The truth is in a class with others: what was added is one of them, and what would tell them apart."""
-        from pipelines.cli.diagnosis_text import measurements_table
+        from pipelines.cli.measurements_text import measurements_table
 
         out, hidden = console(), self.hidden.effect
         group = next(g for g in document["not_told_apart"] if hidden in g)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from itertools import zip_longest
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -44,7 +43,8 @@ class Proposed:
     def rows(self) -> list[dict[str, Any]]:
         """All of it as rows, in the order in which it is to be measured."""
         rows: list[dict[str, Any]] = []
-        for (group, wanted), alike in zip_longest(self.parting, self.twins, fillvalue=()):
+        twins = [*self.twins, *[()] * (len(self.parting) - len(self.twins))]
+        for (group, wanted), alike in zip(self.parting, twins, strict=True):
             rows += rows_of(wanted) if wanted is not None else [] if alike else [_breaker(group)]
             rows += [_no_measurement(alike)] if alike else []
         return rows if self.showing is None else [*rows, *rows_of(self.showing)]
