@@ -238,16 +238,20 @@ def followed(task: tuple[str, int]) -> tuple[str, dict[str, Any]]:
 def _followed(blind: Blind, seed: int) -> dict[str, Any]:
     from threadpoolctl import threadpool_limits
 
+    from inertial.criticism.proposals import Circumstances
+    from inertial.planning.sequences import StationPace
     from pipelines.diagnosis.diagnose import examined
     from pipelines.diagnosis.next_measurement import proposed
 
+    # what a station's file says of its chamber and table
+    pace = StationPace(move_s=MOVE, dwell_s=10.0, ramp=RAMP, lag=LAG, soak_s=900.0, settled=SETTLED)
     run = Continued(blind, seed)
     dwells, history = run.tables()
     with threadpool_limits(1):
         _, _, diagnosis = examined(dwells, history, None)
         if diagnosis is None:
             return {"ended": "blocked", "classes": []}
-        following = proposed(diagnosis)
+        following = proposed(diagnosis, Circumstances(pace=pace))
         classes = [list(n.effects.ids) for n in diagnosis.named]
         answer: dict[str, Any] = {"classes": classes, "proposals": [], "twins": []}
         held = [group for group in classes if blind.effect in group]
