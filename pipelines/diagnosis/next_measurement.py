@@ -92,7 +92,7 @@ def _breaker(group: EffectClass) -> dict[str, Any]:
     ordered = sorted(group.members[:2], key=lambda m: m.term.effect.scope == "data")
     first, second = (m.term.effect for m in ordered)
     outer, inner, temperature = BREAKER_POSE
-    steps = "" if group.of_data else "no steps of this station part them for sure; needed: "
+    steps = "" if group.of_data else "no steps that the station is known to take part them for sure; needed: "
     why = f"{first.id} | {second.id}: {steps}{second.breaker}"
     return {"outer_deg": outer, "inner_deg": inner, "chamber_C": temperature, "why": why, "measurable": False}
 

@@ -38,7 +38,7 @@ def test_an_effect_added_from_a_class_is_not_called_found(capsys: pytest.Capture
 
 
 def test_where_no_measurement_parts_the_class_that_is_said(capsys: pytest.CaptureFixture[str]) -> None:
-    assert "No measurement of this station tells them apart for sure." in ending(capsys)
+    assert "No measurement that the station is known to take tells them apart for sure." in ending(capsys)
     words = {"why": "aging_log | warm_up: no steps of this station part them for sure; needed: a power cycle"}
     said = ending(capsys, next_measurements=[words | {"measurable": False}])
     assert "needed: a power cycle" in said
