@@ -1,8 +1,9 @@
-"""Verdicts in worlds that nobody prepared: `python benchmarks/worlds nulls faults hidden loop --runs 10`.
+"""Verdicts in worlds that nobody prepared: `python benchmarks/worlds nulls faults hidden loop part --runs 10`.
 
 Prints for every world how many runs were called inadequate, named physics, and told the fault that was made, each with its 95 %
 Clopper-Pearson interval. `--seeds development` are for setting constants, `judging` (the default) only for measuring.
-`--write FOLDER WORLD SEED` writes the tables of one run in the exchange format.
+`part` goes on measuring as a diagnosis proposes, and prints what was parted. `--write FOLDER WORLD SEED` writes the tables of one
+run in the exchange format.
 """
 
 from __future__ import annotations

@@ -20,7 +20,11 @@ class UnseenRange:
     def __str__(self) -> str:
         """The range with its unit."""
         name, unit = self.parameter.replace("_", " "), {"degC": "°C"}.get(self.unit, self.unit)
-        return f"{name} {self.low:.3g} {unit}" if self.low == self.high else f"{name} {self.low:.3g} to {self.high:.3g} {unit}"
+        return (
+            f"{name} {self.low:.3g} {unit}"
+            if self.low == self.high
+            else f"{name} {self.low:.3g} to {self.high:.3g} {unit}"
+        )
 
 
 def unseen_ranges(effect: AnyEffect, state: State, seen: Sequence[bool]) -> tuple[UnseenRange, ...]:

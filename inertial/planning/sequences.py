@@ -217,7 +217,9 @@ def _own_heat(state: State) -> float:
     """By how much settled devices are warmer than the air of the chamber, K; zero where that cannot be seen."""
     if state.temperature is None or state.chamber is None or n_of(state) < _ENOUGH:
         return 0.0
-    device, air, time = (v.reshape(-1, n_of(state)).mean(axis=0) for v in (state.temperature, state.chamber, state.time))
+    device, air, time = (
+        v.reshape(-1, n_of(state)).mean(axis=0) for v in (state.temperature, state.chamber, state.time)
+    )
     passed = np.maximum(np.abs(np.diff(time)), 1e-3)
     still = np.abs(np.diff(device)) / passed < _STILL_RATE
     settled = np.append(still, still[-1]) & np.append(True, still)

@@ -231,7 +231,11 @@ class _Game:
         out.print(text, style="bold yellow", markup=False, soft_wrap=True)
         rows = [row for row in document["next_measurements"] if set(row["why"].split(":")[0].split(" | ")) & set(group)]
         if not rows:
-            out.print("No measurement that the station is known to take tells them apart for sure.", markup=False, soft_wrap=True)
+            out.print(
+                "No measurement that the station is known to take tells them apart for sure.",
+                markup=False,
+                soft_wrap=True,
+            )
         elif "minutes" in rows[0]:
             out.print("The measurement that tells them apart:", markup=False, soft_wrap=True)
             measurements_table(rows, out)

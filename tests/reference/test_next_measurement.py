@@ -97,7 +97,9 @@ def test_the_proposal_brings_five_times_the_information_of_repeating_the_plan():
     got = information(model, group, found.steps)
     # what was measured so far says what it says; the steps add what is expected of them
     assert min(chi for _, chi in found.if_true) == found.after
-    added = {name: chi - sign * observed(model, group) for (name, chi), sign in zip(found.if_true, (1.0, -1.0), strict=True)}
+    added = {
+        name: chi - sign * observed(model, group) for (name, chi), sign in zip(found.if_true, (1.0, -1.0), strict=True)
+    }
     assert min(added.values()) == pytest.approx(got - information(model, group, []), rel=0.05)
     faces = information(model, group, again("six", count))
     plan = information(model, group, again("twenty_six", count))
