@@ -1,4 +1,4 @@
-"""Every figure of docs/reference/measured.md in a short form, one benchmark after the other: `python -m benchmarks`; `--full` as published."""
+"""Every figure of docs/reference/measured.md in a short form: `python -m benchmarks`; `--full` as published."""
 
 from __future__ import annotations
 

@@ -1,8 +1,9 @@
-"""Verdicts in worlds that nobody prepared: `python benchmarks/worlds nulls faults hidden loop --runs 10`.
+"""Verdicts in worlds that nobody prepared: `python benchmarks/worlds nulls faults hidden loop part --runs 10`.
 
 Prints for every world how many runs were called inadequate, named physics, and told the fault that was made, each with its 95 %
 Clopper-Pearson interval. `--seeds development` are for setting constants, `judging` (the default) only for measuring.
-`--write FOLDER WORLD SEED` writes the tables of one run in the exchange format.
+`part` goes on measuring as a diagnosis proposes, and prints what was parted. `--write FOLDER WORLD SEED` writes the tables of one
+run in the exchange format.
 """
 
 from __future__ import annotations
@@ -25,6 +26,7 @@ for _name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
 HERE = Path(__file__).resolve().parent
 sys.path[:0] = [str(HERE), str(HERE.parents[1])]
 
+import part  # noqa: E402
 from scipy import stats  # noqa: E402
 from tables import LOOP, RIGHT, TABLES, WRONG  # noqa: E402
 from world import Made, World, make  # noqa: E402
@@ -130,7 +132,7 @@ def _pooled(work: Callable[..., Any], tasks: list[Any], jobs: int) -> Iterator[A
 def main() -> int:
     """Run tables and print them."""
     parser = argparse.ArgumentParser(prog="python benchmarks/worlds", description=__doc__)
-    parser.add_argument("tables", nargs="*", default=["nulls", "faults"], choices=[*TABLES, "loop"])
+    parser.add_argument("tables", nargs="*", default=["nulls", "faults"], choices=[*TABLES, "loop", "part"])
     parser.add_argument("--world", action="append", default=[])
     parser.add_argument("--runs", type=int, default=5)
     parser.add_argument("--jobs", type=int, default=1)
@@ -143,19 +145,25 @@ def main() -> int:
         return _write(*options.write)
     seeds = range(SEEDS[options.seeds] + options.first, SEEDS[options.seeds] + options.first + options.runs)
     for table in options.tables:
-        worlds = LOOP if table == "loop" else TABLES[table]
+        worlds = {"loop": LOOP, "part": part.SCENES}.get(table) or TABLES[table]
         names = [n for n in worlds if not options.world or n in options.world]
         # seeds of its own for each world: the same draw in all of them would count as many
         places = {name: 1000 * k for k, name in enumerate(worlds)}
-        tasks = [(table, name, seed + places[name]) for name in names for seed in seeds]
+        tasks = [
+            (name, seed + places[name]) if table == "part" else (table, name, seed + places[name])
+            for name in names
+            for seed in seeds
+        ]
         rows: dict[str, list[dict[str, Any]]] = defaultdict(list)
-        for name, row in _pooled(looped if table == "loop" else diagnosed, tasks, options.jobs):
+        for name, row in _pooled(WORK.get(table, diagnosed), tasks, options.jobs):
             rows[name].append(row)
             if options.rows:
                 with options.rows.open("a", encoding="utf-8") as file:
                     file.write(json.dumps({"table": table, "world": name, **row}, default=str) + "\n")
             if len(rows[name]) == options.runs:
-                print((_loop_line if table == "loop" else _line)(name, rows[name]), flush=True)
+                print(LINES.get(table, _line)(name, rows[name]), flush=True)
+        if table == "part":
+            print(_part_line("all", [row for each in rows.values() for row in each]))
     return 0
 
 
@@ -199,13 +207,42 @@ def _loop_line(name: str, rows: list[dict[str, Any]]) -> str:
     return " · ".join(parts)
 
 
+def _part_line(name: str, rows: list[dict[str, Any]]) -> str:
+    """How runs began, and what the proposals for the class with the truth parted."""
+    told = Counter(r["ended"] for r in rows)
+    made = [p for r in rows for p in r.get("proposals", [])]
+    line = [f"{name:26s}", ", ".join(f"{k} {v}" for k, v in told.most_common())]
+    if made:
+        ratios = sorted(p["measured"] / p["promised"] for p in made if p["measured"] is not None)
+        inside = sum(0.7 <= r <= 1.3 for r in ratios)
+        line.append(f"parted {interval(sum(p['parted'] for p in made), len(made))}")
+        if ratios:
+            middle = ratios[len(ratios) // 2]
+            line.append(f"within 30 % of the promise {interval(inside, len(ratios))}, median {middle:.2f}")
+            clean = sorted(p["added"] for p in made if p["added"] is not None)
+            inside = sum(0.7 <= r <= 1.3 for r in clean)
+            line.append(f"without noise {interval(inside, len(clean))}, median {clean[len(clean) // 2]:.2f}")
+        line.append(
+            "; ".join(
+                " | ".join(p["pair"]) + f" {p['promised']:.0f}→{p['measured']:.0f}"
+                for p in made[:6]
+                if p["measured"] is not None
+            )
+        )
+    return " · ".join(line)
+
+
+WORK = {"loop": looped, "part": part.followed}
+LINES = {"loop": _loop_line, "part": _part_line}
+
+
 def _write(folder: str, name: str, seed: str) -> int:
     worlds = {k: v for table in TABLES.values() for k, v in table.items()}
     made = make(worlds[name], int(seed))
     path = Path(folder)
     path.mkdir(parents=True, exist_ok=True)
-    for part in ("dwells", "history", "fresh", "fresh_history"):
-        getattr(made, part).to_parquet(path / f"{part.replace('_', '-')}.parquet")
+    for kind in ("dwells", "history", "fresh", "fresh_history"):
+        getattr(made, kind).to_parquet(path / f"{kind.replace('_', '-')}.parquet")
     print(f"{path}: {name}, {made.told}")
     return 0
 

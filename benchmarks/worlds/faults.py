@@ -66,7 +66,13 @@ def thermometer(scene: Any, readings: Floats, noise: Floats, amount: float, rng:
     """All thermometers of one soak read ``amount`` K too much."""
     soak = int(rng.integers(int(scene.soak.max()) + 1))
     wrong = scene.soak == soak
-    return scene, None, readings + amount * wrong, noise, Told(("soak_thermometer",), (), tuple(np.flatnonzero(wrong)))
+    return (
+        scene,
+        None,
+        readings + amount * wrong,
+        noise,
+        Told(("soak_thermometer",), (), tuple(np.flatnonzero(wrong).tolist())),
+    )
 
 
 def wrong_pose(scene: Any, readings: Floats, noise: Floats, amount: float, rng: np.random.Generator) -> Done:

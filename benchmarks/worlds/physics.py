@@ -82,6 +82,14 @@ def step_change(rng: np.random.Generator, units: int, scene: Any) -> Effect:
     return lambda s: size[:, None] * (s.start > at)[None, :, None]
 
 
+def thermal_kink(rng: np.random.Generator, units: int, scene: Any) -> Effect:
+    """Bias whose slope changes where an adhesive softens, over a few kelvin."""
+    low, high = float(np.min(scene.temperature)), float(np.max(scene.temperature))
+    size = _sizes(rng, units)[..., 0]
+    place, width = low + float(rng.uniform(0.3, 0.7)) * (high - low), float(rng.uniform(1.0, 4.0))
+    return lambda s: size[:, None] * (width * np.logaddexp(0.0, (s.temperature - place) / width))[..., None]
+
+
 def thermal_hysteresis(rng: np.random.Generator, units: int, scene: Any) -> Effect:
     """Play between temperature and bias: the bias follows the edge of a gap of some kelvin."""
     size, half = _sizes(rng, units)[..., 0], float(rng.uniform(4.0, 12.0))
@@ -143,6 +151,7 @@ PHYSICS: dict[str, Callable[..., Effect]] = {
     "aging_linear": aging_linear,
     "warm_up": warm_up,
     "step_change": step_change,
+    "thermal_kink": thermal_kink,
     "thermal_hysteresis": thermal_hysteresis,
     "level_error": level_error,
     "adc_nonlinearity": converter,

@@ -98,7 +98,7 @@ def make(world: World, seed: int) -> Made:
     """The tables of a world; the same seed gives the same bytes."""
     plan, device, first, second, third = (np.random.default_rng(s) for s in np.random.SeedSequence(seed).spawn(5))
     scene = _scene(world, plan, first)
-    lot = _Lot.drawn(device, world.units)
+    lot = Lot.drawn(device, world.units)
     scene, again = (replace(s, output=lot.output(s)) for s in (scene, _with_heat(scene, world, second)))
     noises = [
         1e-6 * dwell_noise(world.noise, s.start, s.duration, world.units, g)
@@ -119,7 +119,7 @@ def make(world: World, seed: int) -> Made:
                 turned = more if turned is None else turned if more is None else turned + more
                 told += one if isinstance(one, tuple) else () if one is None else (one,)
         output = lot.output(true, turned) + extra[k] + noise + k * shift
-        tables.append((_table(world, s, readings, output, rng), _history(s, rng, air=_of_air(world, told))))
+        tables.append((table_of(world, s, readings, output, rng), history_of(s, rng, air=_of_air(world, told))))
     return Made(tables[0][0], tables[0][1], tables[1][0], tables[1][1], told, 1e6 * floor)
 
 
@@ -131,16 +131,19 @@ def _of_air(world: World, told: tuple[Told, ...]) -> NDArray:
 
 
 @dataclass(frozen=True)
-class _Lot:
+class Lot:
+    """Devices: bias, response, and their slopes over temperature."""
+
     bias: Floats
     matrix: Floats
     bias_tempco: Floats
     scale_tempco: Floats
 
     @staticmethod
-    def drawn(rng: np.random.Generator, units: int) -> _Lot:
+    def drawn(rng: np.random.Generator, units: int) -> Lot:
+        """Devices of one make."""
         matrix = np.eye(3) + 3e-3 * rng.standard_normal((units, 3, 3))
-        return _Lot(
+        return Lot(
             0.02 * rng.standard_normal((units, 3)),
             matrix,
             50e-6 * (rng.standard_normal(3) + 0.6 * rng.standard_normal((units, 3))),
@@ -245,7 +248,7 @@ def _left(scene: Scene, shape: Floats) -> Floats:
     return out
 
 
-def _table(world: World, scene: Scene, readings: Floats, output: Floats, rng: np.random.Generator) -> pd.DataFrame:
+def table_of(world: World, scene: Scene, readings: Floats, output: Floats, rng: np.random.Generator) -> pd.DataFrame:
     units, n = readings.shape
     samples = np.maximum((scene.duration * RATE_HZ).astype(int), 2)
     white = 1e-6 * world.noise.white * np.sqrt(RATE_HZ / 2.0) * world.noise.factors(units)
@@ -281,7 +284,7 @@ def _quantised(
     return mean, spread
 
 
-def _history(scene: Scene, rng: np.random.Generator, *, air: NDArray) -> pd.DataFrame:
+def history_of(scene: Scene, rng: np.random.Generator, *, air: NDArray) -> pd.DataFrame:
     """The units' temperatures against time; the chamber's air in the units (units,) of which nothing else is read."""
     every = slice(None, None, 6)
     rows = [

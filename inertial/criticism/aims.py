@@ -1,6 +1,7 @@
 """What a next measurement is for: to part rivals, or to let effects show that were not seen."""
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
@@ -9,9 +10,9 @@ from numpy.typing import NDArray
 from inertial.criticism.decisions import TOLD_APART
 from inertial.criticism.heldout import Fitting
 from inertial.criticism.model import Model, Term
-from inertial.criticism.penalty import cost_of, freedom
+from inertial.criticism.penalty import freedom, price
 from inertial.criticism.problem import Lot, Problem
-from inertial.criticism.separation import Rivals, left_of, predictions, separations, smallest, widened
+from inertial.criticism.separation import Apart, Rivals, apart, left_of, predictions, separations, widened
 from inertial.criticism.turn_on import with_turn_on
 from inertial.planning.sequences import SequenceStep, StationPace
 
@@ -20,13 +21,7 @@ Array = NDArray[np.float64]
 UNLUCKY = 1.65
 """Standard deviations of bad luck that the measurement must stand."""
 
-MARGIN = 1.5
-"""Rivals are refitted with other nonlinear parameters afterwards: that costs separation."""
-
 LEAST_WEIGHT = 0.02
-
-MORE = 3.0
-"""Factor by which the separation of rivals that are still not told apart must rise."""
 
 _SHOWN = 36.0
 """Chi-square, a coefficient, at which an effect of typical size counts as seen: six standard errors."""
@@ -47,8 +42,8 @@ class Objective(Protocol):
         """The effects that it is about."""
         ...
 
-    def worth(self, steps: Sequence[SequenceStep], pace: StationPace) -> float:
-        """Share, 0 … 1, of all that is wanted that is there after these steps."""
+    def worth(self, steps: Sequence[SequenceStep], pace: StationPace, *, fine: bool = False) -> float:
+        """Share, 0 … 1, of all that is wanted that is there after these steps; ``fine`` for a promise, not for a search."""
         ...
 
     def picks(
@@ -59,9 +54,26 @@ class Objective(Protocol):
 
     def effect_of_steps(
         self, already: Sequence[SequenceStep], steps: Sequence[SequenceStep], pace: StationPace
-    ) -> tuple[float, float, tuple[str, ...]]:
-        """What ``steps`` change, taken after ``already``: the figure before and after, and the ids that it is about."""
+    ) -> "Promise":
+        """What ``steps`` change, taken after ``already``."""
         ...
+
+
+@dataclass(frozen=True)
+class Promise:
+    """What steps are expected to bring.
+
+    before, after : chi-square between the pair, whichever of the two is true; of a coefficient for effects not seen
+    ids : the effects that it is about: the best rival and the nearest that will be told apart from it; effects that will show
+    if_true : chi-square expected between the two, by which of them is true
+    remaining : rivals that are still not told apart from the best
+    """
+
+    before: float
+    after: float
+    ids: tuple[str, ...]
+    if_true: tuple[tuple[str, float], ...] = ()
+    remaining: tuple[str, ...] = ()
 
 
 class RivalDiscrimination:
@@ -69,11 +81,15 @@ class RivalDiscrimination:
 
     least = 0.03
 
-    def __init__(self, rivals: Rivals, scores: Array) -> None:
-        self.rivals = rivals
+    def __init__(
+        self, rivals: Rivals, scores: Array, every: Rivals | None = None, never: NDArray[np.bool_] | None = None
+    ) -> None:
+        self.rivals, self.every = rivals, every or rivals
+        # (r, r): of a pair that no measurement parts nothing is wanted
+        self.never = np.eye(len(scores), dtype=bool) if never is None else never | np.eye(len(scores), dtype=bool)
         self.weight = np.maximum(np.exp(-0.5 * scores), LEAST_WEIGHT)
-        # what is there already has not been enough, whatever was expected of it: more is wanted than that
-        self.needed = np.maximum(_needed(rivals), MORE * separations(rivals))
+        self.needed = _needed(rivals, apart(rivals, fine=False))
+        self._begun: dict[bool, Array] = {}
 
     @property
     def lot(self) -> Lot:
@@ -85,12 +101,24 @@ class RivalDiscrimination:
         """The rivals."""
         return self.rivals.terms
 
-    def worth(self, steps: Sequence[SequenceStep], pace: StationPace) -> float:
+    def worth(self, steps: Sequence[SequenceStep], pace: StationPace, *, fine: bool = False) -> float:
         """Share of the separations wanted that is there after these steps."""
-        left = separations(self.rivals, steps, pace)
-        off = ~np.eye(len(left), dtype=bool)
-        share = np.minimum(left / self.needed, 1.0) * off
-        return float(np.sum(self.weight[:, None] * share) / np.sum(self.weight[:, None] * off))
+        gap, needed = self.expected(steps, pace, fine=fine)
+        wanted = self.weight[:, None] * ~self.never
+        return float(np.sum(wanted * np.clip(gap / needed, 0.0, 1.0)) / max(float(np.sum(wanted)), 1e-12))
+
+    def expected(self, steps: Sequence[SequenceStep], pace: StationPace, *, fine: bool = True) -> tuple[Array, Array]:
+        """Chi-square (r, r) expected for the truth of a row against that of a column, and how much is needed.
+
+        What was measured already says what it says, whatever could be expected of it; what is new is expected to add its own.
+        """
+        rivals = self.every if fine else self.rivals
+        if fine not in self._begun:
+            self._begun[fine] = separations(rivals, fine=fine)
+        if not steps:
+            return rivals.observed, _needed(rivals, apart(rivals, fine=fine))
+        found = apart(rivals, steps, pace, fine=fine)
+        return rivals.observed + np.maximum(found.left - self._begun[fine], 0.0), _needed(rivals, found)
 
     def picks(
         self, held: Sequence[SequenceStep], grid: Sequence[SequenceStep], pace: StationPace, count: int
@@ -104,26 +132,35 @@ class RivalDiscrimination:
         n = problem.n - len(grid)
         error = _error(problem, rivals)[:, n:, None]
 
-        def apart(train: NDArray[np.bool_]) -> Array:
+        def told_apart(train: NDArray[np.bool_]) -> Array:
             total = np.zeros(len(grid))
             for column, fit in enumerate(fits):
                 left = fit.left(truths, train)[:, n:] / error
                 gained = np.sum(left**2, axis=0) * rivals.weight / rivals.variance  # (grid, truths)
-                gained[:, column] = 0.0
+                gained[:, self.never[:, column]] = 0.0
                 total += np.minimum(gained / self.needed[:, column], 1.0) @ self.weight
             return total
 
-        return _greedy(grid, n, count, apart)
+        return _greedy(grid, n, count, told_apart)
 
     def effect_of_steps(
         self, already: Sequence[SequenceStep], steps: Sequence[SequenceStep], pace: StationPace
-    ) -> tuple[float, float, tuple[str, ...]]:
-        """Chi-square between the best rival and its nearest, before and after; the best and the one it is parted from most."""
-        before = smallest(separations(self.rivals, already, pace))
-        after = smallest(separations(self.rivals, [*already, *steps], pace))
-        gained = np.minimum((after - before)[0, 1:], self.needed[0, 1:])
+    ) -> Promise:
+        """The best rival and the nearest that will be told apart from it, whichever of the two is true."""
+        before, _ = self.expected(already, pace)
+        after, needed = self.expected([*already, *steps], pace)
         names = self.rivals.ids
-        return float(before[0, 1:].min()), float(after[0, 1:].min()), (names[0], names[1 + int(np.argmax(gained))])
+        sure = np.minimum(after / needed, (after / needed).T)[0, 1:]
+        parted = [k for k in range(1, len(names)) if sure[k - 1] >= 1.0]
+        other = parted[0] if parted else 1 + int(np.argmax(sure))
+        both = (names[0], float(after[0, other])), (names[other], float(after[other, 0]))
+        return Promise(
+            before=float(max(before[0, other], 0.0)),
+            after=min(chi for _, chi in both),
+            ids=(names[0], names[other]),
+            if_true=both,
+            remaining=tuple(names[k] for k in range(1, len(names)) if k not in parted),
+        )
 
 
 class Sighting:
@@ -144,8 +181,9 @@ class Sighting:
         """A few units of what was measured."""
         return self.rivals.lot
 
-    def worth(self, steps: Sequence[SequenceStep], pace: StationPace) -> float:
+    def worth(self, steps: Sequence[SequenceStep], pace: StationPace, *, fine: bool = False) -> float:
         """Mean share over the effects of the chi-square wanted."""
+        del fine
         return float(np.mean(np.minimum(self.shown(steps, pace) / _SHOWN, 1.0)))
 
     def shown(self, steps: Sequence[SequenceStep], pace: StationPace) -> Array:
@@ -179,12 +217,12 @@ class Sighting:
 
     def effect_of_steps(
         self, already: Sequence[SequenceStep], steps: Sequence[SequenceStep], pace: StationPace
-    ) -> tuple[float, float, tuple[str, ...]]:
+    ) -> Promise:
         """Chi-square a coefficient of the effect that shows least of those that will, before and after; those that will."""
         before, after = self.shown(already, pace), self.shown([*already, *steps], pace)
         will = after >= max(1.0, 0.5 * min(_SHOWN, float(np.max(after))))
         names = tuple(t.effect.id for t, there in zip(self.terms, will, strict=True) if there)
-        return float(before[will].min()), float(after[will].min()), names
+        return Promise(float(before[will].min()), float(after[will].min()), names)
 
 
 def _typical(problem: Problem, terms: Sequence[Term]) -> tuple[Array, list[int]]:
@@ -227,15 +265,23 @@ def _error(problem: Problem, rivals: Rivals) -> Array:
     return np.where(np.isfinite(problem.error), problem.error * rivals.noise.scale[:, None], np.inf)
 
 
-def _needed(rivals: Rivals) -> Array:
+def _needed(rivals: Rivals, found: Apart) -> Array:
     """Chi-square (r, r) that must lie between a truth (row) and a wrong rival (column) for the class to drop the wrong one.
 
-    The difference found scatters by twice the root of its own size about it; a simpler rival has its penalty in its favour.
+    The difference found scatters by twice the root of its own size about it; a simpler rival has its price in its favour.
     """
-    costs = np.array([_cost(t, c) for t, c in zip(rivals.terms, rivals.predicted, strict=True)])
-    least = np.maximum(TOLD_APART + costs[:, None] - costs[None, :], TOLD_APART)
-    return MARGIN * (UNLUCKY + np.sqrt(UNLUCKY**2 + least)) ** 2
+    counts = [_coefficients(rivals, t) for t in rivals.terms]
+    paid = np.array([price(d, k) for d, k in zip(found.whole, counts, strict=True)])
+    wrong = np.array([[price(max(d - lost, 0.0), k) for k, lost in zip(counts, row, strict=True)]
+                      for d, row in zip(found.whole, found.left, strict=True)])  # fmt: skip
+    least = np.maximum(TOLD_APART + paid[:, None] - wrong, TOLD_APART)
+    return (UNLUCKY + np.sqrt(UNLUCKY**2 + least)) ** 2
 
 
-def _cost(term: Term, coefficients: Array) -> float:
-    return cost_of(int(coefficients.size), int(coefficients.shape[-1]), freedom(term))
+def _coefficients(rivals: Rivals, term: Term) -> float:
+    """Coefficients of a rival in the whole lot, the unknown state of its memory and nonlinear parameters among them."""
+    problem = Problem(rivals.lot)
+    columns = problem.columns(term.effect, term.keywords)[..., : term.first].shape[-1]
+    columns += problem.start(term.effect, term.keywords).shape[-1]
+    blocks = 1.0 if term.shared else problem.blocks * rivals.weight
+    return blocks * columns + freedom(term)

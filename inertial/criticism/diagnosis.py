@@ -24,10 +24,12 @@ from inertial.criticism.model import Model, Term
 from inertial.criticism.penalty import PER_COEFFICIENT, log_p_value
 from inertial.criticism.problem import Lot, Problem
 from inertial.criticism.search import Rival, SearchResult
+from inertial.criticism.smallest import Smallest, smallest_named
 from inertial.criticism.tails import with_tails
 from inertial.criticism.unknown import better_curve
-from inertial.criticism.unseen import UnseenRange, unseen, unseen_ranges
+from inertial.criticism.unseen import unseen
 from inertial.effects.covariate import Covariate
+from inertial.planning.ranges import UnseenRange
 
 
 @dataclass(frozen=True)
@@ -47,6 +49,8 @@ class Diagnosis:
     rms : of the base model's residuals; floor : of the noise that is there
     handled : what handling did; removed : single dwells that were left out, those marked that are tails of the noise
     carried : dwells that carry the verdict: of its first class, or the largest of what is left where nothing is named
+    unseen_in_part : effects that the plan cannot see at some values of their nonlinear parameters, with these
+    smallest : the size from which each effect would have been named, those first that slow noise hides most
     """
 
     problem: Problem
@@ -63,8 +67,9 @@ class Diagnosis:
     ladder: tuple[Rival, ...]
     handled: tuple[Named, ...] = ()
     removed: tuple[BadDwell, ...] = ()
-    unseen_ranges: tuple[UnseenRange, ...] = ()
     carried: Carried = field(default_factory=Carried)
+    unseen_in_part: tuple[tuple[str, tuple[UnseenRange, ...]], ...] = ()
+    smallest: tuple[Smallest, ...] = ()
 
 
 def diagnose(lot: Lot, effects: Sequence[str], rng: Generator) -> Diagnosis:
@@ -97,7 +102,7 @@ def _told(run: Run, search_: Search, rng: Generator) -> Diagnosis:
     where = places(problem, drivers, base.at(final.noise), final.space.variance)
     charged = tuple(p for p in where if p.log_p + np.log(len(drivers)) < np.log(ADEQUATE_ABOVE))
     every = [*run.handled, *named]
-    blind = unseen(fields, base, [e for e in catalogue.catalogue().values() if e.id not in set(run.effects)])
+    blind, in_part = unseen(fields, base, [e for e in catalogue.catalogue().values() if e.id not in set(run.effects)])
     return Diagnosis(
         problem=problem,
         base=base,
@@ -110,7 +115,8 @@ def _told(run: Run, search_: Search, rng: Generator) -> Diagnosis:
         named=named,
         unexplained=unexplained,
         unseen=blind,
-        unseen_ranges=unseen_ranges(fields, base, blind),
+        unseen_in_part=in_part,
+        smallest=tuple(smallest_named(fields, final)),
         ladder=found.ladder,
         handled=tuple(run.handled),
         removed=removed,

@@ -13,6 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inertial import frames, poses
+from inertial.planning.drivers import first_unit
+from inertial.planning.features import levels
 from inertial.planning.sequences import SequenceStep, StationPace, n_of, standing
 from inertial.state import T_REFERENCE, State
 
@@ -24,6 +26,7 @@ _EXCURSION_K = 25.0
 _MINOR_K = 8.0
 _VARIED_K = 5.0
 _NEARLY_K = 1.0
+_STOPS = 8
 
 
 @dataclass(frozen=True)
@@ -131,7 +134,11 @@ def courses(state: State, reach: Reach, best: Sequence[SequenceStep], here: floa
         *(_power_cycles(chosen) if reach.power and state.since_power is not None else ()),
     ]
     if reach.temperature is not None:
-        found += [*_excursions(reach, here, chosen), *_ramps(reach, here, chosen)]
+        found += [
+            *_excursions(reach, here, chosen),
+            *_between(state, reach, here, chosen),
+            *_ramps(reach, here, chosen),
+        ]
     return [c for c in found if c.steps and all(reach.allows(s) for s in c.steps)]
 
 
@@ -215,6 +222,24 @@ def _excursions(reach: Reach, here: float, chosen: Sequence[SequenceStep]) -> li
         stops = [t for k, t in enumerate(way) if abs(t - (way[k - 1] if k else here)) > 1.0]
         steps = [replace(pose, temperature=t) for t in stops for pose in chosen[:count]]
         found.append(StepSequence("excursion", tuple(steps)))
+    return found
+
+
+def _between(state: State, reach: Reach, here: float, chosen: Sequence[SequenceStep]) -> list[StepSequence]:
+    """Soaks half-way between those of the run, beginning at the nearer end: a bend between two soaks shows only there."""
+    soaks = np.array(sorted(levels(first_unit(state))))
+    apart = np.flatnonzero(np.diff(soaks) > _VARIED_K)
+    if reach.temperature is None or apart.size < 1:
+        return []
+    halves = np.round(0.5 * (soaks[apart] + soaks[apart + 1]), 1)
+    low, wide = soaks[apart], np.diff(soaks)[apart]
+    quarters = np.round(np.concatenate([low + 0.25 * wide, low + 0.75 * wide]), 1)
+    found: list[StepSequence] = []
+    for stops in (halves, np.sort(quarters), np.sort(np.concatenate([halves, quarters]))):
+        way = stops[:_STOPS] if abs(stops[0] - here) <= abs(stops[-1] - here) else stops[::-1][:_STOPS]
+        for count in (2, 4):
+            steps = [replace(pose, temperature=float(t)) for t in way for pose in chosen[:count]]
+            found.append(StepSequence("excursion", tuple(steps)))
     return found
 
 

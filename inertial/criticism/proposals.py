@@ -1,7 +1,7 @@
 """The next measurement: the steps that part rivals that fit alike, or show what was not seen, per minute of station time."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -11,7 +11,8 @@ from inertial.criticism.classes import EffectClass
 from inertial.criticism.handling.base import Handling
 from inertial.criticism.menus import Kind, Reach, StepSequence, courses, pose_grid, present, reach_of, temperatures
 from inertial.criticism.model import Model, Term
-from inertial.criticism.separation import Rivals, rivals_of
+from inertial.criticism.separation import FEW, MANY, Rivals, rivals_of
+from inertial.criticism.twins import never_apart, twins_of
 from inertial.design import grid_of
 from inertial.errors import MissingInput
 from inertial.planning.reasons import drivers_of
@@ -25,6 +26,9 @@ _PICKS = 12
 _SIZES = (3, 6, 12)
 _REPEATS = (1, 2, 4)
 _ROUNDS = 4
+_ALL = 0.999
+"""Share of all that is wanted that counts as all of it."""
+
 Minutes = Callable[[Sequence[SequenceStep]], float]
 
 
@@ -34,8 +38,9 @@ class Proposal:
 
     ids : the effects that it is about; pair : the two rivals that it parts most; empty where it shows what was not seen
     minutes : of station time
-    before, after : chi-square expected between the best rival and its nearest, whichever is true; of a coefficient of
-        typical size for effects that were not seen
+    before, after : chi-square between the two rivals so far, and expected with the steps whichever of them is true; of a
+        coefficient of typical size for effects that were not seen
+    if_true : the same by which of the two is true; remaining : rivals that are still not told apart from the best
     settled : share of all that is wanted that will be there afterwards, 0 … 1
     """
 
@@ -47,6 +52,8 @@ class Proposal:
     before: float
     after: float
     settled: float
+    if_true: tuple[tuple[str, float], ...] = ()
+    remaining: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -68,29 +75,41 @@ class Circumstances:
         return timeline(steps, self.pace, self.pace.start or standing(state), present(state, self.pace)).end / 60.0
 
 
-def rivals_in(model: Model, group: EffectClass) -> Rivals | None:
+def rivals_in(model: Model, group: EffectClass, most: int = FEW) -> Rivals | None:
     """The members of a class as rivals; None for a class of one, and where no angles say how to go on."""
     if len(group.members) < 2 or not _goes_on(model):
         return None
     others = [t for t in model.terms if t.effect.id not in group.ids]
-    return rivals_of(model, [m.term for m in group.members[:_MEMBERS]], others)
+    return rivals_of(model, [m.term for m in group.members[:_MEMBERS]], others, most)
 
 
 def proposal(
     model: Model, group: EffectClass, around: Circumstances | None = None, already: Sequence[SequenceStep] = ()
 ) -> Proposal | None:
-    """The steps that best part the members of a class; None where nothing the station does parts them.
+    """The steps that best part the members of a class; None where nothing the station does parts two of them for sure.
 
     Parameters
     ----------
     already : steps that are to be measured anyway, for another class; the proposal comes after them
     """
-    rivals = rivals_in(model, group)
-    if rivals is None:
+    rivals, every = rivals_in(model, group), rivals_in(model, group, MANY)
+    if rivals is None or every is None:
+        return None
+    around = around or Circumstances()
+    never = never_apart(rivals, around.reach, around.pace)
+    if never[0, 1:].all():
         return None
     scores = np.array([m.score for m in group.members[:_MEMBERS]])
-    found = ProposalSearch(RivalDiscrimination(rivals, scores), around or Circumstances(), already).best()
-    return None if found is None else _named(found, rivals.ids)
+    found = ProposalSearch(RivalDiscrimination(rivals, scores, every, never), around, already).best()
+    # a measurement that may well tell nothing apart is not worth its station time
+    return None if found is None or len(found.remaining) == len(rivals.terms) - 1 else replace(found, ids=rivals.ids)
+
+
+def twins(model: Model, group: EffectClass, around: Circumstances | None = None) -> tuple[str, ...]:
+    """The best member of a class and those that no measurement of the station parts from it; empty where there is none."""
+    rivals = rivals_in(model, group)
+    around = around or Circumstances()
+    return () if rivals is None else twins_of(rivals, never_apart(rivals, around.reach, around.pace))
 
 
 def sighting(
@@ -112,12 +131,7 @@ def sighting(
         return None
     rivals = rivals_of(model, [], model.terms)
     found = ProposalSearch(Sighting(rivals, terms), around, already).best()
-    return None if found is None else _named(found, found.pair, pair=())
-
-
-def _named(found: Proposal, ids: tuple[str, ...], pair: tuple[str, ...] | None = None) -> Proposal:
-    kept = found.pair if pair is None else pair
-    return Proposal(found.kinds, found.steps, ids, kept, found.minutes, found.before, found.after, found.settled)
+    return None if found is None else replace(found, pair=())
 
 
 def _goes_on(model: Model) -> bool:
@@ -174,21 +188,25 @@ class ProposalSearch:
         now = self.aim.worth(self.already, self.pace)
         whole: _Offer | None = None
         for turn in range(_ROUNDS):
-            if now > 1.0 - self.aim.least:
+            if now >= _ALL:
                 break
             offers = self._weighed(chosen, now)
             if turn == 0:
-                whole = min(
-                    (o for o in offers if o.worth > 1.0 - self.aim.least), key=lambda o: o.minutes, default=None
-                )
+                whole = min((o for o in offers if o.worth >= _ALL), key=lambda o: o.minutes, default=None)
             if not offers:
                 break
             best = max(offers, key=lambda o: o.rate)
-            now = best.worth
             chosen.append(best.course)
-        if whole is not None and (now <= 1.0 - self.aim.least or self._minutes(chosen) > whole.minutes):
-            chosen, now = [whole.course], whole.worth
+            now = self._promised(chosen)  # on the grid alone the wrong rivals look further away than they are
+        if whole is not None and (now < _ALL or self._minutes(chosen) > whole.minutes):
+            promised = self._promised([whole.course])
+            if promised >= min(now, _ALL):
+                chosen, now = [whole.course], promised
         return self._told(chosen, now) if chosen else None
+
+    def _promised(self, chosen: Sequence[StepSequence]) -> float:
+        """What is there after courses, with every rival fitted as it will be."""
+        return self.aim.worth([*self.already, *(s for c in chosen for s in c.steps)], self.pace, fine=True)
 
     def _minutes(self, chosen: Sequence[StepSequence]) -> float:
         return self.around.cost(self.aim, [*self.already, *(s for c in chosen for s in c.steps)])
@@ -203,7 +221,7 @@ class ProposalSearch:
             if minutes > self.around.budget:
                 continue
             worth = self.aim.worth([*held, *course.steps], self.pace)
-            if worth - now >= self.aim.least:
+            if worth - now >= min(self.aim.least, 0.5 * (1.0 - now)):
                 rate = (worth - now) / (minutes - spent + 1.0)  # a minute goes by for the follow-up itself
                 found.append(_Offer(course, worth, minutes, rate))
         return found
@@ -227,15 +245,17 @@ class ProposalSearch:
 
     def _told(self, chosen: Sequence[StepSequence], worth: float) -> Proposal:
         steps = [s for c in chosen for s in c.steps]
-        before, after, about = self.aim.effect_of_steps(self.already, steps, self.pace)
+        promise = self.aim.effect_of_steps(self.already, steps, self.pace)
         whole, free = [*self.already, *steps], self.already
         return Proposal(
             kinds=tuple(dict.fromkeys(c.kind for c in chosen)),
             steps=tuple(steps),
-            ids=about,
-            pair=about,
+            ids=promise.ids,
+            pair=promise.ids,
             minutes=self.around.cost(self.aim, whole) - self.around.cost(self.aim, free),
-            before=before,
-            after=after,
+            before=promise.before,
+            after=promise.after,
             settled=worth,
+            if_true=promise.if_true,
+            remaining=promise.remaining,
         )

@@ -50,11 +50,11 @@ def _placed(space: Space, problem: Problem, term: Term) -> Term:
 
 def _refine_one(space: Space, problem: Problem, term: Term, parameter: Nonlinear) -> Term:
     """Three rounds of five values, each round narrower, about the value that all axes share."""
-    centre, width = _on_scale(parameter, float(np.mean(term.keywords[parameter.name]))), _cell(parameter)
+    centre, width = on_scale(parameter, float(np.mean(term.keywords[parameter.name]))), cell(parameter)
     for _ in range(3):
-        values = _around(parameter, centre, width)
+        values = around(parameter, centre, width)
         gain = space.gain(_varied(problem, term, parameter, values))
-        centre, width = _on_scale(parameter, float(values[int(np.argmax(gain.drop))])), 0.4 * width
+        centre, width = on_scale(parameter, float(values[int(np.argmax(gain.drop))])), 0.4 * width
     return _with_value(term, parameter, float(_off_scale(parameter, centre)))
 
 
@@ -65,13 +65,13 @@ def _per_axis(space: Space, problem: Problem, term: Term, parameter: Nonlinear) 
     total = 0.0
     for axis in range(3):
         values = parameter.grid()
-        width, taken = _cell(parameter), 0.0
+        width, taken = cell(parameter), 0.0
         found = float(values[0])
         for _ in range(4):
             by_axis = space.gain(_varied(problem, term, parameter, values)).by_block[axis::3].sum(axis=0)
             found = float(values[int(np.argmax(by_axis))])
             taken = float(by_axis.max())
-            values, width = _around(parameter, _on_scale(parameter, found), width), 0.4 * width
+            values, width = around(parameter, on_scale(parameter, found), width), 0.4 * width
         best.append(found)
         total += taken
     if total - common < decisions.AXES_DIFFER * space.variance:
@@ -79,7 +79,7 @@ def _per_axis(space: Space, problem: Problem, term: Term, parameter: Nonlinear) 
     return _with_value(term, parameter, tuple(best))
 
 
-def _on_scale(parameter: Nonlinear, value: float) -> float:
+def on_scale(parameter: Nonlinear, value: float) -> float:
     """A value on the scale on which it is varied."""
     return {"log": np.log, "inverse": lambda v: 1.0 / v, "linear": lambda v: v}[parameter.scale](value)
 
@@ -88,16 +88,16 @@ def _off_scale(parameter: Nonlinear, value: float) -> float:
     return {"log": np.exp, "inverse": lambda v: 1.0 / v, "linear": lambda v: v}[parameter.scale](value)
 
 
-def _cell(parameter: Nonlinear) -> float:
+def cell(parameter: Nonlinear) -> float:
     """Width of a cell of the starting grid, on its scale."""
-    return abs(_on_scale(parameter, parameter.high) - _on_scale(parameter, parameter.low)) / max(
+    return abs(on_scale(parameter, parameter.high) - on_scale(parameter, parameter.low)) / max(
         parameter.grid().size - 1, 1
     )
 
 
-def _around(parameter: Nonlinear, centre: float, width: float) -> Array:
+def around(parameter: Nonlinear, centre: float, width: float) -> Array:
     """Five values about a centre on the parameter's scale, within its bounds."""
-    low, high = sorted((_on_scale(parameter, parameter.low), _on_scale(parameter, parameter.high)))
+    low, high = sorted((on_scale(parameter, parameter.low), on_scale(parameter, parameter.high)))
     points = np.clip(centre + width * np.array([-0.9, -0.45, 0.0, 0.45, 0.9]), low, high)
     return np.array([_off_scale(parameter, float(p)) for p in points])
 

@@ -13,22 +13,20 @@ from numpy.typing import NDArray
 
 from inertial.criticism.comparison import estimate
 from inertial.criticism.covariance import Covariance, Noise
+from inertial.criticism.decisions import AXES_DIFFER
 from inertial.criticism.handling.base import Handling
 from inertial.criticism.model import Model, Term
 from inertial.criticism.problem import Lot, Problem
+from inertial.criticism.profile import Profile
 from inertial.criticism.shared_noise import shared_factor
 from inertial.criticism.space import Space
 from inertial.criticism.turn_on import with_turn_on
-from inertial.effects.base import Nonlinear
 from inertial.planning.sequences import SequenceStep, StationPace, extended
 
 Array = NDArray[np.float64]
 
-_STEPS = (0.25, 0.625, 1.6, 4.0)
-"""Factors by which the nonlinear parameters of a rival may move when it is fitted to what is measured next."""
-
-_FEW = 3
-"""Units that stand for the lot: all go through the same steps."""
+FEW, MANY = 3, 16
+"""Units that stand for the lot, where all go through the same steps: while steps are looked for, and for what is promised."""
 
 
 @dataclass(frozen=True)
@@ -40,6 +38,7 @@ class Rivals:
     predicted : per rival, its coefficients (blocks, p) or (p,) for a station's effect
     noise : of the few units; variance : what units share of it makes it larger
     covariance : that the noise's shares are counted in
+    observed : (r, r), chi-square by which what was measured so far speaks for the rival of a row against that of a column
     """
 
     lot: Lot
@@ -50,6 +49,7 @@ class Rivals:
     noise: Noise
     variance: float
     covariance: Covariance
+    observed: Array
 
     @property
     def ids(self) -> tuple[str, ...]:
@@ -57,7 +57,7 @@ class Rivals:
         return tuple(t.effect.id for t in self.terms)
 
 
-def rivals_of(model: Model, terms: Sequence[Term], others: Sequence[Term]) -> Rivals:
+def rivals_of(model: Model, terms: Sequence[Term], others: Sequence[Term], most: int = FEW) -> Rivals:
     """Rivals with the coefficients that a fit beside the rest of the model gives each of them.
 
     Parameters
@@ -65,15 +65,19 @@ def rivals_of(model: Model, terms: Sequence[Term], others: Sequence[Term]) -> Ri
     model : with everything that was found, for the noise
     terms : the rivals
     others : the terms of the model beside them
+    most : units that stand for the lot
     """
     units = model.problem.lot.state.time.shape[0]
-    pick = np.unique(np.linspace(0, units - 1, min(units, _FEW)).round().astype(int)).tolist()
+    pick = np.unique(np.linspace(0, units - 1, min(units, most)).round().astype(int)).tolist()
     blocks = pick if model.problem.lot.radial else [3 * u + a for u in pick for a in range(3)]
     others = [
         t for t in others if not isinstance(t.effect, Handling)
     ]  # of single units, and no step to come changes them
-    predicted = tuple(_coefficients(Model(model.problem, [t, *others], near=model.noise), t, blocks) for t in terms)
+    fitted = [Model(model.problem, [t, *others], near=model.noise) for t in terms]
+    predicted = tuple(_coefficients(m, t, blocks) for m, t in zip(fitted, terms, strict=True))
+    squares = np.array([m.at(model.noise).rss for m in fitted])
     widened_by = shared_factor(Model(model.problem, [terms[0], *others], near=model.noise), terms[0]) if terms else 1.0
+    variance = model.space.variance * widened_by
     return Rivals(
         lot=model.problem.lot.units(pick),
         weight=units / len(pick),
@@ -81,8 +85,9 @@ def rivals_of(model: Model, terms: Sequence[Term], others: Sequence[Term]) -> Ri
         terms=tuple(terms),
         predicted=predicted,
         noise=model.noise.pick(blocks),
-        variance=model.space.variance * widened_by,
+        variance=variance,
         covariance=model.problem.covariance,
+        observed=(squares[None, :] - squares[:, None]) / variance,
     )
 
 
@@ -93,49 +98,43 @@ def _coefficients(model: Model, term: Term, blocks: Sequence[int]) -> Array:
     return found.shared[:columns] if term.shared else found.local[list(blocks), :columns]
 
 
-def separations(rivals: Rivals, steps: Sequence[SequenceStep] = (), pace: StationPace | None = None) -> Array:
+@dataclass(frozen=True)
+class Apart:
+    """How far rivals lie apart.
+
+    left : (r, r), chi-square over the whole lot that the rival of a column leaves of what the rival of a row predicts
+    whole : (r,), the same that the model without any of them leaves
+    """
+
+    left: Array
+    whole: Array
+
+
+def separations(
+    rivals: Rivals, steps: Sequence[SequenceStep] = (), pace: StationPace | None = None, *, fine: bool = True
+) -> Array:
     """Chi-square (r, r) that the rival of a column leaves, fitted to what the rival of a row predicts, in the whole lot.
 
     Parameters
     ----------
     steps : taken after what was measured; none for what the measurements so far part
+    fine : whether the wrong rival's nonlinear parameters are fitted, or only the best of their grid is taken
     """
+    return apart(rivals, steps, pace, fine=fine).left
+
+
+def apart(
+    rivals: Rivals, steps: Sequence[SequenceStep] = (), pace: StationPace | None = None, *, fine: bool = True
+) -> Apart:
+    """How far rivals lie apart with steps taken after what was measured; parameters as :func:`separations`."""
     problem = widened(rivals, steps, pace) if steps else Problem(rivals.lot)
-    targets = predictions(rivals, problem)
     noise = problem.covariance.taken(rivals.noise, rivals.covariance)
-    count = len(rivals.terms)
-    left = np.zeros((count, count))
-    for column, wrong in enumerate(rivals.terms):
-        rest = with_turn_on(problem.lot.state, rivals.rest)
-        near = [left_of(Model(problem, [*rest, t]), targets, noise) for t in _neighbours(problem, wrong)]
-        left[:, column] = np.min(near, axis=0)
+    rest = Model(problem, with_turn_on(problem.lot.state, rivals.rest))
+    to_lot = rivals.weight / rivals.variance
+    profile = Profile(rest, predictions(rivals, problem), noise, AXES_DIFFER / to_lot)
+    left = np.stack([profile.left(wrong, fine=fine) for wrong in rivals.terms], axis=1)
     np.fill_diagonal(left, 0.0)
-    return left * rivals.weight / rivals.variance
-
-
-def _neighbours(problem: Problem, term: Term) -> list[Term]:
-    """A rival as it was fitted, and with each nonlinear parameter a step to both sides: it will be fitted again.
-
-    A choice that only the next measurement offers (whether ageing goes on without power) will be made as suits it best.
-    """
-    found = [term]
-    for parameter in term.effect.parameters(problem.lot.state):
-        if parameter.name not in term.keywords:
-            found += [Term(term.effect, (*term.values, (parameter.name, c)), term.first) for c in parameter.choices]
-        elif not parameter.choices:
-            values = [_moved(term.keywords[parameter.name], factor, parameter) for factor in _STEPS]
-            found += [
-                Term(term.effect, tuple({**term.keywords, parameter.name: v}.items()), term.first)
-                for v in dict.fromkeys(values)
-            ]
-    return found
-
-
-def _moved(value: float | tuple[float, ...], factor: float, parameter: Nonlinear) -> float | tuple[float, ...]:
-    """A nonlinear parameter, or that of each axis, moved within its bounds."""
-    if isinstance(value, tuple):
-        return tuple(float(np.clip(v * factor, parameter.low, parameter.high)) for v in value)
-    return float(np.clip(value * factor, parameter.low, parameter.high))
+    return Apart(left * to_lot, profile.whole * to_lot)
 
 
 def smallest(left: Array) -> Array:

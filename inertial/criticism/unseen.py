@@ -1,7 +1,6 @@
-"""Effects that a plan could not have seen, whole or for a part of the range of their nonlinear parameter."""
+"""Effects that a plan could not have seen, at all or at some values of their nonlinear parameters."""
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
@@ -9,52 +8,50 @@ from inertial.criticism.covariance import Noise
 from inertial.criticism.field import Candidates
 from inertial.criticism.model import Model, Term
 from inertial.criticism.problem import Problem
+from inertial.design import grid_of
 from inertial.effects.base import AnyEffect
+from inertial.planning.ranges import UnseenRange, unseen_ranges
+
+InPart = tuple[tuple[str, tuple[UnseenRange, ...]], ...]
 
 
-@dataclass(frozen=True)
-class UnseenRange:
-    """Values of an effect's nonlinear parameter at which the plan shows nothing of it, in the parameter's unit."""
+def unseen(field: Candidates, base: Model, candidates: Sequence[AnyEffect]) -> tuple[tuple[str, ...], InPart]:
+    """Effects that the plan could not have seen, and those that it could not have seen at some values, with these.
 
-    effect: str
-    parameter: str
-    unit: str
-    low: float
-    high: float
-
-
-def unseen(field: Candidates, base: Model, candidates: Sequence[AnyEffect]) -> tuple[str, ...]:
-    """Effects whose columns the plan leaves empty, makes one with the model's, or does not carry the quantities for."""
+    Not seen is an effect whose columns the plan leaves empty, makes equal to columns of the model, or whose quantities were not
+    recorded.
+    """
     gains = field.gains(base.at(base.problem.covariance.white_noise()), {t.effect.id for t in base.terms})
     blind = [name for name, gain in gains.items() if not gain.rank.any()]
     order = [e.id for e in candidates]
-    return tuple(sorted({*blind, *field.lacking} & set(order), key=order.index))
+    state = base.problem.lot.state
+    memories = _memories(field, base, {*blind, *(t.effect.id for t in base.terms)})
+    ranges = [
+        (e.id, unseen_ranges(e, state, memories.get(e.id, (gains[e.id].rank > 0).tolist())))
+        for e in candidates
+        if e.id in gains
+    ]
+    return tuple(sorted({*blind, *field.lacking} & set(order), key=order.index)), tuple(r for r in ranges if r[1])
 
 
-def unseen_ranges(field: Candidates, base: Model, blind: Sequence[str]) -> tuple[UnseenRange, ...]:
-    """Effects with a memory that the plan shows for a part of their range only.
+def _memories(field: Candidates, base: Model, without: set[str]) -> Mapping[str, list[bool]]:
+    """Whether each effect with a memory is visible, by its place on the grid of its parameter.
 
     Beside a memory stands its unknown state before the first dwell: a play that is narrower than the steps of soaks that only
-    climb is that state and a bias, and nothing else. One unit tells, as the plan is the same for all.
+    climb is that state and a bias, and nothing else. One unit is enough, as the plan is the same for all.
     """
     if base.problem.lot.radial:
-        return ()
-    held = {t.effect.id for t in base.terms} | set(blind)
+        return {}
     problem = Problem(base.problem.lot.units([0]))
     alone = Model(problem, [t for t in base.terms if not t.shared and "unit" not in t.keywords])
     noise = problem.covariance.white_noise()
-    found: list[UnseenRange] = []
+    visible: dict[str, list[bool]] = {}
     for effect in field.effects:
         parameters = effect.parameters(problem.lot.state)
-        if not effect.memory or effect.id in held or len(parameters) != 1 or parameters[0].choices:
+        if not effect.memory or effect.id in without or len(parameters) != 1 or parameters[0].choices:
             continue
-        name, unit = parameters[0].name, parameters[0].unit
-        values = [place[name] for place in field.grids[effect.id]]
-        shown = np.array([_shown(alone, noise, effect, place) for place in field.grids[effect.id]])
-        if shown.any() and not shown.all():
-            dark = [v for v, seen in zip(values, shown, strict=True) if not seen]
-            found.append(UnseenRange(effect.id, name, unit, float(min(dark)), float(max(dark))))
-    return tuple(found)
+        visible[effect.id] = [_shown(alone, noise, effect, place) for place in grid_of(effect, problem.lot.state)]
+    return visible
 
 
 def _shown(model: Model, noise: Noise, effect: AnyEffect, place: dict[str, float]) -> bool:
@@ -62,4 +59,4 @@ def _shown(model: Model, noise: Noise, effect: AnyEffect, place: dict[str, float
     problem = model.problem
     term = Term(effect, tuple(place.items()), 1)
     beside = model.with_curves(problem.start(effect, place))
-    return bool(beside.at(noise).gain(term.candidate(problem)).rank[0])
+    return bool(np.any(beside.at(noise).gain(term.candidate(problem)).rank[0]))

@@ -19,6 +19,9 @@ _GRAIN_S = 15.0
 _STILL_K, _LONG_S = 0.02, 120.0
 """Temperature difference below which the temperatures count as constant, K, and the time step then, s."""
 
+_STILL_RATE, _ENOUGH = 1e-3, 3
+"""Rate, K/s, below which a device counts as settled between two dwells, and how many dwells of that kind tell its own heat."""
+
 
 @dataclass(frozen=True)
 class SequenceStep:
@@ -177,7 +180,9 @@ def extended(
     middle = T_REFERENCE if last is None else float(np.mean(last))
     apart = np.zeros(batch) if last is None else last - middle
     there = pace.start or standing(state)
-    ran = timeline(steps, pace, there, middle if pace.start is None else pace.start.temperature)
+    own = _own_heat(state)
+    ran = timeline(steps, pace, there, middle - own if pace.start is None else pace.start.temperature)
+    apart = apart + own
     outer, inner = np.array([s.outer for s in steps]), np.array([s.inner for s in steps])
     scale = float(np.mean(np.linalg.norm(state.force, axis=-1)))
     force = np.broadcast_to(scale * frames.force_from_angles(outer, inner), (*wide, 3))
@@ -206,6 +211,19 @@ def extended(
         history=_history(history, begin + ran.grid, ran.grid_device + apart[..., None]),
         memory={},
     )
+
+
+def _own_heat(state: State) -> float:
+    """By how much settled devices are warmer than the air of the chamber, K; zero where that cannot be seen."""
+    if state.temperature is None or state.chamber is None or n_of(state) < _ENOUGH:
+        return 0.0
+    device, air, time = (
+        v.reshape(-1, n_of(state)).mean(axis=0) for v in (state.temperature, state.chamber, state.time)
+    )
+    passed = np.maximum(np.abs(np.diff(time)), 1e-3)
+    still = np.abs(np.diff(device)) / passed < _STILL_RATE
+    settled = np.append(still, still[-1]) & np.append(True, still)
+    return float(np.median((device - air)[settled])) if np.count_nonzero(settled) >= _ENOUGH else 0.0
 
 
 def standing(state: State) -> SequenceStep | None:

@@ -4,7 +4,7 @@ Computed before the measurement from the same columns that the fit and the diagn
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +15,7 @@ from inertial.effects import SensorEffect
 from inertial.effects.base import AnyEffect, excited
 from inertial.errors import MissingInput
 from inertial.noise.dwells import whitener
+from inertial.planning.ranges import UnseenRange, unseen_ranges
 from inertial.state import State
 
 Array = NDArray[np.float64]
@@ -40,6 +41,7 @@ class Visibility:
     size : RMS over the dwells of an effect of the floor's size, g; infinite where not visible
     alias : confounded effects; exact : those of them that are identical to rounding
     breaker : measurement that separates the effect from those it is confounded with
+    unseen_ranges : values of its nonlinear parameters at which it is not visible, where it is at others
     """
 
     effect: str
@@ -52,6 +54,7 @@ class Visibility:
     exact: tuple[str, ...] = ()
     column: int = 0
     size: float = float("inf")
+    unseen_ranges: tuple[UnseenRange, ...] = ()
 
     @property
     def variance_inflation(self) -> float:
@@ -128,6 +131,7 @@ class _Remainder:
     by_axis: tuple[float, float, float]
     columns: Array
     before: Array
+    unseen: tuple[UnseenRange, ...] = ()
 
 
 def _span(state: State, base: Sequence[str], white: Array | None = None) -> Array:
@@ -143,14 +147,16 @@ def _span(state: State, base: Sequence[str], white: Array | None = None) -> Arra
 def _remainder(effect: AnyEffect, state: State, span: Array) -> _Remainder | None:
     """Columns after the base model at the nonlinear values with the largest remainder; None where an input is missing."""
     best: _Remainder | None = None
+    seen: list[bool] = []
     try:
         for values in _values(effect, state):
             columns = _columns(effect, state, values)
             found = _measured(columns, _after(span, columns, _start(effect, state, values)))
+            seen.append(found.remaining_fraction > SEEN)
             best = found if best is None else _better(best, found)
     except MissingInput:
         return None
-    return best
+    return None if best is None else replace(best, unseen=unseen_ranges(effect, state, seen))
 
 
 def _after(span: Array, columns: Array, start: Array) -> Array:
@@ -238,6 +244,7 @@ def _visibility(
         exact,
         int(column),
         float(size[axis, column]),
+        remainder.unseen,
     )
 
 

@@ -31,8 +31,8 @@ CHARTS_SIMULATED = 6000
 IN_THE_TAIL = 0.02  # share of the simulated charts that the tail is known from
 SURELY_BELOW = 0.8
 """A chart is judged by the correlation below which that of the series lies with this probability. Simulated with 0.75, 0.85 and
-0.92 (500 series in control with ρ = 0.6; 40, 100 and 150 points): at most 1.4 % have p < 0.01. With 0.8: at most 1.0 % (10, 20 and
-40 points of the baseline)."""
+0.92 (500 series in control with ρ = 0.6; 40, 100 and 150 points): at most 1.4 % have p < 0.01. With 0.8: at most 1.0 % (10, 20
+and 40 points of the baseline)."""
 EWMA_WEIGHT, EWMA_WIDTH = 0.2, 2.962
 EWMA_RUN_LENGTH = 500.0  # of these two (Lucas and Saccucci 1990; Montgomery, table 9.11)
 

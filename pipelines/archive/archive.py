@@ -115,7 +115,9 @@ class Archive:
             return Run(self, matches[0])
         where = f"archive {self.root}"
         if matches:
-            message = f"{where}: '{name}' begins {len(matches)} runs ({', '.join(matches)}), one is needed; write more of it"
+            message = (
+                f"{where}: '{name}' begins {len(matches)} runs ({', '.join(matches)}), one is needed; write more of it"
+            )
         elif ids:
             message = f"{where}: no run is called '{name}'; {did_you_mean(name, ids)}"
         else:

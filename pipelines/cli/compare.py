@@ -44,7 +44,7 @@ def command(
     *,
     as_json: JsonOption = False,
 ) -> None:
-    """Fit a model to dwells and tell its error there, on dwells left out, and on a fresh run with the coefficients unchanged."""
+    """Fit a model to dwells; state its error there, on dwells left out, and on a fresh run with the coefficients unchanged."""
     from pipelines.cli.inputs import add_effect_files, both_runs, judged_effects
     from pipelines.diagnosis.diagnose import default_model
 
@@ -85,10 +85,11 @@ def print_comparison(document: dict[str, Any], poses: int = POSES) -> None:
     ]
     if document["fresh_rms_ug"] is not None:
         lines.append(["fresh run, coefficients unchanged", short(document["fresh_rms_ug"])])
-    lines.append(["noise as this model sees it", short(document["floor_ug"])])
+    lines.append(["noise assumed by this fit", short(document["floor_ug"])])
     print_table(["error", "rms\nµg"], lines)
     out.print(
-        "What is missing from the model counts as noise here, unlike in the floor of 'tumbleline diagnose'.",
+        "The noise assumed by the fit includes what is missing from the model; 'tumbleline diagnose' states the noise of the "
+        "measurement.",
         style="dim",
         soft_wrap=True,
     )

@@ -125,6 +125,7 @@ class _Game:
         added = self._extend(diagnosis["recommended"])
         after = self._compare("4. And with it?", first=False) if added else before
         found = {name for group in diagnosis["classes"] for name in group["effects"]}
+        several = [group["effects"] for group in diagnosis["classes"] if len(group["effects"]) > 1]
         document = {
             "hidden": {"kind": self.hidden.kind, "effect": self.hidden.effect, "physics": self.hidden.truth},
             "classes": [group["effects"] for group in diagnosis["classes"]],
@@ -132,6 +133,9 @@ class _Game:
             "unseen": diagnosis["unseen"],
             "added": added,
             "found": self.hidden.effect in found,
+            "told_apart": [self.hidden.effect] in [group["effects"] for group in diagnosis["classes"]],
+            "not_told_apart": several,
+            "next_measurements": diagnosis["next_measurements"] if several else [],
             "before": _errors(before),
             "after": _errors(after),
             "folder": str(self.folder),
@@ -156,6 +160,7 @@ class _Game:
         self._step("2. What is missing?", _command("diagnose", self.folder, self.hidden.model))
         source = str(self.folder / "dwells.parquet")
         document, report = diagnosed(self.lot.dwells, self.lot.history, self.model, source, wanted=True)
+        document["history"] = str(self.folder / "history.parquet")
         write_report(self.folder / "report.html", report)
         if not self.quiet:
             file = self.folder / "model.toml"
@@ -195,8 +200,10 @@ class _Game:
             soft_wrap=True,
         )
         named = ", ".join(" or ".join(group) for group in document["classes"]) or "nothing"
-        if document["found"]:
+        if document["told_apart"]:
             out.print(f"The diagnosis named {named}. Found.", style="bold green", markup=False, soft_wrap=True)
+        elif document["found"]:
+            self._one_of_a_class(document, named)
         elif self.hidden.effect in document["unseen"]:
             text = f"The diagnosis named {named}, and listed {self.hidden.effect} as not visible under this plan."
             out.print(text, style="bold yellow", markup=False, soft_wrap=True)
@@ -208,6 +215,32 @@ class _Game:
         ]
         print_table(["model", "residual, µg", "fresh run, µg"], lines)
         out.print(f"Everything is in {self.folder}: dwells, model.toml and report.html.", markup=False, soft_wrap=True)
+
+    def _one_of_a_class(self, document: dict[str, Any], named: str) -> None:
+        """The truth is in a class with others: what was added is one of them, and what would tell them apart."""
+        from pipelines.cli.measurements_text import measurements_table
+
+        out, hidden = console(), self.hidden.effect
+        group = next(g for g in document["not_told_apart"] if hidden in g)
+        added = [name for name in document["added"] if name in group]
+        others = ", ".join(name for name in group if name not in added)
+        what = (
+            f"what was added, {' and '.join(added)}, is one of a class" if added else "nothing of its class was added"
+        )
+        text = f"The diagnosis named {named}. Found in a class, not told apart: {what}; these data fit as well with {others}."
+        out.print(text, style="bold yellow", markup=False, soft_wrap=True)
+        rows = [row for row in document["next_measurements"] if set(row["why"].split(":")[0].split(" | ")) & set(group)]
+        if not rows:
+            out.print(
+                "No measurement that the station is known to take tells them apart for sure.",
+                markup=False,
+                soft_wrap=True,
+            )
+        elif "minutes" in rows[0]:
+            out.print("The measurement that tells them apart:", markup=False, soft_wrap=True)
+            measurements_table(rows, out)
+        else:
+            out.print(rows[0]["why"], markup=False, soft_wrap=True)
 
     def _step(self, title: str, line: str) -> None:
         if self.asks:

@@ -13,6 +13,8 @@ if TYPE_CHECKING:
 
 
 BAD_DWELL = "bad_dwell"
+HIDDEN, SHOWN = 3.0, 4
+"""Factor by which slow noise must raise the smallest size that is named for an effect to be listed, and how many are."""
 
 SMALL = 1.1
 """Errors below so many times the floor look like noise to whoever compares the two numbers."""
@@ -32,7 +34,8 @@ def print_diagnosis(document: dict[str, Any], *, source: str, model: Path | None
     _unexplained(out, document, model)
     _next_command(out, document, source, model)
     _unseen(document)
-    _unseen_ranges(document)
+    from pipelines.cli.measurements_text import measurements_table
+
     measurements_table(document["next_measurements"])
 
 
@@ -92,23 +95,23 @@ def verdict(document: dict[str, Any]) -> str:
             f"CANNOT BE JUDGED: every unit ({len(faulty)}) has a data fault; no physics is judged until it is mended."
         )
     sound = len(document["units"]) - len(faulty)
-    floor = f"the noise that is there is {short(error['floor_ug'])} µg (p {equal(error['p_value'])})"
-    left = f"{short(error['rms_ug'])} µg rms are left in {sound} unit{'s' if sound != 1 else ''}, {floor}"
+    left = f"residual {short(error['rms_ug'])} µg rms over {sound} unit{'s' if sound != 1 else ''}"
+    left += f"; noise of the measurement {short(error['floor_ug'])} µg rms (p {equal(error['p_value'])})"
     if document["adequate"]:
         return f"ADEQUATE: {left}."
     if error["rms_ug"] < SMALL * error["floor_ug"]:
-        left += "; what is wrong is small beside it, but no noise"
+        left += "; the misfit is smaller than the noise, but significant"
     spoilt = [told_of(group) for group in document["classes"] if group["scope"] == "data"]
     named = [" or ".join(group["effects"]) for group in document["classes"] if group["scope"] != "data"]
     if spoilt:
-        rest = f"; missing beside it: {', and '.join(named)}" if named else ""
+        rest = f"; also missing: {', and '.join(named)}" if named else ""
         return f"NOT ADEQUATE: {left}; the data: {'; '.join(spoilt)}{rest}."
     if named:
         return f"NOT ADEQUATE: {left}; missing: {', and '.join(named)}."
     if document["unexplained"]:
         driver = document["unexplained"]["driver"]
-        return f"NOT ADEQUATE: {left}; the rest follows {driver}, and no effect of the catalogue explains it."
-    return f"NOT ADEQUATE: {left}; nothing that was recorded explains the rest."
+        return f"NOT ADEQUATE: {left}; the residual follows {driver}, and no effect of the catalogue explains it."
+    return f"NOT ADEQUATE: {left}; nothing that was recorded explains the residual."
 
 
 def told_of(group: dict[str, Any]) -> str:
@@ -226,10 +229,13 @@ def _next_command(out: Console, document: dict[str, Any], source: str, model: Pa
         markup=False,
         soft_wrap=True,
     )
-    several = [group["effects"] for group in document["classes"] if len(group["effects"]) > 1]
+    added = set(document["recommended"])
+    several = [g["effects"] for g in document["classes"] if len(g["effects"]) > 1 and added & set(g["effects"])]
     if several:
         told = "; ".join(" or ".join(effects) for effects in several)
-        out.print(f"These data do not tell apart: {told}. What is added is one of them.", style="dim", soft_wrap=True)
+        out.print(
+            f"These data do not tell apart: {told}. What is added is one of the class.", style="dim", soft_wrap=True
+        )
 
 
 def _free_name() -> str:
@@ -245,43 +251,29 @@ def _unseen(document: dict[str, Any]) -> None:
         reasons = document.get("reasons", {})
         lines = [[name, reasons.get(name) or document["breakers"][name]] for name in document["unseen"]]
         print_table(["effect", "why, and what would show it"], lines, title="This plan could not have seen", whole=1)
+    parts: dict[str, list[str]] = {}
+    for row in document.get("unseen_in_part", ()):
+        parts.setdefault(row["effect"], []).append(row["text"])
+    if parts:
+        lines = [[name, "; ".join(texts)] for name, texts in parts.items()]
+        print_table(["effect", "not visible for"], lines, title="This plan could have seen only in part", whole=1)
+    _hidden_by_noise(document.get("smallest_named", ()))
 
 
-def _unseen_ranges(document: dict[str, Any]) -> None:
-    """Effects that the plan shows for a part of their range only."""
-    for one in document.get("unseen_ranges", ()):
-        values = f"{short(one['low'])} … {short(one['high'])} {one['unit']}"
-        text = f"{one['effect']} with {one['parameter']} in {values} could not have been seen: the plan does not undo its memory"
-        console().print(text, style="dim", markup=False, soft_wrap=True)
+def _hidden_by_noise(rows: list[dict[str, Any]]) -> None:
+    """Effects that 1/f or random walk of this size imitates, up to what size, and what would show smaller ones."""
+    from inertial import effects
 
-
-def measurements_table(proposed: list[dict[str, Any]], out: Console | None = None) -> None:
-    """Print what to measure next, step by step, with what it costs and brings.
-
-    Parameters
-    ----------
-    out : standard output where None
-    """
-    if not proposed:
-        return
-    lines = [
-        [
-            short(p["outer_deg"]),
-            short(p["inner_deg"]),
-            short(p["chamber_C"]) + ("" if p.get("soaked", True) else " (on the way)"),
-            short(p.get("wait_s")) + (f" after {short(p['off_s'] / 60.0)} min off" if p.get("off_s") else ""),
-            str(p.get("repeats", 1)),
-            p["why"],
+    raised = [row for row in rows if row["size_ug"] > HIDDEN * row["without_slow_noise_ug"]][:SHOWN]
+    if raised:
+        lines = [
+            [
+                r["effect"],
+                short(r["size_ug"], 2),
+                short(r["without_slow_noise_ug"], 2),
+                effects.get(r["effect"]).breaker,
+            ]
+            for r in raised
         ]
-        for p in proposed
-    ]
-    title = "Measure next, in this order"
-    print_table(
-        ["outer\n°", "inner\n°", "chamber\n°C", "wait\ns", "times", "decides between"], lines, title=title, out=out
-    )
-    for row in {p["why"]: p for p in proposed if "minutes" in p}.values():
-        text = (
-            f"{row['why']}: {short(row['minutes'])} min of station time; χ² between the best and its nearest rival "
-            f"{row['separation_before']:.1f} now, {row['separation_after']:.0f} expected then"
-        )
-        (out or console()).print(text, style="dim", markup=False, soft_wrap=True)
+        columns = ["effect", "named from\nµg rms", "with white noise only\nµg rms", "what would show less"]
+        print_table(columns, lines, title="Slow noise (1/f, random walk) imitates these effects", whole=1)

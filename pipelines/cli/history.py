@@ -1,4 +1,4 @@
-"""``tumbleline history``: the error of a model, version by version, beside the floor."""
+"""``tumbleline history``: the error of a model, version by version, beside the noise that its fit assumes."""
 
 from __future__ import annotations
 
@@ -100,7 +100,7 @@ def _print(rows: list[dict[str, Any]], name: str) -> None:
         "fitted_ug": "fitted\nµg",
         "heldout_ug": "left out\nµg",
         "fresh_ug": "fresh run\nµg",
-        "floor_ug": "floor\nµg",
+        "floor_ug": "noise assumed\nµg",
     }
     errors = [[str(row["version"]), *(short(row[key]) for key in keys), row["text"]] for row in rows]
     print_table(
@@ -111,7 +111,7 @@ def _print(rows: list[dict[str, Any]], name: str) -> None:
     )
     out.print(
         "left out: the worst of poses, soaks and stretches of time · fresh run: coefficients unchanged, each unit's "
-        "bias of that day in it · floor: the noise as each version sees it",
+        "bias of that day in it · noise assumed: by the fit of each version, with what is missing from it",
         style="dim",
         soft_wrap=True,
     )

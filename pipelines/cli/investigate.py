@@ -130,7 +130,7 @@ def _approval(
 
 def _question(inquiry: Inquiry, follow_up: FollowUp) -> Consent:
     """The answer at the terminal to a proposed follow-up."""
-    from pipelines.cli.diagnosis_text import measurements_table
+    from pipelines.cli.measurements_text import measurements_table
     from pipelines.cli.terminal import agreed
 
     out = error_console()
@@ -185,7 +185,8 @@ def _continue_command() -> str:
 
 def print_inquiry(document: dict[str, Any]) -> None:
     """Print an inquiry."""
-    from pipelines.cli.diagnosis_text import measurements_table, print_findings, verdict
+    from pipelines.cli.diagnosis_text import print_findings, verdict
+    from pipelines.cli.measurements_text import measurements_table
 
     out = console()
     good = document["ended"] in {"adequate", "told_apart"}

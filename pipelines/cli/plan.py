@@ -31,6 +31,9 @@ PART = "Measure"
 ORDER = 120
 SUMMARY = "Show what a recipe can and cannot determine, before anything is measured."
 
+RAISED = 3.0
+"""Factor by which 1/f and random walk must raise a floor to be listed."""
+
 RECIPE = "recipe"
 MICRO = 1e-6
 
@@ -339,6 +342,17 @@ def _print(document: dict[str, Any]) -> None:
         "contribution to a dwell (3σ, RMS), and its coefficient; =: identical under this plan",
         style="dim",
     )
+    raised = [r for r in seen if r["floor_white_ug"] and r["floor_size_ug"] > RAISED * r["floor_white_ug"]]
+    if raised:
+        raised.sort(key=lambda r: -r["floor_size_ug"] / r["floor_white_ug"])
+        lines = [[r["effect"], short(r["floor_size_ug"]), short(r["floor_white_ug"]), r["breaker"]] for r in raised[:5]]
+        heads = ["raised by slow noise", "floor\nµg", "white only\nµg", "what lowers it"]
+        print_table(heads, lines)
+    in_part = [
+        [row["effect"], "; ".join(r["text"] for r in row["unseen_ranges"])] for row in seen if row["unseen_ranges"]
+    ]
+    if in_part:
+        print_table(["effect visible in part", "not visible for"], in_part)
     invisible = [row for row in document["effects"] if not row["seen"]]
     print_table(
         ["effect not visible", "reason; what to add"], [[r["effect"], r["why"] or r["breaker"]] for r in invisible]

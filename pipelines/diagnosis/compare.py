@@ -103,19 +103,32 @@ def _compared(
         lesser = Model(problem, terms_of(catalogue.get_all(list(before)), problem))
         lot = None if again is None else lot_of(again, like=found, square=square)
         answer["progress"] = progress(lesser, model, out, lot)
+        if again is not None and _remember(again, [t for t in model.terms if t.effect.id not in set(before)]):
+            answer["progress"]["confirmed"] = None  # what it predicts there cannot be computed
+    if again is not None:
+        answer["warnings"] += [
+            f"{name} depends on the temperature between the dwells, and no history of the fresh run was given: what it predicts "
+            "there is of little worth; give --fresh-history FILE"
+            for name in _remember(again, model.terms)
+        ]
     return answer
 
 
 def without_history(found: Measured, terms: Sequence[Term]) -> list[str]:
     """A sentence for every effect that remembers the temperature between the dwells where no history of it was given."""
+    return [
+        f"{name} depends on the temperature between the dwells, and no history was given: its size is of little worth; "
+        "give --history FILE"
+        for name in _remember(found, terms)
+    ]
+
+
+def _remember(found: Measured, terms: Sequence[Term]) -> list[str]:
+    """The effects that remember the temperature between the dwells; none where a history of it was given."""
     if found.state.temperature is None or found.state.history is not None:
         return []
-    return [
-        f"{t.effect.id} depends on the temperature between the dwells, and no history was given: its size is of little worth; "
-        "give --history FILE"
-        for t in terms
-        if not isinstance(t.effect, Handling) and t.effect.memory and "temperature" in drivers_of(found.state, t.effect)
-    ]
+    own = [t.effect for t in terms if not isinstance(t.effect, Handling)]
+    return [e.id for e in own if e.memory and "temperature" in drivers_of(found.state, e)]
 
 
 def _station(fitted: Estimate) -> list[dict[str, Any]]:

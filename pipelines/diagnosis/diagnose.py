@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -19,10 +18,12 @@ from pipelines.diagnosis.next_measurement import proposed
 from pipelines.diagnosis.result_rows import (
     Names,
     classes_of,
+    in_part_of,
     influence_of,
     noise_of,
     probability,
     removed_of,
+    smallest_of,
     without_influence,
 )
 from pipelines.tables.dwells import Measured, lot_of, measured
@@ -115,7 +116,8 @@ def document(
             "recommended": [],
             "unexplained": None,
             "unseen": [],
-            "unseen_ranges": [],
+            "unseen_in_part": [],
+            "smallest_named": [],
             "next_measurements": [],
         }
     faulty = {f.unit for f in faults}
@@ -150,7 +152,8 @@ def document(
             "p_value": probability(diagnosis.unexplained.log_p),
         },
         "unseen": list(diagnosis.unseen),
-        "unseen_ranges": [asdict(one) for one in diagnosis.unseen_ranges],
+        "unseen_in_part": in_part_of(diagnosis),
+        "smallest_named": smallest_of(diagnosis),
         "next_measurements": (proposed(diagnosis) if following is None else following).rows(),
     }
 

@@ -117,18 +117,36 @@ class NextMeasurement(TypedDict):
     off_s: NotRequired[Annotated[float, "time with the devices switched off before the step, s"]]
     repeats: NotRequired[Annotated[int, "dwells in a row"]]
     minutes: NotRequired[Annotated[float, "station time of all rows with the same `why`"]]
-    separation_before: NotRequired[Annotated[float, "χ² between the best effect and its nearest rival so far"]]
-    separation_after: NotRequired[Annotated[float, "the same with these rows measured"]]
+    separation_before: NotRequired[Annotated[float, "χ² so far between the two effects of `why`"]]
+    separation_after: NotRequired[
+        Annotated[float, "χ² expected with these rows measured, whichever of the two is true"]
+    ]
+    separation_if: NotRequired[Annotated[dict[str, float], "the same by which of the two is true"]]
+    not_parted: NotRequired[Annotated[list[str], "effects of the class that these rows do not tell from the best"]]
+    measurable: NotRequired[Annotated[bool, "false: no steps; `why` says what is needed"]]
 
 
-class UnseenRangeDocument(TypedDict):
-    """A part of an effect's range that this plan could not have seen."""
+UnseenInPart = TypedDict(
+    "UnseenInPart",
+    {
+        "effect": str,
+        "parameter": str,
+        "unit": str,
+        "from": Annotated[float, "lowest value at which the plan cannot see the effect"],
+        "to": float,
+        "text": Annotated[str, "the range in words"],
+        "breaker": Annotated[str, "a measurement that would show it"],
+    },
+)
+"""Values of a parameter at which this plan could not have seen an effect that it sees at others."""
+
+
+class SmallestNamed(TypedDict):
+    """The size from which an effect would have been named, RMS over the dwells."""
 
     effect: str
-    parameter: str
-    unit: str
-    low: float
-    high: float
+    size_ug: Annotated[float, "beside the noise of this measurement, µg"]
+    without_slow_noise_ug: Annotated[float, "beside its white part alone, µg"]
 
 
 class SuggestedFormula(TypedDict):
@@ -152,9 +170,8 @@ class DiagnosisDocument(TypedDict):
     recommended: Annotated[list[str], "one effect per class; empty if the model is adequate or the cause unknown"]
     unexplained: UnexplainedExcess | None
     unseen: Annotated[list[str], "effects that this plan could not have seen"]
-    unseen_ranges: NotRequired[
-        Annotated[list[UnseenRangeDocument], "effects that this plan shows only outside this range of a parameter"]
-    ]
+    unseen_in_part: list[UnseenInPart]
+    smallest_named: Annotated[list[SmallestNamed], "most hidden by slow noise first"]
     next_measurements: list[NextMeasurement]
     influence: Annotated[list[InfluentialDwell], "largest share first"]
     without_influence: NotRequired[WithoutInfluence | None]

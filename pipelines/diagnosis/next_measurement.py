@@ -7,28 +7,33 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from inertial.criticism.proposals import Circumstances, Proposal, proposal, sighting
+from inertial import effects as catalogue
+from inertial.criticism.proposals import Circumstances, Proposal, proposal, sighting, twins
 from inertial.errors import MissingInput
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from inertial.criticism.classes import EffectClass
     from inertial.criticism.diagnosis import Diagnosis
     from inertial.planning.sequences import SequenceStep
 
 BREAKER_POSE = (0.0, 0.0, 25.0)
-"""Where a row says a breaker in words: any pose is as good, the words count."""
+"""Pose in a row that says in words what is needed (``measurable`` is false there): the words count."""
 
 
 @dataclass(frozen=True)
 class Proposed:
     """What to measure next, in order: for every class of more than one effect what parts it, then what shows the unseen.
 
-    parting : classes, each with None where no steps of the station part it
+    parting : classes, each with None where no steps of the station part it for sure
+    twins : per class, the members that no measurement of the station parts from its best one, and that one
     showing : None where nothing that was not seen matters, or the station cannot show it
     """
 
     parting: tuple[tuple[EffectClass, Proposal | None], ...] = ()
     showing: Proposal | None = None
+    twins: tuple[tuple[str, ...], ...] = ()
 
     @property
     def found(self) -> tuple[Proposal, ...]:
@@ -38,8 +43,10 @@ class Proposed:
     def rows(self) -> list[dict[str, Any]]:
         """All of it as rows, in the order in which it is to be measured."""
         rows: list[dict[str, Any]] = []
-        for group, wanted in self.parting:
-            rows += [_breaker(group)] if wanted is None else rows_of(wanted)
+        twins = [*self.twins, *[()] * (len(self.parting) - len(self.twins))]
+        for (group, wanted), alike in zip(self.parting, twins, strict=True):
+            rows += rows_of(wanted) if wanted is not None else [] if alike else [_breaker(group)]
+            rows += [_no_measurement(alike)] if alike else []
         return rows if self.showing is None else [*rows, *rows_of(self.showing)]
 
 
@@ -52,6 +59,7 @@ def proposed(diagnosis: Diagnosis, around: Circumstances | None = None) -> Propo
     """
     parting: list[tuple[EffectClass, Proposal | None]] = []
     already: list[SequenceStep] = []
+    twin: list[tuple[str, ...]] = []
     for named in (*diagnosis.handled, *diagnosis.named):
         if len(named.effects.members) > 1:
             # what handling did is not parted from physics by more poses, but by what its own words say
@@ -59,7 +67,15 @@ def proposed(diagnosis: Diagnosis, around: Circumstances | None = None) -> Propo
             wanted = None if handled else _parted(diagnosis, named.effects, around, already)
             already += wanted.steps if wanted is not None else ()
             parting.append((named.effects, wanted))
-    return Proposed(tuple(parting), sighting(diagnosis.final, diagnosis.unseen, around, already))
+            twin.append(() if handled else _twins(diagnosis, named.effects, around))
+    return Proposed(tuple(parting), sighting(diagnosis.final, diagnosis.unseen, around, already), tuple(twin))
+
+
+def _twins(diagnosis: Diagnosis, group: EffectClass, around: Circumstances | None) -> tuple[str, ...]:
+    try:
+        return twins(diagnosis.final, group, around)
+    except MissingInput:
+        return ()
 
 
 def _parted(
@@ -76,8 +92,17 @@ def _breaker(group: EffectClass) -> dict[str, Any]:
     ordered = sorted(group.members[:2], key=lambda m: m.term.effect.scope == "data")
     first, second = (m.term.effect for m in ordered)
     outer, inner, temperature = BREAKER_POSE
-    why = f"{first.id} | {second.id}: {second.breaker}"
-    return {"outer_deg": outer, "inner_deg": inner, "chamber_C": temperature, "why": why}
+    steps = "" if group.of_data else "no steps that the station is known to take part them for sure; needed: "
+    why = f"{first.id} | {second.id}: {steps}{second.breaker}"
+    return {"outer_deg": outer, "inner_deg": inner, "chamber_C": temperature, "why": why, "measurable": False}
+
+
+def _no_measurement(alike: Sequence[str]) -> dict[str, Any]:
+    """What would part effects that do the same under every step of the station, in words."""
+    outer, inner, temperature = BREAKER_POSE
+    cures = dict.fromkeys(catalogue.get(name).breaker for name in alike)
+    why = f"{' | '.join(alike)}: no measurement of this station parts them; needed: {'; '.join(cures)}"
+    return {"outer_deg": outer, "inner_deg": inner, "chamber_C": temperature, "why": why, "measurable": False}
 
 
 def rows_of(found: Proposal) -> list[dict[str, Any]]:
@@ -104,6 +129,8 @@ def rows_of(found: Proposal) -> list[dict[str, Any]]:
         "minutes": round(found.minutes, 1),
         "separation_before": round(found.before, 2),
         "separation_after": round(found.after, 2),
+        **({"separation_if": {name: round(chi, 2) for name, chi in found.if_true}} if found.if_true else {}),
+        **({"not_parted": list(found.remaining)} if found.remaining else {}),
     }
     return [{**row, **whole} for row in rows]
 

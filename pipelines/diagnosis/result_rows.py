@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from inertial import effects as catalogue
 from schemas.units import MICRO
 
 if TYPE_CHECKING:
@@ -86,6 +87,31 @@ def _bad_dwell(diagnosis: Diagnosis, found: BadDwell, names: Names) -> dict[str,
         "without_influence": {"dwells": 1, "p_value": 1.0},
         "evidence": f"{MICRO * size:.0f} µg off, {found.deviations:.1f} standard deviations; the dwell is left out",
     }
+
+
+def in_part_of(diagnosis: Diagnosis) -> list[dict[str, Any]]:
+    """Effects that the plan cannot see at some values of their nonlinear parameters, one row a range."""
+    return [
+        {
+            "effect": name,
+            "parameter": r.parameter,
+            "unit": r.unit,
+            "from": r.low,
+            "to": r.high,
+            "text": str(r),
+            "breaker": catalogue.get(name).breaker,
+        }
+        for name, ranges in diagnosis.unseen_in_part
+        for r in ranges
+    ]
+
+
+def smallest_of(diagnosis: Diagnosis) -> list[dict[str, Any]]:
+    """Sizes from which effects would have been named, those first that slow noise hides most."""
+    return [
+        {"effect": s.effect, "size_ug": MICRO * s.size, "without_slow_noise_ug": MICRO * s.without_slow}
+        for s in diagnosis.smallest
+    ]
 
 
 def influence_of(diagnosis: Diagnosis, names: Names) -> list[dict[str, Any]]:

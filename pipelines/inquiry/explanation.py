@@ -43,7 +43,7 @@ def why(state: State, base: Sequence[str], proposal: Proposal) -> str:
     first, second = proposal.pair
     rivals = " and ".join([", ".join(proposal.ids[:-1]), proposal.ids[-1]])
     hidden = _hidden(state, base, proposal.kinds, first, second)
-    gain = f"χ² between {first} and its nearest rival rises from {proposal.before:.1f} to {proposal.after:.0f}"
+    gain = f"χ² between {first} and {second} is expected to rise from {proposal.before:.1f} to {proposal.after:.0f}"
     steps = f"{what(state, proposal)} discriminates between them"
     return f"{rivals} fit equally well: {hidden}. {steps} ({gain}; {proposal.minutes:.1f} min)"
 

@@ -43,6 +43,12 @@ class PlannedCoefficient(TypedDict):
     unit: str
 
 
+UnseenRange = TypedDict(
+    "UnseenRange",
+    {"parameter": str, "unit": str, "from": float, "to": float, "text": Annotated[str, "the same in words"]},
+)
+
+
 class PlannedEffect(TypedDict):
     """What the plan can see of one effect of the catalogue."""
 
@@ -56,10 +62,14 @@ class PlannedEffect(TypedDict):
     left_by_axis: NotRequired[list[float]]
     floor_unit: NotRequired[str | None]
     floor_size_ug: NotRequired[Annotated[float | None, "the same as a specific force, µg"]]
+    floor_white_ug: NotRequired[
+        Annotated[float | None, "`floor_size_ug` with white noise only, without 1/f and random walk"]
+    ]
     typical_ug: NotRequired[Annotated[list[float], "usual size, from and to, µg"]]
     faint: NotRequired[Annotated[bool, "whether its usual size is below the smallest detected one"]]
     alias_exact: NotRequired[list[str]]
     why: NotRequired[Annotated[str, "what hides it; empty if it is seen"]]
+    unseen_ranges: NotRequired[Annotated[list[UnseenRange], "values of its parameters at which it is not seen"]]
 
 
 class PlannedBias(TypedDict):

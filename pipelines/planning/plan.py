@@ -73,6 +73,8 @@ def plan(context: PlanContext) -> dict[str, Any]:
     recipe, noise = context.recipe, context.noise
     expected = identified(replace(context, covariance=_of_record(context)))
     found = visibilities(context.state, recipe.effects, noise.error(recipe.dwell_s), covariance=context.covariance)
+    fast = visibilities(context.state, recipe.effects, noise.white(recipe.dwell_s), [s.effect for s in found if s.seen])
+    alone = {s.effect: MICRO * s.size for s in fast if np.isfinite(s.size)}
     white, wander, together = (MICRO * f(recipe.dwell_s) for f in (noise.white, noise.wander, noise.error))
     return {
         "recipe": recipe.name,
@@ -87,7 +89,7 @@ def plan(context: PlanContext) -> dict[str, Any]:
         "minutes": spent(context.activities).document(),
         "coefficients": _coefficient_rows(expected),
         "bias": _bias(context, expected),
-        "effects": [_row(s, context.state, recipe.effects) for s in found],
+        "effects": [_row(s, context.state, recipe.effects) | {"floor_white_ug": alone.get(s.effect)} for s in found],
     }
 
 
@@ -204,5 +206,9 @@ def _row(visibility: Visibility, state: State, model: Sequence[str]) -> dict[str
         "alias": list(visibility.alias),
         "alias_exact": list(visibility.exact),
         "breaker": visibility.breaker,
+        "unseen_ranges": [
+            {"parameter": r.parameter, "unit": r.unit, "from": r.low, "to": r.high, "text": str(r)}
+            for r in visibility.unseen_ranges
+        ],
         "why": "" if visibility.seen else reason(state, visibility.effect, model),
     }

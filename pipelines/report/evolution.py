@@ -56,7 +56,7 @@ def draw(place: Axes, rows: list[dict[str, Any]]) -> None:
                 markersize=6,
             )
     floor = rows[-1]["floor_ug"]
-    place.axhline(floor, color=FLOOR, linestyle="--", linewidth=1.4, label="noise as the last model sees it")
+    place.axhline(floor, color=FLOOR, linestyle="--", linewidth=1.4, label="noise assumed by the last fit")
     top = max(row[key] for row in rows for key, *_ in LINES if row[key] is not None)
     for k, row in enumerate(rows):
         if row["confirmed"] is False:

@@ -168,3 +168,12 @@ def test_plan_of_a_recipe_with_the_lines_model_asks_the_archive_for_it(faces, tm
     assert document["model"] == ["bias", "scale", "misalignment", "own_square"]
     other = CliRunner().invoke(app, ["plan", str(faces), "--effects", "bias,scale,misalignment", "--json"])
     assert json.loads(other.stdout)["model"] == ["bias", "scale", "misalignment"]
+
+
+def test_effects_that_slow_noise_hides_are_listed_with_what_shows_them():
+    done = CliRunner().invoke(app, ["plan", "--noise", "2", "--wander", "40"])
+    assert done.exit_code == 0
+    listed = done.stdout.split("raised by slow noise", 1)[1].split("effect visible in part", 1)[0]
+    assert re.search(r"step_change|warm_up|bias_temperature_quadratic|creep_after_move", listed)
+    done = CliRunner().invoke(app, ["plan", "--noise", "2", "--wander", "0"])
+    assert "raised by slow noise" not in done.stdout

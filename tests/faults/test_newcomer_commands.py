@@ -77,4 +77,4 @@ def test_an_error_below_the_noise_that_is_no_noise_is_said_to_be_small(rms, told
     document = {"adequate": False, "error": error, "blocked_by": [], "units": ["U1"], "unexplained": None}
     said = verdict({**document, "classes": [{"effects": ["scale_temperature_quadratic"], "scope": "sensor"}]})
     assert said.startswith("NOT ADEQUATE")
-    assert ("small beside it" in said) == told_so
+    assert ("the misfit is smaller than the noise" in said) == told_so

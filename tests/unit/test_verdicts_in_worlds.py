@@ -43,9 +43,9 @@ def test_a_random_walk_is_no_physics():
     assert names(document) == []
     assert document["error"]["walk_share"] > 100.0
     # soaks that only climb hide any hysteresis that is narrower than their steps
-    (dark,) = (row for row in document["unseen_ranges"] if row["effect"] == "thermal_hysteresis")
-    assert (dark["parameter"], dark["low"]) == ("half_width", pytest.approx(1.0))
-    assert 15.0 < dark["high"] < 35.0
+    (dark,) = (row for row in document["unseen_in_part"] if row["effect"] == "thermal_hysteresis")
+    assert (dark["parameter"], dark["from"]) == ("half_width", pytest.approx(1.0))
+    assert 15.0 < dark["to"] < 35.0
 
 
 @pytest.mark.slow

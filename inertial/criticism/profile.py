@@ -1,0 +1,166 @@
+"""What a wrong effect leaves of a true one when its nonlinear parameters are fitted again: the least over all their values.
+
+Every value of the grid is tried, and values near the best, for each truth by itself; each sensor axis may have its own where
+that takes off as much as the search asks of it (:data:`inertial.criticism.decisions.AXES_DIFFER`).
+"""
+
+from collections.abc import Sequence
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from inertial.criticism.covariance import Noise
+from inertial.criticism.decisions import AXES_DIFFER
+from inertial.criticism.handling.base import Handling
+from inertial.criticism.model import Model, Term
+from inertial.criticism.problem import Values
+from inertial.criticism.refinement import around, cell, on_scale
+from inertial.criticism.space import Candidate
+from inertial.design import grid_of
+from inertial.effects.base import Nonlinear
+
+Array = NDArray[np.float64]
+
+_JITTER = 1e-8
+"""Part of a column, squared, below which a direction is rounding, as in the fits."""
+
+_ROUNDS = 3
+_AXES = 3
+
+
+class Profile:
+    """Truths that a model does not have, and how much of them a wrong effect beside it cannot take up.
+
+    Parameters
+    ----------
+    rest : the model without the rivals
+    targets : (blocks, n, r), what each truth adds to the series, g
+    noise : that everything is whitened for
+    by_axis : least reduction, in whitened squares, for which each axis has its own values; infinite for never
+    """
+
+    def __init__(self, rest: Model, targets: Array, noise: Noise, by_axis: float = AXES_DIFFER) -> None:
+        self.problem, self.noise, self.by_axis = rest.problem, noise, by_axis
+        self.space = rest.at(noise)
+        self.targets = self.space.project(self.space.whiten(targets))
+        shared = self.space.targets[..., 1:]
+        size = np.sqrt(np.einsum("bnq,bnq->q", shared, shared))
+        self.shared = shared / np.where(size > 0.0, size, 1.0)
+
+    @cached_property
+    def whole(self) -> Array:
+        """Whitened sum of squares (r,) that the model without any rival leaves of each truth."""
+        flat = self.targets.reshape(-1, self.targets.shape[-1])
+        return _after(self.shared.reshape(flat.shape[0], -1), flat)
+
+    def left(self, wrong: Term, *, fine: bool) -> Array:
+        """Whitened sum of squares (r,) that the model with a wrong effect leaves of each truth.
+
+        Parameters
+        ----------
+        fine : whether values between those of the grid are tried, too
+        """
+        if isinstance(wrong.effect, Handling):
+            raise TypeError(f"{wrong.effect.id}: what handling did has no parameters to fit again")
+        state = self.problem.lot.state
+        grid: list[Values] = [dict(v) for v in grid_of(wrong.effect, state)]
+        parameters = [p for p in wrong.effect.parameters(state) if not p.choices]
+        if wrong.values:
+            grid += [{**grid[0], **wrong.keywords}]
+        total, axes = self._over(wrong, grid)
+        best = [grid[int(k)] for k in np.argmin(total, axis=0)]
+        least = total.min(axis=0)
+        own = None if axes is None else [[grid[int(k)] for k in np.argmin(a, axis=0)] for a in axes]
+        least_own = None if axes is None else axes.min(axis=1)
+        if fine and parameters:
+            best, least = self._finer(wrong, parameters, best, least, None)
+            if own is not None and least_own is not None:
+                for axis in range(_AXES):
+                    own[axis], least_own[axis] = self._finer(wrong, parameters, own[axis], least_own[axis], axis)
+        if least_own is None or not parameters:
+            return least
+        apart = least_own.sum(axis=0)
+        return np.where(least - apart > self.by_axis, apart, least)
+
+    def _finer(
+        self, wrong: Term, parameters: Sequence[Nonlinear], best: list[Values], least: Array, axis: int | None
+    ) -> tuple[list[Values], Array]:
+        """The best values of each truth moved between those of the grid, one parameter after the other."""
+        best, least = list(best), least.copy()
+        truths = range(len(best))
+        for parameter in parameters:
+            width = cell(parameter)
+            for _ in range(_ROUNDS):
+                tried = [
+                    {**best[r], parameter.name: float(v)}
+                    for r in truths
+                    for v in around(parameter, on_scale(parameter, _value(best[r], parameter, axis)), width)
+                ]
+                total, axes = self._over(wrong, tried)
+                found = total if axis is None or axes is None else axes[axis]
+                count = len(tried) // len(best)
+                for r in truths:
+                    place = r * count + int(np.argmin(found[r * count : (r + 1) * count, r]))
+                    if found[place, r] < least[r]:
+                        best[r], least[r] = tried[place], found[place, r]
+                width *= 0.4
+        return best, least
+
+    def _over(self, wrong: Term, grid: Sequence[Values]) -> tuple[Array, Array | None]:
+        """What is left (g, r) at each set of values, and by sensor axis (3, g, r) where blocks have their own coefficients."""
+        columns = np.stack([self._columns(wrong, values) for values in grid], axis=2)
+        white = Candidate(columns, wrong.shared).whitened(self.problem.covariance, self.noise)
+        blocks, n, g, p = white.shape
+        size = np.sqrt(np.einsum("bngp,bngp->bgp", white, white))
+        left = self.space.project(white.reshape(blocks, n, g * p)).reshape(blocks, n, g, p)
+        if wrong.shared:
+            size = np.sqrt(np.sum(size**2, axis=0))
+            left = left / np.where(size > 0.0, size, 1.0)
+            flat = self.targets.reshape(blocks * n, -1)
+            shared = self.shared.reshape(blocks * n, -1)
+            found = [
+                _after(np.concatenate([shared, left[:, :, k].reshape(blocks * n, p)], axis=1), flat) for k in range(g)
+            ]
+            return np.array(found), None
+        left = left / np.where(size > 0.0, size, 1.0)[:, None]
+        return self._local(left)
+
+    def _local(self, left: Array) -> tuple[Array, Array | None]:
+        """The same for columns (blocks, n, g, p) with coefficients by block."""
+        both = np.concatenate([self.targets, self.shared], axis=-1)
+        r = self.targets.shape[-1]
+        gram = np.einsum("bngp,bngs->bgps", left, left, optimize=True)
+        inside = np.einsum("bngp,bnt->bgpt", left, both, optimize=True)
+        values, vectors = np.linalg.eigh(gram)
+        scale = np.where(values > _JITTER, 1.0 / np.sqrt(np.where(values > _JITTER, values, 1.0)), 0.0)
+        along = np.einsum("bgps,bgpt->bgst", vectors, inside, optimize=True) * scale[..., None]
+        if not self.shared.shape[-1]:
+            own = np.einsum("bnt,bnt->bt", both, both)[:, None, :] - np.sum(along**2, axis=2)
+            own = np.maximum(own, 0.0)
+            radial = self.problem.lot.radial
+            axes = None if radial else np.stack([own[a::3].sum(axis=0) for a in range(_AXES)])
+            return own.sum(axis=0), axes
+        whole = np.einsum("bnt,bns->ts", both, both) - np.einsum("bgpt,bgps->gts", along, along, optimize=True)
+        inner = np.linalg.pinv(whole[:, r:, r:], rcond=_JITTER, hermitian=True)
+        taken = np.einsum("gtq,gqs,gts->gt", whole[:, :r, r:], inner, whole[:, :r, r:], optimize=True)
+        return np.maximum(np.einsum("gtt->gt", whole[:, :r, :r]) - taken, 0.0), None
+
+    def _columns(self, wrong: Term, values: Values) -> Array:
+        """Columns of an effect and of the unknown state of its memory, (blocks, n, p)."""
+        own = self.problem.columns(wrong.effect, values)[..., : wrong.first]
+        return np.concatenate([own, self.problem.start(wrong.effect, values)], axis=-1)
+
+
+def _value(values: Values, parameter: Nonlinear, axis: int | None) -> float:
+    found = values[parameter.name]
+    if isinstance(found, tuple):
+        return float(np.mean(found)) if axis is None else found[axis]
+    return found
+
+
+def _after(columns: Array, targets: Array) -> Array:
+    """Sums of squares (r,) of targets (m, r) after columns (m, p)."""
+    if columns.shape[1]:
+        targets = targets - columns @ np.linalg.lstsq(columns, targets, rcond=1e-6)[0]
+    return np.sum(targets**2, axis=0)

@@ -1,0 +1,87 @@
+"""The smallest size of each effect that a measurement would have named, beside its own noise and without the slow part of it.
+
+The slow part, 1/f and random walk, is found from the same dwells: what it takes up, an effect of the same shape could be. So a
+model that is adequate beside such noise is adequate for what is larger than these sizes, and no more.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import stats
+
+from inertial.criticism.covariance import Noise, Shares
+from inertial.criticism.decisions import MATERIAL, NAMED_BELOW
+from inertial.criticism.field import Candidates
+from inertial.criticism.model import Model
+from inertial.criticism.penalty import price
+from inertial.criticism.space import SEEN, Space
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Smallest:
+    """The size of an effect, g rms over the dwells, that would be named; without slow noise likewise."""
+
+    effect: str
+    size: float
+    without_slow: float
+
+
+def smallest_named(field: Candidates, model: Model) -> list[Smallest]:
+    """The smallest sizes of the effects that the plan sees, those first that slow noise hides most.
+
+    Of an effect with nonlinear parameters the median over the values at which the plan sees it.
+    """
+    noise = model.noise
+    spaces = model.at(noise), model.at(Noise(Shares(), noise.scale, noise.prior))
+    least = MATERIAL * model.floor()
+    held = {t.effect.id for t in model.terms}
+    found: list[Smallest] = []
+    for name in (e.id for e in field.effects if e.id not in held):
+        sizes = _sizes(field, model, spaces, name, least)
+        sizes = sizes[:, np.isfinite(sizes).all(axis=0) & (sizes > 0.0).all(axis=0)]
+        if sizes.size:
+            found.append(Smallest(name, *np.median(sizes, axis=1).tolist()))
+    return sorted(found, key=lambda s: -s.size / s.without_slow)
+
+
+def _sizes(field: Candidates, model: Model, spaces: tuple[Space, Space], name: str, least: float) -> Array:
+    """RMS, g, of the effect's clearest column that would be named in the mean, (2, grid): in each space; infinite where unseen.
+
+    Parameters
+    ----------
+    spaces : with the noise that was found, and with its white part alone
+    least : RMS, g, of what the model cannot absorb of an effect below which it is not named however clear it is
+    """
+    problem, effect = model.problem, field.of(name)
+    there = problem.covariance.there[:, :, None, None]
+    values: list[Array] = []
+    for piece in problem.pieces(effect, field.grids[name]):
+        raw = np.sqrt(np.einsum("bngp,bngp->gp", piece.columns * there, piece.columns * there) / problem.count)
+        blocks, n, grid, p = piece.columns.shape
+        coefficients = float(p if piece.shared else blocks * p) + len(field.grids[name][0]) * (
+            len(field.grids[name]) > 1
+        )
+        needed = _needed(coefficients, field.looks, problem.count)
+        each: list[Array] = []
+        share = np.ones((grid, p))
+        for space in spaces:
+            white = piece.whitened(problem.covariance, space.noise)
+            left = space.project(white.reshape(blocks, n, grid * p)).reshape(blocks, n, grid, p)
+            seen, whole = np.einsum("bngp,bngp->gp", left, left), np.einsum("bngp,bngp->gp", white, white)
+            visible = seen > SEEN**2 * whole
+            share = np.where(visible, seen / np.where(visible, whole, 1.0), 0.0)
+            each.append(np.where(visible, raw * np.sqrt(needed / np.where(visible, seen, 1.0)), np.inf))
+        material = least / np.sqrt(np.where(share > 0.0, share, 1.0))
+        values.append(np.stack([np.min(np.maximum(each[0], material), axis=1), np.min(each[1], axis=1)]))
+    return np.concatenate(values, axis=1)
+
+
+def _needed(coefficients: float, looks: int, count: int) -> float:
+    """Noncentrality from which an effect of so many coefficients is named in the mean: it pays, and chance does not do it."""
+    deviance = max(float(stats.chi2.isf(NAMED_BELOW / max(looks, 1), coefficients)), coefficients)
+    while deviance - price(deviance, coefficients) < np.log(max(count, 2)):
+        deviance *= 1.02
+    return max(deviance - coefficients, 1.0)

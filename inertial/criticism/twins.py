@@ -1,0 +1,46 @@
+"""Effects that no measurement of a station parts: one does all that the other does, under every step it can take."""
+
+import numpy as np
+
+from inertial.criticism.menus import Reach, courses, pose_grid, present, reach_of, temperatures
+from inertial.criticism.separation import Rivals, apart
+from inertial.planning.sequences import SequenceStep, StationPace
+from inertial.state import State
+
+NOTHING = 1e-6
+"""Part of a truth, in chi-square, that a wrong effect may leave under every step and is still no other: rounding."""
+
+_EVERY, _FURTHER = 4, 12
+
+
+def everything(state: State, reach: Reach, pace: StationPace) -> list[SequenceStep]:
+    """Steps of every kind that a station can take: directions, temperatures, waits, approaches, ramps, power."""
+    here = present(state, pace)
+    poses = pose_grid(reach, here)
+    steps = poses[::_EVERY]
+    for temperature in temperatures(here, reach):
+        steps += pose_grid(reach, temperature)[::_FURTHER]
+    kinds: set[str] = set()
+    for course in courses(state, reach, poses[:4], here):
+        if course.kind not in kinds:
+            kinds.add(course.kind)
+            steps += course.steps
+    return steps
+
+
+def never_apart(rivals: Rivals, reach: Reach | None, pace: StationPace) -> np.ndarray:
+    """Whether (r, r) the rival of a column takes up all that the rival of a row predicts, under every step of the station."""
+    state = rivals.lot.state
+    steps = everything(state, reach or reach_of(state), pace)
+    if not steps:
+        return ~np.eye(len(rivals.terms), dtype=bool)
+    found = apart(rivals, steps, pace)
+    same = found.left < NOTHING * np.maximum(found.whole, 1e-300)[:, None]
+    np.fill_diagonal(same, val=False)
+    return same
+
+
+def twins_of(rivals: Rivals, never: np.ndarray) -> tuple[str, ...]:
+    """The best rival and those that no measurement parts from it; empty where there is none."""
+    alike = [name for name, same in zip(rivals.ids, never[0], strict=True) if same]
+    return (rivals.ids[0], *alike) if alike else ()

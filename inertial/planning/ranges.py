@@ -1,0 +1,54 @@
+"""Ranges of a nonlinear parameter in which a plan cannot see an effect that it sees elsewhere."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from inertial.design import grid_of
+from inertial.effects.base import AnyEffect
+from inertial.state import State
+
+
+@dataclass(frozen=True)
+class UnseenRange:
+    """Values of a parameter, from the lowest to the highest that was tried, at which an effect is not visible."""
+
+    parameter: str
+    unit: str
+    low: float
+    high: float
+
+    def __str__(self) -> str:
+        """The range with its unit."""
+        name, unit = self.parameter.replace("_", " "), {"degC": "°C"}.get(self.unit, self.unit)
+        return (
+            f"{name} {self.low:.3g} {unit}"
+            if self.low == self.high
+            else f"{name} {self.low:.3g} to {self.high:.3g} {unit}"
+        )
+
+
+def unseen_ranges(effect: AnyEffect, state: State, seen: Sequence[bool]) -> tuple[UnseenRange, ...]:
+    """Ranges of each parameter in which an effect is not visible whatever the others are; empty where it never is.
+
+    Parameters
+    ----------
+    seen : whether it is visible at each set of values of :func:`inertial.design.grid_of`
+    """
+    grid = grid_of(effect, state)
+    if not any(seen) or all(seen):
+        return ()
+    found: list[UnseenRange] = []
+    for parameter in effect.parameters(state):
+        if parameter.choices:
+            continue
+        at = {float(v): False for v in sorted(parameter.grid().tolist())}
+        for values, there in zip(grid, seen, strict=True):
+            at[float(values[parameter.name])] |= bool(there)
+        begun: list[float] = []
+        for value, there in [*at.items(), (float("nan"), True)]:
+            if not there:
+                begun.append(value)
+            elif begun:
+                found.append(UnseenRange(parameter.name, parameter.unit, begun[0], begun[-1]))
+                begun = []
+    return tuple(found)

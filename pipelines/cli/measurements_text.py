@@ -1,0 +1,53 @@
+"""What to measure next, for people: the steps, what they cost and bring, and what no steps of the station part."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from pipelines.cli.options import console, print_table, short
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+
+def measurements_table(proposed: list[dict[str, Any]], out: Console | None = None) -> None:
+    """Print what to measure next, step by step, with what it costs and brings.
+
+    Parameters
+    ----------
+    out : standard output where None
+    """
+    steps = [p for p in proposed if p.get("measurable", True)]
+    lines = [
+        [
+            short(p["outer_deg"]),
+            short(p["inner_deg"]),
+            short(p["chamber_C"]) + ("" if p.get("soaked", True) else " (on the way)"),
+            short(p.get("wait_s")) + (f" after {short(p['off_s'] / 60.0)} min off" if p.get("off_s") else ""),
+            str(p.get("repeats", 1)),
+            p["why"],
+        ]
+        for p in steps
+    ]
+    where = out or console()
+    if lines:
+        columns = ["outer\n°", "inner\n°", "chamber\n°C", "wait\ns", "times", "decides between"]
+        print_table(columns, lines, title="Measure next, in this order", out=out)
+    for row in {p["why"]: p for p in steps if "minutes" in p}.values():
+        where.print(brings(row), style="dim", markup=False, soft_wrap=True)
+    for row in proposed:
+        if not row.get("measurable", True):
+            where.print(row["why"], markup=False, soft_wrap=True)
+
+
+def brings(row: dict[str, Any]) -> str:
+    """What the steps of a row's measurement cost and bring."""
+    text = f"{row['why']}: {short(row['minutes'])} min of station time; "
+    expected = row.get("separation_if")
+    if not expected:
+        return text + (
+            f"χ² of a coefficient of typical size {row['separation_before']:.1f} now, {row['separation_after']:.0f} expected"
+        )
+    after = ", ".join(f"{chi:.0f} if {name} is true" for name, chi in expected.items())
+    text += f"χ² between the two {row['separation_before']:.1f} now, expected {after}"
+    return text + (f"; not told from the first by it: {', '.join(row['not_parted'])}" if row.get("not_parted") else "")

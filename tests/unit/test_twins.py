@@ -1,0 +1,82 @@
+"""Rivals that no measurement of a station parts are said to be so; others get a measurement that parts them when it is made."""
+
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from inertial import effects
+from inertial.criticism.classes import EffectClass, Member
+from inertial.criticism.model import Model, Term
+from inertial.criticism.problem import Problem
+from inertial.criticism.proposals import proposal, rivals_in, twins
+from inertial.criticism.separation import left_of, predictions, separations, widened
+from inertial.design import grid_of
+from inertial.planning.sequences import SequenceStep
+from pipelines.diagnosis.next_measurement import Proposed
+from pipelines.tables.dwells import lot_of, measured
+
+HERE = Path(__file__).resolve().parents[2] / "benchmarks" / "worlds"
+
+
+@pytest.fixture(scope="module")
+def part():
+    sys.path.insert(0, str(HERE))
+    try:
+        import part
+
+        yield part
+    finally:
+        sys.path.remove(str(HERE))
+
+
+def problem_of(part, blind, seed: int):
+    return Problem(lot_of(measured(*part.Continued(blind, seed).tables())))
+
+
+def rivals(problem, *names: str) -> tuple[Model, EffectClass]:
+    base = [Term(effects.get(name)) for name in ("bias", "scale", "misalignment")]
+    terms = [Term(e, tuple(grid_of(e, problem.lot.state)[0].items())) for e in map(effects.get, names)]
+    members = tuple(Member(t, 0.5 * k) for k, t in enumerate(terms))
+    return Model(problem, [*base, terms[0]]), EffectClass(members, -30.0, 1e-5)
+
+
+def test_level_and_the_offset_of_the_outer_encoder_get_a_sentence_and_no_steps(part) -> None:
+    problem = problem_of(part, part.Blind("level_error", 4.0, "corners", 1, units=3), 5)
+    model, group = rivals(problem, "outer_encoder_offset", "level_error")
+    alike = twins(model, group)
+    assert alike == ("outer_encoder_offset", "level_error")
+    assert proposal(model, group) is None
+    rows = Proposed(((group, None),), None, (alike,)).rows()
+    assert [row["measurable"] for row in rows] == [False]
+    assert "no measurement of this station parts them; needed: a level on the table" in rows[0]["why"]
+
+
+def test_rivals_that_poses_part_are_no_twins(part) -> None:
+    problem = problem_of(part, part.Blind("third_order", 4.0, "edges", 2, units=3), 5)
+    model, group = rivals(problem, "third_order", "odd_quadratic")
+    assert twins(model, group) == ()
+    assert proposal(model, group) is not None
+
+
+def test_a_kink_that_may_move_is_not_promised_as_far_away_as_one_that_may_not(part) -> None:
+    blind = part.Blind("bias_temperature_quadratic", 4.0, "faces", 1, (0.0, 20.0, 40.0, 60.0), units=3)
+    problem = problem_of(part, blind, 8)
+    model, group = rivals(problem, "bias_temperature_quadratic", "thermal_kink")
+    found = rivals_in(model, group)
+    steps = [SequenceStep(o, 0.0, t, 2.0) for t in (30.0, 10.0) for o in (0.0, np.pi)]
+    free = separations(found, steps)[0, 1]
+    wide = widened(found, steps, None)
+    noise = wide.covariance.taken(found.noise, found.covariance)
+    fixed = left_of(Model(wide, [*found.rest, group.members[1].term]), predictions(found, wide), noise)[0]
+    assert free < 0.5 * fixed * found.weight / found.variance
+
+
+def test_what_is_proposed_parts_the_rivals_when_it_is_measured(part) -> None:
+    """One run of the benchmark `python benchmarks/worlds part`, with a generator that the proposal knows nothing of."""
+    found = part.followed(("cubic on 18, faint", 9100))[1]
+    assert found["ended"] == "open"
+    made = found["proposals"][0]
+    assert made["parted"]
+    assert made["added"] == pytest.approx(1.0, abs=0.3)
