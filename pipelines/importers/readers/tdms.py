@@ -1,0 +1,69 @@
+"""TDMS files of National Instruments: the channels of a group, with time from their waveform properties."""
+
+from __future__ import annotations
+
+import io
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from pipelines.importers.content import Content, chosen
+from pipelines.importers.library import library
+from pipelines.importers.unpacking import refuse_larger
+from schemas.errors import DataRejected
+from schemas.foreign import foreign
+
+NAME, TITLE, EXTRA, ORDER = "tdms", "TDMS", "tdms", 60
+MAGIC = b"TDSm"
+REMEDY = "copy it again, or export the group as CSV"
+
+
+def recognised(data: bytes) -> bool:
+    """Whether the file begins as TDMS does."""
+    return data.startswith(MAGIC)
+
+
+def read(name: str, data: bytes, group: str) -> Content:
+    """The channels of one group; `time` in s where the file states an interval (``wf_increment``)."""
+    nptdms = library("nptdms", EXTRA, f"{name}: a TDMS file")
+    broken = f"{name}: a TDMS file that cannot be read"
+    with foreign(broken, REMEDY):
+        about = nptdms.TdmsFile.read_metadata(io.BytesIO(data))
+        claimed = sum(8 * len(channel) for one in about.groups() for channel in one.channels())
+    refuse_larger(claimed, len(data), name)
+    with foreign(broken, REMEDY):
+        file = nptdms.TdmsFile.read(io.BytesIO(data))
+        groups = {one.name: [c for c in one.channels() if len(c) and _numeric(c)] for one in file.groups()}
+    groups = {label: channels for label, channels in groups.items() if channels}
+    if not groups:
+        raise DataRejected(f"{name}: no channel with numbers in this TDMS file, one is needed; check the file")
+    label = chosen([(one, len(channels[0])) for one, channels in groups.items()], group, name)
+    with foreign(broken, REMEDY):
+        return _content(groups[label], name)
+
+
+def _numeric(channel: Any) -> bool:
+    kind = np.asarray(channel[:1]).dtype.kind
+    return kind in "fiubM"
+
+
+def _content(channels: list[Any], name: str) -> Content:
+    longest = max(len(channel) for channel in channels)
+    kept = [channel for channel in channels if len(channel) == longest]
+    left_out = [channel.name for channel in channels if len(channel) != longest]
+    columns = {channel.name: np.asarray(channel[:]) for channel in kept}
+    units = {channel.name: str(channel.properties.get("unit_string") or "") for channel in kept}
+    intervals = {float(c.properties["wf_increment"]) for c in kept if "wf_increment" in c.properties}
+    interval = intervals.pop() if len(intervals) == 1 else None
+    if len(intervals) >= 1:
+        raise DataRejected(
+            f"{name}: channels of one group with several intervals ({', '.join(f'{i:g} s' for i in sorted(intervals))}), "
+            "one is needed; export them apart"
+        )
+    if interval is not None and interval > 0.0 and "time" not in columns:
+        start = float(kept[0].properties.get("wf_start_offset") or 0.0)
+        columns = {"time": start + interval * np.arange(longest), **columns}
+        units["time"] = "s"
+    remarks = (f"channels of another length were left out: {', '.join(left_out[:6])}",) if left_out else ()
+    return Content(pd.DataFrame(columns), remarks, units, interval)
