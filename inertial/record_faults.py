@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from scipy.ndimage import median_filter
 
 Array = NDArray[np.float64]
 
@@ -162,8 +163,7 @@ def torn(x: ArrayLike) -> list[Torn]:
 
 def running_median(x: Array, width: int = _MEDIAN) -> Array:
     """Median of each sample (n,) and its neighbours; at the ends of those that there are."""
-    padded = np.pad(x, width // 2, mode="reflect")
-    return np.median(np.lib.stride_tricks.sliding_window_view(padded, width), axis=-1)
+    return np.asarray(median_filter(x, width, mode="mirror"), dtype=np.float64)
 
 
 def _wings(x: Array, step: float) -> tuple[NDArray[np.int64], NDArray[np.int64], int]:

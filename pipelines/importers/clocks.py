@@ -206,7 +206,14 @@ def clock(numbers: NDArray[np.float64], name: str, claimed: str, stated: str, wh
         )
     unit = claimed or found.unit or "s"
     seconds = (numbers - numbers[0]) * TIME_UNITS[unit]  # of Unix time in ns the difference keeps its digits
-    return Clock(seconds, unit, _doubts(step, unit, found, column) if claimed else (f"{column}: time in {unit}: {found.reason}",))
+    return Clock(seconds, unit, _doubts(step, unit, found, column) if claimed else (_taken(column, unit, found, step, len(numbers)),))
+
+
+def _taken(column: str, unit: str, found: Recognised, step: float, count: int) -> str:
+    """How time was read, for people."""
+    seconds = step * TIME_UNITS[unit]
+    rate = f", {1.0 / seconds:.4g} Hz for {seconds * (count - 1):.5g} s" if seconds > 0.0 else ""
+    return f"{column}: time in {unit} ({found.reason}){rate}"
 
 
 def _doubts(step: float, unit: str, found: Recognised, column: str) -> tuple[str, ...]:

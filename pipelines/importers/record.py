@@ -10,7 +10,7 @@ import pandas as pd
 
 from pipelines.importers import exchange, pose_check, sample_faults, unit_check, values
 from pipelines.importers.mapping import FACES, MEANINGS, OUTPUT_UNITS, Mapping
-from pipelines.importers.record_time import backwards, gaps_of, seconds
+from pipelines.importers.record_time import backwards, gaps_of, seconds, time_doubts
 from pipelines.importers.stated_units import column_name
 from pipelines.importers.stretches import Stretches, stretches
 from schemas.errors import DataRejected, WrongUse, did_you_mean
@@ -99,7 +99,8 @@ def imported(
     dwells = _means(samples, found, tuple(extras), mapping) if len(found) else None
     if dwells is not None:
         remarks = (*remarks, *pose_check.refuse_or_remark(dwells, mapping, where))
-    return Imported(samples, dwells, out_unit, (*remarks, *found.remarks, *short), tuple(faults.rows(time)))
+    remarks = (*remarks, *found.remarks, *short, *time_doubts(time, extras.get("unit_C"), found, mapping, labels is None))
+    return Imported(samples, dwells, out_unit, remarks, tuple(faults.rows(time)))
 
 
 def _columns(table: pd.DataFrame, mapping: Mapping, where: str) -> dict[str, pd.Series]:

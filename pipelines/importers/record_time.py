@@ -19,6 +19,13 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    from pipelines.importers.stretches import Stretches
+
+FASTEST_K_S = 5.0
+"""Rate of temperature that no chamber reaches."""
+LONGEST_MOVE_S = 300.0
+"""Between two positions, of a hand or a table."""
+SHORTEST_RECORD_S = 3.0
 GAP = 5.0
 """Usual steps that a longer one leaves room for."""
 
@@ -152,3 +159,26 @@ def gaps_of(
             f"{where}: {found}; samples without gaps are needed; record again, or add --gaps split to use what lies between"
         )
     return sorted({*breaks, *wide.tolist()}), (f"{found}; dwells end there",)
+
+
+def time_doubts(
+    time: NDArray[np.float64], heat: NDArray[np.float64] | None, found: Stretches, mapping: Mapping, searched: bool
+) -> tuple[str, ...]:
+    """Remarks where a record in seconds shows what no hand, table or chamber does: its time may be in another unit.
+
+    Parameters
+    ----------
+    heat : (n,), °C; None where none was recorded.
+    searched : whether the stretches were found in the record itself.
+    """
+    span = float(time[-1])
+    doubts: list[str] = []
+    if heat is not None and span > 0.0 and float(np.ptp(heat)) > FASTEST_K_S * span:
+        doubts.append(f"temperature changes by {float(np.ptp(heat)):.3g} K in {span:.3g} s")
+    if searched and mapping.positions is None and mapping.block_s is None:
+        moves = [float(time[b] - time[a - 1]) for a, b in zip(found.last, found.first[1:], strict=False)]
+        if len(moves) >= 2 and float(np.median(moves)) > LONGEST_MOVE_S:
+            doubts.append(f"the moves between the dwells take {float(np.median(moves)):.4g} s")
+        if not len(found) and span < SHORTEST_RECORD_S:
+            doubts.append(f"the record lasts {span:.3g} s, too short for a dwell")
+    return (f"CHECK THE UNIT OF TIME: {'; '.join(doubts)}",) if doubts else ()

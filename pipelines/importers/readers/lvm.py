@@ -70,7 +70,7 @@ def _segment(about: dict[str, list[str]], body: str, divider: str, decimal: str,
     with foreign(f"{name}: rows that do not have the {len(labels)} columns of their header", "repair or remove them"):
         table = pd.read_csv(
             io.StringIO("\n".join(lines[1:])), sep=divider, decimal=decimal, header=None,
-            names=[*labels, "\0comment"], usecols=range(len(labels) + 1), index_col=False, low_memory=False,
+            names=[*labels, "\0comment"], index_col=False, low_memory=False,
         ).drop(columns="\0comment")  # fmt: skip
     with foreign(f"{name}: Delta_X that is no number", REMEDY):
         steps = {float(word.replace(",", ".")) for word in about.get("Delta_X", []) if word}
