@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pandas as pd
 
+from inertial.quantities import LARGEST
 from pipelines.importers import clocks, unit_check, values
 from pipelines.importers.clocks import typical_step
 from pipelines.importers.stated_units import TEMPERATURE, output_unit
@@ -73,10 +74,15 @@ def guesses(content: Content) -> Guesses:
     return Guesses(found, _time_unit(content, numeric, found), _output(content, numeric, found))
 
 
+def measurable(numbers: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Numbers without those that nothing measured can be: their squares would not be numbers any more."""
+    return np.where(np.abs(numbers) <= LARGEST, numbers, np.nan)
+
+
 def _numbers(column: pd.Series) -> NDArray[np.float64] | None:
     if column.dtype.kind in "mM" or isinstance(column.dtype, pd.DatetimeTZDtype) or column.dtype.kind == "b":
         return None
-    numbers = np.asarray(pd.to_numeric(column, errors="coerce"), dtype=np.float64)
+    numbers = measurable(np.asarray(pd.to_numeric(column, errors="coerce"), dtype=np.float64))
     return numbers if np.mean(np.isfinite(numbers)) > 0.5 else None
 
 

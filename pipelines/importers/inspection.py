@@ -11,7 +11,7 @@ import numpy as np
 
 from inertial import change_of_level, record_faults, static_intervals
 from pipelines.importers import clocks, files, sample_faults, sources, values
-from pipelines.importers.guesses import Guesses, guesses
+from pipelines.importers.guesses import Guesses, guesses, measurable
 from pipelines.importers.mapping import TIME_UNITS
 from pipelines.importers.record_time import GAP
 from pipelines.importers.stated_units import TEMPERATURE
@@ -101,7 +101,7 @@ def _time(content: Content, guessed: Guesses) -> tuple[NDArray[np.float64] | Non
     elif clocks.is_stamps(column):
         time = clocks.stamps(column.ffill().bfill(), name)
     else:
-        numbers = np.asarray(values.as_numbers(column, name), dtype=np.float64)
+        numbers = measurable(np.asarray(values.as_numbers(column, name), dtype=np.float64))
         unit = guessed.time_unit.meaning
         if not unit:
             open_.append(f"the unit of time: {guessed.time_unit.reason}; --units time=s|ms|us|ns, or time=samples and --rate HZ")
@@ -125,7 +125,7 @@ def _output(content: Content, guessed: Guesses) -> NDArray[np.float64] | None:
     names = [guessed.column(axis) for axis in "xyz"]
     if not all(names):
         return None
-    return np.column_stack([values.as_numbers(content.table[name], name) for name in names])
+    return np.column_stack([measurable(values.as_numbers(content.table[name], name)) for name in names])
 
 
 def _intervals(output: NDArray[np.float64], time: NDArray[np.float64] | None, rate: float) -> list[IntervalDocument]:
@@ -155,7 +155,7 @@ def _columns(content: Content, guessed: Guesses) -> list[ColumnDocument]:
             unit = unit or guessed.output.meaning
         elif guess.meaning == "time":
             unit = unit or guessed.time_unit.meaning
-        numbers = column.to_numpy(dtype=np.float64) if column.dtype.kind in "fiu" else np.zeros(0)
+        numbers = measurable(column.to_numpy(dtype=np.float64)) if column.dtype.kind in "fiu" else np.zeros(0)
         there = numbers[np.isfinite(numbers)]
         axis = there if guess.meaning in {"x", "y", "z"} and there.size else None
         found.append(

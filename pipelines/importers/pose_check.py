@@ -16,6 +16,9 @@ if TYPE_CHECKING:
     from pipelines.importers.mapping import Mapping
 
 _DEAD = 0.2
+_LEAST = 4
+_SILENT = 0.05
+_TURNED = 0.8
 _CLEAR = 0.6
 _MISFIT = 0.1
 """Part of gravity that a response may leave and still be one of exchanged axes."""
@@ -23,8 +26,25 @@ OUT = ["out_x", "out_y", "out_z"]
 FORCE = ["force_x", "force_y", "force_z"]
 
 
+def silent_axis(dwells: pd.DataFrame) -> str:
+    """A sentence on an axis, its letter first, that stays the same where another turns through gravity; empty where none does."""
+    means = dwells[OUT].to_numpy(dtype=np.float64)
+    if len(means) < _LEAST:
+        return ""
+    spans = np.ptp(means, axis=0)
+    weak, strong = int(np.argmin(spans)), int(np.argmax(spans))
+    if not spans[strong] > 0.0 or spans[weak] > _SILENT * spans[strong]:
+        return ""
+    if spans[strong] < _TURNED * float(np.median(np.linalg.norm(means - means.mean(axis=0), axis=1))):
+        return ""
+    return (
+        f"{AXES[weak]} changes by {spans[weak]:.3g} over {len(means)} dwells, {AXES[strong]} by {spans[strong]:.3g}; "
+        f"a dead axis, another quantity mapped as {AXES[weak]}, or a sensor turned about {AXES[weak]} alone"
+    )
+
+
 def refuse_or_remark(dwells: pd.DataFrame, mapping: Mapping, where: str) -> tuple[str, ...]:
-    """Remarks on dwells; nothing where no faces are named.
+    """Remarks on dwells, such as an axis that does not answer to positions.
 
     Raises
     ------
@@ -32,7 +52,8 @@ def refuse_or_remark(dwells: pd.DataFrame, mapping: Mapping, where: str) -> tupl
         The outputs belong to other faces than those named, or an axis does not answer to gravity.
     """
     if not mapping.poses or FORCE[0] not in dwells.columns:
-        return ()
+        silent = silent_axis(dwells)
+        return (f"CHECK AXIS {silent[0]}: {silent}",) if silent else ()
     force, output = dwells[FORCE].to_numpy(dtype=np.float64), dwells[OUT].to_numpy(dtype=np.float64)
     design = np.column_stack([np.ones(len(force)), force])
     if np.linalg.matrix_rank(design, tol=0.1) < 4:

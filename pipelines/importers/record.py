@@ -114,11 +114,11 @@ def _columns(table: pd.DataFrame, mapping: Mapping, where: str) -> dict[str, pd.
                 f"{where}: column '{shown(wanted)}' (for {meaning}) is not there; {did_you_mean(wanted, names)}"
             )
         found[meaning] = pd.Series(named[column], name=column)
-    axes = [found[axis].name for axis in AXES]
-    if len(set(axes)) < len(axes):
+    meanings = [meaning for meaning in ("time", *AXES) if meaning in found]
+    names_ = [str(found[meaning].name) for meaning in meanings]
+    if len(set(names_)) < len(names_):
         raise DataRejected(
-            f"{where}: x, y and z are columns {', '.join(shown(str(name)) for name in axes)}, three different ones are needed; "
-            "correct --map"
+            f"{where}: {', '.join(meanings)} are columns {', '.join(map(shown, names_))}, different ones are needed; correct --map"
         )
     return found
 

@@ -19,6 +19,7 @@ COMMENTS = ("#", "%")
 BLANKS = r"\s+"
 _SAMPLE = 300
 _TAIL = 40
+_LONGEST = 64
 _POINT = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eEdD][+-]?\d+)?")
 _COMMA = re.compile(r"[+-]?(?:\d+,\d+|\d+|,\d+)(?:[eEdD][+-]?\d+)?")
 _GAPS = frozenset({"", "nan", "-nan", "na", "n/a", "null", "none", "inf", "-inf", "+inf", "infinity", "#n/a"})
@@ -72,7 +73,8 @@ def fields_of(line: str, divider: str) -> list[str]:
 
 def is_number(word: str, decimal: str = ".") -> bool:
     """Whether a word is a finite number, written with this decimal sign."""
-    return (_POINT if decimal == "." else _COMMA).fullmatch(word) is not None
+    # a pattern takes time that grows with the square of a word's length, and no number is that long
+    return len(word) <= _LONGEST and (_POINT if decimal == "." else _COMMA).fullmatch(word) is not None
 
 
 def layout(lines: Sequence[str]) -> Layout | None:
