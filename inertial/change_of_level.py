@@ -1,4 +1,4 @@
-"""Positions logged back to back, without the moves between them: a record that is level in pieces, and where the level changes."""
+"""Positions logged back to back, without the moves between them: a record that is level in pieces, and where it changes."""
 
 import heapq
 from dataclasses import dataclass
@@ -78,12 +78,16 @@ def levels(x: ArrayLike, count: int | None, *, shortest: int = _SHORTEST) -> Lev
     data = np.asarray(x, dtype=np.float64)
     n = len(data)
     if count is not None and n < count * shortest:
-        msg = f"positions: {n} samples, {count * shortest} are needed for {count} positions of {shortest}; ask for fewer"
+        msg = (
+            f"positions: {n} samples, {count * shortest} are needed for {count} positions of {shortest}; ask for fewer"
+        )
         raise ValueError(msg)
     noise = neighbour_noise(data)
     scaled = (data - data.mean(axis=0)) / np.where(noise > 0.0, noise, 1.0)
     sums = np.concatenate([np.zeros((1, data.shape[1])), np.cumsum(scaled, axis=0)])
-    boundaries = _divided(sums, n, (count or _MOST) - 1, shortest, 3.0 * np.log(n) * data.shape[1] if count is None else -1.0)
+    boundaries = _divided(
+        sums, n, (count or _MOST) - 1, shortest, 3.0 * np.log(n) * data.shape[1] if count is None else -1.0
+    )
     boundaries = _refined(sums, [0, *sorted(boundaries), n], shortest)
     whole = float(np.sum(scaled**2))
     edges = np.array(boundaries)

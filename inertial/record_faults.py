@@ -1,6 +1,6 @@
 """What the samples of a raw record show before any physics: resolution, clipping, axes that stand still, torn words.
 
-All tests look at one axis at a time and need nothing to be known of poses or noise: what is usual is measured in the record itself.
+All tests look at one axis at a time and need nothing to be known of poses or noise: what is usual is measured in the record.
 """
 
 from dataclasses import dataclass
@@ -49,7 +49,7 @@ class Frozen:
 class Torn:
     """Samples of an axis that are off by powers of two of the resolution: high and low byte of different readings.
 
-    rows : (m,), samples · offsets : the powers of two in steps of the resolution, the most frequent first · share : of all samples
+    rows : (m,), samples · offsets : powers of two in steps of the resolution, the most frequent first · share : of all samples
     """
 
     axis: int
@@ -169,8 +169,8 @@ def running_median(x: Array, width: int = _MEDIAN) -> Array:
 def _wings(x: Array, step: float) -> tuple[NDArray[np.int64], NDArray[np.int64], int]:
     """Samples off by a power of two, the powers, and how many samples were looked at.
 
-    A power counts when several blocks have samples that far off, and clearly more do than lie at three quarters, five quarters and one and a half times as
-    far: what a hand or a knock leaves in quiet blocks is spread over all distances.
+    A power counts when several blocks have samples that far off, and clearly more do than lie at three quarters, five quarters
+    and one and a half times as far: what a hand or a knock leaves in quiet blocks is spread over all distances.
     """
     away = x - running_median(x)
     blocks = away[: away.size // _BLOCK * _BLOCK].reshape(-1, _BLOCK)

@@ -73,7 +73,9 @@ def command(
     ] = None,
     threshold: Annotated[
         float | None,
-        typer.Option("--threshold", metavar="SD", help="Standard deviation in a window above which it moves, in --units output."),
+        typer.Option(
+            "--threshold", metavar="SD", help="Standard deviation in a window above which it moves, in --units output."
+        ),
     ] = None,
     shortest: Annotated[
         float | None, typer.Option("--shortest", metavar="S", help="Shortest dwell that counts; 1 s.")
@@ -86,7 +88,8 @@ def command(
         typer.Option("--faulty", metavar="refuse|leave-out|keep", help="Axes that stand still and torn words; refuse."),
     ] = "",
     join: Annotated[
-        str, typer.Option("--join", metavar="rows|columns", help="Several files are one recording: how they are joined.")
+        str,
+        typer.Option("--join", metavar="rows|columns", help="Several files are one recording: how they are joined."),
     ] = "",
     group: Annotated[
         str, typer.Option("--group", metavar="NAME", help="Group of channels of a file that has several.")

@@ -25,7 +25,8 @@ PICTURES = (".svg", ".png", ".pdf")
 def command(
     files: Annotated[list[Path], typer.Argument(metavar="FILE…", help="Recordings in any format that import reads.")],
     join: Annotated[
-        str, typer.Option("--join", metavar="rows|columns", help="Several files are one recording: how they are joined.")
+        str,
+        typer.Option("--join", metavar="rows|columns", help="Several files are one recording: how they are joined."),
     ] = "",
     group: Annotated[
         str, typer.Option("--group", metavar="NAME", help="Group of channels of a file that has several.")
@@ -96,7 +97,10 @@ def _print(one: InspectDocument) -> None:
         out.print(f"  {one['gaps']} gaps in time longer than five samples", soft_wrap=True)
     for fault in one["faults"][:MOST_FAULTS]:
         what = "stands still" if fault["fault"] == "stuck_output" else "has torn words"
-        out.print(f"  axis {fault['axis']} {what}: {fault['samples']} samples from row {fault['first_row']} on", soft_wrap=True)
+        out.print(
+            f"  axis {fault['axis']} {what}: {fault['samples']} samples from row {fault['first_row']} on",
+            soft_wrap=True,
+        )
     more = len(one["faults"]) - MOST_FAULTS
     if more > 0:
         out.print(f"  and {more} more such faults", soft_wrap=True)

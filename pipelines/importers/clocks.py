@@ -1,7 +1,7 @@
 """Seconds from the time of a foreign file: stamps of date and time, Unix time, counters in s, ms, µs or ns.
 
-The unit of a counter is what the file states, else what its steps allow; where they allow several, it is asked for. A unit that was
-given and contradicts what the file states is refused, one that contradicts the steps is remarked upon.
+The unit of a counter is what the file states, else what its steps allow; where they allow several, it is asked for. A unit
+that was given and contradicts what the file states is refused, one that contradicts the steps is remarked upon.
 """
 
 from __future__ import annotations
@@ -59,7 +59,11 @@ class Recognised:
 def unit_stated(text: str) -> str:
     """The unit of time that a text names, as one of s, ms, us, ns; empty where it names none."""
     word = text.strip().lower().replace("µ", "u").replace("μ", "u")
-    for unit, words in {"ns": ("ns", "nsec", "nano"), "us": ("us", "usec", "micro"), "ms": ("ms", "msec", "milli")}.items():
+    for unit, words in {
+        "ns": ("ns", "nsec", "nano"),
+        "us": ("us", "usec", "micro"),
+        "ms": ("ms", "msec", "milli"),
+    }.items():
         if word == unit or word.startswith(words[1:]):
             return unit
     return "s" if word in {"s", "sec", "secs", "second", "seconds"} else ""
@@ -95,7 +99,9 @@ def _by_steps(numbers: NDArray[np.float64]) -> Recognised:
     fractions = bool(np.any(numbers != np.rint(numbers)))
     reason = f"steps of {step:.6g}"
     if "s" in possible and step < 1.0 and fractions:
-        return Recognised("s", reason, ("s",))  # counters of ms and below that count in fractions have it in their names
+        return Recognised(
+            "s", reason, ("s",)
+        )  # counters of ms and below that count in fractions have it in their names
     return Recognised(possible[0] if len(possible) == 1 else "", reason, possible)
 
 
@@ -127,7 +133,9 @@ def stamps(column: pd.Series, where: str) -> NDArray[np.float64]:
     text = column.astype(str).str.strip().str.replace(_FRACTION, r"\1.\2", regex=True)
     if column.notna().all() and bool(text.str.match(_CLOCK).all()):
         with foreign(f"{where}: column '{name}': times of day that cannot be read", "give seconds, or ISO stamps"):
-            spans = pd.to_timedelta(text.str.replace(r":(\d+)$", r".\1", regex=True) if text.iloc[0].count(":") == 3 else text)
+            spans = pd.to_timedelta(
+                text.str.replace(r":(\d+)$", r".\1", regex=True) if text.iloc[0].count(":") == 3 else text
+            )
         seconds = np.asarray(spans.dt.total_seconds(), dtype=np.float64)
         midnights = np.cumsum(np.concatenate([[0.0], np.diff(seconds) < -_HALF_DAY_S]))
         return seconds + 86_400.0 * midnights - seconds[0]
@@ -206,7 +214,11 @@ def clock(numbers: NDArray[np.float64], name: str, claimed: str, stated: str, wh
         )
     unit = claimed or found.unit or "s"
     seconds = (numbers - numbers[0]) * TIME_UNITS[unit]  # of Unix time in ns the difference keeps its digits
-    return Clock(seconds, unit, _doubts(step, unit, found, column) if claimed else (_taken(column, unit, found, step, len(numbers)),))
+    return Clock(
+        seconds,
+        unit,
+        _doubts(step, unit, found, column) if claimed else (_taken(column, unit, found, step, len(numbers)),),
+    )
 
 
 def _taken(column: str, unit: str, found: Recognised, step: float, count: int) -> str:

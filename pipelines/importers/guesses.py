@@ -127,7 +127,9 @@ def _axes(content: Content, numeric: dict[str, NDArray[np.float64]], found: dict
             stem = name[: axis.start(1)] + "?" + name[axis.end(1) :]
             named.setdefault(stem, {})[axis[1].lower()] = name
     triples = [axes for axes in named.values() if len(axes) == 3]
-    triples.sort(key=lambda axes: not (_ACCELERATION.search(axes["x"]) or output_unit(content.units.get(axes["x"], ""))))
+    triples.sort(
+        key=lambda axes: not (_ACCELERATION.search(axes["x"]) or output_unit(content.units.get(axes["x"], "")))
+    )
     if triples:
         for axis, name in triples[0].items():
             found[name] = Guess(axis, "its name")
@@ -146,7 +148,9 @@ def _axes(content: Content, numeric: dict[str, NDArray[np.float64]], found: dict
 def _steadiest(numeric: dict[str, NDArray[np.float64]], names: list[str]) -> tuple[str, ...]:
     """The three neighbouring columns with the steadiest norm, each of which changes; empty where there are not three."""
     live = [name for name in names if np.nanstd(numeric[name][:_SOME]) > 0.0]
-    threes = [three for three in combinations(live, 3) if len(live) < 6 or live.index(three[2]) - live.index(three[0]) == 2]
+    threes = [
+        three for three in combinations(live, 3) if len(live) < 6 or live.index(three[2]) - live.index(three[0]) == 2
+    ]
 
     def unsteady(three: tuple[str, ...]) -> float:
         size = np.linalg.norm(np.column_stack([numeric[name][:_SOME] for name in three]), axis=1)
@@ -189,14 +193,18 @@ def _time_unit(content: Content, numeric: dict[str, NDArray[np.float64]], found:
         change, span = float(np.nanmax(numeric[heat]) - np.nanmin(numeric[heat])), float(numbers[-1] - numbers[0])
         slow = tuple(unit for unit in possible if change <= _FASTEST_K_S * span * clocks.TIME_UNITS[unit])
         if len(slow) == 1 and len(possible) > 1:
-            return Guess(slow[0], f"{seen.reason}; in any other unit the temperature changes faster than {_FASTEST_K_S:g} K/s")
+            return Guess(
+                slow[0], f"{seen.reason}; in any other unit the temperature changes faster than {_FASTEST_K_S:g} K/s"
+            )
         possible = slow or possible
     near = min(possible, key=lambda unit: abs(np.log(1.0 / (step * clocks.TIME_UNITS[unit]) / _LIKELY_HZ)))
     rates = ", ".join(f"{1.0 / (step * clocks.TIME_UNITS[unit]):.4g} Hz in {unit}" for unit in possible)
     return Guess(near, f"{seen.reason} allow {rates}: check")
 
 
-def _output(content: Content, numeric: dict[str, NDArray[np.float64]], found: dict[str, Guess]) -> Guess:
+def _output(  # noqa: PLR0911 - one answer per reason
+    content: Content, numeric: dict[str, NDArray[np.float64]], found: dict[str, Guess]
+) -> Guess:
     names = [name for axis in "xyz" for name, guess in found.items() if guess.meaning == axis]
     if len(names) != 3:
         return Guess("", "")

@@ -82,7 +82,9 @@ def inspect(paths: Sequence[Path], *, join: str = "", group: str = "") -> Inspec
         "faults": [] if faults is None or kept is None else faults.rows(np.arange(len(kept)) if own is None else own),
         "intervals": intervals,
         "open": open_,
-        "command": _command(paths, content, guessed, join=join, group=group, split=split, faulty=bool(faults), positions=positions),
+        "command": _command(
+            paths, content, guessed, join=join, group=group, split=split, faulty=bool(faults), positions=positions
+        ),
     }
     return Inspection(document, own, kept)
 
@@ -93,7 +95,11 @@ def _time(content: Content, guessed: Guesses) -> tuple[NDArray[np.float64] | Non
     if not name and guessed.dwells:
         return None, 0, []
     if not name:
-        return None, 0, ["the rate of the samples: no column of time was recognised and the file states no interval; --rate HZ"]
+        return (
+            None,
+            0,
+            ["the rate of the samples: no column of time was recognised and the file states no interval; --rate HZ"],
+        )
     column = content.table[name]
     open_: list[str] = []
     if values.is_moment(column):
@@ -104,13 +110,17 @@ def _time(content: Content, guessed: Guesses) -> tuple[NDArray[np.float64] | Non
         numbers = measurable(np.asarray(values.as_numbers(column, name), dtype=np.float64))
         unit = guessed.time_unit.meaning
         if not unit:
-            open_.append(f"the unit of time: {guessed.time_unit.reason}; --units time=s|ms|us|ns, or time=samples and --rate HZ")
+            open_.append(
+                f"the unit of time: {guessed.time_unit.reason}; --units time=s|ms|us|ns, or time=samples and --rate HZ"
+            )
         first = numbers[np.isfinite(numbers)][0] if np.any(np.isfinite(numbers)) else 0.0
         time = (numbers - first) * TIME_UNITS.get(unit, 1.0)
     steps = np.diff(time[np.isfinite(time)])
     usual = float(np.median(steps[steps > 0.0])) if np.any(steps > 0.0) else 0.0
     if np.any(steps < 0.0) and not guessed.column("dwell"):
-        open_.append(f"time runs back at row {int(np.flatnonzero(steps < 0.0)[0]) + 2}: sort the rows, or divide the file")
+        open_.append(
+            f"time runs back at row {int(np.flatnonzero(steps < 0.0)[0]) + 2}: sort the rows, or divide the file"
+        )
     return time, int(np.count_nonzero(steps > GAP * usual)), open_
 
 

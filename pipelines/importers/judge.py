@@ -24,5 +24,7 @@ def judge(method: str, data: Imported, mapping: Mapping) -> FitAnswer:
     """The fit called `method`, one of `METHODS`, of one unit's import."""
     silent = silent_axis(data.dwells) if method == "norm" and data.dwells is not None else ""
     if silent:  # more poses, which the fit would ask for, would not help
-        raise DataRejected(f"import: axis {silent}; three axes that answer to gravity are needed for --fit norm; correct --map {silent[0]}=…")
+        raise DataRejected(
+            f"import: axis {silent}; three axes that answer to gravity are needed for --fit norm; correct --map {silent[0]}=…"
+        )
     return METHODS[method](data, mapping)

@@ -80,7 +80,10 @@ def refuse_or_remark(dwells: pd.DataFrame, mapping: Mapping, where: str) -> tupl
         f"{AXES[i]} reads {'+' if s > 0 else '-'}{AXES[j]}" for i, j, s in zip(rows, columns, signs, strict=True)
     )
     # output i reads axis j: wanted axis j is mapped axis of output i
-    inverse = {int(j): (mapping.axes[int(i)], "+" if (s > 0) == (mapping.signs[int(i)] == "+") else "-") for i, j, s in zip(rows, columns, signs, strict=True)}
+    inverse = {
+        int(j): (mapping.axes[int(i)], "+" if (s > 0) == (mapping.signs[int(i)] == "+") else "-")
+        for i, j, s in zip(rows, columns, signs, strict=True)
+    }
     order, turned = (",".join(inverse[k][part] for k in range(3)) for part in (0, 1))
     raise DataRejected(
         f"{where}: by the faces named, {found}; each output must read its own axis; correct --poses, or add --axes {order} "

@@ -99,7 +99,12 @@ def imported(
     dwells = _means(samples, found, tuple(extras), mapping) if len(found) else None
     if dwells is not None:
         remarks = (*remarks, *pose_check.refuse_or_remark(dwells, mapping, where))
-    remarks = (*remarks, *found.remarks, *short, *time_doubts(time, extras.get("unit_C"), found, mapping, labels is None))
+    remarks = (
+        *remarks,
+        *found.remarks,
+        *short,
+        *time_doubts(time, extras.get("unit_C"), found, mapping, searched=labels is None),
+    )
     return Imported(samples, dwells, out_unit, remarks, tuple(faults.rows(time)))
 
 
@@ -118,7 +123,8 @@ def _columns(table: pd.DataFrame, mapping: Mapping, where: str) -> dict[str, pd.
     names_ = [str(found[meaning].name) for meaning in meanings]
     if len(set(names_)) < len(names_):
         raise DataRejected(
-            f"{where}: {', '.join(meanings)} are columns {', '.join(map(shown, names_))}, different ones are needed; correct --map"
+            f"{where}: {', '.join(meanings)} are columns {', '.join(map(shown, names_))}, different ones are needed; "
+            "correct --map"
         )
     return found
 
@@ -126,13 +132,17 @@ def _columns(table: pd.DataFrame, mapping: Mapping, where: str) -> dict[str, pd.
 def _with_numbers(
     columns: dict[str, pd.Series], mapping: Mapping, where: str
 ) -> tuple[NDArray[np.int64], dict[str, pd.Series], tuple[str, ...]]:
-    """Rows that are kept (k,), the columns with these rows, and a remark on the others: rows without a number, where they may be."""
+    """Rows that are kept (k,), the columns with these rows, and a remark on the others, which have no number somewhere."""
     count = len(columns["x"])
     if mapping.gaps == "refuse":
         return np.arange(count), columns, ()
     whole = np.ones(count, dtype=bool)
     for meaning, column in columns.items():
-        if meaning in {"unit", "dwell"} or column.dtype.kind in "mM" or (meaning == "time" and column.dtype.kind not in "fiu"):
+        if (
+            meaning in {"unit", "dwell"}
+            or column.dtype.kind in "mM"
+            or (meaning == "time" and column.dtype.kind not in "fiu")
+        ):
             whole &= column.notna().to_numpy()
         else:
             whole &= np.isfinite(values.as_numbers(column, where, flags=meaning not in MEANINGS))
@@ -142,7 +152,9 @@ def _with_numbers(
     if kept.size == count:
         return kept, columns, ()
     first = int(np.flatnonzero(~whole)[0]) + 1
-    remark = f"{count - kept.size} of {count} rows without a number left out, the first is row {first}; dwells end there"
+    remark = (
+        f"{count - kept.size} of {count} rows without a number left out, the first is row {first}; dwells end there"
+    )
     return kept, {name: one.iloc[kept].reset_index(drop=True) for name, one in columns.items()}, (remark,)
 
 

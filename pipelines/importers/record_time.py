@@ -162,7 +162,7 @@ def gaps_of(
 
 
 def time_doubts(
-    time: NDArray[np.float64], heat: NDArray[np.float64] | None, found: Stretches, mapping: Mapping, searched: bool
+    time: NDArray[np.float64], heat: NDArray[np.float64] | None, found: Stretches, mapping: Mapping, *, searched: bool
 ) -> tuple[str, ...]:
     """Remarks where a record in seconds shows what no hand, table or chamber does: its time may be in another unit.
 

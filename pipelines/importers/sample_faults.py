@@ -94,9 +94,16 @@ def without_short(found: Stretches, record: NDArray[np.int64]) -> tuple[Stretche
     numbers[np.array(kept, dtype=np.int64) + 1] = np.arange(len(kept)) + 1
     gone = [found.labels[k] for k in range(len(found)) if k not in set(kept)]
     fewer = Stretches(
-        tuple(found.first[k] for k in kept), tuple(found.last[k] for k in kept), tuple(found.labels[k] for k in kept), found.remarks
+        tuple(found.first[k] for k in kept),
+        tuple(found.last[k] for k in kept),
+        tuple(found.labels[k] for k in kept),
+        found.remarks,
     )
-    return fewer, numbers[record], (f"dwells left out because most of their samples have faults: {', '.join(gone[:_MOST_TOLD])}",)
+    return (
+        fewer,
+        numbers[record],
+        (f"dwells left out because most of their samples have faults: {', '.join(gone[:_MOST_TOLD])}",),
+    )
 
 
 def refuse_or_remark(

@@ -60,7 +60,9 @@ def read(
     else:
         joined, breaks = _after(contents, names, time)
     digest = hashlib.sha256("".join(one.sha256 for one in sources).encode()).hexdigest()
-    about = Source(" + ".join(one.path for one in sources), digest, sum(one.size for one in sources), sources[0].form, sources)
+    about = Source(
+        " + ".join(one.path for one in sources), digest, sum(one.size for one in sources), sources[0].form, sources
+    )
     return joined, about, breaks
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -89,7 +90,9 @@ def _by_positions(output: NDArray[np.float64], count: int, where: str) -> Stretc
         raise DataRejected(f"{where}: {problem}") from None
     # the samples beside a change may belong to either side
     start, stop = found.start + (found.start > 0), found.stop - (found.stop < len(output))
-    remark = f"{len(found)} positions logged back to back, {100.0 * found.explained:.4g} % of the scatter explained by them"
+    remark = (
+        f"{len(found)} positions logged back to back, {100.0 * found.explained:.4g} % of the scatter explained by them"
+    )
     names = tuple(f"position {k}" for k in range(len(found)))
     return Stretches(tuple(start.tolist()), tuple(stop.tolist()), names, (remark,))
 
@@ -99,7 +102,7 @@ def _found(output: NDArray[np.float64], time: NDArray[np.float64], edges: list[i
     first: list[int] = []
     last: list[int] = []
     thresholds: list[float] = []
-    for a, b in zip(edges[:-1], edges[1:], strict=True):
+    for a, b in pairwise(edges):
         if b - a < 3 or time[b - 1] <= time[a]:
             continue
         rate = mapping.rate_hz or (b - a - 1) / float(time[b - 1] - time[a])
@@ -123,7 +126,11 @@ def _refuse_several_positions(found: Stretches, output: NDArray[np.float64], whe
     worst = max(several, key=lambda k: counts[k])
     a, b = found.first[worst], found.last[worst]
     total = change_of_level.several_levels(output)
-    offer = f"--positions {total} divides the record at the changes" if total > 1 else "--window 0.2 --shortest 0.2 finds shorter dwells"
+    offer = (
+        f"--positions {total} divides the record at the changes"
+        if total > 1
+        else "--window 0.2 --shortest 0.2 finds shorter dwells"
+    )
     raise DataRejected(
         f"{where}: rows {a + 1} to {b}: one dwell by its scatter, but about {counts[worst]} positions logged back to back by its "
         f"levels; a position per dwell is needed; {offer}, or map a column of labels as dwell=…"

@@ -10,6 +10,7 @@ import csv
 import re
 from collections import Counter
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
@@ -35,7 +36,7 @@ _ALIKE = 0.9
 class Layout:
     """Layout of a text.
 
-    divider, decimal : ``\\s+`` for blanks; point or comma
+    divider, decimal : a pattern for blanks; point or comma
     first : index of the first line of the table
     names : of the columns; empty where no line names them
     header : index of the line with the names; −1 where there is none, or where it is a comment
@@ -92,7 +93,11 @@ def layout(lines: Sequence[str]) -> Layout | None:
     above = [fields_of(lines[k], divider) for k in filled[max(0, place - 2) : place]][::-1]
     if above and _is_header(above[0], width, decimal, trailing=trailing):
         header, names = filled[place - 1], tuple(above[0])
-        if len(above) > 1 and _is_header(above[1], width, decimal, trailing=trailing) and _are_units(above[0], above[1]):
+        if (
+            len(above) > 1
+            and _is_header(above[1], width, decimal, trailing=trailing)
+            and _are_units(above[0], above[1])
+        ):
             header, names, units = filled[place - 2], tuple(above[1]), tuple(above[0])
     elif _only_numbered([fields_of(lines[k], divider) for k in filled[place : place + 2]]):
         header, names, integers = first, tuple(fields_of(lines[first], divider)), True
@@ -139,21 +144,23 @@ def _first_row(
     """The first line of the table: like the sampled ones, with the broken rows right above it, which are rows too."""
     if not any(numeric):
         return filled[1] if len(filled) > 1 else len(lines)  # names alone
-    place = 0
-    for place, k in enumerate(filled):
-        row = fields_of(lines[k], divider)
-        if len(row) == width and all(
-            not wanted or is_number(word, decimal) or word.lower() in _GAPS
-            for wanted, word in zip(numeric, row, strict=True)
-        ):
-            if any(wanted and is_number(word, decimal) for wanted, word in zip(numeric, row, strict=True)):
-                break
+    alike = (place for place, k in enumerate(filled) if _is_row(fields_of(lines[k], divider), decimal, numeric))
+    place = next(alike, len(filled) - 1)
     while place > 0:
         row = fields_of(lines[filled[place - 1]], divider)
         if len(row) != width or not any(is_number(word, decimal) for word in row):
             break
         place -= 1
     return filled[place]
+
+
+def _is_row(row: list[str], decimal: str, numeric: list[bool]) -> bool:
+    """Whether a line is like the rows of the table: numbers, or gaps, where they have numbers, and one number at least."""
+    if len(row) != len(numeric):
+        return False
+    words = [word for wanted, word in zip(numeric, row, strict=True) if wanted]
+    numbers = [is_number(word, decimal) for word in words]
+    return any(numbers) and all(known or word.lower() in _GAPS for known, word in zip(numbers, words, strict=True))
 
 
 def _is_header(row: list[str], width: int, decimal: str, *, trailing: bool) -> bool:
@@ -187,7 +194,7 @@ def _counts(row: list[str]) -> bool:
     if len(words) < 3 or not all(word.isdigit() and word.isascii() and len(word) < 6 for word in words):
         return False
     numbers = [int(word) for word in words]
-    return numbers[0] in {0, 1} and all(b - a == 1 for a, b in zip(numbers, numbers[1:], strict=False))
+    return numbers[0] in {0, 1} and all(b - a == 1 for a, b in pairwise(numbers))
 
 
 def _commented(lines: Sequence[str], first: int, divider: str, width: int) -> tuple[str, ...]:

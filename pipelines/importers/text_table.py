@@ -114,9 +114,13 @@ def _remarks(found: Layout, lines: Sequence[str], encoding: str) -> tuple[str, .
     passed = [line for line in lines[:begin] if not is_comment(line)]
     if passed:
         place = f"the header in line {found.header + 1}" if found.header >= 0 else f"the first row in line {begin + 1}"
-        remarks.append(f"{len(passed)} lines before {place} were not read, beginning with '{shown(passed[0].strip(), 60)}'")
+        remarks.append(
+            f"{len(passed)} lines before {place} were not read, beginning with '{shown(passed[0].strip(), 60)}'"
+        )
     if found.integers:
-        remarks.append(f"line {found.header + 1} only numbers the columns: {', '.join(filter(None, found.names[:6]))}, …")
+        remarks.append(
+            f"line {found.header + 1} only numbers the columns: {', '.join(filter(None, found.names[:6]))}, …"
+        )
     elif found.names and found.header < 0:
         remarks.append(f"columns named by a comment: {shown(', '.join(found.names))}")
     if found.decimal == ",":

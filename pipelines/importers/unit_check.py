@@ -19,7 +19,7 @@ _MOST = 200_000
 
 
 def size_of(output: NDArray[np.float64]) -> float:
-    """Size of gravity in a record (n, 3): half the mean range about the middle where all axes turn, else the median norm."""
+    """Size of gravity in a record (n, 3), as its median norm."""
     return float(np.median(np.linalg.norm(output[:_MOST], axis=1)))
 
 
@@ -44,10 +44,11 @@ def refuse_other_unit(output: NDArray[np.float64], claimed: str, where: str) -> 
         advice = (
             f"the unit looks like {other}, say so with --units output={other}"
             if other
-            else "numbers of a converter are LSB, of a voltmeter V or mV: --units output=LSB|V|mV, with the counts' or volts' own scale"
+            else "numbers of a converter are LSB, of a voltmeter V or mV: --units output=LSB|V|mV"
         )
         raise DataRejected(
-            f"{where}: the norm of the output is {size:.5g}, about {GRAVITY[claimed]:.5g} is needed if its unit is {claimed}; {advice}"
+            f"{where}: the norm of the output is {size:.5g}, about {GRAVITY[claimed]:.5g} is needed if its unit is {claimed}; "
+            f"{advice}"
         )
     close = next((unit for unit, one in GRAVITY.items() if abs(size / one - 1.0) < SURE), "")
     if claimed == "LSB":

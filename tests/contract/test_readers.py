@@ -1,4 +1,4 @@
-"""Every reader of recordings that is found: it is told from the others by the first bytes, reads its sample, and is in the guide."""
+"""Every reader of recordings that is found: the first bytes are its own, it reads its sample, and it is in the guide."""
 
 import io
 import tomllib
@@ -67,7 +67,9 @@ def tdms(path: Path) -> None:
     nptdms = pytest.importorskip("nptdms")
     about = {"wf_increment": 0.01, "wf_start_offset": 0.0, "unit_string": "g"}
     with nptdms.TdmsWriter(str(path)) as writer:
-        writer.write_segment([nptdms.ChannelObject("log", name, values, properties=about) for name, values in AXES.items()])
+        writer.write_segment(
+            [nptdms.ChannelObject("log", name, values, properties=about) for name, values in AXES.items()]
+        )
 
 
 def rdata(path: Path) -> None:
@@ -93,7 +95,7 @@ SAMPLES = {"parquet": parquet, "matlab": matlab, "text": text, "hdf5": hdf5, "uf
 @pytest.mark.parametrize("name", READERS)
 def test_a_reader_says_what_it_is_and_is_in_the_guide(name: str) -> None:
     reader = READERS[name]
-    assert reader.NAME == name
+    assert name == reader.NAME
     assert reader.TITLE
     assert not reader.EXTRA or reader.EXTRA in EXTRAS
     assert f"`{name}`" in GUIDE
@@ -170,8 +172,10 @@ def test_several_groups_of_channels_are_asked_about(tmp_path: Path) -> None:
         for group, count in (("fast", 40), ("slow", 4)):
             writer.write_segment([nptdms.ChannelObject(group, name, np.arange(float(count))) for name in AXES])
     (tmp_path / "a.tdms").write_bytes(sink.getvalue())
-    with pytest.raises(WrongUse, match=r"2 groups .*'fast' \(40 samples\), 'slow' \(4 samples\); choose one with --group"):
+    with pytest.raises(
+        WrongUse, match=r"2 groups .*'fast' \(40 samples\), 'slow' \(4 samples\); choose one with --group"
+    ):
         files.read_content(tmp_path / "a.tdms")
-    with pytest.raises(WrongUse, match="no group is called 'fas'.*fast"):
+    with pytest.raises(WrongUse, match=r"no group is called 'fas'.*fast"):
         files.read_content(tmp_path / "a.tdms", "fas")
     assert len(files.read_content(tmp_path / "a.tdms", "slow")[0].table) == 4

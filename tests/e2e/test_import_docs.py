@@ -16,7 +16,9 @@ from pipelines.importers.exchange import read_dwells
 ROOT = Path(__file__).resolve().parents[2]
 GUIDE = (ROOT / "docs" / "how-to" / "import-your-data.md").read_text(encoding="utf-8")
 EXAMPLES = [block.partition("\n") for block in re.findall(r"```console\n\$ (.*?)```", GUIDE, flags=re.DOTALL)]
-TUMBLE, CHAMBER = (next(c for c, _, _ in EXAMPLES if file in c and " import " in c) for file in ("xsens_acc", "imu_raw_data"))
+TUMBLE, CHAMBER = (
+    next(c for c, _, _ in EXAMPLES if file in c and " import " in c) for file in ("xsens_acc", "imu_raw_data")
+)
 
 
 def run(command: str, data: Path, archive: Path, *more: str) -> subprocess.CompletedProcess[str]:

@@ -26,7 +26,14 @@ def told(monkeypatch, capsys, *words: object) -> tuple[int, str, str]:
 
 
 def imported(path: Path, tmp_path: Path, *more: str) -> dict:
-    words = ["import", *map(str, path if isinstance(path, list) else [path]), *more, "--archive", str(tmp_path / "archive"), "--json"]
+    words = [
+        "import",
+        *map(str, path if isinstance(path, list) else [path]),
+        *more,
+        "--archive",
+        str(tmp_path / "archive"),
+        "--json",
+    ]
     done = CliRunner().invoke(app, words)
     assert done.exit_code == 0 or isinstance(done.exception, SystemExit), done.exception
     return json.loads(done.stdout)
@@ -39,7 +46,10 @@ def record(rng: np.random.Generator) -> recordings.Recording:
 
 def device_file(one: recordings.Recording) -> str:
     """A preamble, decimal commas, semicolons, milliseconds."""
-    rows = [f"{1000 * t:.1f};{x:.1f};{y:.1f};{z:.1f}".replace(".", ",") for t, (x, y, z) in zip(one.time, one.output, strict=True)]
+    rows = [
+        f"{1000 * t:.1f};{x:.1f};{y:.1f};{z:.1f}".replace(".", ",")
+        for t, (x, y, z) in zip(one.time, one.output, strict=True)
+    ]
     return "\n".join(["Recorder: R-9", "Started: 12:00:00", "", "Time [ms];Acc X;Acc Y;Acc Z", *rows, ""])
 
 
@@ -85,7 +95,15 @@ def test_the_command_that_inspect_prints_imports_the_file(write, record, monkeyp
 
 def test_inspect_draws_the_record_and_writes_a_page(record, tmp_path: Path) -> None:
     (tmp_path / "a.csv").write_text(frozen_file(record), encoding="utf-8")
-    words = ["inspect", str(tmp_path / "a.csv"), "--picture", str(tmp_path / "a.svg"), "--page", str(tmp_path / "a.html"), "--json"]
+    words = [
+        "inspect",
+        str(tmp_path / "a.csv"),
+        "--picture",
+        str(tmp_path / "a.svg"),
+        "--page",
+        str(tmp_path / "a.html"),
+        "--json",
+    ]
     done = CliRunner().invoke(app, words)
     assert done.exit_code == 0, done.output
     document = json.loads(done.stdout)
@@ -98,7 +116,9 @@ def test_inspect_draws_the_record_and_writes_a_page(record, tmp_path: Path) -> N
     assert document["command"].replace("'", "&#39;") in page
 
 
-def test_what_a_file_does_not_say_stands_in_capitals_and_leaves_with_1(record, monkeypatch, capsys, tmp_path: Path) -> None:
+def test_what_a_file_does_not_say_stands_in_capitals_and_leaves_with_1(
+    record, monkeypatch, capsys, tmp_path: Path
+) -> None:
     recordings.table(record).drop(columns="t").to_csv(tmp_path / "a.csv", index=False)
     status, out, _ = told(monkeypatch, capsys, "inspect", tmp_path / "a.csv")
     assert status == 1
@@ -142,7 +162,9 @@ def test_positions_logged_back_to_back_are_seen_and_divided(rng, monkeypatch, ca
     np.testing.assert_allclose(found, truth, atol=5.0)
 
 
-def test_a_frozen_axis_among_unknown_poses_is_named_and_what_is_sound_is_used(record, monkeypatch, capsys, tmp_path) -> None:
+def test_a_frozen_axis_among_unknown_poses_is_named_and_what_is_sound_is_used(
+    record, monkeypatch, capsys, tmp_path
+) -> None:
     (tmp_path / "a.csv").write_text(frozen_file(record), encoding="utf-8")
     status, _, err = told(monkeypatch, capsys, "import", tmp_path / "a.csv", *MAPPED, "--archive", tmp_path / "b")
     assert status == 2
@@ -187,7 +209,9 @@ def test_two_files_one_after_another_are_one_recording(record, monkeypatch, caps
     boundary = (half - 0.5) / 100.0
     assert all(not one["start_s"] < boundary < one["end_s"] for one in document["dwell_list"])
     other = _written(frame.rename(columns={"ax": "bx"}), tmp_path / "3.csv")
-    status, _, err = told(monkeypatch, capsys, "import", first, other, *MAPPED, "--join", "rows", "--archive", tmp_path / "b")
+    status, _, err = told(
+        monkeypatch, capsys, "import", first, other, *MAPPED, "--join", "rows", "--archive", tmp_path / "b"
+    )
     assert status == 2
     assert "the same are needed" in err
 

@@ -18,8 +18,8 @@ from pipelines.importers.values import BOUNDS, LARGEST
 from pipelines.jobs.model_files import read_model
 from pipelines.jobs.recipes import load_recipe, read_limits
 from pipelines.jobs.seating import read_seating
-from schemas.errors import TumblelineError
 from schemas.bounds import COLDEST_C, HOTTEST_C, LONGEST_WAIT_S
+from schemas.errors import TumblelineError
 from schemas.profile import parse_profile
 from schemas.recipe import read_text
 from schemas.serials import is_serial
@@ -167,7 +167,9 @@ def recordings_of_others():
     sink = io.BytesIO()
     wavfile.write(sink, 10, (20000 * frame[["ax", "ay", "az"]].to_numpy()).astype(np.int16))
     found.append((".wav", sink.getvalue()))
-    stamped = frame.assign(t=(pd.Timestamp("2026-01-01") + pd.to_timedelta(frame["t"], unit="s")).dt.strftime("%d.%m.%Y %H:%M:%S.%f"))
+    stamped = frame.assign(
+        t=(pd.Timestamp("2026-01-01") + pd.to_timedelta(frame["t"], unit="s")).dt.strftime("%d.%m.%Y %H:%M:%S.%f")
+    )
     found.append((".csv", csv(stamped)))
     for make in (_hdf5, _tdms, _uff, _rdata):
         with contextlib.suppress(ImportError):
@@ -181,7 +183,9 @@ def _hdf5(frame):
     sink = io.BytesIO()
     with h5py.File(sink, "w") as file:
         for name in frame:
-            file.create_dataset(f"imu/{name}", data=frame[name].to_numpy(), compression="gzip" if name == "ay" else None)
+            file.create_dataset(
+                f"imu/{name}", data=frame[name].to_numpy(), compression="gzip" if name == "ay" else None
+            )
     return ".h5", sink.getvalue()
 
 
@@ -190,7 +194,12 @@ def _tdms(frame):
 
     sink = io.BytesIO()
     with nptdms.TdmsWriter(sink) as writer:
-        writer.write_segment([nptdms.ChannelObject("log", name, frame[name].to_numpy(), properties={"unit_string": "g"}) for name in frame])
+        writer.write_segment(
+            [
+                nptdms.ChannelObject("log", name, frame[name].to_numpy(), properties={"unit_string": "g"})
+                for name in frame
+            ]
+        )
     return ".tdms", sink.getvalue()
 
 

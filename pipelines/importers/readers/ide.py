@@ -36,7 +36,9 @@ def read(name: str, data: bytes, group: str) -> Content:
                 lengths = {key: len(channel.getSession()) for key, channel in channels.items()}
             filled = {key: n for key, n in lengths.items() if n > 0}
             if not filled:
-                raise DataRejected(f"{name}: no channel with samples in this IDE recording, one is needed; check the file")
+                raise DataRejected(
+                    f"{name}: no channel with samples in this IDE recording, one is needed; check the file"
+                )
             with foreign(broken, REMEDY):
                 titles = {f"{key} {channels[key].name}".strip(): key for key in filled}
             titles = {**titles, **({group: group} if group in filled else {})}

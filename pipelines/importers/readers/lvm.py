@@ -1,7 +1,7 @@
 """LabVIEW measurement files (.lvm): text whose header blocks state divider, decimal sign, interval and units.
 
-Source: National Instruments, "Specification for the LabVIEW Measurement File (.lvm)": a file header and a header per segment, each
-ended by ``***End_of_Header***``, then a line of column names.
+Source: National Instruments, "Specification for the LabVIEW Measurement File (.lvm)": a file header and a header per segment,
+each ended by ``***End_of_Header***``, then a line of column names.
 """
 
 from __future__ import annotations
@@ -51,10 +51,14 @@ def _settings(text: str, divider: str | None) -> dict[str, list[str]]:
     """Key → words of the lines of a header."""
     found: dict[str, list[str]] = {}
     for line in text.splitlines():
-        words = [word.strip() for word in (line.replace(",", "\t").split("\t") if divider is None else line.split(divider))]
+        words = [
+            word.strip() for word in (line.replace(",", "\t").split("\t") if divider is None else line.split(divider))
+        ]
         if words and words[0]:
             # "Decimal_Separator<TAB>," loses its comma to the guess of the divider
-            found[words[0]] = [","] if words[0] == "Decimal_Separator" and divider is None and "," in line else words[1:]
+            found[words[0]] = (
+                [","] if words[0] == "Decimal_Separator" and divider is None and "," in line else words[1:]
+            )
     return found
 
 

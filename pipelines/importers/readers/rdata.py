@@ -31,7 +31,7 @@ def _unpacked_head(data: bytes) -> bytes:
     """First bytes of what bzip2 or xz packed; empty where that is no R data."""
     unpack = bz2.BZ2Decompressor() if data.startswith(_BZIP2) else lzma.LZMADecompressor(memlimit=2**27)
     try:
-        head = unpack.decompress(data[:2**20], 64)
+        head = unpack.decompress(data[: 2**20], 64)
     except (OSError, lzma.LZMAError, EOFError):
         return b""
     return head if head.startswith((*_SAVED, *_SINGLE)) else b""

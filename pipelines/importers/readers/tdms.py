@@ -68,7 +68,11 @@ class _Said(logging.Handler):
     @contextmanager
     def heard(self) -> Generator[None]:
         """A block in which the library's log comes here."""
-        loggers = [logging.getLogger(name) for name in ("nptdms", *list(logging.root.manager.loggerDict)) if name.startswith("nptdms")]
+        loggers = [
+            logging.getLogger(name)
+            for name in ("nptdms", *list(logging.root.manager.loggerDict))
+            if name.startswith("nptdms")
+        ]
         before = [(one, list(one.handlers), one.propagate) for one in loggers]
         try:
             for one in loggers:
