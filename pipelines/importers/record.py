@@ -255,8 +255,10 @@ def _as_dwells(
     frame = pd.DataFrame({"unit": serials, "dwell": count, "time_s": time})
     frame[["out_x", "out_y", "out_z"]] = output
     labels = columns["dwell"].astype(str).tolist() if "dwell" in columns else [f"dwell {k}" for k in count]
+    sound, still = sample_faults.sound_dwells(extras, labels, mapping, where)
+    remarks = (*remarks, *still)
     frame = _finished(frame.assign(record=count, pose=labels, **extras), mapping)
-    dwells = exchange.checked(frame, where=where, foreign=True)
+    dwells = exchange.checked(frame[sound].reset_index(drop=True), where=where, foreign=True)
     remarks = (*remarks, *pose_check.refuse_or_remark(dwells, mapping, where))
     return Imported(None, dwells, OUTPUT_UNITS[mapping.units.output][0], remarks)
 

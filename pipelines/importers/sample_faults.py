@@ -106,6 +106,40 @@ def without_short(found: Stretches, record: NDArray[np.int64]) -> tuple[Stretche
     )
 
 
+def sound_dwells(
+    columns: dict[str, NDArray[np.float64]], labels: list[str], mapping: Mapping, where: str
+) -> tuple[NDArray[np.bool_], tuple[str, ...]]:
+    """Which rows that are dwells already are used (n,), and a remark: those in which an axis has no scatter are not sound.
+
+    Raises
+    ------
+    DataRejected
+        There are such dwells and the mapping does not say what to do with them.
+    """
+    sound = np.ones(len(labels), dtype=bool)
+    if not all(f"sd_{axis}" in columns for axis in AXES):
+        return sound, ()
+    spread = np.column_stack([columns[f"sd_{axis}"] for axis in AXES])
+    usual = np.median(spread, axis=0)
+    still = (spread < 1e-6 * usual) & (usual > 0.0)
+    rows = np.flatnonzero(still.any(axis=1))
+    if not rows.size:
+        return sound, ()
+    first = int(rows[0])
+    axis = AXES[int(np.argmax(still[first]))]
+    found = f"axis {axis} stands still in dwell '{labels[first]}' (row {first + 1}): no scatter, usually {usual[AXES.index(axis)]:.3g}"
+    if mapping.faulty == "refuse":
+        raise DataRejected(
+            f"{where}: {found} ({rows.size} such dwells); samples of the sensor are needed; measure them again, or add "
+            "--faulty leave-out, or --faulty keep if this is what the sensor does"
+        )
+    if mapping.faulty == "leave-out":
+        sound[rows] = False
+    return sound, (
+        f"{rows.size} dwells with an axis that stands still {'kept' if sound.all() else 'left out'}: {found}",
+    )
+
+
 def refuse_or_remark(
     found: SampleFaults, output: NDArray[np.float64], time: NDArray[np.float64], mapping: Mapping, where: str
 ) -> tuple[str, ...]:
