@@ -9,6 +9,8 @@ import numpy as np
 from schemas.units import AXES, MICRO
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping as Mapping_
+
     import pandas as pd
     from numpy.typing import NDArray
 
@@ -46,7 +48,7 @@ def dwell_rows(data: Imported, judged: FitAnswer | None, mapping: Mapping) -> li
     return rows
 
 
-def _ends(data: Imported, dwell: dict[str, Any], half: float) -> tuple[float, float]:
+def _ends(data: Imported, dwell: Mapping_[Any, Any], half: float) -> tuple[float, float]:
     if data.samples is None:
         return float(dwell["time_s"]) - half, float(dwell["time_s"]) + half
     time = data.samples.loc[data.samples["record"] == dwell["record"], "time_s"]

@@ -64,7 +64,11 @@ def inspect(paths: Sequence[Path], *, join: str = "", group: str = "") -> Inspec
         open_.append("three columns of acceleration were not recognised: map x, y and z by name or number")
     if guessed.output.meaning == "" and output is not None:
         open_.append("the unit of the output: --units output=g|mg|m/s^2|V|mV|LSB")
-    positions = change_of_level.several_levels(kept) if any(one["positions"] > 1 for one in intervals) else 0
+    positions = (
+        change_of_level.several_levels(kept)
+        if kept is not None and any(one["positions"] > 1 for one in intervals)
+        else 0
+    )
     split = bool(gaps) or not bool(whole.all())
     document: InspectDocument = {
         "files": [str(path) for path in paths],
@@ -79,7 +83,7 @@ def inspect(paths: Sequence[Path], *, join: str = "", group: str = "") -> Inspec
         "rate_hz": rate,
         "duration_s": float(own[-1] - own[0]) if own is not None and len(own) > 1 else None,
         "gaps": gaps,
-        "faults": [] if faults is None or kept is None else faults.rows(np.arange(len(kept)) if own is None else own),
+        "faults": [] if faults is None or kept is None else faults.rows(_clock_of(kept, own)),
         "intervals": intervals,
         "open": open_,
         "command": _command(
@@ -122,6 +126,11 @@ def _time(content: Content, guessed: Guesses) -> tuple[NDArray[np.float64] | Non
             f"time runs back at row {int(np.flatnonzero(steps < 0.0)[0]) + 2}: sort the rows, or divide the file"
         )
     return time, int(np.count_nonzero(steps > GAP * usual)), open_
+
+
+def _clock_of(output: NDArray[np.float64], time: NDArray[np.float64] | None) -> NDArray[np.float64]:
+    """Seconds, or the numbers of the samples where there is no time."""
+    return np.arange(len(output), dtype=np.float64) if time is None else time
 
 
 def _rate(time: NDArray[np.float64] | None) -> float | None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 import pandas as pd
@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from pipelines.importers.content import Content
+    from pipelines.importers.documents import SampleFaultDocument
 
 
 @dataclass(frozen=True)
@@ -36,7 +37,7 @@ class Imported:
     """Exchange format; None where nothing stands still."""
     out_unit: str
     remarks: tuple[str, ...]
-    faults: tuple[dict[str, Any], ...] = field(default=())
+    faults: tuple[SampleFaultDocument, ...] = field(default=())
     """Faults of the samples that were left out or kept, for JSON."""
 
     @property

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -15,6 +15,7 @@ from schemas.units import AXES
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    from pipelines.importers.documents import SampleFaultDocument
     from pipelines.importers.mapping import Mapping
 
 _MOST_TOLD = 5
@@ -49,18 +50,19 @@ class SampleFaults:
             for one in self.torn
         ]
 
-    def rows(self, time: NDArray[np.float64]) -> list[dict[str, Any]]:
+    def rows(self, time: NDArray[np.float64]) -> list[SampleFaultDocument]:
         """What was found, for JSON."""
-        still = [
+        still: list[SampleFaultDocument] = [
             {"fault": "stuck_output", "axis": AXES[one.axis], "first_row": one.start + 1, "samples": one.count,
              "start_s": float(time[one.start]), "offsets_lsb": []}
             for one in self.frozen
         ]  # fmt: skip
-        return still + [
+        torn: list[SampleFaultDocument] = [
             {"fault": "torn_words", "axis": AXES[one.axis], "first_row": int(one.rows.min()) + 1, "samples": one.rows.size,
              "start_s": float(time[one.rows.min()]), "offsets_lsb": list(one.offsets)}
             for one in self.torn
         ]  # fmt: skip
+        return still + torn
 
 
 def look(output: NDArray[np.float64]) -> SampleFaults:
@@ -127,7 +129,8 @@ def sound_dwells(
         return sound, ()
     first = int(rows[0])
     axis = AXES[int(np.argmax(still[first]))]
-    found = f"axis {axis} stands still in dwell '{labels[first]}' (row {first + 1}): no scatter, usually {usual[AXES.index(axis)]:.3g}"
+    size = f"no scatter, usually {usual[AXES.index(axis)]:.3g}"
+    found = f"axis {axis} stands still in dwell '{labels[first]}' (row {first + 1}): {size}"
     if mapping.faulty == "refuse":
         raise DataRejected(
             f"{where}: {found} ({rows.size} such dwells); samples of the sensor are needed; measure them again, or add "

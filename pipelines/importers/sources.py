@@ -100,8 +100,9 @@ def _behind(before: pd.DataFrame, table: pd.DataFrame, time: str) -> tuple[pd.Da
 def _beside(contents: list[Content], names: list[str], time: str) -> Content:
     """Files side by side: by their clocks where both have the column of time, else row by row."""
     first = contents[0]
-    columns, units, remarks = dict(first.table.items()), dict(first.units), list(first.remarks)
-    label = column_name([str(one) for one in columns], time)
+    columns: dict[str, Any] = {str(name): column for name, column in first.table.items()}
+    units, remarks = dict(first.units), list(first.remarks)
+    label = column_name(list(columns), time)
     for number, (content, name) in enumerate(zip(contents[1:], names[1:], strict=True), start=2):
         clocked = label and label in content.table.columns
         if not clocked and len(content.table) != len(first.table):

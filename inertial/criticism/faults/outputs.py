@@ -27,7 +27,7 @@ def stuck(readings: Readings) -> Iterator[Fault]:
 
 
 def _still(readings: Readings, unit: int) -> NDArray[np.intp]:
-    """Dwells in which an axis has no scatter although it has in most: means of equal samples differ by rounding, scatters do not."""
+    """Dwells in which an axis has no scatter although it has in most: the means of equal samples differ by rounding."""
     if readings.spread is None or readings.count is None:
         return np.zeros(0, dtype=np.intp)
     spread = np.where((readings.count[unit] > 2.0)[:, None], readings.spread[unit], np.nan)

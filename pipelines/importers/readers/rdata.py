@@ -43,8 +43,10 @@ def read(name: str, data: bytes, group: str) -> Content:
     plain = _plain(name, data)
     suffix = ".rds" if plain.startswith(_SINGLE) else ".rda"
     with as_file(plain, suffix) as path, foreign(f"{name}: a file of R that cannot be read", REMEDY):
-        frames: dict[str, pd.DataFrame] = {str(key or "frame"): value for key, value in pyreadr.read_r(path).items()}
-    frames = {key: frame for key, frame in frames.items() if frame is not None and len(frame.columns)}
+        frames: dict[str, pd.DataFrame] = {
+            str(key or "frame"): value for key, value in pyreadr.read_r(path).items() if value is not None
+        }
+    frames = {key: frame for key, frame in frames.items() if len(frame.columns)}
     if not frames:
         raise DataRejected(f"{name}: no data frame in this file of R, one is needed; {REMEDY}")
     frame = frames[chosen([(key, len(one)) for key, one in frames.items()], group, name)]

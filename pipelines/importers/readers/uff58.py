@@ -87,7 +87,7 @@ def _record(one: dict[str, Any]) -> tuple[str, tuple[float, float, int, int], np
     """Label, clock (first instant, interval, count, abscissa type), values, unit and ordinate type of a set."""
     values = np.asarray(one["data"])
     if values.dtype.kind == "c":
-        values = values.real
+        values = np.real(values)
     x = np.asarray(one["x"], dtype=np.float64)
     interval = float(one.get("abscissa_inc") or 0.0)
     if not one.get("abscissa_spacing") or interval <= 0.0:
