@@ -259,3 +259,21 @@ def test_a_unit_that_the_file_states_is_taken_and_not_contradicted(record, monke
     assert "dwells in g" in out
     status, _, err = told(monkeypatch, capsys, "import", path, *words, "--units", "output=m/s^2")
     assert (status, "the file states g for its output" in err) == (2, True)
+
+
+def test_the_export_of_an_import_says_how_to_fit_it(record, monkeypatch, capsys, tmp_path: Path) -> None:
+    run = imported(_written(recordings.table(record), tmp_path / "a.csv"), tmp_path, *MAPPED)["run"]
+    status, _, err = told(monkeypatch, capsys, "export", run, "--archive", tmp_path / "archive")
+    assert status in {2, 3}
+    assert f"run {run} was imported and has no table 'grades'" in err
+    assert "give its command again" not in err
+
+
+def test_a_dead_axis_is_named_instead_of_asking_for_more_poses(record, monkeypatch, capsys, tmp_path: Path) -> None:
+    frame = recordings.table(record)
+    frame["ay"] = np.round(frame["ay"] * 0.0 + 12.0 + np.random.default_rng(3).normal(0.0, 4.0, len(frame)))
+    words = (*MAPPED, "--local-g", "9.80665", "--fit", "norm", "--archive", tmp_path / "b")
+    status, _, err = told(monkeypatch, capsys, "import", _written(frame, tmp_path / "a.csv"), *words)
+    assert status == 2
+    assert "axis y changes by" in err
+    assert "add poses" not in err
