@@ -37,7 +37,13 @@ class StaticIntervals:
 
 
 def find(
-    x: ArrayLike, rate_hz: float, *, window_s: float = 1.0, shortest_s: float = 1.0, trim_s: float | None = None
+    x: ArrayLike,
+    rate_hz: float,
+    *,
+    window_s: float = 1.0,
+    shortest_s: float = 1.0,
+    trim_s: float | None = None,
+    threshold: float | None = None,
 ) -> StaticIntervals:
     """Static intervals of a record of three axes.
 
@@ -53,6 +59,7 @@ def find(
     window_s : length of the sliding window, s
     shortest_s : shortest interval that counts after trimming, s
     trim_s : taken off both ends, where the hand still lets go, s; half a window by default
+    threshold : standard deviation of a window above which it moves, in the unit of the record; found in the record by default
     """
     data = np.asarray(x, dtype=np.float64)
     width = max(3, round(window_s * rate_hz))
@@ -61,15 +68,15 @@ def find(
         raise ValueError(msg)
     sd = np.sqrt(moving_variance(data, width).sum(axis=-1))
     quiet = _quietest(sd, width)
-    threshold = _threshold(sd, quiet)
-    inside = _spread(sd <= threshold, width, data.shape[0])
+    limit = _threshold(sd, quiet) if threshold is None else threshold
+    inside = _spread(sd <= limit, width, data.shape[0])
     trim = round((0.5 * window_s if trim_s is None else trim_s) * rate_hz)
     start, stop = _runs(inside)
     # the ends of the record are no hand's doing: nothing is trimmed there
     start = np.where(start > 0, start + trim, start)
     stop = np.where(stop < data.shape[0], stop - trim, stop)
     kept = stop - start >= max(2, round(shortest_s * rate_hz))
-    return StaticIntervals(start[kept], stop[kept], quiet, threshold)
+    return StaticIntervals(start[kept], stop[kept], quiet, limit)
 
 
 def moving_variance(x: Array, width: int) -> Array:

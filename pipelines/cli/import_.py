@@ -7,11 +7,21 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from pipelines.cli.options import ArchiveOption, JsonOption, console, error_console, print_json
+from pipelines.cli.options import (
+    ArchiveOption,
+    JsonOption,
+    console,
+    error_console,
+    print_json,
+    print_table,
+    short,
+    short_values,
+)
 from schemas.errors import DONE, PART_FAILED, WrongUse, did_you_mean
 from schemas.foreign import shown
 
 if TYPE_CHECKING:
+    from pipelines.importers.content import Content
     from pipelines.importers.mapping import Mapping
 
 PART = "Measure"
@@ -27,7 +37,13 @@ VERDICTS = {
 
 
 def command(
-    files: Annotated[list[Path], typer.Argument(metavar="FILE…", help="CSV, TSV, text, Parquet or MATLAB; also .gz.")],
+    files: Annotated[
+        list[Path],
+        typer.Argument(
+            metavar="FILE…",
+            help="Text, Parquet, MATLAB, WAV, LVM; with an extra HDF5, UFF58, TDMS, IDE, R. Also .gz.",
+        ),
+    ],
     columns: Annotated[
         str, typer.Option("--map", metavar="time=…,x=…,y=…,z=…", help="What each column of the file means.")
     ] = "",
@@ -49,6 +65,38 @@ def command(
     blocks: Annotated[
         float | None, typer.Option("--blocks", metavar="S", help="Dwells of this length, for a record in one pose.")
     ] = None,
+    positions: Annotated[
+        int | None, typer.Option("--positions", metavar="N", help="Positions logged back to back, without the moves.")
+    ] = None,
+    window: Annotated[
+        float | None, typer.Option("--window", metavar="S", help="Sliding window that finds dwells; 1 s.")
+    ] = None,
+    threshold: Annotated[
+        float | None,
+        typer.Option(
+            "--threshold", metavar="SD", help="Standard deviation in a window above which it moves, in --units output."
+        ),
+    ] = None,
+    shortest: Annotated[
+        float | None, typer.Option("--shortest", metavar="S", help="Shortest dwell that counts; 1 s.")
+    ] = None,
+    gaps: Annotated[
+        str, typer.Option("--gaps", metavar="refuse|split", help="Rows without a number and gaps in time; refuse.")
+    ] = "",
+    faulty: Annotated[
+        str,
+        typer.Option("--faulty", metavar="refuse|leave-out|keep", help="Axes that stand still and torn words; refuse."),
+    ] = "",
+    join: Annotated[
+        str,
+        typer.Option("--join", metavar="rows|columns", help="Several files are one recording: how they are joined."),
+    ] = "",
+    group: Annotated[
+        str, typer.Option("--group", metavar="NAME", help="Group of channels of a file that has several.")
+    ] = "",
+    list_dwells: Annotated[
+        bool, typer.Option("--list-dwells", help="List every dwell: start, end, mean, sd, residual, influence.")
+    ] = False,
     local_g: Annotated[
         float | None, typer.Option("--local-g", metavar="M/S2", help="Gravity where it was measured, m/s².")
     ] = None,
@@ -59,8 +107,8 @@ def command(
 ) -> None:
     """Bring recordings of others into the archive: a raw record and its dwells in the exchange format.
 
-    Columns are named (or numbered from 1 where a text file has no header). Nothing is guessed: what is not understood is
-    refused. Exit status 1: the fit asked for is not adequate for these data, or they cannot tell.
+    Columns are named, or numbered from 1. What a file does not state and its numbers do not show is not guessed but asked for.
+    Exit status 1: the fit asked for is not adequate for these data, or they cannot tell.
     """
     from pipelines.importers import mapping as mapped
 
@@ -72,6 +120,14 @@ def command(
         "unit": unit,
         "face": face,
         "block_s": blocks,
+        "positions": positions,
+        "window_s": window,
+        "threshold": threshold,
+        "shortest_s": shortest,
+        "gaps": gaps,
+        "faulty": faulty,
+        "join": join,
+        "group": group,
         "rows": rows,
         "rate_hz": rate,
         "axes": [part.strip() for part in axes.split(",")] if axes else None,
@@ -79,36 +135,39 @@ def command(
         "local_gravity_m_s2": local_g,
     }
     wanted = given | {key: value for key, value in options.items() if value not in ("", None, {}, [])}  # 0 is a value
-    _refuse_unmapped(files[0], wanted)
-    how = mapped.build(wanted, str(mapping or "import"))
     _refuse_unknown_fit(fit)
-    imports = [_import_one(path, how, fit, archive) for path in files]
+    sets = [files] if wanted.get("join") else [[path] for path in files]
+    imports = [_import_one(paths, wanted, str(mapping or "import"), fit, archive) for paths in sets]
     verdicts = [one["adequate"] for one in imports if one["fit"]]
     adequate = False if False in verdicts else None if None in verdicts else True
     if as_json:
         print_json(imports[0] if len(imports) == 1 else {"imports": imports, "adequate": adequate})
     else:
         for one in imports:
-            _print(one)
+            _print(one, list_dwells=list_dwells)
     raise typer.Exit(DONE if adequate is True else PART_FAILED)
 
 
-def _refuse_unmapped(path: Path, wanted: dict[str, Any]) -> None:
-    """Refuse a mapping without columns or the output's unit, with the columns that there are."""
-    if "columns" in wanted and "units" in wanted:
-        return
-    from pipelines.importers import files
-    from pipelines.importers.mapping import OUTPUT_UNITS
+def _mapping(wanted: dict[str, Any], content: Content, where: str, name: str) -> Mapping:
+    """The mapping, with the unit that the file states where none was given; one without columns or unit is refused."""
+    from pipelines.importers import mapping as mapped
+    from pipelines.importers import stated_units
 
-    if "columns" in wanted:
+    if "columns" not in wanted:
         raise WrongUse(
-            f"import: the output's unit is not told, one of {', '.join(OUTPUT_UNITS)} is needed; add --units output=…"
+            f"import: no column of {name} is mapped, x, y and z are needed at least (its columns: "
+            f"{', '.join(map(str, content.table.columns))}); add --map time=…,x=…,y=…,z=… and --units output=…, or --mapping "
+            f"FILE.toml; 'tumbleline inspect {name}' proposes a command"
         )
-    table, _ = files.read(path)
-    raise WrongUse(
-        f"import: no column of {path.name} is mapped, x, y and z are needed at least (its columns: "
-        f"{', '.join(map(str, table.columns))}); add --map time=…,x=…,y=…,z=… and --units output=…, or --mapping FILE.toml"
-    )
+    complete = stated_units.completed(wanted, content)
+    if "output" not in complete.get("units", {}) and all(axis in wanted["columns"] for axis in mapped.NEEDED):
+        raise WrongUse(
+            f"import: the unit of the output is not given and {name} states none, one of {', '.join(mapped.OUTPUT_UNITS)} is "
+            f"needed; add --units output=…; 'tumbleline inspect {name}' shows the size of the numbers"
+        )
+    how = mapped.build(complete, where)
+    stated_units.refuse_contradiction(how, content, name)
+    return how
 
 
 def _refuse_unknown_fit(fit: str) -> None:
@@ -118,13 +177,23 @@ def _refuse_unknown_fit(fit: str) -> None:
         )
 
 
-def _import_one(path: Path, how: Mapping, fit: str, archive: str | None) -> dict[str, Any]:
-    """Read, judge and keep one file; the document for JSON."""
-    from pipelines.importers import files, judge, keep, record
+def _import_one(paths: list[Path], wanted: dict[str, Any], where: str, fit: str, archive: str | None) -> dict[str, Any]:
+    """Read, judge and keep one recording; the document for JSON."""
+    from pipelines.importers import judge, keep, record, sources
+    from pipelines.importers import mapping as mapped
+    from pipelines.importers.dwell_list import dwell_rows
 
-    with error_console().status(f"reading {path.name}"):
-        table, source = files.read(path)
-        data = record.imported(table, how, path.name)
+    name = " + ".join(path.name for path in paths)
+    columns, units = wanted.get("columns"), wanted.get("units")
+    if isinstance(columns, dict) and isinstance(units, dict) and "output" in units:
+        mapped.build(wanted, where)  # a slip in the mapping is said before anything is read
+    with error_console().status(f"reading {name}"):
+        time = str(columns.get("time", "")) if isinstance(columns, dict) else ""
+        content, source, breaks = sources.read(
+            paths, join=str(wanted.get("join", "")), time=time, group=str(wanted.get("group", ""))
+        )
+        how = _mapping(wanted, content, where, name)
+        data = record.imported(content.table, how, name, content, breaks)
     judged = judge.judge(fit, data, how) if fit else None
     run = keep.keep(data, source, how, judged, archive)
     return {
@@ -135,20 +204,47 @@ def _import_one(path: Path, how: Mapping, fit: str, archive: str | None) -> dict
         "samples": 0 if data.samples is None else len(data.samples),
         "dwells": 0 if data.dwells is None else len(data.dwells),
         "remarks": list(data.remarks),
+        "faults": list(data.faults),
         "fit": fit or None,
         "adequate": None if judged is None else judged.adequate,
         **({} if judged is None else judged.document),
         "lines": [] if judged is None else list(judged.lines),
+        "dwell_list": dwell_rows(data, judged, how),
     }
 
 
-def _print(one: dict[str, Any]) -> None:
+def _print(one: dict[str, Any], *, list_dwells: bool) -> None:
     """An import for people."""
     out = console()
     rows = f"{one['samples']} samples, {one['dwells']} dwells" if one["samples"] else f"{one['dwells']} dwells"
     out.print(f"{', '.join(one['units'])}: {rows} in {one['out_unit']}, kept as run {one['run']}", markup=False)
     for remark in [*one["remarks"], *one["lines"]]:
         out.print(f"  {remark}", markup=False, soft_wrap=True)
+    if list_dwells:
+        _print_dwells(one["dwell_list"], one["out_unit"])
     if one["fit"]:
         verdict, style = VERDICTS[one["adequate"]]
         out.print(f"  {verdict}", style=style)
+
+
+def _print_dwells(dwells: list[dict[str, Any]], unit: str) -> None:
+    heads = ["dwell", "label", "start, s", "end, s", "samples", f"mean x / y / z, {unit}", f"sd x / y / z, {unit}",
+             "residual, µg", "influence"]  # fmt: skip
+    print_table(
+        heads,
+        [
+            [
+                str(one["dwell"]),
+                one["label"],
+                f"{one['start_s']:.2f}",
+                f"{one['end_s']:.2f}",
+                "" if one["n"] is None else str(one["n"]),
+                " / ".join(f"{value:.6g}" for value in one["mean"]),
+                "" if one["sd"] is None else short_values(one["sd"]),
+                "" if one["residual_ug"] is None else f"{one['residual_ug']:.1f}",
+                short(one["influence"]),
+            ]
+            for one in dwells
+        ],
+        whole=2,
+    )

@@ -42,12 +42,30 @@ __all__ = ["compare", "default_model", "diagnose", "document", "examined"]
 DEFAULT = ("bias", "scale", "misalignment")
 THERMAL = ("bias_temperature", "scale_temperature")
 _WARM = 5.0
+_SAME_G, _SAME_DEG = 0.02, 1.0
 _SEED = 1293
 """Noise that adequacy is measured against is drawn anew, but alike, for every diagnosis: the same data give the same answer."""
 
 
 def default_model(dwells: pd.DataFrame) -> list[str]:
-    """The model that is judged where none is named: with temperature terms when it varies by more than 5 °C."""
+    """The model that is judged where none is named: with temperature terms when it varies by more than 5 °C.
+
+    One pose tells a bias and what drives it, neither scale nor misalignment.
+    """
+    if _one_pose(dwells):
+        return ["bias", *(THERMAL[:1] if "bias_temperature" in _of_temperature(dwells) else ())]
+    return _of_temperature(dwells)
+
+
+def _one_pose(dwells: pd.DataFrame) -> bool:
+    """Whether the reference, or the table, is the same in all dwells."""
+    for columns, least in ((("force_x", "force_y", "force_z"), _SAME_G), (("outer_deg", "inner_deg"), _SAME_DEG)):
+        if all(name in dwells.columns and dwells[name].notna().all() for name in columns):
+            return all(float(np.ptp(dwells[name])) < least for name in columns)
+    return False
+
+
+def _of_temperature(dwells: pd.DataFrame) -> list[str]:
     for column in ("unit_C", "chamber_C"):
         if column in dwells.columns and dwells[column].notna().any():
             return [*DEFAULT, *THERMAL] if float(np.ptp(dwells[column].dropna())) > _WARM else list(DEFAULT)

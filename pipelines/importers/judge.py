@@ -6,7 +6,9 @@ from typing import TYPE_CHECKING
 
 from pipelines.importers.faces import six_faces
 from pipelines.importers.norm import norm
+from pipelines.importers.pose_check import silent_axis
 from pipelines.importers.ramp import ramp
+from schemas.errors import DataRejected
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -20,4 +22,9 @@ METHODS: dict[str, Callable[[Imported, Mapping], FitAnswer]] = {"norm": norm, "f
 
 def judge(method: str, data: Imported, mapping: Mapping) -> FitAnswer:
     """The fit called `method`, one of `METHODS`, of one unit's import."""
+    silent = silent_axis(data.dwells) if method == "norm" and data.dwells is not None else ""
+    if silent:  # more poses, which the fit would ask for, would not help
+        raise DataRejected(
+            f"import: axis {silent}; three axes that answer to gravity are needed for --fit norm; correct --map {silent[0]}=…"
+        )
     return METHODS[method](data, mapping)

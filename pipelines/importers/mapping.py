@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator
 
-from inertial.quantities import FORCE_COLUMNS, OUTPUT_COLUMNS, RECORDED, SPREAD_COLUMNS
+from inertial.quantities import FORCE_COLUMNS, LARGEST, OUTPUT_COLUMNS, RECORDED, SPREAD_COLUMNS
 from schemas.bounds import FASTEST_HZ, LONGEST_WAIT_S
 from schemas.errors import RecipeInvalid, WrongUse, close_matches, did_you_mean
 from schemas.foreign import shown
@@ -32,6 +32,7 @@ RESERVED = frozenset({
 })  # fmt: skip
 """Columns that the tables of an import have with a meaning of their own: no covariate may be called so."""
 SHORTEST_BLOCK_S = 1e-3
+MOST_POSITIONS = 2000
 LONGEST_NAME = 200
 
 OUTPUT_UNITS: dict[str, tuple[str, float]] = {
@@ -55,7 +56,8 @@ class Units(BaseModel):
 
     model_config = ConfigDict(extra="forbid", frozen=True)
     output: str
-    time: str = "s"
+    time: str = ""
+    """Empty: as the file states it, or as its steps tell."""
     temperature: str = "degC"
 
     @field_validator("output")
@@ -66,7 +68,7 @@ class Units(BaseModel):
     @field_validator("time")
     @classmethod
     def _known_time(cls, value: str) -> str:
-        return _one_of(value, (*TIME_UNITS, "samples"), "unit of time")
+        return value and _one_of(value, (*TIME_UNITS, "samples"), "unit of time")
 
     @field_validator("temperature")
     @classmethod
@@ -95,6 +97,22 @@ class Mapping(BaseModel):
     """The face that is up all the time, for a record in one pose."""
     block_s: Annotated[float, Field(ge=SHORTEST_BLOCK_S, le=LONGEST_WAIT_S)] | None = None
     """Dwells of this length instead of found ones, for a record in one pose."""
+    positions: Annotated[int, Field(ge=2, le=MOST_POSITIONS)] | None = None
+    """Count of positions logged back to back, without the moves between them."""
+    window_s: Annotated[float, Field(ge=SHORTEST_BLOCK_S, le=LONGEST_WAIT_S)] | None = None
+    """Length of the sliding window that finds dwells."""
+    threshold: Annotated[float, Field(gt=0.0, le=LARGEST)] | None = None
+    """Standard deviation of a window above which it moves, in the unit of the output."""
+    shortest_s: Annotated[float, Field(ge=SHORTEST_BLOCK_S, le=LONGEST_WAIT_S)] | None = None
+    """Shortest dwell."""
+    gaps: Literal["refuse", "split"] = "refuse"
+    """What is done with rows without a number and with gaps in time."""
+    faulty: Literal["refuse", "leave-out", "keep"] = "refuse"
+    """What is done with samples of an axis that stands still, and with torn words."""
+    group: str = ""
+    """Group of channels of a file that has several with clocks of their own."""
+    join: Literal["", "rows", "columns"] = ""
+    """How several files are one recording: one after another, or side by side."""
 
     @field_validator("columns")
     @classmethod

@@ -2,33 +2,34 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
 
 import numpy as np
 import pandas as pd
 
-from inertial import static_intervals
-from pipelines.importers import exchange, values
-from pipelines.importers.mapping import FACES, MEANINGS, OUTPUT_UNITS, TIME_UNITS, Mapping
+from pipelines.importers import exchange, pose_check, sample_faults, unit_check, values
+from pipelines.importers.mapping import FACES, MEANINGS, OUTPUT_UNITS, Mapping
+from pipelines.importers.record_time import backwards, gaps_of, seconds, time_doubts
+from pipelines.importers.stated_units import column_name
+from pipelines.importers.stretches import Stretches, stretches
 from schemas.errors import DataRejected, WrongUse, did_you_mean
 from schemas.foreign import shown
 from schemas.serials import refuse_unusable_serials
-from schemas.units import AXES, STANDARD_GRAVITY_M_S2
+from schemas.units import AXES
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from numpy.typing import NDArray
 
-_LIKELY = (0.5, 2.0)
-"""Median norm over gravity of a record in the unit claimed: bias and hand shaking stay well inside."""
-_SURE = 0.05
+    from pipelines.importers.content import Content
+    from pipelines.importers.documents import SampleFaultDocument
 
 
 @dataclass(frozen=True)
 class Imported:
-    """One file's record and dwells, in the tables of the archive."""
+    """One recording's samples and dwells, in the tables of the archive."""
 
     samples: pd.DataFrame | None
     """Raw record; None where the file's rows are dwells already."""
@@ -36,6 +37,8 @@ class Imported:
     """Exchange format; None where nothing stands still."""
     out_unit: str
     remarks: tuple[str, ...]
+    faults: tuple[SampleFaultDocument, ...] = field(default=())
+    """Faults of the samples that were left out or kept, for JSON."""
 
     @property
     def units(self) -> list[str]:
@@ -44,49 +47,121 @@ class Imported:
         return [] if table is None else sorted(set(table["unit"].tolist()))
 
 
-def imported(table: pd.DataFrame, mapping: Mapping, where: str) -> Imported:
+def imported(
+    table: pd.DataFrame, mapping: Mapping, where: str, content: Content | None = None, breaks: Sequence[int] = ()
+) -> Imported:
     """The record and dwells of a foreign table.
+
+    Parameters
+    ----------
+    content : what the file states about its columns.
+    breaks : rows before which another file begins.
 
     Raises
     ------
     DataRejected
-        A column is not there, a value is no finite number, time runs back, the norm contradicts the unit.
+        A column is not there, a value is no finite number, time runs back, the norm contradicts the unit, samples are missing,
+        an axis stands still, words are torn, or a dwell holds several positions.
     """
     columns = _columns(table, mapping, where)
-    output = _output(columns, mapping, where)
-    out_unit = OUTPUT_UNITS[mapping.units.output][0]
-    _refuse_other_unit(output, out_unit, where)
+    remarks = () if content is None else content.remarks
+    stated = {} if content is None else content.units
+    kept, columns, dropped = _with_numbers(columns, mapping, where)
+    breaks = sorted({int(np.searchsorted(kept, k)) for k in breaks} | _behind(kept))
+    raw = np.column_stack([_finite(columns[axis], where) for axis in mapping.axes])
+    raw = raw * [1.0 if sign == "+" else -1.0 for sign in mapping.signs]
+    remarks = (*remarks, *dropped, *unit_check.refuse_other_unit(raw, mapping.units.output, where))
+    out_unit, factor = OUTPUT_UNITS[mapping.units.output]
     serials = _serials(columns, mapping, where)
     extras = _extras(columns, mapping, where)
     if mapping.rows == "dwells":
-        return _as_dwells(columns, output, serials, extras, mapping, where)
-    time, remarks = _time(columns, mapping, where)
+        return _as_dwells(columns, raw * factor, serials, extras, mapping, where, remarks)
+    clock = seconds(columns, mapping, stated, where, breaks)
+    breaks, wide = gaps_of(clock.seconds, columns.get("dwell"), breaks, mapping, where)
     if len(set(serials)) > 1:
         raise DataRejected(
             f"{where}: samples of {len(set(serials))} units in one file, one unit is needed; divide the file"
         )
+    time = clock.seconds - clock.seconds[0]
+    faults = sample_faults.look(raw)
+    remarks = (*remarks, *clock.remarks, *wide, *sample_faults.refuse_or_remark(faults, raw, time, mapping, where))
+    bad = faults.bad if mapping.faulty == "leave-out" else np.zeros(len(raw), dtype=bool)
     samples = pd.DataFrame({"unit": serials, "slot": 0, "record": 0, "kind": "dwell", "time_s": time})
-    samples[list(AXES)] = output
+    samples[list(AXES)] = raw * factor
     samples = samples.assign(**extras)
-    first, last, labels = _stretches(columns, output, time, mapping)
-    first, last, labels = _wanted(first, last, labels, mapping, where)
-    dwells = _means(samples, first, last, labels, tuple(extras), mapping) if first else None
+    labels = columns["dwell"].astype(str).tolist() if "dwell" in columns else None
+    found = stretches(labels, sample_faults.mended(raw, faults, bad), time, breaks, mapping, where)
     record = np.zeros(len(samples), dtype=np.int64)
-    for number, (a, b) in enumerate(zip(first, last, strict=True)):
+    for number, (a, b) in enumerate(zip(found.first, found.last, strict=True)):
         record[a:b] = number + 1
+    record[bad] = 0
+    found, record, short = sample_faults.without_short(found, record)
     samples["record"] = record
-    return Imported(samples, dwells, out_unit, remarks)
+    dwells = _means(samples, found, tuple(extras), mapping) if len(found) else None
+    if dwells is not None:
+        remarks = (*remarks, *pose_check.refuse_or_remark(dwells, mapping, where))
+    remarks = (
+        *remarks,
+        *found.remarks,
+        *short,
+        *time_doubts(time, extras.get("unit_C"), found, mapping, searched=labels is None),
+    )
+    return Imported(samples, dwells, out_unit, remarks, tuple(faults.rows(time)))
 
 
 def _columns(table: pd.DataFrame, mapping: Mapping, where: str) -> dict[str, pd.Series]:
     names = [str(name) for name in table.columns]
     named = table.set_axis(names, axis=1)
-    for meaning, column in mapping.columns.items():
-        if column not in names:
+    found: dict[str, pd.Series] = {}
+    for meaning, wanted in mapping.columns.items():
+        column = column_name(names, wanted)
+        if not column:
             raise DataRejected(
-                f"{where}: column '{shown(column)}' (for {meaning}) is not there; {did_you_mean(column, names)}"
+                f"{where}: column '{shown(wanted)}' (for {meaning}) is not there; {did_you_mean(wanted, names)}"
             )
-    return {meaning: pd.Series(named[column], name=column) for meaning, column in mapping.columns.items()}
+        found[meaning] = pd.Series(named[column], name=column)
+    meanings = [meaning for meaning in ("time", *AXES) if meaning in found]
+    names_ = [str(found[meaning].name) for meaning in meanings]
+    if len(set(names_)) < len(names_):
+        raise DataRejected(
+            f"{where}: {', '.join(meanings)} are columns {', '.join(map(shown, names_))}, different ones are needed; "
+            "correct --map"
+        )
+    return found
+
+
+def _with_numbers(
+    columns: dict[str, pd.Series], mapping: Mapping, where: str
+) -> tuple[NDArray[np.int64], dict[str, pd.Series], tuple[str, ...]]:
+    """Rows that are kept (k,), the columns with these rows, and a remark on the others, which have no number somewhere."""
+    count = len(columns["x"])
+    if mapping.gaps == "refuse":
+        return np.arange(count), columns, ()
+    whole = np.ones(count, dtype=bool)
+    for meaning, column in columns.items():
+        if (
+            meaning in {"unit", "dwell"}
+            or column.dtype.kind in "mM"
+            or (meaning == "time" and column.dtype.kind not in "fiu")
+        ):
+            whole &= column.notna().to_numpy()
+        else:
+            whole &= np.isfinite(values.as_numbers(column, where, flags=meaning not in MEANINGS))
+    kept = np.flatnonzero(whole)
+    if not kept.size:
+        raise DataRejected(f"{where}: no row has a number in every mapped column, one is needed at least; check --map")
+    if kept.size == count:
+        return kept, columns, ()
+    first = int(np.flatnonzero(~whole)[0]) + 1
+    remark = (
+        f"{count - kept.size} of {count} rows without a number left out, the first is row {first}; dwells end there"
+    )
+    return kept, {name: one.iloc[kept].reset_index(drop=True) for name, one in columns.items()}, (remark,)
+
+
+def _behind(kept: NDArray[np.int64]) -> set[int]:
+    """Places among the kept rows before which a row was left out."""
+    return {int(k) + 1 for k in np.flatnonzero(np.diff(kept) > 1)}
 
 
 def _finite(column: pd.Series, where: str, *, flags: bool = False) -> NDArray[np.float64]:
@@ -96,41 +171,10 @@ def _finite(column: pd.Series, where: str, *, flags: bool = False) -> NDArray[np
         row = int(bad[0])
         raise DataRejected(
             f"{where}: row {row + 1}, column '{shown(str(column.name))}': found {shown(str(column.iloc[row]))}, a finite number "
-            f"is needed ({bad.size} such rows); repair the file or leave those rows out"
+            f"is needed ({bad.size} such rows); repair the file, or add --gaps split to use what lies between"
         )
     values.refuse_outside(numbers, "", where, label=str(column.name))
     return numbers
-
-
-def _output(columns: dict[str, pd.Series], mapping: Mapping, where: str) -> NDArray[np.float64]:
-    """Output (n, 3) after axes, signs and unit."""
-    factor = OUTPUT_UNITS[mapping.units.output][1]
-    signs = [factor if sign == "+" else -factor for sign in mapping.signs]
-    return np.column_stack(
-        [_finite(columns[axis], where) * sign for axis, sign in zip(mapping.axes, signs, strict=True)]
-    )
-
-
-def _refuse_other_unit(output: NDArray[np.float64], out_unit: str, where: str) -> None:
-    size = float(np.median(np.linalg.norm(output, axis=1)))
-    gravity = {"g": 1.0, "m/s^2": STANDARD_GRAVITY_M_S2}
-    if out_unit in gravity:
-        if _LIKELY[0] < size / gravity[out_unit] < _LIKELY[1]:
-            return
-        other = next(
-            (u for u, one in (*gravity.items(), ("mg", 1e3)) if _LIKELY[0] < size / one < _LIKELY[1]), "LSB or V"
-        )
-        raise DataRejected(
-            f"{where}: the norm of the output is {size:.5g}, about {gravity[out_unit]:.5g} is needed if its unit is "
-            f"{out_unit}; the unit looks like {other}, say so with --units output={other.split()[0]}"
-        )
-    whole = bool(np.all(output[:1000] == np.rint(output[:1000])))
-    close = [unit for unit, one in gravity.items() if abs(size / one - 1.0) < _SURE]
-    if out_unit == "LSB" and close and not whole:
-        raise DataRejected(
-            f"{where}: the norm of the output is {size:.5g} and its values are no whole numbers, counts are needed if its "
-            f"unit is LSB; the unit looks like {close[0]}, say so with --units output={close[0]}"
-        )
 
 
 def _serials(columns: dict[str, pd.Series], mapping: Mapping, where: str) -> list[str]:
@@ -144,61 +188,6 @@ def _serials(columns: dict[str, pd.Series], mapping: Mapping, where: str) -> lis
         raise WrongUse(f"{where}: whose record is it? no unit is mapped, a serial number is needed; give --unit SN")
     refuse_unusable_serials([mapping.unit], where)
     return [mapping.unit] * len(columns["x"])
-
-
-def _clock(columns: dict[str, pd.Series], mapping: Mapping, where: str) -> NDArray[np.float64]:
-    """Seconds from any beginning."""
-    if "time" in columns and values.is_moment(columns["time"]):
-        return values.seconds(columns["time"], where)
-    if "time" not in columns or mapping.units.time == "samples":
-        if mapping.rate_hz is None:
-            raise WrongUse(
-                f"{where}: no time in seconds is mapped, a rate is needed then; map time=…, or give --rate HZ"
-            )
-        count = _finite(columns["time"], where) if "time" in columns else np.arange(len(columns["x"]), dtype=np.float64)
-        time = count / mapping.rate_hz
-    else:
-        time = _finite(columns["time"], where) * TIME_UNITS[mapping.units.time]
-    values.refuse_outside(time, "time_s", where)
-    return time
-
-
-def _refuse_backwards(time: NDArray[np.float64], group: Sequence[Any], where: str, *, together: bool) -> None:
-    """Refuse times that run back within a group.
-
-    Parameters
-    ----------
-    group : a label for each row.
-    together : whether rows of a group that others lie between belong together, as those of one unit do.
-    """
-    codes = pd.factorize(np.asarray(group, dtype=object))[0]
-    order = np.argsort(codes, kind="stable") if together else np.arange(len(time))
-    back = np.flatnonzero((np.diff(time[order]) < 0.0) & (np.diff(codes[order]) == 0))
-    if back.size:
-        row, before = int(order[back[0] + 1]), int(order[back[0]])
-        label = f" within {shown(str(group[row]))}" if len(set(codes.tolist())) > 1 else ""
-        raise DataRejected(
-            f"{where}: row {row + 1}: time runs back by {time[before] - time[row]:.4g} s{label}, it must not; sort the rows"
-        )
-
-
-def _time(columns: dict[str, pd.Series], mapping: Mapping, where: str) -> tuple[NDArray[np.float64], tuple[str, ...]]:
-    """Seconds since the first sample of a record."""
-    time = _clock(columns, mapping, where)
-    if "dwell" in columns:  # dwells may have been recorded one by one, each with a clock of its own
-        _refuse_backwards(time, columns["dwell"].astype(str).tolist(), where, together=False)
-        return time - time[0], ()
-    _refuse_backwards(time, [""] * len(time), where, together=False)
-    if len(time) < 2 or time[-1] <= time[0]:
-        found = "1 sample" if len(time) < 2 else f"{len(time)} samples, all at {time[0]:g} s"
-        raise DataRejected(
-            f"{where}: {found}, a record of two at least that takes some time is needed; map another column as time, give "
-            "--rate HZ without one, or say --rows dwells"
-        )
-    gaps = np.diff(time)
-    typical = float(np.median(gaps))
-    wide = int(np.sum(gaps > 5.0 * typical)) if typical > 0.0 else 0
-    return time - time[0], (f"{wide} gaps in time, longer than five samples",) if wide else ()
 
 
 def _extras(columns: dict[str, pd.Series], mapping: Mapping, where: str) -> dict[str, NDArray[np.float64]]:
@@ -222,68 +211,27 @@ def _celsius(values: NDArray[np.float64], unit: str) -> NDArray[np.float64]:
     return (values - 32.0) / 1.8 if unit == "degF" else values
 
 
-def _stretches(
-    columns: dict[str, pd.Series], output: NDArray[np.float64], time: NDArray[np.float64], mapping: Mapping
-) -> tuple[list[int], list[int], list[str]]:
-    """First, one past the last sample, and label of each stretch at rest."""
-    if "dwell" in columns:
-        labels = columns["dwell"].astype(str).to_numpy(dtype=object)
-        first = np.concatenate([[0], np.flatnonzero(labels[1:] != labels[:-1]) + 1])
-        last = np.concatenate([first[1:], [labels.size]])
-        return first.tolist(), last.tolist(), [str(labels[k]) for k in first]
-    if mapping.block_s is not None:
-        number = np.floor((time - time[0]) / mapping.block_s).astype(np.int64)
-        first = np.concatenate([[0], np.flatnonzero(np.diff(number)) + 1])
-        last = np.concatenate([first[1:], [time.size]])
-        return first.tolist(), last.tolist(), [f"block {k}" for k in range(first.size)]
-    rate = mapping.rate_hz or (len(time) - 1) / float(time[-1])
-    if len(time) < 3 * max(3, round(rate)):
-        return [], [], []
-    found = static_intervals.find(output, rate)
-    return found.start.tolist(), found.stop.tolist(), [f"dwell {k}" for k in range(len(found))]
-
-
-def _wanted(
-    first: list[int], last: list[int], labels: list[str], mapping: Mapping, where: str
-) -> tuple[list[int], list[int], list[str]]:
-    """The stretches that the poses name; all where no pose is named."""
-    if not mapping.poses:
-        return first, last, labels
-    missing = [label for label in mapping.poses if label not in labels]
-    if missing:
-        raise DataRejected(
-            f"{where}: no dwell is labelled '{missing[0]}' (in --poses); {did_you_mean(missing[0], labels)}"
-        )
-    kept = [k for k, label in enumerate(labels) if label in mapping.poses]
-    return [first[k] for k in kept], [last[k] for k in kept], [labels[k] for k in kept]
-
-
-def _means(
-    samples: pd.DataFrame,
-    first: list[int],
-    last: list[int],
-    labels: list[str],
-    extras: tuple[str, ...],
-    mapping: Mapping,
-) -> pd.DataFrame:
+def _means(samples: pd.DataFrame, found: Stretches, extras: tuple[str, ...], mapping: Mapping) -> pd.DataFrame:
     """Dwells in the exchange format."""
-    values = samples[[*AXES, *extras]].to_numpy(dtype=np.float64)
-    time = samples["time_s"].to_numpy(dtype=np.float64)
-    slices = [slice(a, b) for a, b in zip(first, last, strict=True)]
-    mean = np.stack([values[s].mean(axis=0) for s in slices])
-    sd = np.stack([values[s, :3].std(axis=0, ddof=1) if s.stop - s.start > 1 else np.zeros(3) for s in slices])
+    numbers = samples[[*AXES, *extras]].to_numpy(dtype=np.float64)
+    time, record = samples["time_s"].to_numpy(dtype=np.float64), samples["record"].to_numpy()
+    inside = [
+        a + np.flatnonzero(record[a:b] == k + 1) for k, (a, b) in enumerate(zip(found.first, found.last, strict=True))
+    ]
+    mean = np.stack([numbers[rows].mean(axis=0) for rows in inside])
+    sd = np.stack([numbers[rows, :3].std(axis=0, ddof=1) if rows.size > 1 else np.zeros(3) for rows in inside])
     frame = pd.DataFrame(
         {
             "unit": samples["unit"].iloc[0],
-            "dwell": np.arange(len(slices)),
-            "time_s": [float(time[s].mean()) for s in slices],
+            "dwell": np.arange(len(found)),
+            "time_s": [float(time[rows].mean()) for rows in inside],
             **{f"out_{axis}": mean[:, k] for k, axis in enumerate(AXES)},
             **{f"sd_{axis}": sd[:, k] for k, axis in enumerate(AXES)},
-            "n": [s.stop - s.start for s in slices],
-            "duration_s": [float(time[s.stop - 1] - time[s.start]) for s in slices],
+            "n": [rows.size for rows in inside],
+            "duration_s": [float(time[rows[-1]] - time[rows[0]]) for rows in inside],
             **{name: mean[:, 3 + k] for k, name in enumerate(extras)},
-            "record": np.arange(len(slices)) + 1,
-            "pose": labels,
+            "record": np.arange(len(found)) + 1,
+            "pose": list(found.labels),
         }
     )
     return _finished(frame, mapping)
@@ -296,19 +244,24 @@ def _as_dwells(
     extras: dict[str, NDArray[np.float64]],
     mapping: Mapping,
     where: str,
+    remarks: tuple[str, ...],
 ) -> Imported:
     """A file whose rows are dwells already."""
     count = pd.Series(serials).groupby(serials).cumcount().to_numpy()
     time = count.astype(np.float64)
     if "time" in columns:
-        time = _clock(columns, mapping, where)
-        _refuse_backwards(time, serials, where, together=True)  # units may follow one another, or alternate
+        time = seconds(columns, mapping, {}, where, (), dwells=True).seconds
+        backwards(time, serials, where, together=True)  # units may follow one another, or alternate
         time = time - float(time.min())
     frame = pd.DataFrame({"unit": serials, "dwell": count, "time_s": time})
     frame[["out_x", "out_y", "out_z"]] = output
     labels = columns["dwell"].astype(str).tolist() if "dwell" in columns else [f"dwell {k}" for k in count]
+    sound, still = sample_faults.sound_dwells(extras, labels, mapping, where)
+    remarks = (*remarks, *still)
     frame = _finished(frame.assign(record=count, pose=labels, **extras), mapping)
-    return Imported(None, exchange.checked(frame, where=where, foreign=True), OUTPUT_UNITS[mapping.units.output][0], ())
+    dwells = exchange.checked(frame[sound].reset_index(drop=True), where=where, foreign=True)
+    remarks = (*remarks, *pose_check.refuse_or_remark(dwells, mapping, where))
+    return Imported(None, dwells, OUTPUT_UNITS[mapping.units.output][0], remarks)
 
 
 def _finished(frame: pd.DataFrame, mapping: Mapping) -> pd.DataFrame:

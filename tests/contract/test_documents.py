@@ -24,6 +24,7 @@ CASES = {
     "compare --json": ["compare", "latest", "--fresh", "latest"],
     "history --json": ["history", "{folder}/model.toml", "--dwells", "latest"],
     "list --json": ["list"],
+    "inspect FILE --json": ["inspect", "{folder}/record.csv"],
     "show RUN --json": ["show"],
     "show RUN TABLE --json": ["show", "latest", "coefficients"],
     "show UNIT --at DATE --json": ["show", "A1", "--at", "2026-06-01"],
@@ -38,7 +39,7 @@ CASES = {
     "station log --json": ["station", "log"],
     "run --json": ["fit", "latest", "--limits", "consumer"],
 }
-WITHOUT_ARCHIVE = {"plan", "station"}
+WITHOUT_ARCHIVE = {"plan", "station", "inspect"}
 
 
 @pytest.fixture(scope="module")
@@ -51,6 +52,8 @@ def kept(tmp_path_factory: pytest.TempPathFactory) -> Path:
     assert CliRunner().invoke(app, certify).exit_code == 0
     model = '[model]\nname = "m"\nversion = 1\neffects = ["bias", "scale", "misalignment"]\n'
     (folder / "model.toml").write_text(model, encoding="utf-8")
+    rows = [f"{k / 10},{k % 3},{k % 2},16{k % 10}" for k in range(200)]
+    (folder / "record.csv").write_text("\n".join(["t,ax,ay,az", *rows, ""]), encoding="utf-8")
     return folder
 
 

@@ -26,6 +26,7 @@ from inertial.errors import InertialError
 from schemas.errors import TumblelineError
 
 MOST_BYTES = 2**30
+TABLES = 4  # of the readers: dwells, raw, recording, history
 
 # -- mutations ------------------------------------------------------------------------------------------------------------
 
@@ -223,6 +224,7 @@ def retyped(rng, ending, data):
         return data
 
 
+PACKED = (".parquet", ".mat", ".gz", ".h5", ".tdms", ".wav", ".rda")
 BINARY = (flip, other_bytes, cut, without, twice, word_in)
 TEXT = (*BINARY, digit, digit, number_out, number_out, cells_out, cells_out, cells_out, lines_moved)
 
@@ -233,7 +235,7 @@ def mutated(rng, ending, data):
         return packed(mutated(rng, ending.removesuffix(".gz"), gzip.decompress(data)))
     if ending in {".parquet", ".mat"} and rng.random() < 0.5:
         return retyped(rng, ending, data)
-    kinds = BINARY if ending.endswith((".parquet", ".mat", ".gz")) else TEXT
+    kinds = BINARY if ending.endswith(PACKED) else TEXT
     for _ in range(int(rng.choice([1, 1, 1, 2, 4]))):
         data = kinds[int(rng.integers(len(kinds)))](rng, data)
     return data
@@ -243,8 +245,8 @@ def case(seed, number, every):
     """Reader, ending and bytes of the mutation of this number, the same whenever it is asked for."""
     rng = np.random.default_rng([seed, number])
     names = list(every)
-    # tables have more formats than the rest: two of three
-    name = names[int(rng.integers(3))] if rng.random() < 0.6 else names[int(rng.integers(3, len(names)))]
+    # tables have more formats than the rest: three of five
+    name = names[int(rng.integers(TABLES))] if rng.random() < 0.6 else names[int(rng.integers(TABLES, len(names)))]
     ending, data = every[name][int(rng.integers(len(every[name])))]
     return name, ending, mutated(rng, ending, data)
 

@@ -1,22 +1,25 @@
 """Files that people bring, one of each kind and format, and their readers with the rules that whatever is accepted keeps."""
 
+import contextlib
 import gzip
 import io
 import json
+import tempfile
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
-from scipy.io import savemat
+from scipy.io import savemat, wavfile
 
 from pipelines.archive import files as archive_files
 from pipelines.audit.rules import load_rules
-from pipelines.importers import exchange, files, mapping, record
+from pipelines.importers import exchange, files, inspection, mapping, record
 from pipelines.importers.values import BOUNDS, LARGEST
 from pipelines.jobs.model_files import read_model
 from pipelines.jobs.recipes import load_recipe, read_limits
 from pipelines.jobs.seating import read_seating
 from schemas.bounds import COLDEST_C, HOTTEST_C, LONGEST_WAIT_S
+from schemas.errors import TumblelineError
 from schemas.profile import parse_profile
 from schemas.recipe import read_text
 from schemas.serials import is_serial
@@ -131,6 +134,7 @@ def samples():
             (".csv.gz", packed(csv(raw()))),
             (".mat.gz", packed(mat(raw(), packed=False))),
         ],
+        "recording": recordings_of_others(),
         "history": [(".csv", csv(history())), (".parquet", parquet(history()))],
         "recipe": [(".toml", product("schemas", "samples", "production.toml"))],
         "limits": [(".toml", product("schemas", "samples", "limits-consumer.toml"))],
@@ -146,6 +150,80 @@ def samples():
         "mapping": [(".toml", MAPPING.encode())],
         "manifest": [(".json", json.dumps(manifest, indent=1).encode())],
     }
+
+
+def recordings_of_others():
+    """A small recording in every format whose library is installed."""
+    frame = raw().drop(columns="heat")
+    rows = "\n".join(";".join(f"{value:.6f}" for value in row) for row in frame.to_numpy()).replace(".", ",")
+    names = list(frame)
+    lvm = "\n".join("\t".join(f"{value:.6f}" for value in row) for row in frame.to_numpy())
+    head = "LabVIEW Measurement\nSeparator\tTab\nDecimal_Separator\t.\n***End_of_Header***\nChannels\t3\nDelta_X\t0.1\t0.1\t0.1\n"
+    found = [
+        (".csv", f"Recorder: R-9\nStarted;12:00\n\n{';'.join(names)}\n{rows}\n".encode()),
+        (".csv", "\ufeff0;1;2;3\n".encode("utf-8") + rows.encode()),
+        (".lvm", (head + "***End_of_Header***\nX_Value\tax\tay\taz\tComment\n" + lvm + "\n").encode()),
+    ]
+    sink = io.BytesIO()
+    wavfile.write(sink, 10, (20000 * frame[["ax", "ay", "az"]].to_numpy()).astype(np.int16))
+    found.append((".wav", sink.getvalue()))
+    stamped = frame.assign(
+        t=(pd.Timestamp("2026-01-01") + pd.to_timedelta(frame["t"], unit="s")).dt.strftime("%d.%m.%Y %H:%M:%S.%f")
+    )
+    found.append((".csv", csv(stamped)))
+    for make in (_hdf5, _tdms, _uff, _rdata):
+        with contextlib.suppress(ImportError):
+            found.append(make(frame))
+    return found
+
+
+def _hdf5(frame):
+    import h5py
+
+    sink = io.BytesIO()
+    with h5py.File(sink, "w") as file:
+        for name in frame:
+            file.create_dataset(
+                f"imu/{name}", data=frame[name].to_numpy(), compression="gzip" if name == "ay" else None
+            )
+    return ".h5", sink.getvalue()
+
+
+def _tdms(frame):
+    import nptdms
+
+    sink = io.BytesIO()
+    with nptdms.TdmsWriter(sink) as writer:
+        writer.write_segment(
+            [
+                nptdms.ChannelObject("log", name, frame[name].to_numpy(), properties={"unit_string": "g"})
+                for name in frame
+            ]
+        )
+    return ".tdms", sink.getvalue()
+
+
+def _uff(frame):
+    import pyuff
+
+    with tempfile.TemporaryDirectory() as folder:
+        file = pyuff.UFF(str(Path(folder) / "a.uff"))
+        for number, name in enumerate(("ax", "ay", "az")):
+            one = {"type": 58, "func_type": 1, "rsp_node": 1, "rsp_dir": number + 1, "ref_node": 0, "ref_dir": 0, "id1": name,
+                   "data": frame[name].to_numpy(), "x": frame["t"].to_numpy(), "rsp_ent_name": "NONE", "ref_ent_name": "NONE",
+                   "abscissa_spacing": 1, "abscissa_spec_data_type": 17, "ordinate_spec_data_type": 12,
+                   "ordinate_axis_units_lab": "g", "orddenom_spec_data_type": 0, "abscissa_inc": 0.1, "abscissa_min": 0.0,
+                   "num_pts": len(frame), "ord_data_type": 4, "binary": 0}  # fmt: skip
+            file.write_sets(one, "add" if number else "overwrite")
+        return ".uff", (Path(folder) / "a.uff").read_bytes()
+
+
+def _rdata(frame):
+    import pyreadr
+
+    with tempfile.TemporaryDirectory() as folder:
+        pyreadr.write_rdata(str(Path(folder) / "a.rda"), frame, df_name="imu")
+        return ".rda", (Path(folder) / "a.rda").read_bytes()
 
 
 # -- readers, with the rules that whatever is accepted keeps --------------------------------------------------------------
@@ -182,6 +260,24 @@ def read_raw(path):
             assert table["t"].dtype.kind != "M" or data.samples["time_s"].iloc[-1] < 1e9, "units of time mistaken"
 
 
+def read_recording(path):
+    """A first look, and an import by the numbers of the columns."""
+    inspection.inspect([path])
+    content, _ = files.read_content(path)
+    how = {"columns": {"time": "1", "x": "2", "y": "3", "z": "4"}, "units": {"output": "LSB"}, "unit": "A1"}
+    for more in ({}, {"gaps": "split", "faulty": "leave-out"}):
+        try:
+            data = record.imported(content.table, mapping.build({**how, **more}, "fuzz"), path.name, content)
+        except TumblelineError:
+            continue
+        for frame in (data.samples, data.dwells):
+            if frame is not None:
+                _within(frame)
+        assert (np.diff(data.samples["time_s"]) >= 0.0).all()
+        if data.dwells is not None:
+            assert np.isfinite(data.dwells[["out_x", "out_y", "out_z"]].to_numpy()).all()
+
+
 def read_history(path):
     frame = exchange.read_history(path)
     _within(frame)
@@ -210,6 +306,7 @@ def read_slots(path):
 READERS = {
     "dwells": read_dwells,
     "raw": read_raw,
+    "recording": read_recording,
     "history": read_history,
     "recipe": read_recipe,
     "limits": lambda path: read_limits(str(path)),

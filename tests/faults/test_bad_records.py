@@ -49,7 +49,11 @@ def told(monkeypatch, capsys, *words: object) -> tuple[int, str, str]:
         (lambda t: t, ("--blocks", "1e-300"), "block_s: found 1e-300"),
         (lambda t: t.assign(ax=t.ax > -1.0), (), "column 'ax' holds true and false"),
         (lambda t: t.assign(t=t.t * 1e300), (), "column t: found 1e\\+298"),
-        (lambda t: t.assign(t=t.t * 1e12), (), "column time_s: found .*, -1e\\+11 to 1e\\+11 s is needed"),
+        (
+            lambda t: t.assign(t=t.t * 1e12),
+            ("--units", "output=g,time=s"),
+            "column time_s: found .*, -1e\\+11 to 1e\\+11 s is needed",
+        ),
         (lambda t: t.assign(az=1e200), (), "column az: found 1e\\+200"),
     ],
 )

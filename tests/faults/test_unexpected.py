@@ -25,7 +25,7 @@ def broken(monkeypatch, tmp_path: Path) -> Path:
         raise KeyError("x")
 
     monkeypatch.setenv("TUMBLELINE_STATE", str(tmp_path / "state"))
-    monkeypatch.setattr("pipelines.importers.files.read", defect)
+    monkeypatch.setattr("pipelines.importers.files.read_content", defect)
     return tmp_path / "state"
 
 

@@ -1,0 +1,158 @@
+"""``tumbleline inspect``: a first look at files of others, and the import command for them."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from pipelines.cli.options import JsonOption, console, error_console, print_json, print_table
+from schemas.errors import DONE, PART_FAILED, WrongUse
+
+if TYPE_CHECKING:
+    from pipelines.importers.documents import InspectDocument
+    from pipelines.importers.inspection import Inspection
+
+PART = "Measure"
+ORDER = 155
+SUMMARY = "Look at recordings of other systems and propose how to import them."
+
+MOST_INTERVALS, MOST_FAULTS = 12, 6
+PICTURES = (".svg", ".png", ".pdf")
+
+
+def command(
+    files: Annotated[list[Path], typer.Argument(metavar="FILE…", help="Recordings in any format that import reads.")],
+    join: Annotated[
+        str,
+        typer.Option("--join", metavar="rows|columns", help="Several files are one recording: how they are joined."),
+    ] = "",
+    group: Annotated[
+        str, typer.Option("--group", metavar="NAME", help="Group of channels of a file that has several.")
+    ] = "",
+    picture: Annotated[
+        Path | None, typer.Option("--picture", metavar="FILE", help="Draw the record: .svg, .png or .pdf.")
+    ] = None,
+    page: Annotated[
+        Path | None, typer.Option("--page", metavar="FILE.html", help="Write the first look as a page.")
+    ] = None,
+    *,
+    as_json: JsonOption = False,
+) -> None:
+    """Say what a file holds and may mean, with reasons: columns, units, rate, gaps, faults, static intervals. Nothing is kept.
+
+    The last line is the import command that fits; what the file does not say stands in it in capitals. Exit status 1: there is
+    such a gap in the command.
+    """
+    from pipelines.importers.inspection import inspect
+
+    if join not in {"", "rows", "columns"}:
+        raise WrongUse(f"--join: found '{join}', rows or columns is needed; correct it")
+    if picture is not None and picture.suffix not in PICTURES:
+        raise WrongUse(f"--picture: {picture}: one of {', '.join(PICTURES)} is needed; choose another ending")
+    sets = [files] if join or len(files) == 1 else [[path] for path in files]
+    if len(sets) > 1 and (picture or page):
+        raise WrongUse(f"inspect: {len(sets)} recordings, --picture and --page show one; name one file, or add --join")
+    found: list[Inspection] = []
+    for paths in sets:
+        with error_console().status(f"reading {paths[0].name}"):
+            found.append(inspect(paths, join=join, group=group))
+    _write(found[0], picture, page)
+    documents = [one.document for one in found]
+    if as_json:
+        print_json(documents[0] if len(documents) == 1 else {"inspections": documents})
+    else:
+        for document in documents:
+            _print(document)
+    raise typer.Exit(PART_FAILED if any(document["open"] for document in documents) else DONE)
+
+
+def _write(found: Inspection, picture: Path | None, page: Path | None) -> None:
+    if picture is None and page is None:
+        return
+    from pipelines.report import recording
+
+    if picture is not None and not recording.save_picture(found, picture):
+        raise WrongUse("inspect: no columns of acceleration were recognised, nothing can be drawn; leave out --picture")
+    if page is not None:
+        page.write_text(recording.page(found), encoding="utf-8")
+
+
+def _print(one: InspectDocument) -> None:
+    """A first look for people."""
+    out = console()
+    names = " + ".join(Path(name).name for name in one["files"])
+    rate = "" if one["rate_hz"] is None else f", {one['rate_hz']:.5g} Hz"
+    long = "" if one["duration_s"] is None else f", {one['duration_s']:.5g} s"
+    out.print(f"{names}: {one['form']}, {one['rows']} rows{rate}{long}", markup=False, soft_wrap=True)
+    for remark in one["remarks"]:
+        out.print(f"  {remark}", markup=False, soft_wrap=True)
+    _print_columns(one)
+    if one["output_unit"]:
+        out.print(f"  output in {one['output_unit']}: {one['output_reason']}", soft_wrap=True)
+    if one["time_unit"]:
+        out.print(f"  time in {one['time_unit']}: {one['time_reason']}", soft_wrap=True)
+    if one["gaps"]:
+        out.print(f"  {one['gaps']} gaps in time longer than five samples", soft_wrap=True)
+    for fault in one["faults"][:MOST_FAULTS]:
+        what = "stands still" if fault["fault"] == "stuck_output" else "has torn words"
+        out.print(
+            f"  axis {fault['axis']} {what}: {fault['samples']} samples from row {fault['first_row']} on",
+            soft_wrap=True,
+        )
+    more = len(one["faults"]) - MOST_FAULTS
+    if more > 0:
+        out.print(f"  and {more} more such faults", soft_wrap=True)
+    _print_intervals(one)
+    for text in one["open"]:
+        out.print(f"  to be added by you: {text}", soft_wrap=True)
+    out.print(one["command"], soft_wrap=True)
+
+
+def _print_columns(one: InspectDocument) -> None:
+    rows = [
+        [
+            str(column["number"]),
+            column["name"],
+            column["meaning"],
+            column["reason"],
+            column["unit"],
+            "" if column["low"] is None else f"{column['low']:.6g}",
+            "" if column["high"] is None else f"{column['high']:.6g}",
+            "" if column["resolution"] is None else f"{column['resolution']:.4g}",
+            str(column["clipped"] or ""),
+            str(column["missing"] or ""),
+        ]
+        for column in one["columns"]
+    ]
+    heads = ["no.", "column", "meaning", "reason", "unit", "lowest", "highest", "resolution", "clipped", "no number"]
+    print_table(heads, rows, whole=2)
+
+
+def _print_intervals(one: InspectDocument) -> None:
+    intervals = one["intervals"]
+    out = console()
+    if not intervals:
+        return
+    several = [k for k, interval in enumerate(intervals) if interval["positions"] > 1]
+    total = sum(interval["end_s"] - interval["start_s"] for interval in intervals)
+    out.print(f"  {len(intervals)} static intervals, {total:.4g} s", soft_wrap=True)
+    for k in several[:MOST_FAULTS]:
+        out.print(
+            f"  interval {k} holds about {intervals[k]['positions']} positions logged back to back", soft_wrap=True
+        )
+    rows = [
+        [
+            str(k),
+            f"{interval['start_s']:.2f}",
+            f"{interval['end_s']:.2f}",
+            str(interval["samples"]),
+            " / ".join(f"{value:.6g}" for value in interval["mean"]),
+            " / ".join(f"{value:.3g}" for value in interval["sd"]),
+        ]
+        for k, interval in enumerate(intervals[:MOST_INTERVALS])
+    ]
+    print_table(["interval", "start, s", "end, s", "samples", "mean x / y / z", "sd x / y / z"], rows)
+    if len(intervals) > MOST_INTERVALS:
+        out.print(f"  and {len(intervals) - MOST_INTERVALS} more", soft_wrap=True)

@@ -1,0 +1,239 @@
+"""Seconds from the time of a foreign file: stamps of date and time, Unix time, counters in s, ms, µs or ns.
+
+The unit of a counter is what the file states, else what its steps allow; where they allow several, it is asked for. A unit
+that was given and contradicts what the file states is refused, one that contradicts the steps is remarked upon.
+"""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pandas as pd
+
+from pipelines.importers import values
+from pipelines.importers.mapping import TIME_UNITS
+from schemas.errors import DataRejected, WrongUse
+from schemas.foreign import foreign, shown
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+EPOCH_S = (9.46e8, 4.1e9)
+"""Unix time of the years 2000 to 2099."""
+USUAL_HZ = (0.5, 5e4)
+"""Rates of samples of accelerometers, of recorders and of loggers."""
+_NAMED = re.compile(r"(?:^|[_\s.\-\[(])(s|sec|secs|second|seconds|ms|msec|milli|millis|milliseconds?|us|µs|μs|usec|micros|"
+                    r"microseconds?|ns|nsec|nanos|nanoseconds?)[\])]?\s*$", re.IGNORECASE)  # fmt: skip
+_CLOCK = re.compile(r"^\s*(\d{1,2}:\d{2}:\d{2}(?:[.,:]\d+)?)\s*$")
+_FRACTION = re.compile(r"(:\d{2}),(\d+)")
+_FORMATS = (
+    *("ISO8601", "%d.%m.%Y %H:%M:%S.%f", "%d.%m.%Y %H:%M:%S", "%d-%b-%Y %H:%M:%S.%f", "%d-%b-%Y %H:%M:%S"),
+    *("%Y/%m/%d %H:%M:%S.%f", "%Y/%m/%d %H:%M:%S"),
+)
+_DAY_FIRST = ("%d/%m/%Y %H:%M:%S.%f", "%d/%m/%Y %H:%M:%S")
+_MONTH_FIRST = ("%m/%d/%Y %H:%M:%S.%f", "%m/%d/%Y %H:%M:%S", "%m/%d/%Y %I:%M:%S %p", "%m/%d/%Y %I:%M:%S.%f %p")
+_HALF_DAY_S = 43_200.0
+
+
+@dataclass(frozen=True)
+class Clock:
+    """Seconds (n,) from any beginning, and how the column was read."""
+
+    seconds: NDArray[np.float64]
+    unit: str
+    remarks: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Recognised:
+    """A unit of time (empty where several or none are possible), why, and which are possible."""
+
+    unit: str
+    reason: str
+    possible: tuple[str, ...]
+
+
+def unit_stated(text: str) -> str:
+    """The unit of time that a text names, as one of s, ms, us, ns; empty where it names none."""
+    word = text.strip().lower().replace("µ", "u").replace("μ", "u")
+    for unit, words in {
+        "ns": ("ns", "nsec", "nano"),
+        "us": ("us", "usec", "micro"),
+        "ms": ("ms", "msec", "milli"),
+    }.items():
+        if word == unit or word.startswith(words[1:]):
+            return unit
+    return "s" if word in {"s", "sec", "secs", "second", "seconds"} else ""
+
+
+def recognised(numbers: NDArray[np.float64], name: str, stated: str = "") -> Recognised:
+    """The unit of a column of time.
+
+    Parameters
+    ----------
+    numbers : (n,), finite.
+    name : of the column; `time_ms` states a unit.
+    stated : unit that the file states elsewhere.
+    """
+    own = unit_stated(stated)
+    if own:
+        return Recognised(own, f"the file states {stated}", (own,))
+    epoch = _epoch(numbers)
+    if epoch:
+        return Recognised(epoch, f"Unix time, in {epoch}", (epoch,))
+    found = _NAMED.search(re.sub(r"(?<=[a-z])(?=[A-Z])", "_", name))
+    own = unit_stated(found[1]) if found else ""
+    if own and found and found[0].strip() != name.strip():
+        return Recognised(own, f"the name '{shown(name)}'", (own,))
+    return _by_steps(numbers)
+
+
+def _by_steps(numbers: NDArray[np.float64]) -> Recognised:
+    step = typical_step(numbers)
+    if not step > 0.0:
+        return Recognised("", "time does not go on", ())
+    possible = tuple(unit for unit, factor in TIME_UNITS.items() if USUAL_HZ[0] <= 1.0 / (step * factor) <= USUAL_HZ[1])
+    fractions = bool(np.any(numbers != np.rint(numbers)))
+    reason = f"steps of {step:.6g}"
+    if "s" in possible and step < 1.0 and fractions:
+        return Recognised(
+            "s", reason, ("s",)
+        )  # counters of ms and below that count in fractions have it in their names
+    return Recognised(possible[0] if len(possible) == 1 else "", reason, possible)
+
+
+def typical_step(numbers: NDArray[np.float64]) -> float:
+    """Median of the steps; where most are zero (stamps coarser than the rate), the mean step."""
+    if numbers.size < 2:
+        return 0.0
+    step = float(np.median(np.diff(numbers)))
+    return step if step > 0.0 else float(numbers[-1] - numbers[0]) / (numbers.size - 1)
+
+
+def _epoch(numbers: NDArray[np.float64]) -> str:
+    middle, step = float(np.median(numbers)), typical_step(numbers)
+    for unit, factor in TIME_UNITS.items():
+        if EPOCH_S[0] <= middle * factor <= EPOCH_S[1] and 1e-3 <= 1.0 / max(step * factor, 1e-30) <= 1e7:
+            return unit
+    return ""
+
+
+def stamps(column: pd.Series, where: str) -> NDArray[np.float64]:
+    """Seconds since the first of stamps of date and time, or of the time of day.
+
+    Raises
+    ------
+    DataRejected
+        A row holds none, or day and month cannot be told apart and it matters.
+    """
+    name = shown(str(column.name))
+    text = column.astype(str).str.strip().str.replace(_FRACTION, r"\1.\2", regex=True)
+    if column.notna().all() and bool(text.str.match(_CLOCK).all()):
+        with foreign(f"{where}: column '{name}': times of day that cannot be read", "give seconds, or ISO stamps"):
+            spans = pd.to_timedelta(
+                text.str.replace(r":(\d+)$", r".\1", regex=True) if text.iloc[0].count(":") == 3 else text
+            )
+        seconds = np.asarray(spans.dt.total_seconds(), dtype=np.float64)
+        midnights = np.cumsum(np.concatenate([[0.0], np.diff(seconds) < -_HALF_DAY_S]))
+        return seconds + 86_400.0 * midnights - seconds[0]
+    for form in _FORMATS:
+        parsed = _parsed(text, form)
+        if parsed is not None:
+            return values.seconds(parsed, where)
+    first = [one for one in (_first(text, forms) for forms in (_DAY_FIRST, _MONTH_FIRST)) if one is not None]
+    found = [values.seconds(one, where) for one in first]
+    if len(found) == 2 and not np.allclose(found[0], found[1]):
+        raise DataRejected(
+            f"{where}: column '{name}': '{shown(column.iloc[0])}': day and month cannot be told apart, and the date changes; "
+            "write the dates as 2026-12-31"
+        )
+    if found:
+        return found[0]
+    row = _first_bad(text)
+    raise DataRejected(
+        f"{where}: row {row + 1}, column '{name}': found {shown(column.iloc[row])!r}, a time is needed: a number, ISO 8601 "
+        "(2026-12-31T23:59:59.5), DD.MM.YYYY hh:mm:ss or hh:mm:ss; repair the row, map another column, or give --rate HZ"
+    )
+
+
+def _first(text: pd.Series, forms: tuple[str, ...]) -> pd.Series | None:
+    return next((one for one in (_parsed(text, form) for form in forms) if one is not None), None)
+
+
+def _parsed(text: pd.Series, form: str) -> pd.Series | None:
+    try:
+        parsed = pd.to_datetime(text, format=form, utc=True, errors="raise")
+    except (ValueError, OverflowError, TypeError):
+        return None
+    return None if parsed.isna().any() else pd.Series(parsed, name=text.name)
+
+
+def _first_bad(text: pd.Series) -> int:
+    """The first row that ISO 8601 does not read, or the first at all."""
+    parsed = pd.to_datetime(text, format="ISO8601", utc=True, errors="coerce")
+    bad = np.flatnonzero(parsed.isna().to_numpy())
+    return int(bad[0]) if bad.size and bad.size < len(text) else 0
+
+
+def is_stamps(column: pd.Series) -> bool:
+    """Whether a column holds text that is no number, as stamps are."""
+    if column.dtype.kind in "fiubmM" or isinstance(column.dtype, pd.DatetimeTZDtype):
+        return False
+    some = column.dropna().head(20)
+    return bool(len(some)) and bool(pd.to_numeric(some, errors="coerce").isna().mean() > 0.5)
+
+
+def clock(numbers: NDArray[np.float64], name: str, claimed: str, stated: str, where: str) -> Clock:
+    """Seconds of a column of numbers.
+
+    Parameters
+    ----------
+    numbers : (n,), finite.
+    claimed : unit that was given; empty to recognise it.
+    stated : unit that the file states; empty where it states none.
+
+    Raises
+    ------
+    WrongUse
+        Several units are possible, or the one given contradicts the file.
+    """
+    found = recognised(numbers, name, stated)
+    column, step = f"column '{shown(name)}'", typical_step(numbers)
+    if not claimed and not found.unit and step > 0.0:
+        rates = ", ".join(f"{1.0 / (step * TIME_UNITS[u]):.4g} Hz in {u}" for u in found.possible or tuple(TIME_UNITS))
+        raise WrongUse(
+            f"{where}: {column}: steps of {step:.6g}: {rates}; the unit is needed; add --units time="
+            f"{'|'.join(found.possible or tuple(TIME_UNITS))}"
+        )
+    if claimed and found.unit and claimed != found.unit and not found.reason.startswith("steps"):
+        raise WrongUse(
+            f"{where}: {column}: {found.reason}, but --units time={claimed} was given; leave it out, or correct it"
+        )
+    unit = claimed or found.unit or "s"
+    seconds = (numbers - numbers[0]) * TIME_UNITS[unit]  # of Unix time in ns the difference keeps its digits
+    return Clock(
+        seconds,
+        unit,
+        _doubts(step, unit, found, column) if claimed else (_taken(column, unit, found, step, len(numbers)),),
+    )
+
+
+def _taken(column: str, unit: str, found: Recognised, step: float, count: int) -> str:
+    """How time was read, for people."""
+    seconds = step * TIME_UNITS[unit]
+    rate = f", {1.0 / seconds:.4g} Hz for {seconds * (count - 1):.5g} s" if seconds > 0.0 else ""
+    return f"{column}: time in {unit} ({found.reason}){rate}"
+
+
+def _doubts(step: float, unit: str, found: Recognised, column: str) -> tuple[str, ...]:
+    """A remark where the unit given makes an unusual rate and another a usual one."""
+    if not step > 0.0:
+        return ()
+    rate = 1.0 / (step * TIME_UNITS[unit])
+    if USUAL_HZ[0] <= rate <= USUAL_HZ[1] or not found.possible:
+        return ()
+    others = " or ".join(f"{1.0 / (step * TIME_UNITS[u]):.4g} Hz in {u}" for u in found.possible)
+    return (f"CHECK THE UNIT OF TIME: {column} in {unit} makes {rate:.4g} Hz; it would be {others}",)

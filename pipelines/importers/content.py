@@ -1,0 +1,68 @@
+"""What a reader of files gives: a table of columns, and what the file itself says about them."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+from schemas.errors import WrongUse, did_you_mean
+from schemas.foreign import shown
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+    import pandas as pd
+
+_BRACKETS = re.compile(r"[\[(]\s*([^\[\]()]{1,12}?)\s*[\])]\s*$")
+_MOST_LISTED = 12
+
+
+@dataclass(frozen=True)
+class Content:
+    """A table of a file.
+
+    table : columns, named as in the file
+    remarks : what the reader found that a person should know, such as a preamble
+    units : column → unit, as the file states it
+    interval_s : sample interval that the file states, s; None where it states none
+    """
+
+    table: pd.DataFrame
+    remarks: tuple[str, ...] = ()
+    units: Mapping[str, str] = field(default_factory=dict[str, str])
+    interval_s: float | None = None
+
+
+def unit_in(name: str) -> str:
+    """The unit in brackets at the end of a column's name; empty where there is none."""
+    found = _BRACKETS.search(name)
+    return found[1] if found else ""
+
+
+def chosen(groups: Sequence[tuple[str, int]], group: str, where: str) -> str:
+    """The group of channels to read: the one named, or the only one.
+
+    Parameters
+    ----------
+    groups : name and count of samples of each group, whose channels share a clock.
+    group : the name wanted; empty where none was given.
+
+    Raises
+    ------
+    WrongUse
+        There are several and none is named, or none has the name.
+    """
+    names = [name for name, _ in groups]
+    if group:
+        if group not in names:
+            raise WrongUse(f"{where}: no group is called '{shown(group)}'; {did_you_mean(group, names)}")
+        return group
+    if len(names) == 1:
+        return names[0]
+    listed = ", ".join(f"'{shown(name)}' ({count} samples)" for name, count in groups[:_MOST_LISTED])
+    more = "" if len(groups) <= _MOST_LISTED else f" and {len(groups) - _MOST_LISTED} more"
+    raise WrongUse(
+        f"{where}: {len(names)} groups of channels with clocks of their own, one is needed: {listed}{more}; "
+        "choose one with --group NAME"
+    )

@@ -1,0 +1,65 @@
+"""The JSON documents of imports: keys that other programs read."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+from typing_extensions import TypedDict
+
+
+class ColumnDocument(TypedDict):
+    """A column of a file."""
+
+    name: str
+    number: Annotated[int, "from 1"]
+    meaning: Annotated[str, "guessed; empty where none is seen"]
+    reason: str
+    unit: Annotated[str, "as the file states it, or as guessed"]
+    missing: Annotated[int, "rows without a number"]
+    low: float | None
+    high: float | None
+    resolution: Annotated[float | None, "step of the lattice of its values; null where they lie on none"]
+    clipped: Annotated[int, "samples at an extreme in runs, as at the end of a range"]
+
+
+class SampleFaultDocument(TypedDict):
+    """A fault of samples."""
+
+    fault: Literal["stuck_output", "torn_words"]
+    axis: str
+    first_row: int
+    samples: int
+    start_s: float
+    offsets_lsb: list[int]
+
+
+class IntervalDocument(TypedDict):
+    """A static interval."""
+
+    start_s: float
+    end_s: float
+    samples: int
+    mean: list[float]
+    sd: list[float]
+    positions: Annotated[int, "positions logged back to back that its levels show; 1 for one dwell"]
+
+
+class InspectDocument(TypedDict):
+    """``inspect FILE --json``: what a file holds and what it may mean; nothing is kept."""
+
+    files: list[str]
+    form: str
+    rows: int
+    columns: list[ColumnDocument]
+    remarks: list[str]
+    time_unit: str
+    time_reason: str
+    output_unit: str
+    output_reason: str
+    rate_hz: float | None
+    duration_s: float | None
+    gaps: int
+    faults: list[SampleFaultDocument]
+    intervals: list[IntervalDocument]
+    open: Annotated[list[str], "what the file does not say and the command lacks"]
+    command: Annotated[str, "the import command that is proposed"]

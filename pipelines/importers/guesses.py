@@ -1,0 +1,228 @@
+"""What the columns of an unknown file may mean, each guess with its reason: proposals for a person, never taken by an import."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from itertools import combinations
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pandas as pd
+
+from inertial.quantities import LARGEST
+from pipelines.importers import clocks, unit_check, values
+from pipelines.importers.clocks import typical_step
+from pipelines.importers.stated_units import TEMPERATURE, output_unit
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from pipelines.importers.content import Content
+
+_TIME = re.compile(r"time|stamp|elapsed|epoch|zeit|^t$|^ts$|^t[_ \[(]|sec(ond)?s?\b|x_value|date|clock", re.IGNORECASE)
+_COUNT = re.compile(r"sample|index|count|number|^n$|^#|window|row", re.IGNORECASE)
+_ACCELERATION = re.compile(r"acc|^a[_ .]?[xyz]|^[xyz]$|force|^channel|g[_ ]?[xyz]\b", re.IGNORECASE)
+_OTHER = re.compile(r"gyr|rot|omega|mag|quat|angle|roll|pitch|yaw|^sd|std|var|error|lux|uv|press", re.IGNORECASE)
+_AXIS = re.compile(r"(?:^|[^a-z])(?:acc\w*?|a|mean|out|force|channel)?[_ .\[(-]*([xyz])(?:[^a-z]|$)", re.IGNORECASE)
+_SPREAD = re.compile(r"^(?:sd|std|sigma|s)[_ .]*(?:acc\w*?|a|out)?[_ .]*([xyz])$", re.IGNORECASE)
+_FASTEST_K_S = 2.0
+"""Rate of temperature that no chamber reaches."""
+_HEAT = re.compile(r"temp|heat|^t_?c$|degc|°c", re.IGNORECASE)
+_MOST_COLUMNS = 24
+_SOME = 20_000
+_LIKELY_HZ = 100.0
+
+
+@dataclass(frozen=True)
+class Guess:
+    """A meaning (time, x, temperature, …; empty where none is seen), and why."""
+
+    meaning: str
+    reason: str
+
+
+@dataclass(frozen=True)
+class Guesses:
+    """Guesses of a file.
+
+    columns : column → guess · time_unit, output : units with their reasons; empty where they are not seen
+    """
+
+    columns: dict[str, Guess]
+    time_unit: Guess
+    output: Guess
+
+    @property
+    def dwells(self) -> bool:
+        """Whether rows look like dwells: standard deviations stand beside the means."""
+        return all(self.column(f"sd_{axis}") for axis in "xyz")
+
+    def column(self, meaning: str) -> str:
+        """The column with a meaning; empty where there is none."""
+        return next((name for name, guess in self.columns.items() if guess.meaning == meaning), "")
+
+
+def guesses(content: Content) -> Guesses:
+    """Guesses of what the columns of a file mean, by names, units and numbers."""
+    table = content.table
+    found: dict[str, Guess] = {str(name): Guess("", "") for name in table.columns}
+    numeric = {str(name): one for name in table.columns if (one := _numbers(table[name])) is not None}
+    _time(table, numeric, found)
+    _axes(content, numeric, found)
+    _others(content, table, numeric, found)
+    return Guesses(found, _time_unit(content, numeric, found), _output(content, numeric, found))
+
+
+def measurable(numbers: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Numbers without those that nothing measured can be: their squares would not be numbers any more."""
+    return np.where(np.abs(numbers) <= LARGEST, numbers, np.nan)
+
+
+def _numbers(column: pd.Series) -> NDArray[np.float64] | None:
+    if column.dtype.kind in "mM" or isinstance(column.dtype, pd.DatetimeTZDtype) or column.dtype.kind == "b":
+        return None
+    numbers = measurable(np.asarray(pd.to_numeric(column, errors="coerce"), dtype=np.float64))
+    return numbers if np.mean(np.isfinite(numbers)) > 0.5 else None
+
+
+def _grows(numbers: NDArray[np.float64]) -> bool:
+    steps = np.diff(numbers[np.isfinite(numbers)])
+    return steps.size > 1 and bool(np.mean(steps >= 0.0) > 0.99) and bool(np.any(steps > 0.0))
+
+
+def _time(table: pd.DataFrame, numeric: dict[str, NDArray[np.float64]], found: dict[str, Guess]) -> None:
+    for name in found:
+        if values.is_moment(table[name]) or (name not in numeric and _reads_as_time(table[name])):
+            found[name] = Guess("time", "stamps of date or time")
+            return
+    growing = [name for name, numbers in numeric.items() if _grows(numbers)]
+    named = [name for name in growing if _TIME.search(name) and not _COUNT.search(name)]
+    if named:
+        found[named[0]] = Guess("time", "its name, and it only grows")
+        return
+    even = [name for name in growing if not _COUNT.search(name)]
+    if even:
+        found[even[0]] = Guess("time", "the first column that only grows")
+
+
+def _reads_as_time(column: pd.Series) -> bool:
+    head = column.dropna().head(50).reset_index(drop=True)
+    if not len(head) or not clocks.is_stamps(head):
+        return False
+    try:
+        clocks.stamps(head, "")
+    except Exception:  # noqa: BLE001 - whatever it is, it is no stamp
+        return False
+    return True
+
+
+def _axes(content: Content, numeric: dict[str, NDArray[np.float64]], found: dict[str, Guess]) -> None:
+    free = [name for name in numeric if not found[name].meaning][:_MOST_COLUMNS]
+    named: dict[str, dict[str, str]] = {}
+    for name in free:
+        axis = _AXIS.search(name)
+        if axis and not _OTHER.search(name):
+            # the same name but for the letter: acc_x, acc_y, acc_z
+            stem = name[: axis.start(1)] + "?" + name[axis.end(1) :]
+            named.setdefault(stem, {})[axis[1].lower()] = name
+    triples = [axes for axes in named.values() if len(axes) == 3]
+    triples.sort(
+        key=lambda axes: not (_ACCELERATION.search(axes["x"]) or output_unit(content.units.get(axes["x"], "")))
+    )
+    if triples:
+        for axis, name in triples[0].items():
+            found[name] = Guess(axis, "its name")
+        return
+    stated = [name for name in free if output_unit(content.units.get(name, ""))]
+    if len(stated) == 3:
+        for axis, name in zip("xyz", stated, strict=True):
+            found[name] = Guess(axis, f"one of three columns in {content.units[name]}")
+        return
+    live = [name for name in free if not _OTHER.search(name) and not _HEAT.search(name) and not _COUNT.search(name)]
+    best = _steadiest(numeric, live)
+    for axis, name in zip("xyz", best, strict=False):
+        found[name] = Guess(axis, "the three columns whose norm changes least, as gravity's does")
+
+
+def _steadiest(numeric: dict[str, NDArray[np.float64]], names: list[str]) -> tuple[str, ...]:
+    """The three neighbouring columns with the steadiest norm, each of which changes; empty where there are not three."""
+    live = [name for name in names if np.nanstd(numeric[name][:_SOME]) > 0.0]
+    threes = [
+        three for three in combinations(live, 3) if len(live) < 6 or live.index(three[2]) - live.index(three[0]) == 2
+    ]
+
+    def unsteady(three: tuple[str, ...]) -> float:
+        size = np.linalg.norm(np.column_stack([numeric[name][:_SOME] for name in three]), axis=1)
+        middle = float(np.nanmedian(size))
+        return float(np.nanmedian(np.abs(size - middle))) / middle if middle > 0.0 else np.inf
+
+    return min(threes, key=unsteady, default=())
+
+
+def _others(
+    content: Content, table: pd.DataFrame, numeric: dict[str, NDArray[np.float64]], found: dict[str, Guess]
+) -> None:
+    for name in list(found):
+        if found[name].meaning:
+            continue
+        spread = _SPREAD.match(name)
+        if name in numeric and spread:
+            found[name] = Guess(f"sd_{spread[1].lower()}", "its name")
+        elif name in numeric and (_HEAT.search(name) or TEMPERATURE.get(content.units.get(name, "").lower())):
+            middle = float(np.nanmedian(numeric[name]))
+            if -100.0 < middle < 500.0 and "temperature" not in {one.meaning for one in found.values()}:
+                found[name] = Guess("temperature", "its name or unit")
+        elif name not in numeric and "dwell" not in {one.meaning for one in found.values()}:
+            distinct = int(table[name].nunique())
+            if 1 < distinct <= max(2, len(table) // 10):
+                found[name] = Guess("dwell", f"{distinct} labels")
+
+
+def _time_unit(content: Content, numeric: dict[str, NDArray[np.float64]], found: dict[str, Guess]) -> Guess:
+    name = next((one for one, guess in found.items() if guess.meaning == "time"), "")
+    if not name or name not in numeric:
+        return Guess("", "")
+    numbers = numeric[name][np.isfinite(numeric[name])]
+    seen = clocks.recognised(numbers, name, content.units.get(name, ""))
+    if seen.unit or not seen.possible:
+        return Guess(seen.unit, seen.reason)
+    step, possible = typical_step(numbers), seen.possible
+    heat = next((one for one, guess in found.items() if guess.meaning == "temperature"), "")
+    if heat:
+        change, span = float(np.nanmax(numeric[heat]) - np.nanmin(numeric[heat])), float(numbers[-1] - numbers[0])
+        slow = tuple(unit for unit in possible if change <= _FASTEST_K_S * span * clocks.TIME_UNITS[unit])
+        if len(slow) == 1 and len(possible) > 1:
+            return Guess(
+                slow[0], f"{seen.reason}; in any other unit the temperature changes faster than {_FASTEST_K_S:g} K/s"
+            )
+        possible = slow or possible
+    near = min(possible, key=lambda unit: abs(np.log(1.0 / (step * clocks.TIME_UNITS[unit]) / _LIKELY_HZ)))
+    rates = ", ".join(f"{1.0 / (step * clocks.TIME_UNITS[unit]):.4g} Hz in {unit}" for unit in possible)
+    return Guess(near, f"{seen.reason} allow {rates}: check")
+
+
+def _output(  # noqa: PLR0911 - one answer per reason
+    content: Content, numeric: dict[str, NDArray[np.float64]], found: dict[str, Guess]
+) -> Guess:
+    names = [name for axis in "xyz" for name, guess in found.items() if guess.meaning == axis]
+    if len(names) != 3:
+        return Guess("", "")
+    stated = {output_unit(content.units.get(name, "")) for name in names}
+    if len(stated) == 1 and "" not in stated:
+        return Guess(stated.pop(), "the file states it")
+    output = np.column_stack([numeric[name] for name in names])
+    output = output[np.isfinite(output).all(axis=1)]
+    if not len(output):
+        return Guess("", "")
+    size = unit_check.size_of(output)
+    whole = bool(np.all(output[:1000] == np.rint(output[:1000])))
+    likely = unit_check.looks_like(size)
+    if likely and not (whole and likely != "mg"):
+        doubt = ", though whole numbers may be counts: check" if whole else ""
+        return Guess(likely, f"its norm is {size:.5g}, gravity in {likely} is {unit_check.GRAVITY[likely]:.5g}{doubt}")
+    if whole:
+        return Guess("LSB", f"whole numbers with a norm of {size:.5g}")
+    if unit_check.VOLTS_PER_G[0] <= size <= unit_check.VOLTS_PER_G[1]:
+        return Guess("V", f"its norm is {size:.5g}, no size of gravity, but one of volts: check")
+    return Guess("LSB", f"its norm is {size:.5g}, neither gravity nor volts: check")

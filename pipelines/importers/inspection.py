@@ -1,0 +1,239 @@
+"""A first look at a file: what it holds, what it may mean, what is wrong with it, and the command that imports it."""
+
+from __future__ import annotations
+
+import re
+import shlex
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from inertial import change_of_level, record_faults, static_intervals
+from pipelines.importers import clocks, files, sample_faults, sources, values
+from pipelines.importers.guesses import Guesses, guesses, measurable
+from pipelines.importers.mapping import TIME_UNITS
+from pipelines.importers.record_time import GAP
+from pipelines.importers.stated_units import TEMPERATURE
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+    from pathlib import Path
+
+    from numpy.typing import NDArray
+
+    from pipelines.importers.content import Content
+    from pipelines.importers.documents import ColumnDocument, InspectDocument, IntervalDocument
+
+_NAMED = ("time", "x", "y", "z", "sd_x", "sd_y", "sd_z", "temperature", "dwell")
+_MOST_INTERVALS = 2000
+
+
+@dataclass(frozen=True)
+class Inspection:
+    """A first look: the document, and the record for a picture (time in s or samples, output (n, 3)); None without axes."""
+
+    document: InspectDocument
+    time: NDArray[np.float64] | None
+    output: NDArray[np.float64] | None
+
+
+def inspect(paths: Sequence[Path], *, join: str = "", group: str = "") -> Inspection:
+    """A first look at a recording of one file or of several.
+
+    Parameters
+    ----------
+    join : how several files are one recording, ``rows`` or ``columns``.
+    group : the group of channels, where a file has several.
+    """
+    first, _ = files.read_content(paths[0], group)
+    time_name = guesses(first).column("time") if len(paths) > 1 else ""
+    content, source, _ = sources.read(paths, join=join, time=time_name, group=group)
+    guessed = guesses(content)
+    time, gaps, open_ = _time(content, guessed)
+    output = _output(content, guessed)
+    whole = np.ones(len(content.table), dtype=bool) if output is None else np.isfinite(output).all(axis=1)
+    if time is not None:
+        whole &= np.isfinite(time)
+    kept = None if output is None else output[whole]
+    own = None if time is None else time[whole]
+    faults = sample_faults.look(kept) if kept is not None and len(kept) > 3 and not guessed.dwells else None
+    rate = _rate(own)
+    intervals = _intervals(kept, own, rate) if kept is not None and rate else []
+    if output is None:
+        open_.append("three columns of acceleration were not recognised: map x, y and z by name or number")
+    if guessed.output.meaning == "" and output is not None:
+        open_.append("the unit of the output: --units output=g|mg|m/s^2|V|mV|LSB")
+    positions = (
+        change_of_level.several_levels(kept)
+        if kept is not None and any(one["positions"] > 1 for one in intervals)
+        else 0
+    )
+    split = bool(gaps) or not bool(whole.all())
+    document: InspectDocument = {
+        "files": [str(path) for path in paths],
+        "form": source.form,
+        "rows": len(content.table),
+        "columns": _columns(content, guessed),
+        "remarks": list(content.remarks),
+        "time_unit": guessed.time_unit.meaning,
+        "time_reason": guessed.time_unit.reason,
+        "output_unit": guessed.output.meaning,
+        "output_reason": guessed.output.reason,
+        "rate_hz": rate,
+        "duration_s": float(own[-1] - own[0]) if own is not None and len(own) > 1 else None,
+        "gaps": gaps,
+        "faults": [] if faults is None or kept is None else faults.rows(_clock_of(kept, own)),
+        "intervals": intervals,
+        "open": open_,
+        "command": _command(
+            paths, content, guessed, join=join, group=group, split=split, faulty=bool(faults), positions=positions
+        ),
+    }
+    return Inspection(document, own, kept)
+
+
+def _time(content: Content, guessed: Guesses) -> tuple[NDArray[np.float64] | None, int, list[str]]:
+    """Seconds of every row, count of gaps, and what is open."""
+    name = guessed.column("time")
+    if not name and guessed.dwells:
+        return None, 0, []
+    if not name:
+        return (
+            None,
+            0,
+            ["the rate of the samples: no column of time was recognised and the file states no interval; --rate HZ"],
+        )
+    column = content.table[name]
+    open_: list[str] = []
+    if values.is_moment(column):
+        time = values.seconds(column.ffill(), name)
+    elif clocks.is_stamps(column):
+        time = clocks.stamps(column.ffill().bfill(), name)
+    else:
+        numbers = measurable(np.asarray(values.as_numbers(column, name), dtype=np.float64))
+        unit = guessed.time_unit.meaning
+        if not unit:
+            open_.append(
+                f"the unit of time: {guessed.time_unit.reason}; --units time=s|ms|us|ns, or time=samples and --rate HZ"
+            )
+        first = numbers[np.isfinite(numbers)][0] if np.any(np.isfinite(numbers)) else 0.0
+        time = (numbers - first) * TIME_UNITS.get(unit, 1.0)
+    steps = np.diff(time[np.isfinite(time)])
+    usual = float(np.median(steps[steps > 0.0])) if np.any(steps > 0.0) else 0.0
+    if np.any(steps < 0.0) and not guessed.column("dwell"):
+        open_.append(
+            f"time runs back at row {int(np.flatnonzero(steps < 0.0)[0]) + 2}: sort the rows, or divide the file"
+        )
+    return time, int(np.count_nonzero(steps > GAP * usual)), open_
+
+
+def _clock_of(output: NDArray[np.float64], time: NDArray[np.float64] | None) -> NDArray[np.float64]:
+    """Seconds, or the numbers of the samples where there is no time."""
+    return np.arange(len(output), dtype=np.float64) if time is None else time
+
+
+def _rate(time: NDArray[np.float64] | None) -> float | None:
+    if time is None or len(time) < 2:
+        return None
+    step = clocks.typical_step(time)
+    return 1.0 / step if step > 0.0 else None
+
+
+def _output(content: Content, guessed: Guesses) -> NDArray[np.float64] | None:
+    names = [guessed.column(axis) for axis in "xyz"]
+    if not all(names):
+        return None
+    return np.column_stack([measurable(values.as_numbers(content.table[name], name)) for name in names])
+
+
+def _intervals(output: NDArray[np.float64], time: NDArray[np.float64] | None, rate: float) -> list[IntervalDocument]:
+    if time is None or len(output) < 3 * max(3, round(rate)) or not np.isfinite(rate):
+        return []
+    found = static_intervals.find(output, rate)
+    pairs = list(zip(found.start.tolist(), found.stop.tolist(), strict=True))[:_MOST_INTERVALS]
+    return [
+        {
+            "start_s": float(time[a] - time[0]),
+            "end_s": float(time[b - 1] - time[0]),
+            "samples": b - a,
+            "mean": output[a:b].mean(axis=0).tolist(),
+            "sd": output[a:b].std(axis=0, ddof=1).tolist(),
+            "positions": change_of_level.several_levels(output[a:b]),
+        }
+        for a, b in pairs
+    ]
+
+
+def _columns(content: Content, guessed: Guesses) -> list[ColumnDocument]:
+    found: list[ColumnDocument] = []
+    for number, (name, guess) in enumerate(guessed.columns.items(), start=1):
+        column = content.table[name]
+        unit = content.units.get(name, "")
+        if guess.meaning in {"x", "y", "z"}:
+            unit = unit or guessed.output.meaning
+        elif guess.meaning == "time":
+            unit = unit or guessed.time_unit.meaning
+        numbers = measurable(column.to_numpy(dtype=np.float64)) if column.dtype.kind in "fiu" else np.zeros(0)
+        there = numbers[np.isfinite(numbers)]
+        axis = there if guess.meaning in {"x", "y", "z"} and there.size else None
+        found.append(
+            {
+                "name": name,
+                "number": number,
+                "meaning": guess.meaning,
+                "reason": guess.reason,
+                "unit": unit,
+                "missing": int(column.isna().sum()) if not numbers.size else int(numbers.size - there.size),
+                "low": float(there.min()) if there.size else None,
+                "high": float(there.max()) if there.size else None,
+                "resolution": None if axis is None else record_faults.resolution(axis),
+                "clipped": 0 if axis is None else record_faults.clipped(axis)[2],
+            }
+        )
+    return found
+
+
+def _command(
+    paths: Sequence[Path],
+    content: Content,
+    guessed: Guesses,
+    *,
+    join: str,
+    group: str,
+    split: bool,
+    faulty: bool,
+    positions: int,
+) -> str:
+    """The import command that is proposed; what the file does not say stands in capitals."""
+    names = list(guessed.columns)
+    pairs = [(meaning, guessed.column(meaning)) for meaning in _NAMED if guessed.column(meaning)]
+    mapped = ",".join(f"{meaning}={_mapped(name, names)}" for meaning, name in pairs)
+    units = [f"output={guessed.output.meaning or 'UNIT'}"]
+    time = guessed.column("time")
+    if time and guessed.time_unit.meaning:
+        units.append(f"time={guessed.time_unit.meaning}")
+    elif time and content.table[time].dtype.kind in "fiu":
+        units.append("time=UNIT")
+    heat = TEMPERATURE.get(content.units.get(guessed.column("temperature"), "").strip().lower(), "degC")
+    units += [f"temperature={heat}"] if heat != "degC" else []
+    words = ["tumbleline", "import", *(str(path) for path in paths), "--map", mapped, "--units", ",".join(units)]
+    words += ["--unit", _serial(paths[0])]
+    words += ["--rows", "dwells"] if guessed.dwells else [] if time else ["--rate", "HZ"]
+    words += ["--join", join] if join else []
+    words += ["--group", group] if group else []
+    words += ["--gaps", "split"] if split else []
+    words += ["--faulty", "leave-out"] if faulty else []
+    words += ["--positions", str(positions)] if positions > 1 else []
+    return shlex.join(words)
+
+
+def _mapped(name: str, names: list[str]) -> str:
+    """A column as --map can name it: by its number where its name has a comma or an equals sign, or blanks at its ends."""
+    return str(names.index(name) + 1) if re.search(r"[,=]|^\s|\s$", name) or not name else name
+
+
+def _serial(path: Path) -> str:
+    """A serial number made of the file's name."""
+    stem = re.sub(r"[^A-Za-z0-9._+-]", "-", path.name.split(".")[0]).strip("._+-")
+    return stem[:64] or "UNIT-1"

@@ -1,0 +1,91 @@
+"""Whether dwells agree with the faces that were named for them: axes exchanged, turned round, or without an answer."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from scipy.optimize import linear_sum_assignment
+
+from schemas.errors import DataRejected
+from schemas.units import AXES
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+    from pipelines.importers.mapping import Mapping
+
+_DEAD = 0.2
+_LEAST = 4
+_SILENT = 0.05
+_TURNED = 0.8
+_CLEAR = 0.6
+_MISFIT = 0.1
+"""Part of gravity that a response may leave and still be one of exchanged axes."""
+OUT = ["out_x", "out_y", "out_z"]
+FORCE = ["force_x", "force_y", "force_z"]
+
+
+def silent_axis(dwells: pd.DataFrame) -> str:
+    """A sentence on an axis, its letter first, that stays the same where another turns through gravity; empty where none does."""
+    means = dwells[OUT].to_numpy(dtype=np.float64)
+    if len(means) < _LEAST:
+        return ""
+    spans = np.ptp(means, axis=0)
+    weak, strong = int(np.argmin(spans)), int(np.argmax(spans))
+    if not spans[strong] > 0.0 or spans[weak] > _SILENT * spans[strong]:
+        return ""
+    if spans[strong] < _TURNED * float(np.median(np.linalg.norm(means - means.mean(axis=0), axis=1))):
+        return ""
+    return (
+        f"{AXES[weak]} changes by {spans[weak]:.3g} over {len(means)} dwells, {AXES[strong]} by {spans[strong]:.3g}; "
+        f"a dead axis, another quantity mapped as {AXES[weak]}, or a sensor turned about {AXES[weak]} alone"
+    )
+
+
+def refuse_or_remark(dwells: pd.DataFrame, mapping: Mapping, where: str) -> tuple[str, ...]:
+    """Remarks on dwells, such as an axis that does not answer to positions.
+
+    Raises
+    ------
+    DataRejected
+        The outputs belong to other faces than those named, or an axis does not answer to gravity.
+    """
+    if not mapping.poses or FORCE[0] not in dwells.columns:
+        silent = silent_axis(dwells)
+        return (f"CHECK AXIS {silent[0]}: {silent}",) if silent else ()
+    force, output = dwells[FORCE].to_numpy(dtype=np.float64), dwells[OUT].to_numpy(dtype=np.float64)
+    design = np.column_stack([np.ones(len(force)), force])
+    if np.linalg.matrix_rank(design, tol=0.1) < 4:
+        return ()
+    fit = np.linalg.lstsq(design, output, rcond=None)[0]
+    response = fit[1:].T
+    size = np.linalg.norm(response, axis=1)
+    misfit = float(np.sqrt(np.mean((output - design @ fit) ** 2)))
+    if misfit > _MISFIT * float(np.median(size)):
+        return ()  # some labels are wrong, not the axes: a matter of the fit's own verdict
+    weak = np.flatnonzero(size < _DEAD * np.median(size))
+    if weak.size:
+        axis = AXES[int(weak[0])]
+        raise DataRejected(
+            f"{where}: axis {axis} answers to gravity with {100.0 * size[weak[0]] / np.median(size):.3g} % of the other axes; "
+            f"its column must be an acceleration; correct --map {axis}=…, or repair the channel"
+        )
+    shares = response / size[:, None]
+    rows, columns = linear_sum_assignment(-np.abs(shares))
+    signs = np.sign(shares[rows, columns])
+    if np.min(np.abs(shares[rows, columns])) < _CLEAR or (np.array_equal(rows, columns) and np.all(signs > 0)):
+        return ()
+    found = ", ".join(
+        f"{AXES[i]} reads {'+' if s > 0 else '-'}{AXES[j]}" for i, j, s in zip(rows, columns, signs, strict=True)
+    )
+    # output i reads axis j: wanted axis j is mapped axis of output i
+    inverse = {
+        int(j): (mapping.axes[int(i)], "+" if (s > 0) == (mapping.signs[int(i)] == "+") else "-")
+        for i, j, s in zip(rows, columns, signs, strict=True)
+    }
+    order, turned = (",".join(inverse[k][part] for k in range(3)) for part in (0, 1))
+    raise DataRejected(
+        f"{where}: by the faces named, {found}; each output must read its own axis; correct --poses, or add --axes {order} "
+        f"--signs={turned}"
+    )

@@ -1,0 +1,51 @@
+"""The readers of files: each is one module of this package and is found here by itself.
+
+A module states ``NAME`` (of the format, as the archive keeps it), ``TITLE`` (for people), ``EXTRA`` (the optional dependency that
+it needs, or empty), ``ORDER`` (readers are asked in this order), ``recognised`` and ``read``.
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from pkgutil import iter_modules
+from typing import TYPE_CHECKING, Protocol, cast
+
+if TYPE_CHECKING:
+    from pipelines.importers.content import Content
+
+
+class Reader(Protocol):
+    """A module that reads one format."""
+
+    NAME: str
+    TITLE: str
+    EXTRA: str
+    ORDER: int
+
+    def recognised(self, data: bytes) -> bool:
+        """Whether the first bytes of a file say that it has this format."""
+        ...
+
+    def read(self, name: str, data: bytes, group: str) -> Content:
+        """The table of a file.
+
+        Parameters
+        ----------
+        name : of the file, for messages.
+        group : the group of channels wanted, where a file has several; empty otherwise.
+        """
+        ...
+
+
+def _found() -> dict[str, Reader]:
+    modules = [cast("Reader", import_module(f"{__name__}.{found.name}")) for found in iter_modules(__path__)]
+    return {module.NAME: module for module in sorted(modules, key=lambda one: one.ORDER)}
+
+
+READERS: dict[str, Reader] = _found()
+"""By name, in the order in which they are asked."""
+
+
+def reader_of(data: bytes) -> Reader:
+    """The reader that recognises a file by its first bytes; delimited text where no other does."""
+    return next(reader for reader in READERS.values() if reader.recognised(data))

@@ -1,0 +1,109 @@
+"""TDMS files of National Instruments: the channels of a group, with time from their waveform properties."""
+
+from __future__ import annotations
+
+import io
+import logging
+from contextlib import contextmanager
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pandas as pd
+
+from pipelines.importers.content import Content, chosen
+from pipelines.importers.library import library
+from pipelines.importers.unpacking import refuse_larger
+from schemas.errors import DataRejected
+from schemas.foreign import foreign, shown
+
+if TYPE_CHECKING:
+    from collections.abc import Generator
+
+_MOST_SAID = 4
+NAME, TITLE, EXTRA, ORDER = "tdms", "TDMS", "tdms", 60
+MAGIC = b"TDSm"
+REMEDY = "copy it again, or export the group as CSV"
+
+
+def recognised(data: bytes) -> bool:
+    """Whether the file begins as TDMS does."""
+    return data.startswith(MAGIC)
+
+
+def read(name: str, data: bytes, group: str) -> Content:
+    """The channels of one group; `time` in s where the file states an interval (``wf_increment``)."""
+    nptdms = library("nptdms", EXTRA, f"{name}: a TDMS file")
+    broken = f"{name}: a TDMS file that cannot be read"
+    said = _Said()
+    with foreign(broken, REMEDY), said.heard():
+        about = nptdms.TdmsFile.read_metadata(io.BytesIO(data))
+        claimed = sum(8 * len(channel) for one in about.groups() for channel in one.channels())
+    refuse_larger(claimed, len(data), name)
+    with foreign(broken, REMEDY), said.heard():
+        file = nptdms.TdmsFile.read(io.BytesIO(data))
+        groups = {one.name: [c for c in one.channels() if len(c) and _numeric(c)] for one in file.groups()}
+    groups = {label: channels for label, channels in groups.items() if channels}
+    if not groups:
+        raise DataRejected(f"{name}: no channel with numbers in this TDMS file, one is needed; check the file")
+    label = chosen([(one, len(channels[0])) for one, channels in groups.items()], group, name)
+    with foreign(broken, REMEDY):
+        found = _content(groups[label], name)
+    return replace(found, remarks=(*found.remarks, *(f"the reader says: {text}" for text in said.texts)))
+
+
+class _Said(logging.Handler):
+    """What the library logs about a file: it goes into the remarks, not to standard error."""
+
+    def __init__(self) -> None:
+        super().__init__(logging.WARNING)
+        self.texts: list[str] = []
+
+    def emit(self, record: logging.LogRecord) -> None:
+        """Keep a message once."""
+        text = shown(record.getMessage(), 160)
+        if text not in self.texts and len(self.texts) < _MOST_SAID:
+            self.texts.append(text)
+
+    @contextmanager
+    def heard(self) -> Generator[None]:
+        """A block in which the library's log comes here."""
+        loggers = [
+            logging.getLogger(name)
+            for name in ("nptdms", *list(logging.root.manager.loggerDict))
+            if name.startswith("nptdms")
+        ]
+        before = [(one, list(one.handlers), one.propagate) for one in loggers]
+        try:
+            for one in loggers:
+                one.handlers, one.propagate = [self], False
+            yield
+        finally:
+            for one, handlers, propagate in before:
+                one.handlers, one.propagate = handlers, propagate
+
+
+def _numeric(channel: Any) -> bool:
+    kind = np.asarray(channel[:1]).dtype.kind
+    return kind in "fiubM"
+
+
+def _content(channels: list[Any], name: str) -> Content:
+    longest = max(len(channel) for channel in channels)
+    kept = [channel for channel in channels if len(channel) == longest]
+    left_out = [channel.name for channel in channels if len(channel) != longest]
+    columns = {channel.name: np.asarray(channel[:]) for channel in kept}
+    units = {channel.name: str(channel.properties.get("unit_string") or "") for channel in kept}
+    intervals = {float(c.properties["wf_increment"]) for c in kept if "wf_increment" in c.properties}
+    interval = intervals.pop() if len(intervals) == 1 else None
+    if len(intervals) >= 1:
+        raise DataRejected(
+            f"{name}: channels of one group with several intervals ({', '.join(f'{i:g} s' for i in sorted(intervals))}), "
+            "one is needed; export them apart"
+        )
+    if interval is not None and interval > 0.0 and "time" not in columns:
+        start = float(kept[0].properties.get("wf_start_offset") or 0.0)
+        columns = {"time": start + interval * np.arange(longest), **columns}
+        units["time"] = "s"
+    remarks = (f"channels of another length were left out: {', '.join(left_out[:6])}",) if left_out else ()
+    return Content(pd.DataFrame(columns), remarks, units, interval)

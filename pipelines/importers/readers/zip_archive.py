@@ -1,0 +1,26 @@
+"""Zip archives, also .xlsx and .npz: recognised, so that the refusal says what they are."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from schemas.errors import DataRejected
+
+if TYPE_CHECKING:
+    from pipelines.importers.content import Content
+
+NAME, TITLE, EXTRA, ORDER = "zip", "zip archive (refused)", "", 30
+MAGIC = b"PK\x03\x04"
+
+
+def recognised(data: bytes) -> bool:
+    """Whether the file begins as a zip archive does."""
+    return data.startswith(MAGIC)
+
+
+def read(name: str, data: bytes, group: str) -> Content:
+    """Nothing: always refused."""
+    del data, group
+    raise DataRejected(
+        f"{name}: a zip archive (also .xlsx, .npz), which is not read; unpack it, or export the table as CSV"
+    )

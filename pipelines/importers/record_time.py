@@ -1,0 +1,184 @@
+"""The time of a foreign record in seconds: any clock, no step back, no gap that is not known of."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pandas as pd
+
+from pipelines.importers import clocks, values
+from pipelines.importers.clocks import Clock
+from pipelines.importers.mapping import TIME_UNITS, Mapping
+from schemas.errors import DataRejected, WrongUse
+from schemas.foreign import shown
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping as Columns
+    from collections.abc import Sequence
+
+    from numpy.typing import NDArray
+
+    from pipelines.importers.stretches import Stretches
+
+FASTEST_K_S = 5.0
+"""Rate of temperature that no chamber reaches."""
+LONGEST_MOVE_S = 300.0
+"""Between two positions, of a hand or a table."""
+SHORTEST_RECORD_S = 3.0
+GAP = 5.0
+"""Usual steps that a longer one leaves room for."""
+
+
+def seconds(
+    columns: Columns[str, pd.Series],
+    mapping: Mapping,
+    stated: Columns[str, str],
+    where: str,
+    breaks: Sequence[int],
+    *,
+    dwells: bool = False,
+) -> Clock:
+    """Seconds of every row from any beginning.
+
+    Parameters
+    ----------
+    stated : column → unit, as the file states it.
+    breaks : rows before which another file begins, or rows are missing.
+    dwells : whether rows are dwells, whose steps say nothing about their unit.
+
+    Raises
+    ------
+    DataRejected
+        Time runs back, or stands still.
+    WrongUse
+        There is neither time nor rate, or the unit of time cannot be recognised.
+    """
+    clock = _clock(columns, mapping, stated, where, dwells=dwells)
+    values.refuse_outside(clock.seconds, "time_s", where)
+    if dwells:
+        return clock
+    time = clock.seconds
+    if "dwell" in columns:  # dwells may have been recorded one by one, each with a clock of its own
+        backwards(time, columns["dwell"].astype(str).tolist(), where, together=False)
+        return clock
+    del breaks
+    backwards(time, [""] * len(time), where, together=False)
+    if len(time) < 2 or time[-1] <= time[0]:
+        found = "1 sample" if len(time) < 2 else f"{len(time)} samples, all at {columns['time'].iloc[0]:g} s"
+        raise DataRejected(
+            f"{where}: {found}, a record of two at least that takes some time is needed; map another column as time, give "
+            "--rate HZ without one, or say --rows dwells"
+        )
+    return clock
+
+
+def _clock(
+    columns: Columns[str, pd.Series], mapping: Mapping, stated: Columns[str, str], where: str, *, dwells: bool
+) -> Clock:
+    time = columns.get("time")
+    if time is not None and values.is_moment(time):
+        return Clock(values.seconds(time, where), "s", ())
+    if time is not None and clocks.is_stamps(time) and mapping.units.time != "samples":
+        return Clock(clocks.stamps(time, where), "s", ())
+    if time is None or mapping.units.time == "samples":
+        if mapping.rate_hz is None:
+            raise WrongUse(
+                f"{where}: no time in seconds is mapped, a rate is needed then; map time=…, or give --rate HZ"
+            )
+        count = np.arange(len(columns["x"]), dtype=np.float64) if time is None else finite(time, where)
+        return Clock(count / mapping.rate_hz, "samples", ())
+    numbers = finite(time, where)
+    name = str(time.name)
+    if dwells:
+        found = clocks.recognised(numbers, name, stated.get(name, ""))
+        own = found.unit if not found.reason.startswith("steps") else ""
+        unit = mapping.units.time or own or "s"
+        return Clock(numbers * TIME_UNITS[unit], unit, ())
+    if np.all(numbers == numbers[0]):
+        return Clock(np.zeros(len(numbers)), "s", ())
+    return clocks.clock(numbers, name, mapping.units.time, stated.get(name, ""), where)
+
+
+def finite(column: pd.Series, where: str) -> NDArray[np.float64]:
+    """The numbers of a column of time; one that is none is refused with its row."""
+    numbers = values.as_numbers(column, where)
+    bad = np.flatnonzero(~np.isfinite(numbers))
+    if bad.size:
+        row = int(bad[0])
+        raise DataRejected(
+            f"{where}: row {row + 1}, column '{shown(str(column.name))}': found {shown(str(column.iloc[row]))}, a time is needed "
+            f"({bad.size} such rows); repair the file, or add --gaps split to use what lies between"
+        )
+    values.refuse_outside(numbers, "", where, label=str(column.name))
+    return numbers
+
+
+def backwards(time: NDArray[np.float64], group: Sequence[Any], where: str, *, together: bool) -> None:
+    """Refuse times that run back within a group.
+
+    Parameters
+    ----------
+    group : a label for each row.
+    together : whether rows of a group that others lie between belong together, as those of one unit do.
+    """
+    codes = pd.factorize(np.asarray(group, dtype=object))[0]
+    order = np.argsort(codes, kind="stable") if together else np.arange(len(time))
+    back = np.flatnonzero((np.diff(time[order]) < 0.0) & (np.diff(codes[order]) == 0))
+    if back.size:
+        row, before = int(order[back[0] + 1]), int(order[back[0]])
+        label = f" within {shown(str(group[row]))}" if len(set(codes.tolist())) > 1 else ""
+        raise DataRejected(
+            f"{where}: row {row + 1}: time runs back by {time[before] - time[row]:.4g} s{label}, it must not; sort the rows"
+        )
+
+
+def gaps_of(
+    time: NDArray[np.float64], labels: pd.Series | None, breaks: Sequence[int], mapping: Mapping, where: str
+) -> tuple[list[int], tuple[str, ...]]:
+    """Rows before which samples are missing, with the breaks that were known before; a remark on them.
+
+    Raises
+    ------
+    DataRejected
+        There are gaps that are not known of, and the mapping does not say that what lies between is used.
+    """
+    steps = np.diff(time)
+    usual = float(np.median(steps[steps > 0.0])) if np.any(steps > 0.0) else 0.0
+    wide = np.flatnonzero(steps > GAP * usual) + 1
+    if labels is not None:  # between two labels nothing needs to be recorded
+        names = labels.astype(str).to_numpy(dtype=object)
+        wide = wide[names[wide] == names[wide - 1]]
+    wide = np.array([k for k in wide.tolist() if k not in set(breaks)], dtype=np.int64)
+    if not wide.size:
+        return list(breaks), ()
+    first, longest = int(wide[0]), float(np.max(steps[wide - 1]))
+    found = f"{wide.size} gaps in time longer than {GAP:g} samples, the first before row {first + 1}, the longest {longest:.4g} s"
+    if mapping.gaps == "refuse":
+        raise DataRejected(
+            f"{where}: {found}; samples without gaps are needed; record again, or add --gaps split to use what lies between"
+        )
+    return sorted({*breaks, *wide.tolist()}), (f"{found}; dwells end there",)
+
+
+def time_doubts(
+    time: NDArray[np.float64], heat: NDArray[np.float64] | None, found: Stretches, mapping: Mapping, *, searched: bool
+) -> tuple[str, ...]:
+    """Remarks where a record in seconds shows what no hand, table or chamber does: its time may be in another unit.
+
+    Parameters
+    ----------
+    heat : (n,), °C; None where none was recorded.
+    searched : whether the stretches were found in the record itself.
+    """
+    span = float(time[-1])
+    doubts: list[str] = []
+    if heat is not None and span > 0.0 and float(np.ptp(heat)) > FASTEST_K_S * span:
+        doubts.append(f"temperature changes by {float(np.ptp(heat)):.3g} K in {span:.3g} s")
+    if searched and mapping.positions is None and mapping.block_s is None:
+        moves = [float(time[b] - time[a - 1]) for a, b in zip(found.last, found.first[1:], strict=False)]
+        if len(moves) >= 2 and float(np.median(moves)) > LONGEST_MOVE_S:
+            doubts.append(f"the moves between the dwells take {float(np.median(moves)):.4g} s")
+        if not len(found) and span < SHORTEST_RECORD_S:
+            doubts.append(f"the record lasts {span:.3g} s, too short for a dwell")
+    return (f"CHECK THE UNIT OF TIME: {'; '.join(doubts)}",) if doubts else ()

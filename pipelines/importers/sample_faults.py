@@ -1,0 +1,172 @@
+"""Samples that an axis repeats, and torn words: refused, left out or kept, as the mapping says."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from inertial import record_faults
+from pipelines.importers.stretches import Stretches
+from schemas.errors import DataRejected
+from schemas.units import AXES
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from pipelines.importers.documents import SampleFaultDocument
+    from pipelines.importers.mapping import Mapping
+
+_MOST_TOLD = 5
+
+
+@dataclass(frozen=True)
+class SampleFaults:
+    """Faults of the samples of a record.
+
+    frozen, torn : as found · bad : (n,), samples of either
+    """
+
+    frozen: tuple[record_faults.Frozen, ...]
+    torn: tuple[record_faults.Torn, ...]
+    bad: NDArray[np.bool_]
+
+    def __bool__(self) -> bool:
+        """Whether there are any."""
+        return bool(self.frozen or self.torn)
+
+    def sentences(self, time: NDArray[np.float64]) -> list[str]:
+        """What was found, for people."""
+        found = [
+            f"axis {AXES[one.axis]} stands still for {one.count} samples from row {one.start + 1} on ({time[one.start]:.6g} s)"
+            for one in sorted(self.frozen, key=lambda one: -one.count)[:_MOST_TOLD]
+        ]
+        more = len(self.frozen) - _MOST_TOLD
+        found += [f"and {more} more such stretches"] if more > 0 else []
+        return found + [
+            f"axis {AXES[one.axis]} has torn words: {100.0 * one.share:.3g} % of its resting samples are off by "
+            f"±{', ±'.join(map(str, one.offsets))} steps of its resolution, from row {int(one.rows.min()) + 1} on"
+            for one in self.torn
+        ]
+
+    def rows(self, time: NDArray[np.float64]) -> list[SampleFaultDocument]:
+        """What was found, for JSON."""
+        still: list[SampleFaultDocument] = [
+            {"fault": "stuck_output", "axis": AXES[one.axis], "first_row": one.start + 1, "samples": one.count,
+             "start_s": float(time[one.start]), "offsets_lsb": []}
+            for one in self.frozen
+        ]  # fmt: skip
+        torn: list[SampleFaultDocument] = [
+            {"fault": "torn_words", "axis": AXES[one.axis], "first_row": int(one.rows.min()) + 1, "samples": one.rows.size,
+             "start_s": float(time[one.rows.min()]), "offsets_lsb": list(one.offsets)}
+            for one in self.torn
+        ]  # fmt: skip
+        return still + torn
+
+
+def look(output: NDArray[np.float64]) -> SampleFaults:
+    """The faults of the samples of a record (n, 3)."""
+    frozen, torn = tuple(record_faults.frozen(output)), tuple(record_faults.torn(output))
+    bad = np.zeros(len(output), dtype=bool)
+    for one in frozen:
+        bad[one.start : one.stop] = True
+    for one in torn:
+        bad[one.rows] = True
+    return SampleFaults(frozen, torn, bad)
+
+
+def mended(output: NDArray[np.float64], found: SampleFaults, bad: NDArray[np.bool_]) -> NDArray[np.float64]:
+    """The record (n, 3) in which dwells are looked for: torn words that are left out replaced by the running median."""
+    if not bad.any() or not found.torn:
+        return output
+    clean = output.copy()
+    for one in found.torn:
+        clean[one.rows, one.axis] = record_faults.running_median(output[:, one.axis])[one.rows]
+    return clean
+
+
+def without_short(found: Stretches, record: NDArray[np.int64]) -> tuple[Stretches, NDArray[np.int64], tuple[str, ...]]:
+    """The dwells that keep half of their samples at least, their samples numbered anew, and a remark on the others."""
+    left = [int(np.count_nonzero(record[a:b])) for a, b in zip(found.first, found.last, strict=True)]
+    kept = [k for k, count in enumerate(left) if 2 * count > found.last[k] - found.first[k]]
+    if len(kept) == len(found):
+        return found, record, ()
+    numbers = np.zeros(len(found) + 1, dtype=np.int64)
+    numbers[np.array(kept, dtype=np.int64) + 1] = np.arange(len(kept)) + 1
+    gone = [found.labels[k] for k in range(len(found)) if k not in set(kept)]
+    fewer = Stretches(
+        tuple(found.first[k] for k in kept),
+        tuple(found.last[k] for k in kept),
+        tuple(found.labels[k] for k in kept),
+        found.remarks,
+    )
+    return (
+        fewer,
+        numbers[record],
+        (f"dwells left out because most of their samples have faults: {', '.join(gone[:_MOST_TOLD])}",),
+    )
+
+
+def sound_dwells(
+    columns: dict[str, NDArray[np.float64]], labels: list[str], mapping: Mapping, where: str
+) -> tuple[NDArray[np.bool_], tuple[str, ...]]:
+    """Which rows that are dwells already are used (n,), and a remark: those in which an axis has no scatter are not sound.
+
+    Raises
+    ------
+    DataRejected
+        There are such dwells and the mapping does not say what to do with them.
+    """
+    sound = np.ones(len(labels), dtype=bool)
+    if not all(f"sd_{axis}" in columns for axis in AXES):
+        return sound, ()
+    spread = np.column_stack([columns[f"sd_{axis}"] for axis in AXES])
+    usual = np.median(spread, axis=0)
+    still = (spread < 1e-6 * usual) & (usual > 0.0)
+    rows = np.flatnonzero(still.any(axis=1))
+    if not rows.size:
+        return sound, ()
+    first = int(rows[0])
+    axis = AXES[int(np.argmax(still[first]))]
+    size = f"no scatter, usually {usual[AXES.index(axis)]:.3g}"
+    found = f"axis {axis} stands still in dwell '{labels[first]}' (row {first + 1}): {size}"
+    if mapping.faulty == "refuse":
+        raise DataRejected(
+            f"{where}: {found} ({rows.size} such dwells); samples of the sensor are needed; measure them again, or add "
+            "--faulty leave-out, or --faulty keep if this is what the sensor does"
+        )
+    if mapping.faulty == "leave-out":
+        sound[rows] = False
+    return sound, (
+        f"{rows.size} dwells with an axis that stands still {'kept' if sound.all() else 'left out'}: {found}",
+    )
+
+
+def refuse_or_remark(
+    found: SampleFaults, output: NDArray[np.float64], time: NDArray[np.float64], mapping: Mapping, where: str
+) -> tuple[str, ...]:
+    """Remarks on the faults that are left out or kept.
+
+    Raises
+    ------
+    DataRejected
+        There are faults and the mapping does not say what to do with them; or an axis stands still all the time.
+    """
+    if not found:
+        return ()
+    words = "; ".join(found.sentences(time))
+    whole = [one for one in found.frozen if one.count == len(output)]
+    if whole and mapping.faulty != "keep":
+        axis = AXES[whole[0].axis]
+        raise DataRejected(
+            f"{where}: axis {axis} never changes in {len(output)} samples while another axis does; map another column as "
+            f"{axis}, repair the sensor's channel, or import it all the same with --faulty keep"
+        )
+    if mapping.faulty == "refuse":
+        raise DataRejected(
+            f"{where}: {words}; samples of the sensor are needed; measure again, or add --faulty leave-out for what is sound, "
+            "or --faulty keep if this is what the sensor does"
+        )
+    done = "left out" if mapping.faulty == "leave-out" else "kept"
+    return (f"{int(found.bad.sum())} samples with faults {done}: {words}",)

@@ -1,0 +1,144 @@
+"""One recording from several files: one after another, or side by side."""
+
+from __future__ import annotations
+
+import hashlib
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pandas as pd
+
+from pipelines.importers import clocks, files, values
+from pipelines.importers.stated_units import column_name
+from schemas.errors import DataRejected, WrongUse
+from schemas.foreign import shown
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+    from pathlib import Path
+
+    from numpy.typing import NDArray
+
+    from pipelines.importers.content import Content
+
+
+@dataclass(frozen=True)
+class Source(files.SourceFile):
+    """Where a recording came from; the files where it has several."""
+
+    parts: tuple[files.SourceFile, ...] = ()
+
+    def as_dict(self) -> dict[str, Any]:
+        """JSON-able."""
+        return {**super().as_dict(), **({"files": [one.as_dict() for one in self.parts]} if self.parts else {})}
+
+
+def read(
+    paths: Sequence[Path], *, join: str = "", time: str = "", group: str = ""
+) -> tuple[Content, files.SourceFile, tuple[int, ...]]:
+    """A recording, where it came from, and the rows before which another file begins.
+
+    Parameters
+    ----------
+    join : ``rows``: the files follow one another; ``columns``: they stand side by side.
+    time : the column of time, by name or number; empty where none is mapped.
+    group : the group of channels wanted of each file that has several.
+
+    Raises
+    ------
+    DataRejected
+        The files do not fit together.
+    """
+    read_ones = [files.read_content(path, group) for path in paths]
+    if len(read_ones) == 1:
+        return (*read_ones[0], ())
+    contents, sources = [one[0] for one in read_ones], tuple(one[1] for one in read_ones)
+    names = [path.name for path in paths]
+    if join == "columns":
+        joined, breaks = _beside(contents, names, time), ()
+    else:
+        joined, breaks = _after(contents, names, time)
+    digest = hashlib.sha256("".join(one.sha256 for one in sources).encode()).hexdigest()
+    about = Source(
+        " + ".join(one.path for one in sources), digest, sum(one.size for one in sources), sources[0].form, sources
+    )
+    return joined, about, breaks
+
+
+def _after(contents: list[Content], names: list[str], time: str) -> tuple[Content, tuple[int, ...]]:
+    """Files one after another; a clock that begins anew is set behind the file before."""
+    first = contents[0]
+    columns = list(first.table.columns)
+    tables, breaks, remarks = [first.table], [0], list(first.remarks)
+    for content, name in zip(contents[1:], names[1:], strict=True):
+        if list(content.table.columns) != columns:
+            raise DataRejected(
+                f"{name}: its columns ({shown(', '.join(content.table.columns))}) are not those of {names[0]} "
+                f"({shown(', '.join(columns))}), the same are needed; join files side by side with --join columns"
+            )
+        breaks.append(breaks[-1] + len(tables[-1]))
+        label = column_name(columns, time)
+        table, shifted = _behind(tables[-1], content.table, label)
+        if shifted:
+            remarks.append(f"{name}: its clock begins anew, set behind {names[len(tables) - 1]}")
+        tables.append(table)
+    return replace(first, table=pd.concat(tables, ignore_index=True), remarks=tuple(remarks)), tuple(breaks[1:])
+
+
+def _behind(before: pd.DataFrame, table: pd.DataFrame, time: str) -> tuple[pd.DataFrame, bool]:
+    """A table whose clock goes on behind the one before it, and whether it had to be moved."""
+    if not time or before[time].dtype.kind not in "fiu" or table[time].dtype.kind not in "fiu":
+        return table, False
+    last, begin = float(before[time].iloc[-1]), float(table[time].iloc[0])
+    if not begin <= last:
+        return table, False
+    step = clocks.typical_step(before[time].to_numpy(dtype=np.float64))
+    return table.assign(**{time: table[time] + (last - begin + step)}), True
+
+
+def _beside(contents: list[Content], names: list[str], time: str) -> Content:
+    """Files side by side: by their clocks where both have the column of time, else row by row."""
+    first = contents[0]
+    columns: dict[str, Any] = {str(name): column for name, column in first.table.items()}
+    units, remarks = dict(first.units), list(first.remarks)
+    label = column_name(list(columns), time)
+    for number, (content, name) in enumerate(zip(contents[1:], names[1:], strict=True), start=2):
+        clocked = label and label in content.table.columns
+        if not clocked and len(content.table) != len(first.table):
+            raise WrongUse(
+                f"{name}: {len(content.table)} rows and no column '{shown(label or time or 'time')}', {names[0]} has "
+                f"{len(first.table)} rows; rows in equal number, or a common column of time mapped as time=…, are needed"
+            )
+        for column, data in content.table.items():
+            if clocked and column == label:
+                continue
+            own = str(column) if str(column) not in columns else f"{number}:{column}"
+            columns[own] = _at(first.table[label], content.table[label], data, name) if clocked else data
+            units |= {own: content.units[str(column)]} if str(column) in content.units else {}
+        how = f"read at the times of {names[0]}, linear in between" if clocked else "row by row"
+        remarks += [*content.remarks, f"columns of {name} {how}"]
+    return replace(first, table=pd.DataFrame(columns), units=units, remarks=tuple(remarks))
+
+
+def _at(wanted: pd.Series, own: pd.Series, data: pd.Series, where: str) -> NDArray[np.float64]:
+    """A column read at other times; not a number outside its own."""
+    at, given = _instants(wanted, where), _instants(own, where)
+    if np.any(np.diff(given) < 0.0):
+        raise DataRejected(f"{where}: time runs back, it must not; sort the rows")
+    numbers = values.as_numbers(data, where)
+    inside = np.interp(at, given, numbers)
+    slack = 2.0 * clocks.typical_step(given)  # the last reading of a slow channel holds until the next would come
+    return np.where((at < given[0] - slack) | (at > given[-1] + slack), np.nan, inside)
+
+
+def _instants(column: pd.Series, where: str) -> NDArray[np.float64]:
+    """Numbers that grow with time, the same for the same instant in every file."""
+    if column.dtype.kind in "fiu":
+        return column.to_numpy(dtype=np.float64)
+    moments = pd.to_datetime(column, format="ISO8601", utc=True, errors="coerce")
+    if moments.isna().any():
+        raise DataRejected(
+            f"{where}: column '{shown(str(column.name))}': numbers or ISO 8601 stamps are needed to put files side by side"
+        )
+    return np.asarray((moments - pd.Timestamp(0, tz="UTC")) / pd.Timedelta(seconds=1), dtype=np.float64)

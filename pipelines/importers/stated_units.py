@@ -1,0 +1,71 @@
+"""Units that files state, as the mapping calls them: taken where none is given, and never contradicted in silence."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from schemas.errors import WrongUse
+from schemas.foreign import shown
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping as Columns
+
+    from pipelines.importers.content import Content
+    from pipelines.importers.mapping import Mapping
+
+OUTPUT = {
+    **dict.fromkeys(("g", "gn", "g0", "g_n", "grav"), "g"),
+    "mg": "mg",
+    **dict.fromkeys(("m/s^2", "m/s²", "m/s2", "m/s/s", "m/s**2", "m s^-2", "m*s^-2", "m·s⁻²", "ms-2", "mps2"), "m/s^2"),
+    **dict.fromkeys(("v", "volt", "volts"), "V"),
+    "mv": "mV",
+    **dict.fromkeys(("lsb", "count", "counts", "digit", "digits", "raw", "adc", "codes"), "LSB"),
+}
+TEMPERATURE = {
+    **dict.fromkeys(("c", "°c", "degc", "deg c", "celsius", "ºc"), "degC"),
+    **dict.fromkeys(("k", "kelvin"), "K"),
+    **dict.fromkeys(("f", "°f", "degf", "fahrenheit"), "degF"),
+}
+
+
+def output_unit(text: str) -> str:
+    """A unit of the output as the mapping calls it; empty for one that is not known. G is gravity, g the same."""
+    return OUTPUT.get(text.strip().lower(), "")
+
+
+def column_name(columns: list[str], wanted: str) -> str:
+    """A column by its name, or by its number from 1; empty where there is neither."""
+    if wanted in columns:
+        return wanted
+    return columns[int(wanted) - 1] if wanted.isdecimal() and 1 <= int(wanted[:9]) <= len(columns) else ""
+
+
+def completed(given: dict[str, Any], content: Content) -> dict[str, Any]:
+    """The content of a mapping with the unit of the output that the file states, where none is given."""
+    units, columns = dict(given.get("units", {})), given.get("columns", {})
+    if "output" in units or not all(axis in columns for axis in "xyz"):
+        return given
+    stated = _of_axes(columns, content)
+    return given if len(stated) != 1 or "" in stated else given | {"units": {"output": stated.pop(), **units}}
+
+
+def refuse_contradiction(mapping: Mapping, content: Content, where: str) -> None:
+    """Refuse units that are others than those that the file states for its columns."""
+    stated = _of_axes(mapping.columns, content) - {"", mapping.units.output}
+    if stated:
+        raise WrongUse(
+            f"{where}: the file states {' and '.join(sorted(stated))} for its output, but --units output={mapping.units.output} "
+            "was given; leave it out, or correct it"
+        )
+    heat = column_name(list(content.table.columns), mapping.columns.get("temperature", ""))
+    unit = TEMPERATURE.get(content.units.get(heat, "").strip().lower(), "")
+    if unit and unit != mapping.units.temperature:
+        raise WrongUse(
+            f"{where}: column '{shown(heat)}' states {unit}, {mapping.units.temperature} is taken; "
+            f"add --units temperature={unit}"
+        )
+
+
+def _of_axes(columns: Columns[str, str], content: Content) -> set[str]:
+    names = list(content.table.columns)
+    return {output_unit(content.units.get(column_name(names, columns.get(axis, "")), "")) for axis in "xyz"}

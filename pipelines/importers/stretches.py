@@ -1,0 +1,155 @@
+"""The static stretches of a record: by labels, by blocks, by positions logged back to back, or found in the record itself."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from inertial import change_of_level, static_intervals
+from schemas.errors import DataRejected, did_you_mean
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import NDArray
+
+    from pipelines.importers.mapping import Mapping
+
+_MOST_TOLD = 6
+
+
+@dataclass(frozen=True)
+class Stretches:
+    """Static stretches: first and one past the last sample, and label of each; remarks on how they were found."""
+
+    first: tuple[int, ...]
+    last: tuple[int, ...]
+    labels: tuple[str, ...]
+    remarks: tuple[str, ...] = ()
+
+    def __len__(self) -> int:
+        """How many there are."""
+        return len(self.first)
+
+
+def stretches(
+    labels: Sequence[str] | None,
+    output: NDArray[np.float64],
+    time: NDArray[np.float64],
+    breaks: Sequence[int],
+    mapping: Mapping,
+    where: str,
+) -> Stretches:
+    """The static stretches of a record that the mapping keeps.
+
+    Parameters
+    ----------
+    labels : of every sample, where a column has them.
+    output, time : (n, 3) and (n,), s.
+    breaks : samples before which rows or time are missing: no stretch goes over one.
+
+    Raises
+    ------
+    DataRejected
+        A stretch holds several positions, or a pose names a label that is not there.
+    """
+    edges = [0, *(k for k in breaks if 0 < k < len(time)), len(time)]
+    if labels is not None:
+        found = _by_labels(labels, edges)
+    elif mapping.positions is not None:
+        found = _by_positions(output, mapping.positions, where)
+    elif mapping.block_s is not None:
+        found = _by_blocks(time, edges, mapping.block_s)
+    else:
+        found = _found(output, time, edges, mapping)
+        _refuse_several_positions(found, output, where)
+    return _named(found, mapping, where)
+
+
+def _by_labels(labels: Sequence[str], edges: list[int]) -> Stretches:
+    names = np.asarray(labels, dtype=object)
+    first = sorted({*(np.flatnonzero(names[1:] != names[:-1]) + 1).tolist(), *edges[:-1]})
+    last = [*first[1:], names.size]
+    return Stretches(tuple(first), tuple(last), tuple(str(names[k]) for k in first))
+
+
+def _by_blocks(time: NDArray[np.float64], edges: list[int], block_s: float) -> Stretches:
+    number = np.floor((time - time[0]) / block_s).astype(np.int64)
+    first = sorted({*(np.flatnonzero(np.diff(number)) + 1).tolist(), *edges[:-1]})
+    last = [*first[1:], time.size]
+    return Stretches(tuple(first), tuple(last), tuple(f"block {k}" for k in range(len(first))))
+
+
+def _by_positions(output: NDArray[np.float64], count: int, where: str) -> Stretches:
+    try:
+        found = change_of_level.levels(output, count)
+    except ValueError as problem:
+        raise DataRejected(f"{where}: {problem}") from None
+    # the samples beside a change may belong to either side
+    start, stop = found.start + (found.start > 0), found.stop - (found.stop < len(output))
+    remark = (
+        f"{len(found)} positions logged back to back, {100.0 * found.explained:.4g} % of the scatter explained by them"
+    )
+    names = tuple(f"position {k}" for k in range(len(found)))
+    return Stretches(tuple(start.tolist()), tuple(stop.tolist()), names, (remark,))
+
+
+def _found(output: NDArray[np.float64], time: NDArray[np.float64], edges: list[int], mapping: Mapping) -> Stretches:
+    window, shortest = mapping.window_s or 1.0, mapping.shortest_s or 1.0
+    first: list[int] = []
+    last: list[int] = []
+    thresholds: list[float] = []
+    for a, b in pairwise(edges):
+        if b - a < 3 or time[b - 1] <= time[a]:
+            continue
+        rate = mapping.rate_hz or (b - a - 1) / float(time[b - 1] - time[a])
+        if b - a < 3 * max(3, round(window * rate)):
+            continue
+        piece = static_intervals.find(
+            output[a:b], rate, window_s=window, shortest_s=shortest, threshold=mapping.threshold
+        )
+        first += (piece.start + a).tolist()
+        last += (piece.stop + a).tolist()
+        thresholds.append(piece.threshold_sd)
+    return Stretches(tuple(first), tuple(last), tuple(f"dwell {k}" for k in range(len(first))))
+
+
+def _refuse_several_positions(found: Stretches, output: NDArray[np.float64], where: str) -> None:
+    """Refuse stretches whose scatter no noise makes: positions logged one after another."""
+    counts = [change_of_level.several_levels(output[a:b]) for a, b in zip(found.first, found.last, strict=True)]
+    several = [k for k, count in enumerate(counts) if count > 1]
+    if not several:
+        return
+    worst = max(several, key=lambda k: counts[k])
+    a, b = found.first[worst], found.last[worst]
+    total = change_of_level.several_levels(output)
+    offer = (
+        f"--positions {total} divides the record at the changes"
+        if total > 1
+        else "--window 0.2 --shortest 0.2 finds shorter dwells"
+    )
+    raise DataRejected(
+        f"{where}: rows {a + 1} to {b}: one dwell by its scatter, but about {counts[worst]} positions logged back to back by its "
+        f"levels; a position per dwell is needed; {offer}, or map a column of labels as dwell=…"
+    )
+
+
+def _named(found: Stretches, mapping: Mapping, where: str) -> Stretches:
+    """The stretches that the poses name; all where no pose is named."""
+    if not mapping.poses:
+        return found
+    missing = [label for label in mapping.poses if label not in found.labels]
+    if missing:
+        raise DataRejected(
+            f"{where}: no dwell is labelled '{missing[0]}' (in --poses); {did_you_mean(missing[0], found.labels)}"
+        )
+    kept = [k for k, label in enumerate(found.labels) if label in mapping.poses]
+    return Stretches(
+        tuple(found.first[k] for k in kept),
+        tuple(found.last[k] for k in kept),
+        tuple(found.labels[k] for k in kept),
+        found.remarks,
+    )

@@ -1,0 +1,210 @@
+"""How a text of numbers is laid out: divider, decimal sign, where the table begins, and which line names its columns.
+
+Nothing is assumed about the beginning of a file, where devices write their settings. The layout is read from the lines further
+down, which are all alike, and the table begins with the first line that is like them.
+"""
+
+from __future__ import annotations
+
+import csv
+import re
+from collections import Counter
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+COMMENTS = ("#", "%")
+BLANKS = r"\s+"
+_SAMPLE = 300
+_TAIL = 40
+_LONGEST = 64
+_POINT = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eEdD][+-]?\d+)?")
+_COMMA = re.compile(r"[+-]?(?:\d+,\d+|\d+|,\d+)(?:[eEdD][+-]?\d+)?")
+_GAPS = frozenset({"", "nan", "-nan", "na", "n/a", "null", "none", "inf", "-inf", "+inf", "infinity", "#n/a"})
+_CANDIDATES = (
+    *(("\t", "."), ("\t", ","), (";", "."), (";", ","), (",", "."), (",", ","), (BLANKS, "."), (BLANKS, ",")),
+    *(("|", "."), ("|", ",")),
+)
+_ALIKE = 0.9
+"""Share of sampled lines with the usual count of fields, from which on a divider divides them."""
+
+
+@dataclass(frozen=True)
+class Layout:
+    """Layout of a text.
+
+    divider, decimal : a pattern for blanks; point or comma
+    first : index of the first line of the table
+    names : of the columns; empty where no line names them
+    header : index of the line with the names; −1 where there is none, or where it is a comment
+    integers : whether the names are only the numbers 0, 1, 2, …
+    units : of the columns by a line of their own below the names; empty otherwise
+    width : count of fields, a last empty one not counted
+    trailing : whether every line ends with a divider
+    """
+
+    divider: str
+    decimal: str
+    first: int
+    names: tuple[str, ...]
+    header: int
+    integers: bool
+    units: tuple[str, ...]
+    width: int
+    trailing: bool
+
+
+def is_comment(line: str) -> bool:
+    """Whether a line is empty or a comment."""
+    stripped = line.strip()
+    return not stripped or stripped.startswith(COMMENTS)
+
+
+def fields_of(line: str, divider: str) -> list[str]:
+    """The fields of a line, without the blanks about them and without quotes."""
+    if divider == BLANKS:
+        return [word.strip('"') for word in line.split()]
+    if '"' in line and line.count('"') % 2 == 0 and len(line) < 100_000:
+        return [word.strip() for word in next(csv.reader([line], delimiter=divider, skipinitialspace=True))]
+    return [word.strip().strip('"') for word in line.split(divider)]
+
+
+def is_number(word: str, decimal: str = ".") -> bool:
+    """Whether a word is a finite number, written with this decimal sign."""
+    # a pattern takes time that grows with the square of a word's length, and no number is that long
+    return len(word) <= _LONGEST and (_POINT if decimal == "." else _COMMA).fullmatch(word) is not None
+
+
+def layout(lines: Sequence[str]) -> Layout | None:
+    """The layout of a text's lines; None where no line holds anything but comments."""
+    filled = [k for k in range(len(lines)) if not is_comment(lines[k])]
+    if not filled:
+        return None
+    sample = _sampled([lines[k] for k in filled])
+    divider, decimal, width = _divided(sample)
+    trailing = width > 1 and all(not f[-1] for f in (fields_of(s, divider) for s in sample) if len(f) == width)
+    numeric = _numeric_columns(sample, divider, decimal, width)
+    first = _first_row(lines, filled, divider, decimal, width, numeric)
+    place = filled.index(first) if first < len(lines) else len(filled)
+    header, names, units, integers = -1, (), (), False
+    above = [fields_of(lines[k], divider) for k in filled[max(0, place - 2) : place]][::-1]
+    if above and _is_header(above[0], width, decimal, trailing=trailing):
+        header, names = filled[place - 1], tuple(above[0])
+        if (
+            len(above) > 1
+            and _is_header(above[1], width, decimal, trailing=trailing)
+            and _are_units(above[0], above[1])
+        ):
+            header, names, units = filled[place - 2], tuple(above[1]), tuple(above[0])
+    elif _only_numbered([fields_of(lines[k], divider) for k in filled[place : place + 2]]):
+        header, names, integers = first, tuple(fields_of(lines[first], divider)), True
+        first = filled[place + 1]
+    elif not above or first > 0:
+        names = _commented(lines, first, divider, width)
+    kept = width - 1 if trailing else width
+    return Layout(divider, decimal, first, names[:kept], header, integers, units[:kept], kept, trailing)
+
+
+def _sampled(filled: list[str]) -> list[str]:
+    """Lines of the later part of the text, where the table is."""
+    if len(filled) <= _TAIL:
+        return filled[len(filled) // 2 :]
+    later = filled[len(filled) // 3 :]
+    return later[:: max(1, len(later) // _SAMPLE)]
+
+
+def _divided(sample: Sequence[str]) -> tuple[str, str, int]:
+    """Divider, decimal sign and count of fields that fit the sampled lines best."""
+    best: tuple[float, ...] = ()
+    found = (BLANKS, ".", 1)
+    for order, (divider, decimal) in enumerate(_CANDIDATES):
+        rows = [fields_of(line, divider) for line in sample]
+        width, often = Counter(map(len, rows)).most_common(1)[0]
+        words = [word for row in rows if len(row) == width for word in row]
+        numbers = sum(is_number(word, decimal) for word in words) / len(words)
+        alike = often / len(rows) >= _ALIKE
+        # a divider that leaves nothing but numbers, then the more columns, then the usual order
+        key = (float(alike and width > 1), round(numbers, 2), width, -order)
+        if key > best:
+            best, found = key, (divider, decimal, width)
+    return found
+
+
+def _numeric_columns(sample: Sequence[str], divider: str, decimal: str, width: int) -> list[bool]:
+    rows = [row for row in (fields_of(line, divider) for line in sample) if len(row) == width]
+    return [sum(is_number(row[k], decimal) for row in rows) > 0.5 * len(rows) for k in range(width)]
+
+
+def _first_row(
+    lines: Sequence[str], filled: list[int], divider: str, decimal: str, width: int, numeric: list[bool]
+) -> int:
+    """The first line of the table: like the sampled ones, with the broken rows right above it, which are rows too."""
+    if not any(numeric):
+        return filled[1] if len(filled) > 1 else len(lines)  # names alone
+    alike = (place for place, k in enumerate(filled) if _is_row(fields_of(lines[k], divider), decimal, numeric))
+    place = next(alike, len(filled) - 1)
+    while place > 0:
+        row = fields_of(lines[filled[place - 1]], divider)
+        if len(row) != width or not any(is_number(word, decimal) for word in row):
+            break
+        place -= 1
+    return filled[place]
+
+
+def _is_row(row: list[str], decimal: str, numeric: list[bool]) -> bool:
+    """Whether a line is like the rows of the table: numbers, or gaps, where they have numbers, and one number at least."""
+    if len(row) != len(numeric):
+        return False
+    words = [word for wanted, word in zip(numeric, row, strict=True) if wanted]
+    numbers = [is_number(word, decimal) for word in words]
+    return any(numbers) and all(known or word.lower() in _GAPS for known, word in zip(numbers, words, strict=True))
+
+
+def _is_header(row: list[str], width: int, decimal: str, *, trailing: bool) -> bool:
+    """Whether a line names columns: as many as the rows have fields, none a number, most of them there."""
+    if len(row) != width and not (trailing and len(row) == width - 1):
+        return False
+    return not any(is_number(word, decimal) for word in row) and sum(map(bool, row)) >= 0.5 * width
+
+
+def _are_units(row: list[str], above: list[str]) -> bool:
+    """Whether a line below the names holds units: shorter words, often the same, and the names all different."""
+    words = [word.strip("[]()") for word in row if word]
+    return (
+        len(set(above)) == len(above)
+        and max(map(len, words), default=99) <= 8
+        and (len(set(words)) < len(words) or all(word.startswith(("[", "(")) for word in row if word))
+    )
+
+
+def _only_numbered(rows: list[list[str]]) -> bool:
+    """Whether the first of two lines numbers the columns and the second does not."""
+    if len(rows) < 2 or not _counts(rows[0]):
+        return False
+    below = rows[1][-3:]
+    return not all(word.isdigit() for word in below) or [int(b) - int(below[0]) for b in below] != [0, 1, 2]
+
+
+def _counts(row: list[str]) -> bool:
+    """Whether a line only numbers the columns: 0, 1, 2, … or 1, 2, 3, …, perhaps behind an empty field."""
+    words = row[1:] if row and not row[0] else row
+    if len(words) < 3 or not all(word.isdigit() and word.isascii() and len(word) < 6 for word in words):
+        return False
+    numbers = [int(word) for word in words]
+    return numbers[0] in {0, 1} and all(b - a == 1 for a, b in pairwise(numbers))
+
+
+def _commented(lines: Sequence[str], first: int, divider: str, width: int) -> tuple[str, ...]:
+    """Names in the last comment above the table, where it has as many words as there are columns; empty otherwise."""
+    for k in range(first - 1, -1, -1):
+        text = lines[k].strip()
+        if not text.startswith(COMMENTS):
+            continue
+        words = fields_of(text.lstrip("#% \t"), divider)
+        if len(words) == width and not any(is_number(w) for w in words) and len(set(words)) == width:
+            return tuple(words)
+        return ()
+    return ()

@@ -1,0 +1,135 @@
+"""Text of numbers as columns: decoded, its layout found and said, broken rows refused."""
+
+from __future__ import annotations
+
+import io
+import re
+import warnings
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pandas as pd
+
+from pipelines.importers.content import Content, unit_in
+from pipelines.importers.text_layout import BLANKS, Layout, is_comment, layout
+from schemas.errors import DataRejected
+from schemas.foreign import foreign, shown
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+_MORE = "\0more"
+MOST_COLUMNS = 10_000
+_CONTROL = re.compile(r"[\x00-\x08\x0e-\x1f\x7f-\x9f]")
+_FORTRAN = re.compile(r"^\s*[+-]?\d*\.?\d+[dD][+-]?\d+\s*$")
+
+
+def decoded(data: bytes, where: str) -> tuple[str, str]:
+    """The text of a file and its encoding: UTF-8, UTF-16 with a byte-order mark, or Windows-1252.
+
+    Raises
+    ------
+    DataRejected
+        It is none of these.
+    """
+    marked = data.startswith((b"\xff\xfe", b"\xfe\xff"))
+    for encoding in ("utf-16",) if marked else ("utf-8-sig", "cp1252"):
+        try:
+            text = data.decode(encoding)
+        except UnicodeDecodeError:
+            continue
+        if encoding == "utf-8-sig" or not _CONTROL.search(text[:100_000]):
+            return text, "UTF-8" if encoding == "utf-8-sig" else encoding.upper().replace("CP1252", "Windows-1252")
+    raise DataRejected(f"{where}: neither text (UTF-8) nor a known format of recordings; export it as CSV")
+
+
+def content(text: str, where: str, encoding: str = "UTF-8") -> Content:
+    """The columns of a text, named as there ("1", "2", … without a header), and what was found about its layout."""
+    lines = text.splitlines()
+    found = layout(lines)
+    if found is None:
+        raise DataRejected(f"{where}: no rows of data were found, at least one is needed; check the file")
+    labels = _labels(found, where)
+    body = [line for line in lines[found.first :] if not is_comment(line)]
+    table = _parsed(body, found, labels, where)
+    units = {label: unit for label, unit in zip(labels, found.units, strict=False) if unit} or {
+        label: unit for label in labels if (unit := unit_in(label))
+    }
+    units = {label: unit.strip("[]() ") for label, unit in units.items()}
+    return Content(table, _remarks(found, lines, encoding), units)
+
+
+def _labels(found: Layout, where: str) -> list[str]:
+    if found.width > MOST_COLUMNS:
+        line = f"{found.width} columns in line {max(found.header, 0) + 1}"
+        raise DataRejected(f"{where}: {line}, at most {MOST_COLUMNS} are read; one row per sample is needed")
+    if not found.names:
+        return [str(k + 1) for k in range(found.width)]
+    labels = [name or f"column {k + 1}" for k, name in enumerate(found.names)]
+    if len(set(labels)) < len(labels):
+        twice = next(label for label in labels if labels.count(label) > 1)
+        raise DataRejected(f"{where}: column '{shown(twice)}' is there twice, names must differ; rename one")
+    return labels
+
+
+def _parsed(body: Sequence[str], found: Layout, labels: list[str], where: str) -> pd.DataFrame:
+    if not body:
+        return pd.DataFrame(columns=labels)
+    wrong = f"{where}: rows from line {found.first + 1} on do not have the {len(labels)} columns of the first"
+    extra = [*labels, *(["\0last"] if found.trailing else []), _MORE]
+    with foreign(wrong, "repair or remove the broken rows"), warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        table = pd.read_csv(
+            io.StringIO("\n".join(body)),
+            sep=found.divider,
+            decimal=found.decimal,
+            header=None,
+            names=extra,
+            index_col=False,
+            skipinitialspace=True,
+            low_memory=False,
+        )
+    more = table.pop(_MORE).notna().to_numpy()
+    if found.trailing:
+        more = more | table.pop("\0last").notna().to_numpy()
+    if more.any():
+        row = int(np.flatnonzero(more)[0])
+        raise DataRejected(f"{wrong} (row {row} has more); repair or remove the broken rows")
+    return _fortran(table)
+
+
+def _fortran(table: pd.DataFrame) -> pd.DataFrame:
+    """Numbers with the exponent D of Fortran as numbers."""
+    for name in table.columns:
+        column = table[name]
+        if column.dtype.kind in "fiub" or not len(column) or not _FORTRAN.match(str(column.iloc[0])):
+            continue
+        table[name] = pd.to_numeric(column.astype(str).str.replace("D", "e", case=False), errors="coerce")
+    return table
+
+
+def _remarks(found: Layout, lines: Sequence[str], encoding: str) -> tuple[str, ...]:
+    remarks: list[str] = []
+    begin = found.first if found.header < 0 else found.header
+    passed = [line for line in lines[:begin] if not is_comment(line)]
+    if passed:
+        place = f"the header in line {found.header + 1}" if found.header >= 0 else f"the first row in line {begin + 1}"
+        remarks.append(
+            f"{len(passed)} lines before {place} were not read, beginning with '{shown(passed[0].strip(), 60)}'"
+        )
+    if found.integers:
+        remarks.append(
+            f"line {found.header + 1} only numbers the columns: {', '.join(filter(None, found.names[:6]))}, …"
+        )
+    elif found.names and found.header < 0:
+        remarks.append(f"columns named by a comment: {shown(', '.join(found.names))}")
+    if found.decimal == ",":
+        remarks.append("numbers with a decimal comma")
+    if encoding != "UTF-8":
+        remarks.append(f"text in {encoding}")
+    return tuple(remarks)
+
+
+def divider_name(divider: str) -> str:
+    """A divider for people."""
+    return {"\t": "tab", BLANKS: "blanks", ",": "comma", ";": "semicolon", "|": "bar"}[divider]

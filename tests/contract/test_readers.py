@@ -1,0 +1,181 @@
+"""Every reader of recordings that is found: the first bytes are its own, it reads its sample, and it is in the guide."""
+
+import io
+import tomllib
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+from scipy.io import savemat, wavfile
+
+from pipelines.importers import files, library
+from pipelines.importers.readers import READERS, reader_of
+from schemas.errors import DataRejected, WrongUse
+
+ROOT = Path(__file__).resolve().parents[2]
+EXTRAS = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]["optional-dependencies"]
+GUIDE = (ROOT / "docs" / "how-to" / "import-your-data.md").read_text(encoding="utf-8")
+TIME = np.arange(50) / 100.0
+AXES = {name: 0.1 * k + 0.001 * np.sin(TIME * (k + 1)) for k, name in enumerate(("ax", "ay", "az"))}
+REFUSED = {"zip": b"PK\x03\x04" + bytes(40)}
+FROM_ELSEWHERE = {"ide": ("dynamic-files/enDAQ-test.ide", "32 16g DC Acceleration")}
+
+
+def frame() -> pd.DataFrame:
+    return pd.DataFrame({"time": TIME, **AXES})
+
+
+def parquet(path: Path) -> None:
+    frame().to_parquet(path)
+
+
+def matlab(path: Path) -> None:
+    with path.open("wb") as file:
+        savemat(file, {name: frame()[name].to_numpy() for name in frame()})
+
+
+def text(path: Path) -> None:
+    frame().to_csv(path, index=False)
+
+
+def hdf5(path: Path) -> None:
+    h5py = pytest.importorskip("h5py")
+    with h5py.File(path, "w", userblock_size=512) as file:
+        for name in frame():
+            file[name] = frame()[name].to_numpy()[None, :]  # MATLAB stores a column as a row
+        file["rate"] = 100.0
+        file["#refs#/a"] = np.arange(50.0)
+    data = bytearray(path.read_bytes())
+    data[:116] = b"MATLAB 7.3 MAT-file".ljust(116)
+    path.write_bytes(data)
+
+
+def uff58(path: Path) -> None:
+    pyuff = pytest.importorskip("pyuff")
+    file = pyuff.UFF(str(path))
+    for number, (name, values) in enumerate(AXES.items()):
+        one = {"type": 58, "func_type": 1, "rsp_node": 1, "rsp_dir": number + 1, "ref_node": 0, "ref_dir": 0, "data": values,
+               "x": TIME, "id1": name, "rsp_ent_name": "NONE", "ref_ent_name": "NONE", "abscissa_spacing": 1,
+               "abscissa_spec_data_type": 17, "ordinate_spec_data_type": 12, "ordinate_axis_units_lab": "g",
+               "orddenom_spec_data_type": 0, "abscissa_inc": 0.01, "abscissa_min": 0.0, "num_pts": len(TIME),
+               "ord_data_type": 4, "binary": 0}  # fmt: skip
+        file.write_sets(one, "add" if number else "overwrite")
+
+
+def tdms(path: Path) -> None:
+    nptdms = pytest.importorskip("nptdms")
+    about = {"wf_increment": 0.01, "wf_start_offset": 0.0, "unit_string": "g"}
+    with nptdms.TdmsWriter(str(path)) as writer:
+        writer.write_segment(
+            [nptdms.ChannelObject("log", name, values, properties=about) for name, values in AXES.items()]
+        )
+
+
+def rdata(path: Path) -> None:
+    pytest.importorskip("pyreadr").write_rdata(str(path), frame(), df_name="imu")
+
+
+def wav(path: Path) -> None:
+    wavfile.write(path, 100, (30000 * np.column_stack([*AXES.values()])).astype(np.int16))
+
+
+def lvm(path: Path) -> None:
+    head = ["LabVIEW Measurement\t", "Writer_Version\t2", "Separator\tTab", "Decimal_Separator\t,", "X_Columns\tOne",
+            "***End_of_Header***\t", "\t", "Channels\t3", "Samples\t50\t50\t50", "Y_Unit_Label\tg\tg\tg",
+            "Delta_X\t0,010000\t0,010000\t0,010000", "***End_of_Header***\t\t\t\t", "X_Value\tax\tay\taz\tComment"]  # fmt: skip
+    rows = ["\t".join(f"{value:.9f}".replace(".", ",") for value in row) for row in frame().to_numpy()]
+    path.write_text("\r\n".join([*head, *rows]) + "\r\n", encoding="utf-8")
+
+
+SAMPLES = {"parquet": parquet, "matlab": matlab, "text": text, "hdf5": hdf5, "uff58": uff58, "tdms": tdms, "rdata": rdata,
+           "wav": wav, "lvm": lvm}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", READERS)
+def test_a_reader_says_what_it_is_and_is_in_the_guide(name: str) -> None:
+    reader = READERS[name]
+    assert name == reader.NAME
+    assert reader.TITLE
+    assert not reader.EXTRA or reader.EXTRA in EXTRAS
+    assert f"`{name}`" in GUIDE
+    assert not reader.EXTRA or f"tumbleline[{reader.EXTRA}]" in GUIDE
+
+
+def test_the_order_of_the_readers_is_their_own() -> None:
+    orders = [reader.ORDER for reader in READERS.values()]
+    assert len(set(orders)) == len(orders)
+    assert list(READERS)[-1] == "text"
+
+
+def test_every_optional_format_is_in_the_extra_that_has_them_all() -> None:
+    wanted = {reader.EXTRA for reader in READERS.values() if reader.EXTRA}
+    assert EXTRAS["recordings"] == [f"tumbleline[{','.join(sorted(wanted))}]"]
+
+
+@pytest.mark.parametrize("name", READERS)
+def test_a_reader_reads_its_sample_and_no_other_claims_it(name: str, tmp_path: Path, request) -> None:
+    path = tmp_path / "no-ending"
+    group = ""
+    if name in REFUSED:
+        path.write_bytes(REFUSED[name])
+    elif name in FROM_ELSEWHERE:
+        pytest.importorskip("idelib")
+        file, group = FROM_ELSEWHERE[name]
+        path = request.getfixturevalue("shared_data") / file
+    else:
+        SAMPLES[name](path)
+    data = path.read_bytes()
+    assert reader_of(data) is READERS[name]
+    others = [other for other, reader in READERS.items() if other not in {name, "text"} and reader.recognised(data)]
+    assert others == []
+    if name in REFUSED:
+        with pytest.raises(DataRejected, match="which is not read"):
+            files.read(path)
+        return
+    content, source = files.read_content(path, group)
+    assert source.form == name
+    if name in SAMPLES:
+        check(name, content)
+
+
+def check(name: str, content) -> None:
+    """The sample's numbers; and unit and interval where the format has a place for them."""
+    table = content.table
+    time = table[next(one for one in table if str(one) in {"time", "X_Value"})].to_numpy(dtype=float)
+    np.testing.assert_allclose(time, TIME, atol=1e-9)
+    columns = [one for one in table if str(one) not in {"time", "X_Value"}]
+    assert len(columns) == 3
+    tolerance = 1 / 30000 if name == "wav" else 1e-6
+    scale = 1 / 30000 if name == "wav" else 1.0
+    for column, values in zip(columns, AXES.values(), strict=True):
+        np.testing.assert_allclose(scale * table[column].to_numpy(dtype=float), values, atol=tolerance)
+    if name in {"uff58", "tdms", "lvm"}:
+        assert {content.units[str(one)] for one in columns} == {"g"}
+        assert content.interval_s == pytest.approx(0.01)
+
+
+@pytest.mark.parametrize("name", [name for name, reader in READERS.items() if reader.EXTRA])
+def test_a_missing_library_is_named_with_its_installation(name: str, monkeypatch) -> None:
+    def missing(module: str):
+        raise ImportError(module)
+
+    monkeypatch.setattr(library, "import_module", missing)
+    with pytest.raises(WrongUse, match=rf"install it with: pip install 'tumbleline\[{READERS[name].EXTRA}\]'"):
+        READERS[name].read("a.bin", b"RDX3\n" + bytes(100), "")
+
+
+def test_several_groups_of_channels_are_asked_about(tmp_path: Path) -> None:
+    nptdms = pytest.importorskip("nptdms")
+    sink = io.BytesIO()
+    with nptdms.TdmsWriter(sink) as writer:
+        for group, count in (("fast", 40), ("slow", 4)):
+            writer.write_segment([nptdms.ChannelObject(group, name, np.arange(float(count))) for name in AXES])
+    (tmp_path / "a.tdms").write_bytes(sink.getvalue())
+    with pytest.raises(
+        WrongUse, match=r"2 groups .*'fast' \(40 samples\), 'slow' \(4 samples\); choose one with --group"
+    ):
+        files.read_content(tmp_path / "a.tdms")
+    with pytest.raises(WrongUse, match=r"no group is called 'fas'.*fast"):
+        files.read_content(tmp_path / "a.tdms", "fas")
+    assert len(files.read_content(tmp_path / "a.tdms", "slow")[0].table) == 4

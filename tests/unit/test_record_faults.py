@@ -1,0 +1,89 @@
+"""Axes that stand still and torn words are found in records of any resolution, and in sound ones none."""
+
+import numpy as np
+import pytest
+import recordings
+
+from inertial.record_faults import clipped, frozen, resolution, torn
+
+FEW, MANY = 25, 400
+COUNTS = [FEW, pytest.param(MANY, marks=pytest.mark.slow, id="many")]
+SEED = 706_114
+
+
+def drawn(rng: np.random.Generator) -> recordings.Recording:
+    return recordings.counts(
+        rng,
+        rate=float(rng.choice([50.0, 100.0, 200.0, 400.0])),
+        positions=int(rng.integers(8, 25)),
+        per_g=float(rng.choice([256.0, 1000.0, 4096.0, 16384.0, 131072.0])),
+        noise=float(rng.uniform(0.4, 8.0)),
+    )
+
+
+@pytest.mark.parametrize("count", COUNTS)
+def test_an_axis_that_stands_still_for_one_dwell_is_found_and_where(count: int) -> None:
+    hits = 0
+    for number in range(count):
+        rng = np.random.default_rng([SEED, 1, number])
+        one = drawn(rng)
+        axis, (start, stop) = int(rng.integers(3)), one.spans[int(rng.integers(len(one.spans)))]
+        broken = one.output.copy()
+        broken[start:stop, axis] = broken[start, axis]
+        hits += any(f.axis == axis and f.start <= start + 5 and f.stop >= stop - 5 for f in frozen(broken))
+    assert hits >= 0.99 * count
+
+
+@pytest.mark.parametrize("count", COUNTS)
+def test_torn_words_are_found_although_every_dwell_has_them(count: int) -> None:
+    hits = 0
+    for number in range(count):
+        rng = np.random.default_rng([SEED, 2, number])
+        one = drawn(rng)
+        power = 256.0 if one.noise * 8.0 < 256.0 else 512.0
+        axis = int(rng.integers(3))
+        wrong = rng.random(len(one.output)) < rng.uniform(0.06, 0.11)
+        broken = one.output.copy()
+        broken[wrong, axis] += power * rng.choice([-1.0, 1.0], size=int(wrong.sum()))
+        found = torn(broken)
+        hits += [t.axis for t in found] == [axis] and found[0].offsets[0] == int(power)
+    assert hits >= 0.99 * count
+
+
+@pytest.mark.parametrize("count", COUNTS)
+def test_sound_recordings_have_neither(count: int) -> None:
+    false = 0
+    for number in range(count):
+        one = drawn(np.random.default_rng([SEED, 3, number]))
+        false += bool(frozen(one.output) or torn(one.output))
+    assert false <= 0.01 * count
+
+
+def test_an_axis_that_never_changes_is_one_stretch_beside_others_that_do(rng: np.random.Generator) -> None:
+    output = recordings.counts(rng).output
+    output[:, 1] = 7.0
+    assert [(f.axis, f.start, f.stop) for f in frozen(output)] == [(1, 0, len(output))]
+    assert frozen(np.ones((500, 3))) == []
+
+
+def test_digits_coarser_than_the_noise_are_no_axis_that_stands_still(rng: np.random.Generator) -> None:
+    output = np.tile([100.2, -40.4, 7.4], (4000, 1)) + 0.12 * rng.normal(size=(4000, 3))
+    assert frozen(np.round(output)) == []
+
+
+@pytest.mark.parametrize("step", [1.0, 0.25, 3.9e-3, 1 / 16384])
+def test_the_resolution_is_the_step_of_the_converter_also_in_printed_decimals(rng, step: float) -> None:
+    values = step * np.round(rng.normal(0.0, 20.0, 4000))
+    assert resolution(values) == pytest.approx(step, rel=1e-6)
+    printed = np.array([float(f"{value:.7g}") for value in values])
+    assert resolution(printed) == pytest.approx(step, rel=1e-3)
+    assert resolution(rng.normal(size=4000)) is None
+
+
+def test_samples_at_the_end_of_a_range_are_counted_and_a_largest_sample_of_noise_is_not(rng) -> None:
+    wave = np.round(2000.0 * np.sin(np.linspace(0.0, 60.0, 6000)) + rng.normal(0.0, 3.0, 6000))
+    assert clipped(wave)[2] == 0
+    cut = np.clip(wave, -1500.0, 1500.0)
+    low, high, count = clipped(cut)
+    assert (low, high) == (-1500.0, 1500.0)
+    assert count == pytest.approx(np.count_nonzero(np.abs(wave) >= 1500.0), rel=0.1)
