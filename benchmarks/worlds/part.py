@@ -100,7 +100,8 @@ class Continued:
         """Dwells and temperatures of the run, and of further steps where there are any; ``quiet`` without the noise."""
         scene = self._scene([*self.steps, *(further or [])])
         noise = self._noise(scene)
-        output = self.lot.output(scene) + self.effect(scene) + (0.0 if quiet else noise)
+        scene = replace(scene, output=self.lot.output(scene))
+        output = scene.output + self.effect(scene) + (0.0 if quiet else noise)
         rng = np.random.default_rng([len(scene.start), int(1e6 * self.tau[0])])
         world = World(units=self.blind.units, noise=self.blind.noise)
         readings = scene.temperature + 0.003 * rng.standard_normal(scene.temperature.shape)
