@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import stats
 
+from inertial.criticism.bad_norms import bad_norms
 from inertial.criticism.decisions import BAD_DWELL, COMMON, HEAVY, MOST_BAD
 from inertial.criticism.model import Model
 from inertial.criticism.problem import Lot, Problem
@@ -23,6 +24,9 @@ _ALIKE = 0.6
 
 _TELLS = 100
 """Values from which on tails are told from a normal distribution's."""
+
+_AT_LEAST = 2
+"""Dwells that may be taken out of however short a record."""
 
 _LEAST_DOF = 6
 """Degrees of freedom of a unit below which none of its dwells is told from the others."""
@@ -48,10 +52,16 @@ def without(lot: Lot, found: list[BadDwell]) -> Lot:
 
 def bad_dwells(model: Model) -> list[BadDwell]:
     """The dwells that do not belong to a model and its noise, the noise estimated again without them."""
+    if model.problem.lot.radial:
+        return [
+            BadDwell(one.unit, dwell, np.array([off]), deviations)
+            for one in bad_norms(model)
+            for dwell, off, deviations in zip(one.dwells, one.off, one.deviations, strict=True)
+        ]
     found: list[BadDwell] = []
     lot = model.problem.lot
     for _ in range(_ROUNDS):
-        more = _round(model, int(MOST_BAD * lot.state.time.size) + 1 - len(found))
+        more = _round(model, max(int(MOST_BAD * lot.state.time.size) + 1, _AT_LEAST) - len(found))
         if not more:
             break
         found += more
