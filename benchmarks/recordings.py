@@ -99,7 +99,9 @@ def make(what: Recording, seed: int) -> Made:
     white = NOISES[what.noise].white * np.array(NOISES[what.noise].axis_factors)
     sd = 4080.0 * 1e-6 * white * np.sqrt(RATE_HZ / 2.0)
     sd = sd * np.sqrt(rng.chisquare(samples - 1.0, (3, n)).T / (samples - 1.0)[:, None])
-    frame = pd.DataFrame({"unit": what.unit, "dwell": np.arange(n), "time_s": middle, "duration_s": length, "n": samples})
+    frame = pd.DataFrame(
+        {"unit": what.unit, "dwell": np.arange(n), "time_s": middle, "duration_s": length, "n": samples}
+    )
     for k, axis in enumerate("xyz"):
         frame[f"out_{axis}"], frame[f"sd_{axis}"] = output[:, k], sd[:, k]
     return Made(frame.assign(out_unit="LSB"), spoilt, bias, response)
@@ -137,9 +139,7 @@ def samples_of(what: Recording, seed: int) -> pd.DataFrame:
 def nulls(runs: int) -> list[Recording]:
     """Recordings with nothing hidden: every number of positions with every noise in turn."""
     names = list(NOISES)
-    return [
-        Recording(POSITIONS[k % len(POSITIONS)], names[k % len(names)], long_first=k % 3 != 2) for k in range(runs)
-    ]
+    return [Recording(POSITIONS[k % len(POSITIONS)], names[k % len(names)], long_first=k % 3 != 2) for k in range(runs)]
 
 
 def bad(runs: int) -> list[Recording]:
@@ -171,7 +171,15 @@ def judged(what: Recording, seed: int) -> dict[str, object]:
     try:
         document = diagnose(made.dwells)
     except DataRejected:
-        return {"adequate": None, "physics": [], "unexplained": False, "named": set(), "spoilt": set(made.spoilt), "seconds": 0.0, "p": None}
+        return {
+            "adequate": None,
+            "physics": [],
+            "unexplained": False,
+            "named": set(),
+            "spoilt": set(made.spoilt),
+            "seconds": 0.0,
+            "p": None,
+        }
     said = [(g["effects"], set(g.get("dwells") or ())) for g in document["classes"]]
     physics = [effects for effects, _ in said if effects != ["bad_dwell"]]
     named = set().union(*(dwells for effects, dwells in said if effects == ["bad_dwell"]), set())
@@ -210,7 +218,9 @@ def main() -> None:
 def _print(name: str, rows: list[tuple[Recording, dict[str, object]]]) -> None:
     verdicts = Counter(str(row["adequate"]) for _, row in rows)
     able = len(rows) - verdicts["None"]
-    print(f"  not judged {interval(verdicts['None'], len(rows))}; of the others not adequate {interval(verdicts['False'], able)}")
+    print(
+        f"  not judged {interval(verdicts['None'], len(rows))}; of the others not adequate {interval(verdicts['False'], able)}"
+    )
     if name == "nulls":
         print(f"  an effect named {interval(sum(bool(r['physics'] or r['unexplained']) for _, r in rows), len(rows))}")
         print(f"  a dwell called bad {interval(sum(bool(r['named']) for _, r in rows), len(rows))}")

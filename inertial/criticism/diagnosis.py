@@ -10,8 +10,11 @@ from inertial import effects as catalogue
 from inertial.criticism.adequacy import adequacy
 from inertial.criticism.bad_dwells import BadDwell, heavy_tails
 from inertial.criticism.classes import EffectClass, class_of
+from inertial.criticism.comparison import estimate, residuals_of
+from inertial.criticism.comparison import rms as rms_of
 from inertial.criticism.decisions import ADEQUATE_ABOVE, NAMED_BELOW
 from inertial.criticism.drivers import Driver, Misfit, drivers_of, places
+from inertial.criticism.evidence import GROSS, Evidence, evidence, not_judged
 from inertial.criticism.examination import Named, Part, Run, Search, examined, worst
 from inertial.criticism.field import Candidates
 from inertial.criticism.handling.base import Handling
@@ -26,6 +29,7 @@ from inertial.criticism.search import Rival, SearchResult
 from inertial.criticism.unknown import better_curve
 from inertial.effects.base import AnyEffect
 from inertial.effects.covariate import Covariate
+from inertial.probability import passes
 
 UNEXPLAINED = 0.5
 """Share of the floor below which a smooth dependence is left alone."""
@@ -45,7 +49,9 @@ class Diagnosis:
     """What a lot says of a model; errors in g.
 
     problem, base, final : the series without what handling spoilt, the model judged, the model with everything that was found
-    rms : of the base model's residuals; floor : of the noise that is there
+    rms : of the base model's residuals; floor : of the noise that is there, white and wander
+    adequate : None where the data cannot tell, for the reason in ``unjudged``
+    without_removed : the verdict on the dwells that were not removed; None where nothing was, or it cannot be told
     handled : what handling did; removed : single dwells that were left out; heavy : whether these are tails of the noise
     influence : dwells that carry the verdict; log_p_without : of its first class when these are left out
     """
@@ -56,7 +62,7 @@ class Diagnosis:
     rms: float
     floor: float
     log_p: float
-    adequate: bool
+    adequate: bool | None
     where: tuple[Misfit, ...]
     named: tuple[Named, ...]
     unexplained: Unexplained | None
@@ -67,6 +73,9 @@ class Diagnosis:
     heavy: bool = False
     influence: tuple[Influence, ...] = ()
     log_p_without: float | None = None
+    evidence: Evidence | None = None
+    unjudged: str = ""
+    without_removed: bool | None = None
 
 
 def diagnose(lot: Lot, effects: Sequence[str], rng: Generator) -> Diagnosis:
@@ -90,8 +99,16 @@ def _told(run: Run, search_: Search, rng: Generator) -> Diagnosis:
     log_p = adequacy(fields, drivers, base, rng)
     heavy = bool(run.removed) and heavy_tails(base)
     named_data = bool(run.handled) or (bool(run.removed) and not heavy)
-    sound = log_p >= np.log(ADEQUATE_ABOVE) and not found.added
-    final, unexplained = (found.model, None) if sound else _beyond(search_.part, base, found, drivers)
+    rms = _rms(base)
+    unjudged = not_judged(base, rms)
+    passed = passes(np.exp(log_p), ADEQUATE_ABOVE) if rms <= GROSS else False
+    if passed is None and not unjudged:
+        unjudged = "the probability of the residuals is no number; add poses in between"
+    if unjudged:
+        # too little to judge the model by is too little to name what it lacks
+        found = SearchResult(base, (), found.ladder)
+    sound = passed is True and not found.added
+    final, unexplained = (found.model, None) if sound or unjudged else _beyond(search_.part, base, found, drivers)
     classes = _classes(fields, base, final)
     named = _named(problem, base, classes)
     if unexplained is None:
@@ -103,11 +120,11 @@ def _told(run: Run, search_: Search, rng: Generator) -> Diagnosis:
         problem=problem,
         base=base,
         final=final,
-        rms=fit_rms(problem, base.terms),
+        rms=rms,
         floor=final.floor(),
         log_p=log_p,
-        adequate=sound and not named_data,
-        where=() if sound else charged,
+        adequate=_verdict(sound=sound, named_data=named_data, unjudged=unjudged),
+        where=() if sound or unjudged else charged,
         named=named,
         unexplained=unexplained,
         unseen=_unseen(fields, base, [e for e in catalogue.catalogue().values() if e.id not in set(run.effects)]),
@@ -117,7 +134,24 @@ def _told(run: Run, search_: Search, rng: Generator) -> Diagnosis:
         heavy=heavy,
         influence=carried,
         log_p_without=log_without,
+        evidence=evidence(base, fields),
+        unjudged=unjudged,
+        without_removed=(None if unjudged else sound) if run.removed else None,
     )
+
+
+def _verdict(*, sound: bool, named_data: bool, unjudged: str) -> bool | None:
+    """Whether a model is adequate; None where the data cannot tell."""
+    if named_data:
+        return False
+    return None if unjudged else sound
+
+
+def _rms(base: Model) -> float:
+    """Residual of the model that is judged, g: by the fit that is made known where poses are unknown."""
+    if base.problem.lot.radial:
+        return rms_of(residuals_of(base.problem, estimate(base)))
+    return fit_rms(base.problem, base.terms)
 
 
 def _influence(base: Model, named: Sequence[Named]) -> tuple[tuple[Influence, ...], float | None]:
@@ -164,7 +198,8 @@ def _named(problem: Problem, base: Model, classes: Sequence[EffectClass]) -> tup
         model = model.with_term(first)
         after = left_out(model)
         errors = worst(before, after) if before is not None else (float("nan"), float("nan"))
-        found.append(Named(group, fit_rms(problem, model.terms), *errors))
+        left = rms_of(residuals_of(problem, estimate(model))) if problem.lot.radial else fit_rms(problem, model.terms)
+        found.append(Named(group, left, *errors))
         before = after
     return tuple(found)
 

@@ -12,6 +12,9 @@ if TYPE_CHECKING:
     from rich.console import Console
 
 
+STYLE_OF = {True: "bold green", False: "bold red", None: "bold yellow"}
+"""Of a verdict; None: it cannot be given."""
+
 SMALL = 1.1
 """Errors below so many times the floor look like noise to whoever compares the two numbers."""
 
@@ -25,7 +28,8 @@ def print_diagnosis(document: dict[str, Any], *, source: str, model: Path | None
     model : the model file as it was given there
     """
     out = console()
-    out.print(verdict(document), style="bold green" if document["adequate"] else "bold red", soft_wrap=True)
+    out.print(verdict(document), style=STYLE_OF[document["adequate"]], soft_wrap=True)
+    _evidence(document)
     print_findings(document)
     _unexplained(out, document, model)
     _next_command(out, document, source, model)
@@ -46,6 +50,18 @@ def print_findings(document: dict[str, Any]) -> None:
 def _dwells(document: dict[str, Any]) -> None:
     """Dwells that were left out as tails of the noise, and those that carry the verdict."""
     removed, out = document.get("removed"), console()
+    single = document.get("leave_out")
+    if single:
+        names = ",".join(f"{d['unit']}:{d['dwell']}" for d in single["dwells"])
+        verdict_without = {True: "adequate", False: "NOT adequate", None: "cannot be judged"}[
+            single["adequate_without"]
+        ]
+        out.print(
+            f"without {'these dwells' if len(single['dwells']) > 1 else 'this dwell'} the model is: {verdict_without}; "
+            f"to leave out: --leave-out {names}",
+            markup=False,
+            soft_wrap=True,
+        )
     if removed and removed["heavy_tails"]:
         count = len(removed["dwells"])
         out.print(
@@ -83,6 +99,8 @@ def verdict(document: dict[str, Any]) -> str:
     left = f"{short(error['rms_ug'])} µg rms are left in {sound} unit{'s' if sound != 1 else ''}, {floor}"
     if document["adequate"]:
         return f"ADEQUATE: {left}."
+    if document["adequate"] is None:
+        return f"CANNOT BE JUDGED: {document.get('reason')}."
     if error["rms_ug"] < SMALL * error["floor_ug"]:
         left += "; what is wrong is small beside it, but no noise"
     spoilt = [told_of(group) for group in document["classes"] if group["scope"] == "data"]
@@ -152,10 +170,9 @@ def _classes(document: dict[str, Any]) -> None:
     lines = []
     for group in document["classes"]:
         names = "\n".join(f"{name} ({symbol_of(name)})" for name in group["effects"])
-        chosen = recommended_of(document, group)
-        nonlinear = [] if group["scope"] == "data" else effects.get(chosen).nonlinear
-        values = ", ".join(f"{p.name} = {short_values(group['nonlinear'].get(p.name))} {p.unit}" for p in nonlinear)
-        size = short(group["size_ug"]) + ("" if group["plausible"] else " (!)")
+        values = _parameters_of(group, effects)
+        size = short(group["size_ug"]) if group["size_ug"] > 0.0 else "within noise"
+        size += "" if group["plausible"] else " (!)"
         errors = short(group["rms_after_ug"]), short(group["heldout_after_ug"])
         text = group.get("evidence") or values
         lines.append([names, group["scope"], size, chance(group["p_value"]), *errors, text])
@@ -170,6 +187,41 @@ def _classes(document: dict[str, Any]) -> None:
         "left: error after it is added · left out: on dwells not fitted, the worst of poses, soaks, stretches of time"
     )
     console().print(legend, style="dim", markup=False)
+
+
+def _parameters_of(group: dict[str, Any], effects: Any) -> str:
+    """Nonlinear parameters with the effect of the class that they are of; several effects may be in one row."""
+    name = group.get("nonlinear_of") or group["effects"][0]
+    if group["scope"] == "data" or not group["nonlinear"]:
+        return ""
+    known = [p for p in effects.get(name).nonlinear if group["nonlinear"].get(p.name) is not None]
+    values = ", ".join(f"{p.name} = {short_values(group['nonlinear'][p.name])} {p.unit}".rstrip() for p in known)
+    return f"{name}: {values}" if values and len(group["effects"]) > 1 else values
+
+
+def _evidence(document: dict[str, Any]) -> None:
+    """What the verdict rests on, in a line; the smallest effect that would have been seen where the dwells are few."""
+    from inertial.criticism.evidence import FEW_DOF
+
+    found, out = document.get("evidence"), console()
+    if not found:
+        return
+    parts = [f"{found['degrees_of_freedom']} degrees of freedom"]
+    if found["condition"] is not None:
+        parts.append(f"condition {short(found['condition'])}")
+    if found["bias_jackknife_ug"] is not None and found["bias_change_by"] is not None:
+        by = found["bias_change_by"]
+        parts.append(
+            f"bias ± {short(found['bias_jackknife_ug'])} µg by leaving out single dwells (most by dwell {by['dwell']} "
+            f"of {by['unit']}: {short(found['bias_change_ug'])} µg)"
+        )
+    out.print("; ".join(parts), style="dim", markup=False, soft_wrap=True)
+    if document["adequate"] and found["degrees_of_freedom"] < FEW_DOF:
+        smallest = found["smallest_cubic_ug"]
+        seen = f"below {short(smallest)} µg/g³" if smallest is not None else "of any size"
+        out.print(
+            f"few dwells: a cubic term {seen} would not have been seen (probability 0.5)", style="dim", markup=False
+        )
 
 
 def recommended_of(document: dict[str, Any], group: dict[str, Any]) -> str:

@@ -18,10 +18,13 @@ from pipelines.diagnosis.next_measurement import proposed
 from pipelines.diagnosis.result_rows import (
     Names,
     classes_of,
+    evidence_of,
     influence_of,
+    leave_out_of,
     noise_of,
     probability,
     removed_of,
+    white_noise_of,
     without_influence,
 )
 from pipelines.tables.dwells import Measured, lot_of, measured
@@ -121,11 +124,14 @@ def document(
     terms = [*diagnosis.base.terms, *(m.term for n in diagnosis.named for m in n.effects.physics)]
     warnings = without_history(found, terms)
     return {
-        "adequate": bool(diagnosis.adequate),
+        "adequate": diagnosis.adequate,
+        "reason": diagnosis.unjudged or None,
         "blocked_by": blocked,
+        "evidence": evidence_of(diagnosis, names),
         "error": {
             "rms_ug": MICRO * diagnosis.rms,
             "floor_ug": MICRO * diagnosis.floor,
+            "white_noise_ug": white_noise_of(diagnosis.base),
             "p_value": probability(diagnosis.log_p),
             **noise_of(diagnosis.final),
         },
@@ -138,6 +144,7 @@ def document(
         "without_influence": without_influence(diagnosis),
         "removed": removed_of(diagnosis, names),
         "recommended": [n.effects.simplest.effect.id for n in diagnosis.named if not n.effects.of_data and n.predicts],
+        "leave_out": leave_out_of(diagnosis, names),
         "warnings": warnings,
         "unexplained": None
         if diagnosis.unexplained is None

@@ -30,7 +30,10 @@ WARM = 5.0
 _FAR = 8.0
 """Robust standard deviations beyond which a dwell takes no part in finding the point of expansion."""
 
-_SPARE, _ROUNDS = 6, 4  # degrees of freedom from which on dwells are told from each other, and turns of leaving some out
+_SPARE, _ROUNDS = (
+    6,
+    4,
+)  # degrees of freedom from which on dwells are told from each other, and turns of leaving some out
 _WHITE_RANGE = 20.0
 """Factor about the median beyond which a white standard error is taken for a slip: weights must not follow it."""
 
@@ -67,7 +70,8 @@ def lot_of_norms(found: Measured, like: Measured, *, square: bool) -> Lot:
         errors.append(np.where(there[:, None], _white(readings, unit, fit, size[:, 0]), np.inf))
     state = replace(found.state, force=np.stack(forces), memory={})
     eye = np.broadcast_to(np.eye(3), (len(found.units), 3, 3))
-    return Lot(state, np.stack(outputs), np.stack(errors), eye, radial=True)
+    recorded = found.readings.spread is not None and found.readings.count is not None
+    return Lot(state, np.stack(outputs), np.stack(errors), eye, radial=True, recorded=recorded)
 
 
 def expansion(readings: Readings, unit: int, *, shape: Shape = "nine") -> EllipsoidFit:
@@ -99,9 +103,7 @@ def expansion(readings: Readings, unit: int, *, shape: Shape = "nine") -> Ellips
     return fit
 
 
-def _far(
-    readings: Readings, unit: int, fit: EllipsoidFit, kept: NDArray[np.bool_], *, warm: bool
-) -> NDArray[np.bool_]:
+def _far(readings: Readings, unit: int, fit: EllipsoidFit, kept: NDArray[np.bool_], *, warm: bool) -> NDArray[np.bool_]:
     """The dwell that is farthest off among those kept, if it is far beyond the scatter of the others."""
     heat = _heat(readings, unit, readings.there[unit]) if warm else None
     left = np.zeros(kept.size)
