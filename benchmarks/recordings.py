@@ -53,6 +53,7 @@ class Recording:
 
     positions : dwells; noise : name in NOISES; long_first : whether a long rest begins it; cubic, warm_up : sizes of a hidden
     cubic term (µg/g³ on z) and of a drift after switching on (µg, x); bad : how many dwells are off by bad_ug
+    sensor : seed of the sensor itself, so that another seed is another recording of it; its own for every recording where None
     """
 
     positions: int = 40
@@ -64,6 +65,7 @@ class Recording:
     bad: int = 0
     bad_ug: float = 0.0
     unit: str = "HAND-1"
+    sensor: int | None = None
 
 
 @dataclass(frozen=True)
@@ -85,8 +87,9 @@ def make(what: Recording, seed: int) -> Made:
         length[0] = FIRST_REST_S
     start = np.concatenate([[0.0], np.cumsum(length + rng.uniform(1.0, 5.0, n))[:-1]])
     force = _placed(n, rng)
-    bias = 32768.0 + rng.uniform(-300.0, 300.0, 3)
-    response = 4080.0 * (np.diag(1.0 + rng.uniform(-0.01, 0.01, 3)) + 0.004 * rng.standard_normal((3, 3)))
+    own = rng if what.sensor is None else np.random.default_rng(what.sensor)
+    bias = 32768.0 + own.uniform(-300.0, 300.0, 3)
+    response = 4080.0 * (np.diag(1.0 + own.uniform(-0.01, 0.01, 3)) + 0.004 * own.standard_normal((3, 3)))
     error = dwell_noise(NOISES[what.noise], start, length, 1, rng)[0]
     middle = start + 0.5 * length
     error[:, 2] += what.cubic * force[:, 2] ** 3

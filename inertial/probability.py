@@ -1,4 +1,4 @@
-"""The one question whether a probability passes a limit. What is no number passes nothing and fails nothing: it decides nothing."""
+"""The one question whether a probability passes a limit. What is no number neither passes nor fails: it decides nothing."""
 
 import numpy as np
 from numpy.typing import ArrayLike

@@ -26,6 +26,10 @@ if TYPE_CHECKING:
 EVIDENCE = ("dwells", "coefficients", "covariance", "grades")
 
 
+IMPORTED = "imported"
+"""The station of a calibration whose measurements came from elsewhere."""
+
+
 @dataclass
 class Certified:
     """What became of a run's units.
@@ -106,7 +110,7 @@ def _proposals(
     about, result = run.about, Certified()
     evidence = tuple(sorted((name, files.sha256(run.path / f"{name}.json")) for name in EVIDENCE))
     shared: dict[str, Any] = {
-        "device": about["lot"]["device"], "run": run.id, "start": first, "until": last, "station": about["station"]["name"],
+        "device": about["lot"]["device"], "run": run.id, "start": first, "until": last, "station": (about.get("station") or {}).get("name", IMPORTED),
         "recipe": about["recipe"]["name"], "coefficients": run.manifest("coefficients")["sha256"], "reason": reason,
         "evidence": evidence,
     }  # fmt: skip
@@ -129,9 +133,15 @@ def _proposals(
 
 def _grades(run: Run) -> Any:
     if "grades" not in run.tables():
-        raise WrongUse(f"certify: run {run.id} has no grades, they are needed; it was imported, or it is not finished")
+        raise WrongUse(f"certify: run {run.id} has no grades, they are needed; {_how_to_grade(run)}")
     run.table("coefficients")  # refuses one that was changed since it was graded
     return run.table("grades")
+
+
+def _how_to_grade(run: Run) -> str:
+    if run.about.get("capture"):
+        return "it is not finished: give its 'tumbleline run' again and it goes on"
+    return f"it was imported: fit it against limits with 'tumbleline fit {run.id} --limits FILE' and certify the run that this makes"
 
 
 def _blank(serial: str, **content: Any) -> LedgerEntry:

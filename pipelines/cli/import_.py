@@ -120,12 +120,17 @@ def _refuse_unknown_fit(fit: str) -> None:
 
 def _import_one(path: Path, how: Mapping, fit: str, archive: str | None) -> dict[str, Any]:
     """Read, judge and keep one file; the document for JSON."""
-    from pipelines.importers import files, judge, keep, record
+    from pipelines.importers import files, keep, record
 
     with error_console().status(f"reading {path.name}"):
         table, source = files.read(path)
         data = record.imported(table, how, path.name)
-    judged = judge.judge(fit, data, how) if fit else None
+    judged = None
+    if fit:
+        from pipelines.diagnosis.imported import judge
+
+        with error_console().status("fitting and judging"):
+            judged = judge(fit, data, how)
     run = keep.keep(data, source, how, judged, archive)
     return {
         "run": run.id,
@@ -152,3 +157,5 @@ def _print(one: dict[str, Any]) -> None:
     if one["fit"]:
         verdict, style = VERDICTS[one["adequate"]]
         out.print(f"  {verdict}", style=style)
+        if one["fit"] == "norm" and one["adequate"] is False:
+            out.print(f"  to look further: tumbleline diagnose {one['run']}", markup=False, soft_wrap=True)

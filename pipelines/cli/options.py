@@ -63,6 +63,9 @@ OtherEffectsOption = Annotated[
     str, typer.Option("--effects", metavar="a,b,c", help="Another model, as a list of effects.")
 ]
 OtherLimitsOption = Annotated[str, typer.Option("--limits", metavar="FILE", help="Other limits: a file or a name.")]
+LeaveOutOption = Annotated[
+    str, typer.Option("--leave-out", metavar="UNIT:DWELL,…", help="Dwells that are not judged or fitted.")
+]
 EffectFileOption = Annotated[
     list[Path] | None,
     typer.Option("--effect-file", metavar="FILE.py", help="A Python file with effects of your own; may be repeated."),

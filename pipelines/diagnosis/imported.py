@@ -1,11 +1,11 @@
-"""Fits that need no station: gravity's norm, six faces, a temperature ramp; each with a verdict on its own adequacy."""
+"""The fits that an import may ask for, by name: labelled faces, a temperature ramp, or gravity's norm."""
 
 from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from pipelines.diagnosis.imported_norms import norm
 from pipelines.importers.faces import six_faces
-from pipelines.importers.norm import norm
 from pipelines.importers.ramp import ramp
 
 if TYPE_CHECKING:
@@ -19,5 +19,5 @@ METHODS: dict[str, Callable[[Imported, Mapping], FitAnswer]] = {"norm": norm, "f
 
 
 def judge(method: str, data: Imported, mapping: Mapping) -> FitAnswer:
-    """The fit called `method`, one of `METHODS`, of one unit's import."""
+    """The fit called ``method``, one of :data:`METHODS`, of one unit's import, with a verdict on its own adequacy."""
     return METHODS[method](data, mapping)
