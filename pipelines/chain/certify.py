@@ -109,8 +109,9 @@ def _proposals(
     refuse_overdue(run)
     about, result = run.about, Certified()
     evidence = tuple(sorted((name, files.sha256(run.path / f"{name}.json")) for name in EVIDENCE))
+    station = (about.get("station") or {}).get("name", IMPORTED)
     shared: dict[str, Any] = {
-        "device": about["lot"]["device"], "run": run.id, "start": first, "until": last, "station": (about.get("station") or {}).get("name", IMPORTED),
+        "device": about["lot"]["device"], "run": run.id, "start": first, "until": last, "station": station,
         "recipe": about["recipe"]["name"], "coefficients": run.manifest("coefficients")["sha256"], "reason": reason,
         "evidence": evidence,
     }  # fmt: skip
@@ -141,7 +142,8 @@ def _grades(run: Run) -> Any:
 def _how_to_grade(run: Run) -> str:
     if run.about.get("capture"):
         return "it is not finished: give its 'tumbleline run' again and it goes on"
-    return f"it was imported: fit it against limits with 'tumbleline fit {run.id} --limits FILE' and certify the run that this makes"
+    again = f"'tumbleline fit {run.id} --limits FILE'"
+    return f"it was imported: fit it against limits with {again} and certify the run that this makes"
 
 
 def _blank(serial: str, **content: Any) -> LedgerEntry:

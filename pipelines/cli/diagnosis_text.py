@@ -110,10 +110,11 @@ def verdict(document: dict[str, Any]) -> str:
         return f"NOT ADEQUATE: {left}; the data: {'; '.join(spoilt)}{rest}."
     if named:
         return f"NOT ADEQUATE: {left}; missing: {', and '.join(named)}."
-    if document["unexplained"]:
-        driver = document["unexplained"]["driver"]
-        return f"NOT ADEQUATE: {left}; the rest follows {driver}, and no effect of the catalogue explains it."
-    return f"NOT ADEQUATE: {left}; nothing that was recorded explains the rest."
+    driver = (document["unexplained"] or {}).get("driver")
+    rest = "nothing that was recorded explains the rest"
+    if driver:
+        rest = f"the rest follows {driver}, and no effect of the catalogue explains it"
+    return f"NOT ADEQUATE: {left}; {rest}."
 
 
 def told_of(group: dict[str, Any]) -> str:

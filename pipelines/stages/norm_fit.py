@@ -14,10 +14,10 @@ from inertial.criticism.noise import LONGEST
 from inertial.criticism.problem import Problem
 from inertial.criticism.refinement import terms_of
 from inertial.errors import InertialError
-from inertial.fits.norms import NormFit, fit_norms
 from inertial.fits.wander import student
 from inertial.noise.flicker import SLOWEST_DIAGNOSED
 from inertial.noise.measurands import DAY_S, instability, of_a_day
+from inertial.norm_fit import NormFit, fit_norms
 from pipelines.stages.bias_measurands import COLUMNS
 from pipelines.tables.calibration import coefficient_rows, covariance_rows
 from pipelines.tables.dwells import Measured, lot_of, measured
@@ -41,7 +41,7 @@ NORM = "norm"
 class FittedNorms:
     """A fit of norms with what it was made from.
 
-    whitener : as :func:`inertial.fits.norms.fit_norms` has it; scale : (units, 3), output unit per g
+    whitener : as :func:`inertial.norm_fit.fit_norms` has it; scale : (units, 3), output unit per g
     white, flicker, walk : (units,), standard deviations of one dwell's noise, g; walk at the end of the record
     """
 
@@ -174,7 +174,7 @@ def _wander_rows(done: FittedNorms) -> pd.DataFrame:
 
 
 def bias_uncertainty(done: FittedNorms) -> dict[str, Array]:
-    """Standard uncertainties of the bias by measurand, (units, 3) each, µg, as :mod:`pipelines.stages.bias_measurands` names them.
+    """Standard uncertainties of the bias by measurand, (units, 3) each, µg; names of :mod:`pipelines.stages.bias_measurands`.
 
     The flicker of a diagnosis has time constants to four times the record. Scatter that the samples of the dwells do not show
     counts as flicker: few dwells do not tell the kind of it.

@@ -169,7 +169,7 @@ def lot_of(found: Measured, like: Measured | None = None, *, square: bool = Fals
     """
     readings = found.readings
     if found.reference == "norm":
-        return lot_of_norms(found, like or found, square=square)
+        return lot_of_norms(readings, found.state, (like or found).readings, square=square)
     coefficients = (like or found).readings.fits
     scale = np.abs(np.diagonal(coefficients[:, :, 1:], axis1=1, axis2=2))
     scale = np.where(scale > 0.0, scale, 1.0)

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
     from inertial.criticism.readings import Readings
     from inertial.fits.ellipsoid import Shape
-    from pipelines.tables.dwells import Measured
+    from inertial.state import State
 
     Array = NDArray[np.float64]
 
@@ -38,7 +38,7 @@ _WHITE_RANGE = 20.0
 """Factor about the median beyond which a white standard error is taken for a slip: weights must not follow it."""
 
 
-def lot_of_norms(found: Measured, like: Measured, *, square: bool) -> Lot:
+def lot_of_norms(readings: Readings, state: State, like: Readings, *, square: bool) -> Lot:
     """The radial lot of dwells whose poses are unknown: y = |C·(a − b)| − 1 in g, with white standard errors by axis.
 
     Parameters
@@ -52,10 +52,9 @@ def lot_of_norms(found: Measured, like: Measured, *, square: bool) -> Lot:
         Fewer dwells of a unit than unknowns, or orientations that leave one of them undetermined.
     """
     forces, outputs, errors = [], [], []
-    for unit in range(len(found.units)):
-        origin = like if like is not found else found
-        fit = expansion(origin.readings, unit, shape="six" if square else "nine")
-        readings, there = found.readings, found.readings.there[unit]
+    for unit in range(len(readings.output)):
+        fit = expansion(like, unit, shape="six" if square else "nine")
+        there = readings.there[unit]
         corrected = np.zeros((there.size, 3))
         heat = _heat(readings, unit, there) if np.any(fit.temperature_offset) else None
         corrected[there] = fit.apply(readings.output[unit, there], heat)
@@ -68,10 +67,10 @@ def lot_of_norms(found: Measured, like: Measured, *, square: bool) -> Lot:
         forces.append(direction)
         outputs.append(corrected)
         errors.append(np.where(there[:, None], _white(readings, unit, fit, size[:, 0]), np.inf))
-    state = replace(found.state, force=np.stack(forces), memory={})
-    eye = np.broadcast_to(np.eye(3), (len(found.units), 3, 3))
-    recorded = found.readings.spread is not None and found.readings.count is not None
-    return Lot(state, np.stack(outputs), np.stack(errors), eye, radial=True, recorded=recorded)
+    eye = np.broadcast_to(np.eye(3), (len(forces), 3, 3))
+    recorded = readings.spread is not None and readings.count is not None
+    known = replace(state, force=np.stack(forces), memory={})
+    return Lot(known, np.stack(outputs), np.stack(errors), eye, radial=True, recorded=recorded)
 
 
 def expansion(readings: Readings, unit: int, *, shape: Shape = "nine") -> EllipsoidFit:

@@ -1,7 +1,7 @@
 """A model of any of the sensor's effects fitted to dwells of unknown orientation, by the norm of gravity alone.
 
-The force of each dwell is the one that explains its output, f = M⁻¹(a), and the residual |f| − g. A rotation of the sensor in front
-of everything changes no norm, so x stays along the sensor's own x axis: the matrix K is upper triangular. Gauss–Newton with
+The force of each dwell is the one that explains its output, f = M⁻¹(a), and the residual |f| − g. A rotation in front
+changes no norm, so x stays along the sensor's own x axis: the matrix K is upper triangular. Gauss–Newton with
 dρ/dc = −(uᵀK⁻¹)ᵢ·column for a coefficient c of axis i and the direction u of the force.
 """
 
