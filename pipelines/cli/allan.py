@@ -218,7 +218,9 @@ def _print(document: dict[str, Any]) -> None:
     lines = []
     for row in document["terms"]:
         value = short(row["value"], 4) if row["identified"] else "not identified"
-        interval = f"{short(row['low'], 4)} … {short(row['high'], 4)}" if row["identified"] else f"≤ {short(row['high'])}"
+        interval = (
+            f"{short(row['low'], 4)} … {short(row['high'], 4)}" if row["identified"] else f"≤ {short(row['high'])}"
+        )
         lines.append([row["channel"], row["term"], row["name"], value, interval, row["unit"]])
     level = round(100.0 * document["term_confidence"])
     print_table(

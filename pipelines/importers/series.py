@@ -57,7 +57,7 @@ def series_of_file(
 
     Parameters
     ----------
-    columns : names, or numbers from 1 for a text file without a header; every column of numbers but the time's where none is given
+    columns : names, or numbers from 1 for a text file without a header; all columns of numbers but the time where none is given
     time : column of the time, in ``time_unit``; rate_hz : Hz; one of the two is needed
     unit : of the output, as it is to be printed
 

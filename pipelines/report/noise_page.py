@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import matplotlib as mpl
 import numpy as np
 from matplotlib.figure import Figure
+from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
 from pipelines.report.numbers import plain
 from pipelines.report.plots import COLOURS, STYLE
@@ -17,6 +18,7 @@ from schemas.errors import WrongUse
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
+PER_DECADE = 40
 ENDINGS = (".png", ".svg", ".pdf")
 OTHERS = ("#cc79a7", "#e69f00", "#56b4e9", "#7a7a7a")
 PAGE = """\
@@ -81,6 +83,13 @@ def draw(document: dict[str, Any], ending: str) -> bytes:
         place = figure.subplots()
         _spectra(place, document) if "spectra" in document else _curves(place, document)
         place.set(xscale="log", yscale="log")
+        for axis in (place.xaxis, place.yaxis):
+            axis.set_major_locator(LogLocator(base=10.0, subs=(1.0,)))
+            axis.set_minor_locator(LogLocator(base=10.0, subs=(2.0, 5.0)))
+            axis.set_major_formatter(FuncFormatter(_power))
+            axis.set_minor_formatter(
+                FuncFormatter(_within) if _decades(axis.get_view_interval()) < 2.0 else NullFormatter()
+            )
         place.grid(visible=True, which="major", color="#dcdcdc")
         place.set_title(document["source"], loc="left")
         if len(place.lines) + len(place.containers) <= 16:
@@ -104,6 +113,23 @@ def noise_page(document: dict[str, Any]) -> str:
         picture=svg[svg.index("<svg") :],
         number=plain,
     )
+
+
+def _decades(interval: tuple[float, float]) -> float:
+    """How many powers of ten an interval spans."""
+    low, high = sorted(float(end) for end in interval)
+    return float(np.log10(high / low)) if low > 0.0 else 9.0
+
+
+def _power(value: float, _: object) -> str:
+    """A power of ten for an axis."""
+    exponent = round(float(np.log10(value))) if value > 0.0 else 0
+    return f"{value:g}" if -3 <= exponent <= 4 else f"1e{exponent}".replace("-", "−")
+
+
+def _within(value: float, _: object) -> str:
+    """A tick between powers of ten."""
+    return f"{value:.0e}".replace("-0", "-").replace("-", "−") if value < 1e-3 else f"{value:g}"
 
 
 def _colour(name: str, place: int) -> str:
@@ -134,8 +160,13 @@ def _curves(place: Axes, document: dict[str, Any]) -> None:
 
 def _spectra(place: Axes, document: dict[str, Any]) -> None:
     """Noise density of every channel against frequency."""
-    frequency = np.array(document["frequency_hz"])[1:]
+    whole = np.array(document["frequency_hz"])[1:]
+    # so many points for each decade: a record of a million samples would be drawn as a black bar
+    cell = np.floor(PER_DECADE * np.log10(whole / whole[0])).astype(int)
+    _, group = np.unique(cell, return_inverse=True)
+    count = np.bincount(group)
+    frequency = np.exp(np.bincount(group, weights=np.log(whole)) / count)
     for k, row in enumerate(document["spectra"]):
-        amplitude = np.sqrt(np.array(row["density"]))[1:]
-        place.plot(frequency, amplitude, "-", color=_colour(row["channel"], k), linewidth=0.8, label=row["channel"])
+        amplitude = np.sqrt(np.bincount(group, weights=np.array(row["density"])[1:]) / count)
+        place.plot(frequency, amplitude, "-", color=_colour(row["channel"], k), linewidth=1.2, label=row["channel"])
     place.set(xlabel="frequency / Hz", ylabel=f"noise density / {document['unit'] or 'unit'}/√Hz, one-sided")
