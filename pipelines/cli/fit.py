@@ -53,10 +53,14 @@ def command(
     wanted = [name.strip() for name in effects.split(",")] if effects else []
     job = job_of_run(store.run(run), effects=wanted, model=model, limits=limits)
     runner = Runner(job, store)
-    for done in runner.all():
-        error_console().print(
-            f"{done.stage:<9} {'was there' if done.reused else f'{done.seconds:.1f} s'}", markup=False
-        )
+    try:
+        for done in runner.all():
+            error_console().print(
+                f"{done.stage:<9} {'was there' if done.reused else f'{done.seconds:.1f} s'}", markup=False
+            )
+    except Exception:
+        runner.abandon()  # the measurements are the old run's: nothing is lost, and no empty run becomes the latest
+        raise
     document = summary(runner.run)
     if as_json:
         print_json(document)

@@ -139,12 +139,20 @@ def _import_one(path: Path, how: Mapping, fit: str, archive: str | None) -> dict
         "out_unit": data.out_unit,
         "samples": 0 if data.samples is None else len(data.samples),
         "dwells": 0 if data.dwells is None else len(data.dwells),
-        "remarks": list(data.remarks),
+        "remarks": [*data.remarks, *_slips(how)],
         "fit": fit or None,
         "adequate": None if judged is None else judged.adequate,
         **({} if judged is None else judged.document),
         "lines": [] if judged is None else list(judged.lines),
     }
+
+
+def _slips(how: Mapping) -> list[str]:
+    """A sentence for every covariate whose name is close to a known one."""
+    return [
+        f"'{shown(name)}' is taken for a covariate; if {' or '.join(close)} was meant, import again with that name"
+        for name, close in how.likely_slips.items()
+    ]
 
 
 def _print(one: dict[str, Any]) -> None:

@@ -83,13 +83,13 @@ def draw(document: dict[str, Any], ending: str) -> bytes:
         place = figure.subplots()
         _spectra(place, document) if "spectra" in document else _curves(place, document)
         place.set(xscale="log", yscale="log")
+        low, high = place.get_ylim()
+        place.set_ylim(10.0 ** np.floor(np.log10(low)), 10.0 ** np.ceil(np.log10(high)))
         for axis in (place.xaxis, place.yaxis):
             axis.set_major_locator(LogLocator(base=10.0, subs=(1.0,)))
             axis.set_minor_locator(LogLocator(base=10.0, subs=(2.0, 5.0)))
             axis.set_major_formatter(FuncFormatter(_power))
-            axis.set_minor_formatter(
-                FuncFormatter(_within) if _decades(axis.get_view_interval()) < 2.0 else NullFormatter()
-            )
+            axis.set_minor_formatter(NullFormatter())
         place.grid(visible=True, which="major", color="#dcdcdc")
         place.set_title(document["source"], loc="left")
         if len(place.lines) + len(place.containers) <= 16:
@@ -115,21 +115,10 @@ def noise_page(document: dict[str, Any]) -> str:
     )
 
 
-def _decades(interval: tuple[float, float]) -> float:
-    """How many powers of ten an interval spans."""
-    low, high = sorted(float(end) for end in interval)
-    return float(np.log10(high / low)) if low > 0.0 else 9.0
-
-
 def _power(value: float, _: object) -> str:
     """A power of ten for an axis."""
     exponent = round(float(np.log10(value))) if value > 0.0 else 0
     return f"{value:g}" if -3 <= exponent <= 4 else f"1e{exponent}".replace("-", "−")
-
-
-def _within(value: float, _: object) -> str:
-    """A tick between powers of ten."""
-    return f"{value:.0e}".replace("-0", "-").replace("-", "−") if value < 1e-3 else f"{value:g}"
 
 
 def _colour(name: str, place: int) -> str:
