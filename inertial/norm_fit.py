@@ -204,8 +204,10 @@ class _Work:
         unit = rows / np.where(size > 0.0, size, 1.0)
         _, values, turn = np.linalg.svd(unit, full_matrices=False)
         if np.any(size <= 0.0) or values.size < rows.shape[1] or values[-1] < _SINGULAR * values[0]:
-            weak = int(np.argmax(np.where(size > 0.0, np.abs(turn[-1]), 2.0)))
-            axis, column = np.argwhere(self.free)[weak].tolist()
+            share = np.where(size > 0.0, np.abs(turn[-1]), 2.0)
+            # of columns that stand for each other the one that was added last to the model
+            weak = np.argwhere(self.free)[share > 0.3 * share.max()]
+            axis, column = weak[int(np.argmax(weak[:, 1]))].tolist()
             effect, name = self.names[axis][column]
             raise NotIdentified(
                 f"fit: {name} of {effect} on axis {'xyz'[axis]} does not show in the norm of gravity over these dwells; leave "

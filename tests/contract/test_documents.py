@@ -5,6 +5,7 @@ import shutil
 import tarfile
 from pathlib import Path
 
+import numpy as np
 import pytest
 from pydantic import TypeAdapter, ValidationError
 from typer.testing import CliRunner
@@ -32,6 +33,8 @@ CASES = {
     "rerun --json": ["rerun", "latest", "--effects", "bias,scale,misalignment,bias_temperature"],
     "rerun --check --json": ["rerun", "latest", "--check"],
     "run --json": ["fit", "latest", "--limits", "consumer"],
+    "allan --json": ["allan", "{folder}/rest.csv", "--rate", "100"],
+    "psd --json": ["psd", "{folder}/rest.csv", "--rate", "100"],
 }
 WITHOUT_ARCHIVE = {"plan", "station"}
 
@@ -46,6 +49,8 @@ def kept(tmp_path_factory: pytest.TempPathFactory) -> Path:
     assert CliRunner().invoke(app, certify).exit_code == 0
     model = '[model]\nname = "m"\nversion = 1\neffects = ["bias", "scale", "misalignment"]\n'
     (folder / "model.toml").write_text(model, encoding="utf-8")
+    rng = np.random.default_rng(1)
+    np.savetxt(folder / "rest.csv", rng.normal(size=(2000, 3)), delimiter=",", header="x,y,z", comments="")
     return folder
 
 
@@ -66,6 +71,7 @@ def test_a_command_prints_the_document_of_its_type(head: str, kept: Path, tmp_pa
 
 def test_every_typed_document_is_printed_by_a_test() -> None:
     untested = {"run --json (several fillings)", "show RUN --json (no grades)"}  # lots of other tests' runs
+    untested |= {"fit --json (an import)"}  # tests/e2e/test_imported_recording.py
     assert set(BY_HEAD) - set(CASES) == untested
 
 
