@@ -25,6 +25,11 @@ FEW_DOF = 60
 GROSS = 0.02
 """Residual, g rms, that no noise of a usable sensor makes: the model is wrong however few the dwells are."""
 
+SMOOTH = 1e4
+"""Variance of a random walk over the record, over the white variance, from which dwells without recorded noise are a movement.
+
+A walk of 8 µg/√s over an hour beside 10 µg of white noise has 2300."""
+
 POWER = 0.5
 """Probability with which the smallest cubic term would have been seen."""
 
@@ -73,6 +78,11 @@ def not_judged(model: Model, rms: float) -> str:
         return ""
     if not np.isfinite(space.rss) or not np.isfinite(rms):
         return "the residuals are no numbers: the orientations leave the model undetermined; add poses in between"
+    if _is_movement(model):
+        return (
+            "what the model leaves goes on smoothly from dwell to dwell, as in samples of a movement, which are no dwells; import "
+            "the samples so that stretches at rest are found, or give each dwell with sd_x, sd_y, sd_z and n"
+        )
     if space.dof < FEWEST_DOF:
         count = model.problem.count
         return (
@@ -80,6 +90,12 @@ def not_judged(model: Model, rms: float) -> str:
             f"{FEWEST_DOF} are needed; measure {FEWEST_DOF - space.dof} more dwells, or judge a smaller model"
         )
     return ""
+
+
+def _is_movement(model: Model) -> bool:
+    """Whether dwells without recorded noise go on so smoothly that they are samples of a movement."""
+    lot = model.problem.lot
+    return lot.radial and not lot.recorded and model.noise.shares.walk >= SMOOTH
 
 
 def condition(model: Model) -> float:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+from pipelines.cli.evidence_text import print_evidence
 from pipelines.cli.options import console, print_table, short, short_values
 
 if TYPE_CHECKING:
@@ -29,7 +30,7 @@ def print_diagnosis(document: dict[str, Any], *, source: str, model: Path | None
     """
     out = console()
     out.print(verdict(document), style=STYLE_OF[document["adequate"]], soft_wrap=True)
-    _evidence(document)
+    print_evidence(document)
     print_findings(document)
     _unexplained(out, document, model)
     _next_command(out, document, source, model)
@@ -198,42 +199,6 @@ def _parameters_of(group: dict[str, Any], effects: Any) -> str:
     known = [p for p in effects.get(name).nonlinear if group["nonlinear"].get(p.name) is not None]
     values = ", ".join(f"{p.name} = {short_values(group['nonlinear'][p.name])} {p.unit}".rstrip() for p in known)
     return f"{name}: {values}" if values and len(group["effects"]) > 1 else values
-
-
-def evidence_text(document: dict[str, Any]) -> str:
-    """What the verdict rests on, in a line; empty where nothing was judged."""
-    found = document.get("evidence")
-    if not found:
-        return ""
-    parts = [f"{found['degrees_of_freedom']} degrees of freedom"]
-    if found["condition"] is not None:
-        parts.append(f"condition {short(found['condition'])}")
-    if found["bias_jackknife_ug"] is not None and found["bias_change_by"] is not None:
-        by = found["bias_change_by"]
-        parts.append(
-            f"bias ± {short(found['bias_jackknife_ug'])} µg by leaving out single dwells (most by dwell {by['dwell']} "
-            f"of {by['unit']}: {short(found['bias_change_ug'])} µg)"
-        )
-    return "; ".join(parts)
-
-
-def _evidence(document: dict[str, Any]) -> None:
-    """What the verdict rests on, and the smallest effect that would have been seen where the dwells are few."""
-    from inertial.criticism.evidence import FEW_DOF
-
-    found, out = document.get("evidence"), console()
-    if not found:
-        return
-    out.print(evidence_text(document), style="dim", markup=False, soft_wrap=True)
-    if document["adequate"] and found["degrees_of_freedom"] < FEW_DOF:
-        smallest = found["smallest_cubic_ug"]
-        seen = f"below {short(smallest)} µg/g³" if smallest is not None else "of any size"
-        out.print(
-            f"few dwells: a cubic term {seen} would not have been seen (probability 0.5)",
-            style="dim",
-            markup=False,
-            soft_wrap=True,
-        )
 
 
 def recommended_of(document: dict[str, Any], group: dict[str, Any]) -> str:

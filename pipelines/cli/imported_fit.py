@@ -78,7 +78,8 @@ def fit_document(done: Run, source: str) -> dict[str, Any]:
 
 def _known_poses(dwells: Any, past: Any, effects: list[str]) -> dict[str, Any]:
     """The verdict on a fit with commanded poses, and in lines what it rests on."""
-    from pipelines.cli.diagnosis_text import evidence_text, verdict
+    from pipelines.cli.diagnosis_text import verdict
+    from pipelines.cli.evidence_text import evidence_text
     from pipelines.diagnosis.diagnose import diagnose
 
     document = diagnose(dwells, past, effects)

@@ -1,7 +1,9 @@
 """Verdicts on recordings by hand-held placement, poses unknown: adequate, not adequate, or not to be judged, and why."""
 
 import numpy as np
+import pandas as pd
 import pytest
+from scipy.spatial.transform import Rotation
 
 from benchmarks.recordings import NOISES, Recording, make
 from inertial.fits.ellipsoid import fit_ellipsoid
@@ -57,6 +59,18 @@ def test_a_gross_misfit_is_not_adequate_however_few_the_dwells_are() -> None:
     document = diagnose(dwells)
     assert document["error"]["rms_ug"] > 20_000.0
     assert document["adequate"] is False
+
+
+def test_samples_of_a_movement_are_not_judged_and_name_nothing() -> None:
+    rng = np.random.default_rng(0)
+    n = 178
+    turned = Rotation.from_rotvec(np.cumsum(0.15 * rng.standard_normal((n, 3)), axis=0)).apply([0.0, 0.0, 1.0])
+    out = turned + 0.08 * np.cumsum(rng.standard_normal((n, 3)), axis=0) / np.sqrt(20.0)
+    frame = pd.DataFrame(out, columns=["out_x", "out_y", "out_z"])
+    document = diagnose(frame.assign(unit="M", dwell=range(n), time_s=np.arange(n) / 100.0, out_unit="g"))
+    assert document["adequate"] is None
+    assert "samples of a movement" in document["reason"]
+    assert document["recommended"] == []
 
 
 def test_what_the_verdict_rests_on_stands_beside_it() -> None:
