@@ -80,8 +80,8 @@ def not_judged(model: Model, rms: float) -> str:
         return "the residuals are no numbers: the orientations leave the model undetermined; add poses in between"
     if _is_movement(model):
         return (
-            "what the model leaves goes on smoothly from dwell to dwell, as in samples of a movement, which are no dwells; import "
-            "the samples so that stretches at rest are found, or give each dwell with sd_x, sd_y, sd_z and n"
+            "what the model leaves goes on smoothly from dwell to dwell, as in samples of a movement, which are no dwells; "
+            "import the samples so that stretches at rest are found, or give each dwell with sd_x, sd_y, sd_z and n"
         )
     if space.dof < FEWEST_DOF:
         count = model.problem.count

@@ -110,6 +110,17 @@ def test_a_bad_dwell_is_named_and_the_fit_without_it_is_a_run_of_its_own(tmp_pat
     assert again["error"]["rms_ug"] == judged["error"]["rms_ug"]
 
 
+def test_an_import_whose_model_is_not_adequate_gets_no_certificate(tmp_path: Path) -> None:
+    (tmp_path / "limits.toml").write_text(LIMITS.replace("300.0", "9000.0"), encoding="utf-8")
+    answer, _ = imported(DRIFTING, 71, tmp_path)
+    limits = ("--effects", PLAIN, "--limits", tmp_path / "limits.toml")
+    fitted, status = document("fit", answer["run"], *limits, archive=tmp_path / "archive")
+    assert ([unit["outcome"] for unit in fitted["units"]], fitted["adequate"], status) == (["pass"], False, 1)
+    problem = run("certify", fitted["run"], archive=tmp_path / "archive").exception
+    assert isinstance(problem, WrongUse)
+    assert "its model is not adequate" in str(problem)
+
+
 def test_known_poses_go_the_same_way(tmp_path: Path) -> None:
     rng = np.random.default_rng(4)
     force = np.tile(
