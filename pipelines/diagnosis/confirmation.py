@@ -42,13 +42,14 @@ def _by_fresh(before: Model, after: Model, out: LeftOut, fresh: Lot) -> dict[str
     old, new = estimate(before), estimate(after)
     found = came_again(fresh, old, new)
     problem = Problem(fresh)
-    unchanged = tuple(rms(residuals_of(problem, one)) for one in (old, new))
-    rises = _rise("the error on the fresh run", *unchanged) or _rise(
-        "the error on dwells left out", *_worst(before, out)
-    )
+    rises = None
+    if found.confirmed is True:
+        unchanged = tuple(rms(residuals_of(problem, one)) for one in (old, new))
+        rises = _rise("the error on the fresh run", *unchanged)
+        rises = rises or _rise("the error on dwells left out", *_worst(before, out))
     return {
         "judged_by": "fresh run",
-        "confirmed": None if found.confirmed is True and rises else found.confirmed,
+        "confirmed": None if rises else found.confirmed,
         "rises": rises,
         "part": known(found.part),
         "part_u": known(found.error),
@@ -67,11 +68,12 @@ def _by_left_out(before: LeftOut, after: LeftOut) -> dict[str, Any]:
     falls = [float(np.sqrt(np.nanmean(a**2)) - np.sqrt(np.nanmean(b**2))) for a, b in missed]
     worst = int(np.argmin(falls)) if falls else 0
     both = (before.rms(kinds), after.rms(kinds)) if kinds else (float("nan"), float("nan"))
-    rises = _rise("the error on dwells left out", *both)
+    convincing = gain is not None and gain > LEFT_OUT
+    rises = _rise("the error on dwells left out", *both) if convincing else None
     return {
         "judged_by": "dwells left out",
         # absence of evidence is no evidence: without a fresh run nothing is refuted
-        "confirmed": True if gain is not None and gain > LEFT_OUT and not rises else None,
+        "confirmed": True if convincing and not rises else None,
         "rises": rises,
         "part": None,
         "part_u": None,

@@ -108,7 +108,10 @@ def document(
     if diagnosis is None:
         return {
             "adequate": False,
+            "reason": None,
             "blocked_by": blocked,
+            "evidence": None,
+            "leave_out": None,
             "error": {"rms_ug": None, "floor_ug": None, "p_value": None},
             "where": [],
             "classes": [],
