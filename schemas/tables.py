@@ -193,7 +193,7 @@ TABLES: dict[str, Table] = {
         {
             "unit": _text(),
             "dwell": _whole(),
-            "axis": _text(*AXES),
+            "axis": _text(*AXES, "norm"),
             "pose": _text(),
             **_numbers(("force_g", "residual_ug", "standard_error_ug", "expected_ug")),
             **_gaps(("unit_C",)),

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import stats
 
+from inertial.criticism.bad_norms import bad_norms
 from inertial.criticism.decisions import BAD_DWELL, COMMON, MOST_BAD
 from inertial.criticism.model import Model
 from inertial.criticism.problem import Lot, Problem
@@ -20,6 +21,9 @@ Array = NDArray[np.float64]
 _ROUNDS = 8
 _ALIKE = 0.6
 """Of the largest deviation: dwells that are less far off are looked at again when the noise is known without the largest."""
+
+_AT_LEAST = 2
+"""Dwells that may be left out of a record, however short it is."""
 
 _LEAST_DOF = 6
 """Degrees of freedom of a unit below which none of its dwells is told from the others."""
@@ -49,10 +53,16 @@ def without(lot: Lot, found: list[BadDwell]) -> Lot:
 
 def bad_dwells(model: Model) -> list[BadDwell]:
     """The dwells that do not belong to a model and its noise, the noise estimated again without them."""
+    if model.problem.lot.radial:
+        return [
+            BadDwell(one.unit, dwell, np.array([off]), deviations)
+            for one in bad_norms(model)
+            for dwell, off, deviations in zip(one.dwells, one.off, one.deviations, strict=True)
+        ]
     found: list[BadDwell] = []
     lot = model.problem.lot
     for _ in range(_ROUNDS):
-        more = _round(model, int(MOST_BAD * lot.state.time.size) + 1 - len(found))
+        more = _round(model, max(int(MOST_BAD * lot.state.time.size) + 1, _AT_LEAST) - len(found))
         if not more:
             break
         found += more

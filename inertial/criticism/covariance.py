@@ -3,6 +3,9 @@
 A block is the series of one unit and axis. Its covariance is s²·(diag(e²) + F·K_F + W·K_W), where e is the white standard error
 of its dwells and F and W, in units of the lot's white variance, are the same for all blocks. Blocks that have the same dwells at
 the same times and about the same white noise share a whitener; a missing dwell only leaves out its row.
+
+Where only the norm of gravity is known, a block is a unit. What wanders along one axis shows in the norm as far as the force
+points along that axis: the kernels are then (F·K_F + W·K_W) ∘ (u·uᵀ) with the directions u of the force.
 """
 
 from collections import OrderedDict
@@ -68,8 +71,11 @@ class _Kernel:
     time: Array
     there: NDArray[np.bool_]
     profile: Array
+    direction: Array | None = None
 
     def fits(self, time: Array, there: NDArray[np.bool_], profile: Array) -> bool:
+        if self.direction is not None:
+            return False
         alike = bool(np.array_equal(there, self.there)) and bool(np.all(np.abs(time - self.time) < 1.0))
         ratio = np.where(there, profile / self.profile, 1.0)
         return alike and float(ratio.max()) < _EVEN and float(ratio.min()) > 1.0 / _EVEN
@@ -88,9 +94,10 @@ class Covariance:
     ----------
     time : (blocks, n), s
     error : (blocks, n), white standard error of each dwell, g; infinite where a dwell is missing
+    direction : (blocks, n, 3), unit vectors of the force where the measurement is its norm; None where it is one axis' output
     """
 
-    def __init__(self, time: Array, error: Array) -> None:
+    def __init__(self, time: Array, error: Array, direction: Array | None = None) -> None:
         self.there = np.isfinite(error)
         self.count = self.there.sum(axis=1)
         white = np.where(self.there, error, 0.0) ** 2
@@ -101,12 +108,12 @@ class Covariance:
         """White variance that shares are counted in, g²."""
         self.span = max(float(np.ptp(time)), 1.0)
         self._kernels: list[_Kernel] = []
-        self._groups = self._grouped(time, error)
+        self._groups = self._grouped(time, error, direction)
         self._whiteners: OrderedDict[tuple[int, int | None, int | None], tuple[Array, float]] = OrderedDict()
         self._kept: OrderedDict[tuple[object, Shares], Array] = OrderedDict()
         self._used = 0
 
-    def _grouped(self, time: Array, error: Array) -> list[tuple[int, int, NDArray[np.intp]]]:
+    def _grouped(self, time: Array, error: Array, direction: Array | None) -> list[tuple[int, int, NDArray[np.intp]]]:
         """(kernel, steps by which its shares are larger than the lot's, blocks)."""
         found: dict[tuple[int, int], list[int]] = {}
         for block, there in enumerate(self.there):
@@ -117,7 +124,8 @@ class Covariance:
             place = next((i for i, k in enumerate(self._kernels) if k.fits(time[block], there, profile)), None)
             if place is None:
                 place = len(self._kernels)
-                self._kernels.append(_Kernel(time[block], there, profile))
+                way = None if direction is None else direction[block]
+                self._kernels.append(_Kernel(time[block], there, profile, way))
             # by quarters of a decade: levels within a factor of 1.3 share a whitener, the rest is in the block's own variance
             steps = 2 * round(0.5 * SHARE_STEP * np.log10(self.white / self.level[block] ** 2))
             found.setdefault((place, steps), []).append(block)
@@ -129,7 +137,12 @@ class Covariance:
         if self.there.shape[1] > LONGEST:
             return None
         time = np.stack([k.time for k in self._kernels])
-        return flicker_kernel(time), walk_kernel(time)
+        flicker, walk = flicker_kernel(time), walk_kernel(time)
+        ways = [k.direction for k in self._kernels if k.direction is not None]
+        if ways:
+            along = np.stack([way @ way.T for way in ways])
+            flicker, walk = flicker * along, walk * along
+        return flicker, walk
 
     def about_mean(self, shares: Shares) -> Array:
         """Mean variance of the wander of each block about its record's own mean, over its white variance, (blocks,)."""

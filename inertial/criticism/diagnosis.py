@@ -11,8 +11,11 @@ from inertial.criticism import decisions
 from inertial.criticism.adequacy import adequacy
 from inertial.criticism.bad_dwells import BadDwell
 from inertial.criticism.classes import EffectClass, class_of
+from inertial.criticism.comparison import estimate, residuals_of
+from inertial.criticism.comparison import rms as rms_of
 from inertial.criticism.decisions import ADEQUATE_ABOVE, NAMED_BELOW
 from inertial.criticism.drivers import Driver, Misfit, drivers_of, places
+from inertial.criticism.evidence import GROSS, Evidence, evidence, not_judged
 from inertial.criticism.examination import Named, Part, Run, Search, examined, worst
 from inertial.criticism.field import Candidates
 from inertial.criticism.handling.base import Handling
@@ -30,6 +33,7 @@ from inertial.criticism.unknown import better_curve
 from inertial.criticism.unseen import unseen
 from inertial.effects.covariate import Covariate
 from inertial.planning.ranges import UnseenRange
+from inertial.probability import passes
 
 
 @dataclass(frozen=True)
@@ -46,9 +50,11 @@ class Diagnosis:
     """What a lot says of a model; errors in g.
 
     problem, base, final : the series without what handling spoilt, the model judged, the model with everything that was found
-    rms : of the base model's residuals; floor : of the noise that is there
+    rms : of the residuals of the base model; floor : of the noise of the measurement, white and wander
+    adequate : None where the data cannot tell, for the reason in ``unjudged``
+    without_removed : the verdict on the dwells that were not removed; None where none was, or it cannot be given
     handled : what handling did; removed : single dwells that were left out, those marked that are tails of the noise
-    carried : dwells that carry the verdict: of its first class, or the largest of what is left where nothing is named
+    carried : dwells that carry the verdict: of its first class, or the largest residuals where nothing is named
     unseen_in_part : effects that the plan cannot see at some values of their nonlinear parameters, with these
     smallest : the size from which each effect would have been named, those first that slow noise hides most
     """
@@ -59,7 +65,7 @@ class Diagnosis:
     rms: float
     floor: float
     log_p: float
-    adequate: bool
+    adequate: bool | None
     where: tuple[Misfit, ...]
     named: tuple[Named, ...]
     unexplained: Unexplained | None
@@ -70,6 +76,9 @@ class Diagnosis:
     carried: Carried = field(default_factory=Carried)
     unseen_in_part: tuple[tuple[str, tuple[UnseenRange, ...]], ...] = ()
     smallest: tuple[Smallest, ...] = ()
+    evidence: Evidence | None = None
+    unjudged: str = ""
+    without_removed: bool | None = None
 
 
 def diagnose(lot: Lot, effects: Sequence[str], rng: Generator) -> Diagnosis:
@@ -93,8 +102,16 @@ def _told(run: Run, search_: Search, rng: Generator) -> Diagnosis:
     log_p = adequacy(fields, drivers, base, rng)
     removed = tuple(with_tails(found.model, run.removed)) if run.removed else ()
     named_data = bool(run.handled) or any(not d.tail for d in removed)
-    sound = log_p >= np.log(ADEQUATE_ABOVE) and not found.added
-    final, unexplained = (found.model, None) if sound else _beyond(search_.part, base, found, drivers)
+    rms = _rms(base)
+    unjudged = not_judged(base, rms)
+    passed = passes(np.exp(log_p), ADEQUATE_ABOVE) if rms <= GROSS else False
+    if passed is None and not unjudged:
+        unjudged = "the probability of the residuals is no number; add poses in between"
+    if unjudged:
+        # too little to judge the model by is too little to name what it lacks
+        found = SearchResult(base, (), found.ladder)
+    sound = passed is True and not found.added
+    final, unexplained = (found.model, None) if sound or unjudged else _beyond(search_.part, base, found, drivers)
     classes = _classes(fields, base, final)
     named = _named(problem, base, classes)
     if unexplained is None:
@@ -107,11 +124,11 @@ def _told(run: Run, search_: Search, rng: Generator) -> Diagnosis:
         problem=problem,
         base=base,
         final=final,
-        rms=fit_rms(problem, base.terms),
+        rms=rms,
         floor=final.floor(),
         log_p=log_p,
-        adequate=sound and not named_data,
-        where=() if sound else charged,
+        adequate=_verdict(sound=sound, named_data=named_data, unjudged=unjudged),
+        where=() if sound or unjudged else charged,
         named=named,
         unexplained=unexplained,
         unseen=blind,
@@ -121,7 +138,24 @@ def _told(run: Run, search_: Search, rng: Generator) -> Diagnosis:
         handled=tuple(run.handled),
         removed=removed,
         carried=every[0].carried if every else Carried(influence(base, None)),
+        evidence=evidence(base, fields),
+        unjudged=unjudged,
+        without_removed=(None if unjudged else sound) if removed else None,
     )
+
+
+def _verdict(*, sound: bool, named_data: bool, unjudged: str) -> bool | None:
+    """Whether a model is adequate; None where the data cannot tell."""
+    if named_data:
+        return False
+    return None if unjudged else sound
+
+
+def _rms(base: Model) -> float:
+    """Residual of the model that is judged, g: by the fit that is made known where poses are unknown."""
+    if base.problem.lot.radial:
+        return rms_of(residuals_of(base.problem, estimate(base)))
+    return fit_rms(base.problem, base.terms)
 
 
 def _classes(field: Candidates, base: Model, final: Model) -> list[EffectClass]:
@@ -151,7 +185,8 @@ def _named(problem: Problem, base: Model, classes: Sequence[EffectClass]) -> tup
         after = left_out(model)
         errors = worst(before, after) if before is not None else (float("nan"), float("nan"))
         rest = Model(problem, [*base.terms, *(t for t in terms if t is not first)], near=base.noise)
-        found.append(Named(group, fit_rms(problem, model.terms), *errors, carried=carried_by(rest, first)))
+        left = rms_of(residuals_of(problem, estimate(model))) if problem.lot.radial else fit_rms(problem, model.terms)
+        found.append(Named(group, left, *errors, carried=carried_by(rest, first)))
         before = after
     return tuple(found)
 

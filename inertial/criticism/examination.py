@@ -58,8 +58,11 @@ class Named:
 
     @property
     def predicts(self) -> bool:
-        """Whether what was not fitted is predicted no worse with it: nothing else is worth to be added to a model."""
-        return not self.heldout_after > (1.0 + RISES) * self.heldout_before
+        """Whether what was not fitted is predicted no worse with it: nothing else is worth to be added to a model.
+
+        Where dwells left out cannot judge it (NaN), nothing is recommended.
+        """
+        return bool(self.heldout_after <= (1.0 + RISES) * self.heldout_before)
 
 
 @dataclass

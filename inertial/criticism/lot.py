@@ -20,6 +20,7 @@ class Lot:
     error : (units, n, 3), white standard error of each dwell mean, g; infinite where a dwell is missing
     response : (units, 3, 3), K over its diagonal: how a change of force shows on each axis
     radial : only the norm of the force is known; the state's force is then the corrected output's own direction
+    recorded : the white errors are from the scatter and number of samples, not from the residuals
     """
 
     state: State
@@ -27,6 +28,7 @@ class Lot:
     error: Array
     response: Array
     radial: bool = False
+    recorded: bool = False
 
     def units(self, index: Sequence[int]) -> "Lot":
         """The lot of some units only."""

@@ -66,7 +66,7 @@ class Problem:
     def covariance(self) -> Covariance:
         """The covariances of the blocks, at any noise."""
         time = self.lot.state.time if self.lot.radial else np.repeat(self.lot.state.time, 3, axis=0)
-        return Covariance(time, self.error)
+        return Covariance(time, self.error, self._direction if self.lot.radial else None)
 
     def _series(self) -> Array:
         """Measurements (blocks, n), g: outputs, or what the norm of the corrected output exceeds 1 g by."""

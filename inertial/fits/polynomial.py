@@ -8,6 +8,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.stats import chi2
 
 from inertial.errors import NotIdentified
+from inertial.probability import passes
 from inertial.state import T_REFERENCE
 
 Array = NDArray[np.float64]
@@ -15,6 +16,7 @@ Array = NDArray[np.float64]
 _SINGULAR = 1e-12  # eigenvalue of the scaled normal matrix below which a power is not determined
 _FEWEST = 3  # samples in a block
 _BLOCKS = 20  # whose means show what is slower than the noise of a sample
+_LEVEL = 0.01  # over the three axes
 _TIMES_NOISE = 1.25  # that may always be left: in a long record the means of blocks see any trifle
 
 
@@ -104,9 +106,10 @@ class TemperatureCurve:
     """(n, 3), output unit."""
 
     @property
-    def adequate(self) -> bool:
-        """Whether the residual is what the noise explains, on every axis."""
-        return bool(np.all((self.rms <= _TIMES_NOISE * self.noise) | (self.p_value > 0.01 / 3.0)))
+    def adequate(self) -> bool | None:
+        """Whether the residual is what the noise explains, on every axis; None where a probability is no number."""
+        unsettled = ~(self.rms <= _TIMES_NOISE * self.noise)
+        return passes(self.p_value[unsettled], _LEVEL / 3.0) if unsettled.any() else True
 
 
 def fit_temperature_curve(output: ArrayLike, temperature: ArrayLike, *, degree: int = 3) -> TemperatureCurve:

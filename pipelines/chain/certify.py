@@ -26,6 +26,10 @@ if TYPE_CHECKING:
 EVIDENCE = ("dwells", "coefficients", "covariance", "grades")
 
 
+IMPORTED = "imported"
+"""The station of a calibration whose measurements came from elsewhere."""
+
+
 @dataclass
 class Certified:
     """What became of a run's units.
@@ -103,10 +107,12 @@ def _proposals(
     """What is to be certified, and what is not with the reason; a named unit that may not be is refused."""
     grades = {str(row["unit"]): row for row in rows_of(_grades(run))}
     refuse_overdue(run)
+    refuse_inadequate_import(run)
     about, result = run.about, Certified()
     evidence = tuple(sorted((name, files.sha256(run.path / f"{name}.json")) for name in EVIDENCE))
+    station = (about.get("station") or {}).get("name", IMPORTED)
     shared: dict[str, Any] = {
-        "device": about["lot"]["device"], "run": run.id, "start": first, "until": last, "station": about["station"]["name"],
+        "device": about["lot"]["device"], "run": run.id, "start": first, "until": last, "station": station,
         "recipe": about["recipe"]["name"], "coefficients": run.manifest("coefficients")["sha256"], "reason": reason,
         "evidence": evidence,
     }  # fmt: skip
@@ -129,9 +135,16 @@ def _proposals(
 
 def _grades(run: Run) -> Any:
     if "grades" not in run.tables():
-        raise WrongUse(f"certify: run {run.id} has no grades, they are needed; it was imported, or it is not finished")
+        raise WrongUse(f"certify: run {run.id} has no grades, they are needed; {_how_to_grade(run)}")
     run.table("coefficients")  # refuses one that was changed since it was graded
     return run.table("grades")
+
+
+def _how_to_grade(run: Run) -> str:
+    if run.about.get("capture"):
+        return "it is not finished: give its 'tumbleline run' again and it goes on"
+    again = f"'tumbleline fit {run.id} --limits FILE'"
+    return f"it was imported: fit it against limits with {again} and certify the run that this makes"
 
 
 def _blank(serial: str, **content: Any) -> LedgerEntry:
@@ -185,6 +198,24 @@ def refuse_overdue(run: Run) -> None:
                 f"{standard['certificate']}) was due on {standard['due']}; have it calibrated, enter its new certificate in the "
                 "station's file, and measure again"
             )
+
+
+def refuse_inadequate_import(run: Run) -> None:
+    """Refuse an import whose model is not adequate, or cannot be judged: none of its poses was kept to verify it with."""
+    about = run.about
+    if about.get("capture") or "dwells" not in run.tables():
+        return
+    from pipelines.diagnosis.diagnose import diagnose  # loads scipy.stats, and captured runs do not need it
+
+    past = run.table("history") if "history" in run.tables() else None
+    effects = list((about.get("recipe") or {}).get("effects", ()))
+    verdict = diagnose(run.table("dwells"), past, effects or None)
+    if verdict["adequate"] is not True:
+        why = f"cannot be judged ({verdict['reason']})" if verdict["adequate"] is None else "is not adequate"
+        raise WrongUse(
+            f"certify: run {run.id} was imported and its model {why}, an adequate one is needed; see 'tumbleline diagnose "
+            f"{run.id}'"
+        )
 
 
 def refuse_two_at_once(ledger: Ledger, run: Run, serial: str) -> None:

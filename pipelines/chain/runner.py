@@ -5,15 +5,19 @@ That is going on after a crash and running an archive again, by one mechanism.
 
 from __future__ import annotations
 
+import shutil
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from threadpoolctl import threadpool_limits
 
 from pipelines.archive import Archive, Records, Run, code_hash, files, stage_key
 from pipelines.archive.locks import alone
+from pipelines.archive.run import START
+from pipelines.archive.run_files import SEALED
 from pipelines.chain.chain import BY_NAME, ORDER, RECORDS, Stage
 from schemas.progress import silent
 
@@ -61,12 +65,24 @@ class Runner:
         self, job: Job, archive: Archive, progress: Progress = silent, measure: Measure = from_station
     ) -> None:
         self.job, self.archive, self.progress, self.measure = job, archive, progress, measure
-        self.run: Run = archive.open_run(job.recipe.name, job.about, self._decisive())
+        name = archive.run_name(job.recipe.name, decisive := self._decisive())
+        self._was_there = (archive.root / "runs" / name / START).is_file()
+        self.run: Run = archive.open_run(job.recipe.name, job.about, decisive)
 
     def all(self) -> Iterator[Done]:
         """Every stage, in order, as it is done."""
         for name in ORDER:
             yield self.stage(name)
+
+    def abandon(self) -> None:
+        """Remove the run of a re-fit that failed: its capture stays, and no run without results becomes the latest."""
+        if self._was_there or (self.run.path / SEALED).is_file():
+            return
+        with alone(self.run.path, wait=True):
+            if isinstance(self.run.path, Path):
+                shutil.rmtree(self.run.path)
+            else:
+                self.run.path.remove_all()
 
     def stage(self, name: str) -> Done:
         """Do one stage, or find it done."""

@@ -14,6 +14,7 @@ from pipelines.cli.options import (
     EffectsOption,
     HistoryOption,
     JsonOption,
+    LeaveOutOption,
     ModelOption,
     error_console,
     print_json,
@@ -36,6 +37,7 @@ def command(
     model: ModelOption = None,
     history: HistoryOption = "",
     effect_file: EffectFileOption = None,
+    leave_out: LeaveOutOption = "",
     report: Annotated[
         Path | None,
         typer.Option(
@@ -48,14 +50,18 @@ def command(
 ) -> None:
     """Say whether a model is good enough, where it fails, and which physical effect is missing.
 
-    Exit status 0: the model is adequate. 1: it is not, or every unit has a data fault. 2: the input cannot be used.
+    Exit status 0: the model is adequate. 1: it is not, it cannot be judged, or every unit has a data fault. 2: the input cannot
+    be used.
     """
     from pipelines.cli.inputs import add_effect_files, dwells_and_history, history_beside, judged_effects
     from pipelines.importers.exchange import is_file
+    from pipelines.tables.leave_out import leave_out as without_dwells
+    from pipelines.tables.leave_out import named_dwells
 
     add_effect_files(effect_file)
     judged = judged_effects(dwells, archive, effects, model, "diagnose")
     table, temperatures = dwells_and_history(dwells, history, archive)
+    table = without_dwells(table, named_dwells(leave_out))
     beside = history or (history_beside(dwells) if is_file(dwells) else "")
     document, report_text = diagnosed(table, temperatures, judged, dwells, wanted=report is not None)
     document["history"] = beside or None
@@ -71,9 +77,15 @@ def command(
 
 
 def diagnosed(
-    table: pd.DataFrame, history: pd.DataFrame | None, judged: list[str] | None, source: str, *, wanted: bool
+    table: pd.DataFrame,
+    history: pd.DataFrame | None,
+    judged: list[str] | None,
+    source: str,
+    *,
+    wanted: bool,
+    coefficients: list[dict[str, Any]] | None = None,
 ) -> tuple[dict[str, Any], str]:
-    """The document of a diagnosis, and its report where one is wanted."""
+    """The document of a diagnosis, and its report where one is wanted, with a fit's coefficients where they are given."""
     from threadpoolctl import threadpool_limits
 
     with threadpool_limits(1), error_console().status("looking for missing effects"):
@@ -91,7 +103,7 @@ def diagnosed(
     with error_console().status("drawing the report"):
         from pipelines.report.diagnosis import render_diagnosis
 
-        return told, render_diagnosis(told, found, diagnosis, source)
+        return told, render_diagnosis(told, found, diagnosis, source, coefficients)
 
 
 def _extras(units: tuple[str, ...], effects: list[str], diagnosis: Diagnosis | None) -> dict[str, Any]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+from pipelines.cli.evidence_text import print_evidence
 from pipelines.cli.options import console, print_table, short, short_values
 
 if TYPE_CHECKING:
@@ -15,6 +16,8 @@ if TYPE_CHECKING:
 BAD_DWELL = "bad_dwell"
 HIDDEN, SHOWN = 3.0, 4
 """Factor by which slow noise must raise the smallest size that is named for an effect to be listed, and how many are."""
+STYLE_OF = {True: "bold green", False: "bold red", None: "bold yellow"}
+"""Of a verdict; None: it cannot be given."""
 
 SMALL = 1.1
 """Errors below so many times the floor look like noise to whoever compares the two numbers."""
@@ -29,7 +32,8 @@ def print_diagnosis(document: dict[str, Any], *, source: str, model: Path | None
     model : the model file as it was given there
     """
     out = console()
-    out.print(verdict(document), style="bold green" if document["adequate"] else "bold red", soft_wrap=True)
+    out.print(verdict(document), style=STYLE_OF[document["adequate"]], soft_wrap=True)
+    print_evidence(document)
     print_findings(document)
     _unexplained(out, document, model)
     _next_command(out, document, source, model)
@@ -52,6 +56,18 @@ def print_findings(document: dict[str, Any]) -> None:
 def _dwells(document: dict[str, Any]) -> None:
     """Dwells that were left out as tails of the noise, and those that carry the verdict."""
     removed, out = document.get("removed"), console()
+    single = document.get("leave_out")
+    if single:
+        names = ",".join(f"{d['unit']}:{d['dwell']}" for d in single["dwells"])
+        verdict_without = {True: "adequate", False: "NOT adequate", None: "cannot be judged"}[
+            single["adequate_without"]
+        ]
+        out.print(
+            f"without {'these dwells' if len(single['dwells']) > 1 else 'this dwell'} the model is: {verdict_without}; "
+            f"to leave out: --leave-out {names}",
+            markup=False,
+            soft_wrap=True,
+        )
     if removed and removed["heavy_tails"]:
         count = sum(d.get("tail", True) for d in removed["dwells"])
         out.print(
@@ -99,6 +115,8 @@ def verdict(document: dict[str, Any]) -> str:
     left += f"; noise of the measurement {short(error['floor_ug'])} µg rms (p {equal(error['p_value'])})"
     if document["adequate"]:
         return f"ADEQUATE: {left}."
+    if document["adequate"] is None:
+        return f"CANNOT BE JUDGED: {document.get('reason')}."
     if error["rms_ug"] < SMALL * error["floor_ug"]:
         left += "; the misfit is smaller than the noise, but significant"
     spoilt = [told_of(group) for group in document["classes"] if group["scope"] == "data"]
@@ -108,10 +126,11 @@ def verdict(document: dict[str, Any]) -> str:
         return f"NOT ADEQUATE: {left}; the data: {'; '.join(spoilt)}{rest}."
     if named:
         return f"NOT ADEQUATE: {left}; missing: {', and '.join(named)}."
-    if document["unexplained"]:
-        driver = document["unexplained"]["driver"]
-        return f"NOT ADEQUATE: {left}; the residual follows {driver}, and no effect of the catalogue explains it."
-    return f"NOT ADEQUATE: {left}; nothing that was recorded explains the residual."
+    driver = (document["unexplained"] or {}).get("driver")
+    rest = "nothing that was recorded explains the residual"
+    if driver:
+        rest = f"the residual follows {driver}, and no effect of the catalogue explains it"
+    return f"NOT ADEQUATE: {left}; {rest}."
 
 
 def told_of(group: dict[str, Any]) -> str:
@@ -168,10 +187,9 @@ def _classes(document: dict[str, Any]) -> None:
     lines = []
     for group in document["classes"]:
         names = "\n".join(f"{name} ({symbol_of(name)})" for name in group["effects"])
-        chosen = recommended_of(document, group)
-        nonlinear = [] if group["scope"] == "data" else effects.get(chosen).nonlinear
-        values = ", ".join(f"{p.name} = {short_values(group['nonlinear'].get(p.name))} {p.unit}" for p in nonlinear)
-        size = short(group["size_ug"]) + ("" if group["plausible"] else " (!)")
+        values = _parameters_of(group, effects)
+        size = short(group["size_ug"]) if group["size_ug"] > 0.0 else "within noise"
+        size += "" if group["plausible"] else " (!)"
         errors = short(group["rms_after_ug"]), short(group["heldout_after_ug"])
         text = group.get("evidence") or values
         lines.append([names, group["scope"], size, chance(group["p_value"]), *errors, text])
@@ -186,6 +204,16 @@ def _classes(document: dict[str, Any]) -> None:
         "left: error after it is added · left out: on dwells not fitted, the worst of poses, soaks, stretches of time"
     )
     console().print(legend, style="dim", markup=False)
+
+
+def _parameters_of(group: dict[str, Any], effects: Any) -> str:
+    """Nonlinear parameters with the effect of the class that they are of; several effects may be in one row."""
+    name = group.get("nonlinear_of") or group["effects"][0]
+    if group["scope"] == "data" or not group["nonlinear"]:
+        return ""
+    known = [p for p in effects.get(name).nonlinear if group["nonlinear"].get(p.name) is not None]
+    values = ", ".join(f"{p.name} = {short_values(group['nonlinear'][p.name])} {p.unit}".rstrip() for p in known)
+    return f"{name}: {values}" if values and len(group["effects"]) > 1 else values
 
 
 def recommended_of(document: dict[str, Any], group: dict[str, Any]) -> str:

@@ -7,6 +7,7 @@ from typing import Annotated, Any, Literal, NotRequired
 from typing_extensions import TypedDict
 
 from pipelines.capture.interruptions import Interruptions
+from pipelines.diagnosis.documents import LeaveOut, VerdictEvidence
 
 
 class FigureDocument(TypedDict):
@@ -110,6 +111,93 @@ class ShowTableDocument(TypedDict):
     run: str
     table: str
     rows: Annotated[list[dict[str, Any]], "value by column"]
+
+
+class FittedUnit(TypedDict):
+    """The decision on a unit of an import that was fitted against limits."""
+
+    unit: str
+    outcome: Literal["pass", "fail", "refused"]
+    grade: str
+    reasons: str
+
+
+class ImportedFitDocument(TypedDict):
+    """``fit --json (an import)``: a model fitted to an import, its verdict and what the verdict rests on."""
+
+    run: Annotated[str, "the run that holds the fit"]
+    fit_of: Annotated[str, "the import"]
+    effects: list[str]
+    left_out: Annotated[list[str], "dwells left out, UNIT:DWELL"]
+    units: Annotated[list[FittedUnit], "empty without limits"]
+    adequate: Annotated[bool | None, "null: cannot be judged"]
+    reason: Annotated[str | None, "why it cannot be judged"]
+    error: Annotated[dict[str, Any], "as in `diagnose --json`; `fit_rms_ug`: residual of all dwells of the fit, µg"]
+    evidence: VerdictEvidence | None
+    leave_out: LeaveOut | None
+    missing: Annotated[list[list[str]], "classes of effects that are missing"]
+    lines: Annotated[list[str], "the same in words"]
+
+
+class AllanChannel(TypedDict):
+    """The overlapping Allan deviation of a channel."""
+
+    channel: str
+    tau_s: list[float]
+    deviation: Annotated[list[float], "in `unit`"]
+    low: list[float]
+    high: list[float]
+    fitted: Annotated[list[float] | None, "deviation of the fitted terms; null: no mixture explains the curve"]
+
+
+class NoiseTermRow(TypedDict):
+    """A noise term of a channel."""
+
+    channel: str
+    term: Literal["Q", "N", "B", "K", "R"]
+    name: str
+    value: Annotated[float | None, "null: not identified"]
+    low: float
+    high: Annotated[float, "upper end of the interval, or the upper limit"]
+    identified: bool
+    unit: str
+
+
+class AllanDocument(TypedDict):
+    """``allan --json``: the overlapping Allan deviation of a record and its noise terms."""
+
+    source: str
+    unit: Annotated[str, "of the output; empty if not given"]
+    rate_hz: float
+    samples: int
+    confidence: Annotated[float, "of the intervals of the curve"]
+    term_confidence: Annotated[float, "of the intervals and limits of the terms"]
+    curves: list[AllanChannel]
+    terms: list[NoiseTermRow]
+    notes: list[str]
+
+
+class SpectrumChannel(TypedDict):
+    """The spectrum of a channel, and the Allan deviation that follows from it."""
+
+    channel: str
+    density: Annotated[list[float], "one-sided, unit²/Hz"]
+    median_amplitude: Annotated[float, "median noise density, unit/√Hz"]
+    tau_s: list[float]
+    deviation_from_density: list[float]
+    deviation: Annotated[list[float], "of the samples"]
+
+
+class PsdDocument(TypedDict):
+    """``psd --json``: the one-sided power spectral density of a record."""
+
+    source: str
+    unit: str
+    rate_hz: float
+    samples: int
+    segment: Annotated[int, "samples of a segment"]
+    frequency_hz: list[float]
+    spectra: list[SpectrumChannel]
 
 
 class CertifiedBy(TypedDict):

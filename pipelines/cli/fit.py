@@ -7,6 +7,7 @@ import typer
 from pipelines.cli.options import (
     ArchiveOption,
     JsonOption,
+    LeaveOutOption,
     ModelOption,
     OtherEffectsOption,
     OtherLimitsOption,
@@ -14,6 +15,7 @@ from pipelines.cli.options import (
     error_console,
     print_json,
 )
+from schemas.errors import WrongUse
 
 PART = "Old data, new models"
 ORDER = 510
@@ -25,24 +27,40 @@ def command(
     effects: OtherEffectsOption = "",
     model: ModelOption = None,
     limits: OtherLimitsOption = "",
+    leave_out: LeaveOutOption = "",
     archive: ArchiveOption = None,
     *,
     as_json: JsonOption = False,
 ) -> None:
-    """Fit a model to archived data again; the result is a run of its own beside the old one, on the same capture."""
+    """Fit a model to archived data again; the result is a run of its own beside the old one, on the same capture.
+
+    An import is fitted with known poses or, without them, by the norm of gravity. Exit status 1: the model is not adequate, it
+    cannot be judged, or a unit did not pass.
+    """
     from pipelines.archive import Archive
     from pipelines.chain.runner import Runner
     from pipelines.cli.summary import exit_status, print_summary, summary
     from pipelines.jobs.job import job_of_run
 
     store = Archive(archive)
+    found = store.run(run)
+    if not found.about.get("capture"):
+        from pipelines.cli.imported_fit import fit_import
+
+        raise typer.Exit(fit_import(found, (effects, model, limits), leave_out, as_json=as_json))
+    if leave_out:
+        raise WrongUse(f"run {found.id}: --leave-out is for imports, this run was captured; measure the dwell again")
     wanted = [name.strip() for name in effects.split(",")] if effects else []
     job = job_of_run(store.run(run), effects=wanted, model=model, limits=limits)
     runner = Runner(job, store)
-    for done in runner.all():
-        error_console().print(
-            f"{done.stage:<9} {'was there' if done.reused else f'{done.seconds:.1f} s'}", markup=False
-        )
+    try:
+        for done in runner.all():
+            error_console().print(
+                f"{done.stage:<9} {'was there' if done.reused else f'{done.seconds:.1f} s'}", markup=False
+            )
+    except Exception:
+        runner.abandon()  # the measurements are the old run's: nothing is lost, and no empty run becomes the latest
+        raise
     document = summary(runner.run)
     if as_json:
         print_json(document)

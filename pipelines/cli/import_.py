@@ -179,7 +179,7 @@ def _refuse_unknown_fit(fit: str) -> None:
 
 def _import_one(paths: list[Path], wanted: dict[str, Any], where: str, fit: str, archive: str | None) -> dict[str, Any]:
     """Read, judge and keep one recording; the document for JSON."""
-    from pipelines.importers import judge, keep, record, sources
+    from pipelines.importers import keep, record, sources
     from pipelines.importers import mapping as mapped
     from pipelines.importers.dwell_list import dwell_rows
 
@@ -194,7 +194,12 @@ def _import_one(paths: list[Path], wanted: dict[str, Any], where: str, fit: str,
         )
         how = _mapping(wanted, content, where, name)
         data = record.imported(content.table, how, name, content, breaks)
-    judged = judge.judge(fit, data, how) if fit else None
+    judged = None
+    if fit:
+        from pipelines.diagnosis.imported import judge
+
+        with error_console().status("fitting and judging"):
+            judged = judge(fit, data, how)
     run = keep.keep(data, source, how, judged, archive)
     return {
         "run": run.id,
@@ -203,7 +208,7 @@ def _import_one(paths: list[Path], wanted: dict[str, Any], where: str, fit: str,
         "out_unit": data.out_unit,
         "samples": 0 if data.samples is None else len(data.samples),
         "dwells": 0 if data.dwells is None else len(data.dwells),
-        "remarks": list(data.remarks),
+        "remarks": [*data.remarks, *_slips(how)],
         "faults": list(data.faults),
         "fit": fit or None,
         "adequate": None if judged is None else judged.adequate,
@@ -211,6 +216,14 @@ def _import_one(paths: list[Path], wanted: dict[str, Any], where: str, fit: str,
         "lines": [] if judged is None else list(judged.lines),
         "dwell_list": dwell_rows(data, judged, how),
     }
+
+
+def _slips(how: Mapping) -> list[str]:
+    """A sentence for every covariate whose name is close to a known one."""
+    return [
+        f"'{shown(name)}' is taken for a covariate; if {' or '.join(close)} was meant, import again with that name"
+        for name, close in how.likely_slips.items()
+    ]
 
 
 def _print(one: dict[str, Any], *, list_dwells: bool) -> None:
@@ -225,6 +238,8 @@ def _print(one: dict[str, Any], *, list_dwells: bool) -> None:
     if one["fit"]:
         verdict, style = VERDICTS[one["adequate"]]
         out.print(f"  {verdict}", style=style)
+        if one["fit"] == "norm" and one["adequate"] is False:
+            out.print(f"  to look further: tumbleline diagnose {one['run']}", markup=False, soft_wrap=True)
 
 
 def _print_dwells(dwells: list[dict[str, Any]], unit: str) -> None:

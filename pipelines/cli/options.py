@@ -63,6 +63,30 @@ OtherEffectsOption = Annotated[
     str, typer.Option("--effects", metavar="a,b,c", help="Another model, as a list of effects.")
 ]
 OtherLimitsOption = Annotated[str, typer.Option("--limits", metavar="FILE", help="Other limits: a file or a name.")]
+SeriesArgument = Annotated[
+    str, typer.Argument(metavar="FILE|RUN", help="A file of samples at rest, or a run of the archive.")
+]
+SeriesColumnsOption = Annotated[
+    str,
+    typer.Option(
+        "--columns", metavar="x,y,z", help="Columns of the file, or their numbers from 1; all numbers by default."
+    ),
+]
+TimeColumnOption = Annotated[str, typer.Option("--time", metavar="COLUMN", help="Column of the time; or give --rate.")]
+TimeUnitOption = Annotated[str, typer.Option("--time-unit", metavar="s|ms|us|ns", help="Unit of the time column.")]
+RateOption = Annotated[float | None, typer.Option("--rate", metavar="HZ", min=1e-9, help="Sampling rate.")]
+SeriesUnitOption = Annotated[str, typer.Option("--unit", metavar="UNIT", help="Unit of the output, as it is printed.")]
+StretchOption = Annotated[
+    int | None,
+    typer.Option("--stretch", metavar="N", min=1, help="Stretch at rest of an import; the longest by default."),
+]
+PlotOption = Annotated[Path | None, typer.Option("--plot", metavar="FILE.png", help="Draw it, as PNG, SVG or PDF.")]
+PageOption = Annotated[
+    Path | None, typer.Option("--page", metavar="FILE.html", help="Write it with its tables, as HTML.")
+]
+LeaveOutOption = Annotated[
+    str, typer.Option("--leave-out", metavar="UNIT:DWELL,…", help="Dwells that are not judged or fitted.")
+]
 EffectFileOption = Annotated[
     list[Path] | None,
     typer.Option("--effect-file", metavar="FILE.py", help="A Python file with effects of your own; may be repeated."),

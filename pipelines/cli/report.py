@@ -17,7 +17,12 @@ def command(run: RunArgument = "latest", archive: ArchiveOption = None, *, as_js
     from pipelines.report import make_report
 
     found = Archive(archive).run(run)
-    make_report(found)
+    if found.about.get("capture") or found.about.get("parents"):
+        make_report(found)
+    else:
+        from pipelines.cli.imported_report import make_imported_report
+
+        make_imported_report(found)
     if as_json:
         print_json({"run": found.id, "report": str(found.report)})
     else:

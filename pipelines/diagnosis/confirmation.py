@@ -7,9 +7,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from inertial.criticism.came_again import came_again
-from inertial.criticism.comparison import estimate
-from inertial.criticism.decisions import BLOCKS, LEFT_OUT
+from inertial.criticism.comparison import estimate, residuals_of, rms
+from inertial.criticism.decisions import BLOCKS, LEFT_OUT, RISES
 from inertial.criticism.left_out import left_out
+from inertial.criticism.problem import Problem
 from pipelines.diagnosis.result_rows import known
 from schemas.units import MICRO
 
@@ -33,15 +34,23 @@ def progress(before: Model, after: Model, out: LeftOut, fresh: Lot | None) -> di
     ``fall_u_ug``; on a fresh run ``part`` (λ) with ``part_u``; on dwells left out the gain in ``log_density``
     """
     if fresh is not None:
-        return _by_fresh(before, after, fresh)
+        return _by_fresh(before, after, out, fresh)
     return _by_left_out(left_out(before), out)
 
 
-def _by_fresh(before: Model, after: Model, fresh: Lot) -> dict[str, Any]:
-    found = came_again(fresh, estimate(before), estimate(after))
+def _by_fresh(before: Model, after: Model, out: LeftOut, fresh: Lot) -> dict[str, Any]:
+    old, new = estimate(before), estimate(after)
+    found = came_again(fresh, old, new)
+    problem = Problem(fresh)
+    rises = None
+    if found.confirmed is True:
+        unchanged = tuple(rms(residuals_of(problem, one)) for one in (old, new))
+        rises = _rise("the error on the fresh run", *unchanged)
+        rises = rises or _rise("the error on dwells left out", *_worst(before, out))
     return {
         "judged_by": "fresh run",
-        "confirmed": found.confirmed,
+        "confirmed": None if rises else found.confirmed,
+        "rises": rises,
         "part": known(found.part),
         "part_u": known(found.error),
         "fall_ug": MICRO * found.fall,
@@ -58,10 +67,14 @@ def _by_left_out(before: LeftOut, after: LeftOut) -> dict[str, Any]:
     missed = [(before.missed[k], after.missed[k]) for k in sorted(kinds)]
     falls = [float(np.sqrt(np.nanmean(a**2)) - np.sqrt(np.nanmean(b**2))) for a, b in missed]
     worst = int(np.argmin(falls)) if falls else 0
+    both = (before.rms(kinds), after.rms(kinds)) if kinds else (float("nan"), float("nan"))
+    convincing = gain is not None and gain > LEFT_OUT
+    rises = _rise("the error on dwells left out", *both) if convincing else None
     return {
         "judged_by": "dwells left out",
         # absence of evidence is no evidence: without a fresh run nothing is refuted
-        "confirmed": True if gain is not None and gain > LEFT_OUT else None,
+        "confirmed": True if convincing and not rises else None,
+        "rises": rises,
         "part": None,
         "part_u": None,
         "fall_ug": MICRO * falls[worst] if falls else None,
@@ -69,6 +82,22 @@ def _by_left_out(before: LeftOut, after: LeftOut) -> dict[str, Any]:
         "estimated_again": None,
         "log_density": gain,
     }
+
+
+def _rise(what: str, before: float, after: float) -> str | None:
+    """Which error rises with what was added, in words; None where it does not, or nothing can tell."""
+    if not (np.isfinite(before) and np.isfinite(after)):
+        return None
+    if after <= (1.0 + RISES) * before:
+        return None
+    return f"{what} rises from {MICRO * before:.3g} to {MICRO * after:.3g} µg"
+
+
+def _worst(before: Model, after: LeftOut) -> tuple[float, float]:
+    """The worst error on dwells left out before and after, over the kinds that can judge both."""
+    first = left_out(before)
+    kinds = set(first.density) & set(after.density)
+    return first.rms(kinds), after.rms(kinds)
 
 
 def _error(before: np.ndarray, after: np.ndarray) -> float:

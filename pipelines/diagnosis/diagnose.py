@@ -18,12 +18,15 @@ from pipelines.diagnosis.next_measurement import proposed
 from pipelines.diagnosis.result_rows import (
     Names,
     classes_of,
+    evidence_of,
     in_part_of,
     influence_of,
+    leave_out_of,
     noise_of,
     probability,
     removed_of,
     smallest_of,
+    white_noise_of,
     without_influence,
 )
 from pipelines.tables.dwells import Measured, lot_of, measured
@@ -127,6 +130,8 @@ def document(
             "adequate": None,
             "reason": f"every unit ({len({f.unit for f in faults})}) has a data fault; no physics is judged until it is mended",
             "blocked_by": blocked,
+            "evidence": None,
+            "leave_out": None,
             "error": {"rms_ug": None, "floor_ug": None, "p_value": None},
             "where": [],
             "classes": [],
@@ -144,11 +149,14 @@ def document(
     terms = [*diagnosis.base.terms, *(m.term for n in diagnosis.named for m in n.effects.physics)]
     warnings = without_history(found, terms)
     return {
-        "adequate": bool(diagnosis.adequate),
+        "adequate": diagnosis.adequate,
+        "reason": diagnosis.unjudged or None,
         "blocked_by": blocked,
+        "evidence": evidence_of(diagnosis, names),
         "error": {
             "rms_ug": MICRO * diagnosis.rms,
             "floor_ug": MICRO * diagnosis.floor,
+            "white_noise_ug": white_noise_of(diagnosis.base),
             "p_value": probability(diagnosis.log_p),
             **noise_of(diagnosis.final),
         },
@@ -161,6 +169,7 @@ def document(
         "without_influence": without_influence(diagnosis),
         "removed": removed_of(diagnosis, names),
         "recommended": [n.effects.simplest.effect.id for n in diagnosis.named if not n.effects.of_data and n.predicts],
+        "leave_out": leave_out_of(diagnosis, names),
         "warnings": warnings,
         "unexplained": None
         if diagnosis.unexplained is None

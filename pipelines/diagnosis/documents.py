@@ -24,7 +24,10 @@ class ErrorFigures(TypedDict):
     """Residual of the model; null where every unit has a data fault."""
 
     rms_ug: Annotated[float | None, "root mean square residual of the units without a fault, µg"]
-    floor_ug: Annotated[float | None, "noise floor, µg"]
+    floor_ug: Annotated[float | None, "noise floor: white noise and wander between the dwells, µg"]
+    white_noise_ug: NotRequired[
+        Annotated[float | None, "white noise alone, from the samples of each dwell (sd/√n), µg"]
+    ]
     p_value: Annotated[float | None, "probability of such a residual if the model is adequate, at least 1e-300"]
     wander_share: NotRequired[Annotated[float, "variance of the 1/f noise over that of the white noise"]]
     walk_share: NotRequired[
@@ -70,12 +73,45 @@ class EffectClassDocument(TypedDict):
     p_value: float
     size_ug: Annotated[float, "size of the effect, µg"]
     nonlinear: NotRequired[Annotated[dict[str, Any], "estimated time constants, widths, …"]]
+    nonlinear_of: NotRequired[Annotated[str | None, "the effect of the class that they are of"]]
     plausible: NotRequired[Annotated[bool, "whether the size is in the usual range of the effect"]]
     units: NotRequired[Annotated[list[str], "of scope data: the units concerned"]]
     dwells: NotRequired[Annotated[list[int], "of scope data: the dwells concerned"]]
     evidence: NotRequired[Annotated[str, "of scope data: what happened"]]
     influence: NotRequired[Annotated[list[InfluentialDwell], "dwells that carry the verdict on this class"]]
     without_influence: NotRequired[Annotated[WithoutInfluence | None, "the verdict on this class without these dwells"]]
+
+
+class NamedDwell(TypedDict):
+    """A dwell of a unit."""
+
+    unit: str
+    dwell: int
+
+
+class StudentisedDwell(NamedDwell):
+    """A dwell and how far it is off its prediction by all others."""
+
+    studentised: Annotated[float | None, "residual over its standard deviation without the dwell"]
+
+
+class VerdictEvidence(TypedDict):
+    """What a verdict rests on."""
+
+    degrees_of_freedom: int
+    condition: Annotated[float | None, "of the whitened columns of unit length"]
+    bias_jackknife_ug: Annotated[float | None, "jackknife standard deviation of the bias, worst axis, µg"]
+    bias_change_ug: Annotated[float | None, "largest change of the bias by leaving out one dwell, µg"]
+    bias_change_by: Annotated[NamedDwell | None, "the dwell of that change"]
+    largest_residual: Annotated[StudentisedDwell | None, "the dwell that is farthest off"]
+    smallest_cubic_ug: Annotated[float | None, "smallest cubic term seen with probability 0.5, µg/g³; null: none"]
+
+
+class LeaveOut(TypedDict):
+    """Single dwells that are off."""
+
+    dwells: Annotated[list[NamedDwell], "for `--leave-out`"]
+    adequate_without: Annotated[bool | None, "the verdict on the other dwells"]
 
 
 class RemovedDwell(TypedDict):
@@ -161,8 +197,7 @@ class SuggestedFormula(TypedDict):
 class DiagnosisDocument(TypedDict):
     """``diagnose --json``: adequacy of a model, where it fails, and which effects are missing."""
 
-    adequate: Annotated[bool | None, "null: cannot be judged, because every unit has a data fault"]
-    reason: NotRequired[Annotated[str, "why `adequate` is null; missing otherwise"]]
+    adequate: Annotated[bool | None, "null: cannot be judged, see `reason`"]
     blocked_by: list[BlockingFault]
     error: ErrorFigures
     where: Annotated[list[FailingDriver], "most significant first"]
@@ -174,6 +209,9 @@ class DiagnosisDocument(TypedDict):
     smallest_named: Annotated[list[SmallestNamed], "most hidden by slow noise first"]
     next_measurements: list[NextMeasurement]
     influence: Annotated[list[InfluentialDwell], "largest share first"]
+    reason: NotRequired[Annotated[str | None, "why it cannot be judged; null: it can"]]
+    evidence: NotRequired[VerdictEvidence | None]
+    leave_out: NotRequired[Annotated[LeaveOut | None, "null: no single dwell is off"]]
     without_influence: NotRequired[WithoutInfluence | None]
     removed: NotRequired[RemovedDwells | None]
     warnings: NotRequired[list[str]]
@@ -218,6 +256,7 @@ class Confirmation(TypedDict):
     part_u: Annotated[float | None, "standard uncertainty of λ"]
     fall_ug: Annotated[float | None, "decrease of the error, µg"]
     fall_u_ug: Annotated[float | None, "standard uncertainty of the decrease, µg"]
+    rises: NotRequired[Annotated[str | None, "the error that rises with the effect; null: none"]]
     estimated_again: Annotated[str | None, "coefficients estimated from the fresh run before it is judged"]
     log_density: Annotated[float | None, "gain in log predictive density of the dwells left out"]
 

@@ -74,6 +74,8 @@ def text_of(row: dict[str, Any], progress: dict[str, Any] | None) -> str:
     gain = progress["log_density"]
     if progress["confirmed"]:
         return f"confirmed on stretches of time left out (log density +{gain:.1f}); {fall}"
+    if progress.get("rises"):
+        return f"not decided by dwells left out: {progress['rises']}; {fall}; a fresh run of the same units decides"
     why = "they cannot judge it" if gain is None else f"log density {gain:+.1f}, more than 4 is needed"
     return f"not decided by dwells left out: {why}; {fall}; a fresh run of the same units decides"
 
@@ -87,6 +89,8 @@ def _by_fresh(progress: dict[str, Any], fall: str) -> str:
         return f"confirmed: {came}; {fall}"
     if progress["confirmed"] is False:
         return f"NOT there: {came}; {fall}"
+    if progress.get("rises"):
+        return f"not decided: {came}, but {progress['rises']}; {fall}"
     return f"not decided: {came}; {fall}; one more run"
 
 

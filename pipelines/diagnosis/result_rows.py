@@ -58,6 +58,7 @@ def _class(named: Named, names: Names) -> dict[str, Any]:
         "p_value": probability(group.log_p),
         "size_ug": MICRO * group.size,
         "nonlinear": {} if scope == "data" else dict(simplest.values),
+        "nonlinear_of": None if scope == "data" or not simplest.values else simplest.effect.id,
         "plausible": _plausible(group.size, simplest.effect.typical_ug),
     }
     row |= _carried(named.carried, names)
@@ -112,6 +113,53 @@ def smallest_of(diagnosis: Diagnosis) -> list[dict[str, Any]]:
         {"effect": s.effect, "size_ug": MICRO * s.size, "without_slow_noise_ug": MICRO * s.without_slow}
         for s in diagnosis.smallest
     ]
+
+
+def evidence_of(diagnosis: Diagnosis, names: Names) -> dict[str, Any] | None:
+    """What the verdict rests on: degrees of freedom, condition, the bias without single dwells, the smallest cubic seen."""
+    found = diagnosis.evidence
+    if found is None:
+        return None
+    row: dict[str, Any] = {
+        "degrees_of_freedom": found.dof,
+        "condition": known(found.condition),
+        "bias_jackknife_ug": None if found.bias_spread is None else known(MICRO * found.bias_spread),
+        "bias_change_ug": None if found.bias_change is None else known(MICRO * found.bias_change),
+        "bias_change_by": None,
+        "largest_residual": None,
+        "smallest_cubic_ug": None if found.cubic is None else known(MICRO * found.cubic),
+    }
+    if found.carrier is not None:
+        row["bias_change_by"] = {"unit": names.units[found.carrier[0]], "dwell": names.dwells[found.carrier[1]]}
+    if found.largest is not None:
+        size, unit, dwell = found.largest
+        row["largest_residual"] = {
+            "unit": names.units[unit],
+            "dwell": names.dwells[dwell],
+            "studentised": known(round(size, 2)),
+        }
+    return row
+
+
+def white_noise_of(model: Model) -> float | None:
+    """RMS of the white noise that the samples of each dwell leave in its mean, sd/√n, µg; None where it is not recorded."""
+    error = model.problem.error
+    finite = error[np.isfinite(error)]
+    lot = model.problem.lot
+    if not finite.size or (lot.radial and not lot.recorded):
+        return None
+    return known(MICRO * float(np.sqrt(np.mean(finite**2))))
+
+
+def leave_out_of(diagnosis: Diagnosis, names: Names) -> dict[str, Any] | None:
+    """The single dwells to leave out, and the verdict on the others; None where no dwell is off."""
+    dwells = [d for d in diagnosis.removed if not d.tail]
+    if not dwells:
+        return None
+    return {
+        "dwells": [{"unit": names.units[d.unit], "dwell": names.dwells[d.dwell]} for d in dwells],
+        "adequate_without": diagnosis.without_removed,
+    }
 
 
 def influence_of(diagnosis: Diagnosis, names: Names) -> list[dict[str, Any]]:
@@ -177,4 +225,5 @@ def noise_of(model: Model) -> dict[str, Any]:
 
 def _plausible(size: float, typical: tuple[float, float]) -> bool:
     """Whether a size in g is what the effect has been seen to reach, within a factor of ten below."""
-    return 0.1 * typical[0] <= MICRO * size <= typical[1]
+    # an effect within the noise has no size that could be implausible
+    return size <= 0.0 or 0.1 * typical[0] <= MICRO * size <= typical[1]

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from inertial.state import T_REFERENCE
 from pipelines.certificates.statement import stated
 from pipelines.tables.calibration import read_calibration
 from schemas.errors import WrongUse
@@ -71,6 +72,8 @@ def unit_calibrations(
     failed : hand out units that failed their limits too; units whose data were refused have none.
     revoked : hand out units whose calibration was revoked, too.
     """
+    if "grades" not in run.tables():
+        return _ungraded(run, serials)
     grades = run.table("grades").set_index("unit")
     _refuse(grades, serials, failed=failed)
     allowed = ("pass", "fail") if failed else EXPORTABLE
@@ -85,18 +88,57 @@ def unit_calibrations(
     calibration = read_calibration(run.table("coefficients"), run.table("covariance"))
     dwells = run.table("dwells")
     out_unit = str(dwells["out_unit"].iloc[0])
-    measured = {unit: dwells.loc[dwells["unit"] == unit, "unit_C"].to_numpy(dtype=float) for unit in chosen}
     return [
         replace(
-            _one(calibration, unit, grades.loc[unit].to_dict(), out_unit, (measured[unit].min(), measured[unit].max())),
+            _one(calibration, unit, grades.loc[unit].to_dict(), out_unit, _temperatures(dwells, unit)),
             certificate=certificates.get(unit),
         )
         for unit in chosen
     ]
 
 
+UNGRADED = "no limits"
+"""The outcome of a unit that was fitted and compared with no limits: that of an import."""
+
+
+def _ungraded(run: Run, serials: tuple[str, ...]) -> list[UnitCalibration]:
+    """Calibrations of an import that was fitted without limits; a captured run without grades is not finished."""
+    if run.about.get("capture"):
+        raise WrongUse(
+            f"export: run {run.id} has no grades, they are needed; it is not finished: give its 'tumbleline run' again"
+        )
+    missing = [name for name in ("dwells", "coefficients", "covariance") if name not in run.tables()]
+    if missing:
+        raise WrongUse(
+            f"export: run {run.id} was imported and has no {', '.join(missing)}; fit it with 'tumbleline fit {run.id} --effects "
+            "bias,scale,misalignment' and export the run that this makes"
+        )
+    calibration = read_calibration(run.table("coefficients"), run.table("covariance"))
+    for unit in serials:
+        if unit not in calibration.units:
+            raise WrongUse(f"export: no unit {unit} in this run; there are {', '.join(calibration.units)}")
+    dwells = run.table("dwells")
+    out_unit = str(dwells["out_unit"].iloc[0])
+    decided = {"outcome": UNGRADED, "grade": "none"}
+    return [
+        _one(calibration, unit, decided, out_unit, _temperatures(dwells, unit))
+        for unit in (serials or calibration.units)
+    ]
+
+
+def _temperatures(dwells: pd.DataFrame, unit: str) -> tuple[float, float]:
+    """Lowest and highest temperature of a unit's dwells, °C; the reference temperature where none was recorded."""
+    column = next((name for name in ("unit_C", "chamber_C") if name in dwells.columns), None)
+    values = (
+        np.array([]) if column is None else dwells.loc[dwells["unit"] == unit, column].dropna().to_numpy(dtype=float)
+    )
+    return (float(values.min()), float(values.max())) if values.size else (T_REFERENCE, T_REFERENCE)
+
+
 def revoked_units(run: Run) -> dict[str, Stated]:
     """Units of a run whose calibration was revoked: they are left out, unless they are asked for."""
+    if "grades" not in run.tables():
+        return {}
     found = stated(run, tuple(run.table("grades")["unit"]))
     return {unit: one for unit, one in found.items() if one.state == "revoked"}
 

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from inertial.fits.ferraris import Faces, faces, ferraris
+from inertial.probability import passes
 from pipelines.importers.judged import FitAnswer, coefficient, dwells_of, gravity_of
 from pipelines.importers.mapping import FACES
 from schemas.errors import DataRejected
@@ -19,6 +20,7 @@ if TYPE_CHECKING:
     from pipelines.importers.mapping import Mapping
     from pipelines.importers.record import Imported
 
+MODEL = ("bias", "scale", "misalignment")
 GROSS = 0.05
 """Part of gravity that no tilt of a face by hand leaves: cos 18° is 0.95."""
 UNLIKELY = 0.01
@@ -56,7 +58,22 @@ def six_faces(data: Imported, mapping: Mapping) -> FitAnswer:
     }
     lines = tuple(_face_line(k, found, float(published.bias[k]), data.out_unit) for k in range(3))
     lines = (*lines, why) if why else lines
-    return FitAnswer("faces", adequate, document, lines, _face_coefficients(str(dwells["unit"].iloc[0]), found, data))
+    rows = _face_coefficients(str(dwells["unit"].iloc[0]), found, data)
+    return FitAnswer("faces", adequate, document, lines, rows, MODEL, {"covariance": _covariance(rows)})
+
+
+def _covariance(rows: list[dict[str, Any]]) -> pd.DataFrame:
+    """The covariance of the coefficients as the archive's long table: six opposite faces make them independent of each other."""
+    import pandas as pd
+
+    found: list[dict[str, Any]] = []
+    for axis in AXES:
+        own = [row for row in rows if row["axis"] == axis]
+        for row in range(len(own)):
+            for column in range(row + 1):
+                square = float(np.nan_to_num(own[row]["standard_error"])) ** 2 if row == column else 0.0
+                found.append({"unit": own[row]["unit"], "axis": axis, "row": row, "column": column, "value": square})
+    return pd.DataFrame(found)
 
 
 def _verdict(found: Faces, size: NDArray[np.float64]) -> tuple[bool | None, str]:
@@ -73,10 +90,9 @@ def _verdict(found: Faces, size: NDArray[np.float64]) -> tuple[bool | None, str]
             False,
             f"the faces disagree by {100.0 * worst:.3g} % of gravity, whatever the noise; check the labels of the faces",
         )
-    if bool(np.all(found.p_value >= UNLIKELY)):
-        return True, ""
-    if bool(np.any(found.p_value < UNLIKELY)):
-        return False, ""
+    passed = passes(found.p_value, UNLIKELY)
+    if passed is not None:
+        return passed, ""
     return (
         None,
         "cannot be judged: the noise of the means is unknown; map n, sd_x, sd_y and sd_z, or import the samples",

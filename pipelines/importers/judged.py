@@ -25,6 +25,10 @@ class FitAnswer:
     document: dict[str, Any]
     lines: tuple[str, ...]
     coefficients: list[dict[str, Any]] = field(default_factory=list[dict[str, Any]])
+    effects: tuple[str, ...] = ()
+    """The model, as ids of the catalogue; empty where the fit is none of its effects."""
+    tables: dict[str, pd.DataFrame] = field(default_factory=dict[str, "pd.DataFrame"])
+    """Further tables for the archive: covariance, residuals."""
 
 
 def dwells_of(data: Imported) -> pd.DataFrame:

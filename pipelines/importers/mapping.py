@@ -129,9 +129,6 @@ class Mapping(BaseModel):
                 raise ValueError(
                     f"'{shown(name)}': a name of 1 to {LONGEST_NAME} printable characters is needed; choose another"
                 )
-            close = close_matches(name, KNOWN) if name not in KNOWN else ()
-            if close and len(name) > 1:
-                raise ValueError(f"'{name}' is not known, but close to one that is; did you mean {' or '.join(close)}?")
         return value
 
     @field_validator("axes")
@@ -148,6 +145,12 @@ class Mapping(BaseModel):
             if face not in FACES:
                 raise ValueError(f"'{label}': found '{shown(face)}', one of {', '.join(FACES)} is needed")
         return value
+
+    @property
+    def likely_slips(self) -> dict[str, tuple[str, ...]]:
+        """Covariates whose names are close to known ones, with these: perhaps a slip, and allowed all the same."""
+        found = {name: close_matches(name, KNOWN) for name in self.columns if name not in KNOWN and len(name) > 1}
+        return {name: close for name, close in found.items() if close}
 
     @property
     def norm_g(self) -> float | None:

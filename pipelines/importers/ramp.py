@@ -48,4 +48,6 @@ def ramp(data: Imported, mapping: Mapping) -> FitAnswer:
         for k in range(3)
     )
     advice = "something other than temperature itself drives this output; look at its rate and lag with 'tumbleline diagnose'"
+    if fit.adequate is None:
+        advice = "cannot be judged: the noise of a sample or the residual is no number; check the record for constant channels"
     return FitAnswer("temperature", fit.adequate, document, lines if fit.adequate else (*lines, advice))

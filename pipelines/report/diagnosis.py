@@ -23,7 +23,13 @@ if TYPE_CHECKING:
 FEWEST_POSES = 4  # fewer make no map
 
 
-def render_diagnosis(document: dict[str, Any], found: Measured, diagnosis: Diagnosis | None, source: str) -> str:
+def render_diagnosis(
+    document: dict[str, Any],
+    found: Measured,
+    diagnosis: Diagnosis | None,
+    source: str,
+    coefficients: list[dict[str, Any]] | None = None,
+) -> str:
     """The report as one HTML text that needs no other file.
 
     Parameters
@@ -31,12 +37,14 @@ def render_diagnosis(document: dict[str, Any], found: Measured, diagnosis: Diagn
     document : the diagnosis for programs, with its extras
     found, diagnosis : the readings and what was found in them; None where every unit has a data fault
     source : what the dwells were called
+    coefficients : rows of the fit's table, to be shown with it; none where None
     """
     faulty = {unit for fault in document["blocked_by"] for unit in fault["units"]}
     sound = tuple(unit for unit in found.units if unit not in faulty)
     return template("diagnosis.html").render(
         source=source,
         document=document,
+        coefficients=coefficients or [],
         units=len(found.units),
         classes=[_class(group, document) for group in document["classes"]],
         unseen=[
@@ -70,9 +78,11 @@ def _class(group: dict[str, Any], document: dict[str, Any]) -> dict[str, Any]:
     if group["scope"] == "data":
         values = [group.get("evidence", "")]
     else:
-        values = [
-            f"{p.name} = {_value(group['nonlinear'].get(p.name))} {p.unit}" for p in effects.get(simplest).nonlinear
-        ]
+        own = group.get("nonlinear_of") or simplest
+        known = [p for p in effects.get(own).nonlinear if group["nonlinear"].get(p.name) is not None]
+        values = [f"{p.name} = {_value(group['nonlinear'][p.name])} {p.unit}".rstrip() for p in known]
+        if values and len(group["effects"]) > 1:
+            values[0] = f"{own}: {values[0]}"
     members = [_member(name) for name in group["effects"]]
     return {**group, "members": members, "recommended": simplest, "values": ", ".join(values)}
 

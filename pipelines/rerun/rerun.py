@@ -21,6 +21,7 @@ from schemas.errors import DataRejected
 if TYPE_CHECKING:
     from pipelines.jobs.model_change import ModelChange
     from pipelines.rerun.steps import Plan, StageCall
+    from pipelines.tables.leave_out import Dwells
 
 THERE, TAKEN, KEPT, COMPUTED = "there", "taken over", "kept", "computed"
 """What became of a stage: in the new run already; from the old run, whose key is the same; from the old run, because the raw
@@ -39,7 +40,9 @@ class Outcome:
     error: str = ""
 
 
-def again(archive: Archive, run_id: str, wanted: ModelChange, *, report: bool = False) -> Outcome:
+def again(
+    archive: Archive, run_id: str, wanted: ModelChange, *, report: bool = False, left_out: Dwells = ()
+) -> Outcome:
     """Run an archived run again. A new run is published when all of it is there: one that fails or is stopped leaves nothing.
 
     Raises
@@ -50,7 +53,7 @@ def again(archive: Archive, run_id: str, wanted: ModelChange, *, report: bool = 
     start = time.perf_counter()
     wanted.use()
     old = Run(archive, run_id)
-    plan = plan_of(old, wanted)
+    plan = plan_of(old, wanted, left_out)
     raw = raw_samples(old)
     because = changes(old, plan, raw=raw)
     new = BufferedRun(archive, archive.run_name(plan.name, plan.decisive) if because else old.id)
@@ -122,6 +125,10 @@ def changes(old: Run, plan: Plan, *, raw: bool) -> list[dict[str, str]]:
     found: list[dict[str, str]] = []
     there = set(old.tables())
     for step in plan.steps:
+        if step.name == "leave_out":
+            named = ", ".join(f"{unit}:{dwell}" for unit, dwell in step.parameters["left_out"])
+            found.append({"stage": step.name, "what": "dwells left out", "from": "", "to": named})
+            continue
         if (
             not there.issuperset(step.outputs)
             or step.name in {"capture", "import"}

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import pandas as pd
 from pydantic import ValidationError
 
+from inertial.quantities import ANGLE_COLUMNS, FORCE_COLUMNS
 from pipelines.archive import Archive, code_hash
 from pipelines.archive.signatures import ENTRY
 from pipelines.chain.chain import BY_NAME, RECORDS, STAGES, Tables
@@ -18,12 +19,15 @@ from pipelines.jobs.model_files import refuse_unknown_effects, use_formulas
 from pipelines.stages.figures import UNITS
 from pipelines.stages.fit import fit
 from pipelines.stages.grade import Evidence, grade, refuse_limits_without_figures
-from pipelines.stages.verify import verify
+from pipelines.stages.norm_fit import fit_of_norms
+from pipelines.stages.verify import nothing_verified, verify
 from pipelines.tables.frames import empty_table
-from schemas.errors import DataRejected
+from pipelines.tables.leave_out import Dwells, leave_out
+from schemas.errors import DataRejected, WrongUse
 from schemas.limits import Limits, limits_of
 from schemas.recipe import FormulaSpec, Lot, Recipe, explain
 from schemas.station import StationConfig
+from schemas.units import STANDARD_GRAVITY_M_S2
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -78,9 +82,18 @@ class ArchivedJob(Job):
         return {**self.told, **decided, "lot": self.lot.model_dump(mode="json")}
 
 
-def plan_of(run: Run, wanted: ModelChange) -> Plan:
-    """What is to be done to a run, with another model or other limits where they are wanted."""
-    return _captured(run, wanted) if run.about.get("capture") else _imported(run, wanted)
+def plan_of(run: Run, wanted: ModelChange, left_out: Dwells = ()) -> Plan:
+    """What is to be done to a run, with another model or other limits where they are wanted.
+
+    Parameters
+    ----------
+    left_out : dwells of an import that are left out, as (unit, dwell)
+    """
+    if run.about.get("capture"):
+        if left_out:
+            raise WrongUse(f"run {run.id}: --leave-out is for imports, this run was captured; measure the dwell again")
+        return _captured(run, wanted)
+    return _imported(run, wanted, left_out)
 
 
 def archived_job(run: Run, wanted: ModelChange) -> ArchivedJob:
@@ -137,16 +150,19 @@ def _capture_step(run: Run, job: ArchivedJob) -> StageCall:
     return StageCall("capture", (RECORDS,), (*CAPTURED, *more), {"capture": job.capture_id}, "", gathered)
 
 
-def _imported(run: Run, wanted: ModelChange) -> Plan:
+def _imported(run: Run, wanted: ModelChange, left_out: Dwells) -> Plan:
     """Fit, verification and, where limits are known, grades of dwells that were imported."""
     about = run.about
-    dwells = _fit_for_a_fit(run)
+    dwells = leave_out(_fit_for_a_fit(run), left_out)
+    known = has_poses(dwells)
     model = _model_of(run, dwells, wanted)
     use_formulas([FormulaSpec.model_validate(f) for f in model["formulas"]], f"run {run.id}")
     refuse_unknown_effects(model["effects"], f"run {run.id}")
     limits = wanted.limits or (limits_of(about["limits"], UNITS) if about.get("limits") else None)
     history = "history" in run.tables()
-    steps = [_import_step(history), _fit_step(model, history), _verify_step(history)]
+    gravity = gravity_of_import(about)
+    steps = [_import_step(history, left_out, run), _fit_step(model, history, None if known else gravity)]
+    steps += [_verify_step(history)] if known else [_no_verification()]
     steps += [_grade_step(limits)] if limits else []
     recipe = {**about.get("recipe", {}), "name": "import", **model}
     recipe |= {"limits": wanted.limits_name} if wanted.limits else {}
@@ -154,7 +170,22 @@ def _imported(run: Run, wanted: ModelChange) -> Plan:
     new = {**kept, "recipe": recipe, "limits": limits.model_dump(mode="json") if limits else None}
     data = {name: run.manifest(name)["sha256"] for name in ("dwells", "history") if name != "history" or history}
     code = {step.name: step.code for step in steps}
-    return Plan("import", tuple(steps), new, {"data": data, "model": model, "limits": new["limits"], "code": code})
+    decisive = {"data": data, "model": model, "limits": new["limits"], "code": code}
+    if left_out:
+        named = [f"{unit}:{dwell}" for unit, dwell in left_out]
+        decisive["left_out"] = new["left_out"] = [*about.get("left_out", []), *named]
+    return Plan("import", tuple(steps), new, decisive)
+
+
+def has_poses(dwells: pd.DataFrame) -> bool:
+    """Whether dwells have a reference, force or angles; otherwise only the norm of gravity is known."""
+    return any(set(names) <= set(dwells.columns) for names in (FORCE_COLUMNS, ANGLE_COLUMNS))
+
+
+def gravity_of_import(about: dict[str, Any]) -> float:
+    """Gravity where an import was measured, g; the standard value where it was not given."""
+    given = (about.get("mapping") or {}).get("local_gravity_m_s2")
+    return 1.0 if given is None else float(given) / STANDARD_GRAVITY_M_S2
 
 
 def _fit_for_a_fit(run: Run) -> pd.DataFrame:
@@ -164,12 +195,14 @@ def _fit_for_a_fit(run: Run) -> pd.DataFrame:
             f"run {run.id}: imported without dwells, a fit needs them; import it with poses, a face or --blocks"
         )
     dwells = run.table("dwells")
-    wanted = ("force_x", "force_y", "force_z", "sd_x", "sd_y", "sd_z", "n", "kind", "pose", "out_unit")
+    wanted = ("kind", "pose", "out_unit")
+    if has_poses(dwells):
+        wanted = (*FORCE_COLUMNS, "sd_x", "sd_y", "sd_z", "n", *wanted)
     missing = [name for name in wanted if name not in dwells.columns]
     if missing:
         raise DataRejected(
-            f"run {run.id}: its dwells have no {', '.join(missing)}, a fit in the chain needs them; import it again with the "
-            "poses named, or judge it with 'tumbleline diagnose'"
+            f"run {run.id}: its dwells have no {', '.join(missing)}, a fit of known poses needs them; import it again with these "
+            "columns mapped, or judge it with 'tumbleline diagnose'"
         )
     return dwells
 
@@ -183,8 +216,22 @@ def _model_of(run: Run, dwells: pd.DataFrame, wanted: ModelChange) -> dict[str, 
     return {"effects": default_model(dwells), "formulas": [], "model_name": "", "model_version": 0}
 
 
-def _import_step(history: bool) -> StageCall:  # noqa: FBT001 - whether the import has one
+def _import_step(history: bool, left_out: Dwells, old: Run) -> StageCall:  # noqa: FBT001 - whether the import has one
     names = ("dwells", *(("history",) if history else ()))
+    if left_out:
+        parameters = {"left_out": [list(one) for one in left_out], "dwells": old.manifest("dwells")["sha256"]}
+        others = names[1:]
+        return StageCall(
+            "leave_out",
+            (),
+            names,
+            parameters,
+            "",
+            lambda _: {
+                "dwells": leave_out(old.table("dwells"), left_out),
+                **{name: old.table(name) for name in others},
+            },
+        )
     return StageCall("import", (), names, {}, "", lambda run: {name: run.table(name) for name in names})
 
 
@@ -192,15 +239,31 @@ def _history(run: Run) -> pd.DataFrame:
     return run.table("history") if "history" in run.tables() else empty_table(texts="unit", numbers="time_s unit_C")
 
 
-def _fit_step(model: dict[str, Any], history: bool) -> StageCall:  # noqa: FBT001
+def _fit_step(model: dict[str, Any], history: bool, gravity: float | None) -> StageCall:  # noqa: FBT001
+    """The fit of the chain; by the norm of gravity alone where its size is given."""
     stage = BY_NAME["fit"]
     parameters = {"effects": model["effects"], "formulas": model["formulas"]}
     inputs = stage.inputs if history else tuple(name for name in stage.inputs if name != "history")
+
+    if gravity is not None:
+
+        def of_norms(run: Run) -> Tables:
+            past = run.table("history") if history else None
+            return fit_of_norms(run.table("dwells"), past, model["effects"], gravity)
+
+        code = code_hash(("pipelines.stages.norm_fit", "schemas.tables"))
+        return StageCall("fit", inputs, stage.outputs, {**parameters, "gravity_g": gravity}, code, of_norms)
 
     def call(run: Run) -> Tables:
         return fit(run.table("dwells"), _history(run), model["effects"])
 
     return StageCall("fit", inputs, stage.outputs, parameters, code_hash(stage.modules), call)
+
+
+def _no_verification() -> StageCall:
+    """The tables of a verification without a row: dwells of unknown orientation have no pose that was kept for it."""
+    stage = BY_NAME["verify"]
+    return StageCall("verify", (), stage.outputs, {}, code_hash(stage.modules), lambda _: nothing_verified())
 
 
 def _verify_step(history: bool) -> StageCall:  # noqa: FBT001

@@ -39,7 +39,7 @@ def verify(
     its dwells.
     """
     if not np.any(dwells["kind"] == "verification") or coefficients.empty:
-        return _nothing()
+        return nothing_verified()
     # all dwells, so that what an effect remembers of the pose before is there
     lot, calibration = lot_arrays(dwells, history), read_calibration(coefficients, covariance)
     model, unseen = calibration.effects, lot.of_kind("verification")
@@ -113,7 +113,8 @@ def _rows(lot: LotArrays, unseen: NDArray[np.bool_], columns: dict[str, Array], 
     )
 
 
-def _nothing() -> dict[str, pd.DataFrame]:
+def nothing_verified() -> dict[str, pd.DataFrame]:
+    """The tables of a verification without a row."""
     numbers = "norm_g error_ug uncertainty_ug reading_ug error_x_ug error_y_ug error_z_ug unit_C"
     numbers += " rms_uncertainty_x_ug rms_uncertainty_y_ug rms_uncertainty_z_ug"
     return {

@@ -16,6 +16,7 @@ from inertial.criticism.readings import Readings
 from inertial.quantities import OUTPUT_COLUMNS, SPREAD_COLUMNS
 from inertial.state import State
 from pipelines.tables.dwell_table import DwellTable, state_of_table
+from pipelines.tables.norms import lot_of_norms
 from schemas.errors import DataRejected
 
 if TYPE_CHECKING:
@@ -168,7 +169,7 @@ def lot_of(found: Measured, like: Measured | None = None, *, square: bool = Fals
     """
     readings = found.readings
     if found.reference == "norm":
-        return _radial(found, like or found, square=square)
+        return lot_of_norms(readings, found.state, (like or found).readings, square=square)
     coefficients = (like or found).readings.fits
     scale = np.abs(np.diagonal(coefficients[:, :, 1:], axis1=1, axis2=2))
     scale = np.where(scale > 0.0, scale, 1.0)
@@ -216,23 +217,3 @@ def _white_error(readings: Readings, scale: Array, output: Array) -> Array:
     spread = np.sqrt(np.nanmean(readings.misfit**2, axis=1, keepdims=True))
     pooled = np.sqrt(np.mean(spread**2, axis=0, keepdims=True))
     return np.broadcast_to(np.maximum(pooled, 1e-12), readings.output.shape)
-
-
-def _radial(found: Measured, like: Measured, *, square: bool) -> Lot:
-    from inertial.fits.ellipsoid import fit_ellipsoid
-
-    readings = found.readings
-    forces, outputs, errors = [], [], []
-    for unit in range(len(found.units)):
-        there = readings.there[unit]
-        shape = "six" if square else "nine"
-        fit = fit_ellipsoid(like.readings.output[unit, like.readings.there[unit]], shape=shape)
-        corrected = np.zeros((there.size, 3))
-        corrected[there] = fit.apply(readings.output[unit, there])
-        size = np.linalg.norm(corrected, axis=1, keepdims=True)
-        forces.append(np.where(size > 0.0, corrected / np.where(size > 0.0, size, 1.0), (0.0, 0.0, 1.0)))
-        outputs.append(corrected)
-        errors.append(np.where(there, np.sqrt(np.mean((size[there] - 1.0) ** 2)), np.inf)[:, None] * np.ones(3))
-    state = replace(found.state, force=np.stack(forces), memory={})
-    eye = np.broadcast_to(np.eye(3), (len(found.units), 3, 3))
-    return Lot(state, np.stack(outputs), np.stack(errors), eye, radial=True)

@@ -52,7 +52,9 @@ def test_json_holds_the_whole_answer_and_nothing_else(shared_data: Path, tmp_pat
     assert document["adequate"] is True
     file = shared_data / "xsens-tumble" / "xsens_acc.mat.gz"
     assert document["source"]["sha256"] == hashlib.sha256(file.read_bytes()).hexdigest()
-    assert document["error"]["rms_ug"] < 105.0
+    assert (
+        document["error"]["rms_ug"] < 112.0
+    )  # 1.0 mm/s² without weights was published, 1.1 with the noise of each dwell
 
 
 def test_the_mapping_file_of_the_guide_does_the_same(shared_data: Path, tmp_path: Path) -> None:

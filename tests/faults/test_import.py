@@ -82,7 +82,6 @@ def test_refuses_g_claimed_as_counts(rng: np.random.Generator) -> None:
         ({"units": {"output": "G"}}, "known unit of the output is needed: g, mg"),
         ({"units": {"output": "g", "tme": "s"}}, "not known; did you mean time"),
         ({"columns": {"x": "a", "y": "b"}}, "z not mapped"),
-        ({"columns": {"x": "a", "y": "b", "z": "c", "temprature": "d"}}, "did you mean temperature"),
         ({"axes": ["x", "x", "z"]}, "every axis is needed once"),
         ({"poses": {"up": "z"}}, r"found 'z', one of \+x"),
         ({"local_gravity_m_s2": 1.0}, "local_gravity_m_s2"),
@@ -92,6 +91,11 @@ def test_refuses_g_claimed_as_counts(rng: np.random.Generator) -> None:
 def test_refuses_mappings_with_a_slip(content: dict, words: str) -> None:
     with pytest.raises(RecipeInvalid, match=words):
         how(**content)
+
+
+def test_a_covariate_may_have_any_name_and_a_likely_slip_is_remarked() -> None:
+    columns = {"x": "a", "y": "b", "z": "c", "temprature": "d", "hum": "e"}
+    assert how(columns=columns).likely_slips == {"temprature": ("temperature",)}
 
 
 def test_refuses_a_record_of_nobody(rng: np.random.Generator) -> None:

@@ -10,7 +10,10 @@ from inertial.fits.ellipsoid import fit_ellipsoid
 from inertial.fits.ferraris import faces, ferraris
 from inertial.fits.polynomial import fit_temperature_curve
 from inertial.static_intervals import find
+from pipelines.diagnosis.imported_norms import norm
 from pipelines.importers import files
+from pipelines.importers.mapping import build
+from pipelines.importers.record import imported
 
 MILLI = 1e3
 FACES = np.concatenate([np.eye(3), -np.eye(3)]) * 9.81
@@ -35,6 +38,23 @@ class TestHandHeldTumble:
         fit = fit_ellipsoid(means, norm=self.gravity)
         assert float(fit.rms) * MILLI <= 1.0
         np.testing.assert_allclose(fit.scale, [415.0, 413.0, 415.0], rtol=0.005)
+
+    def test_the_fit_with_wander_and_its_verdict_agree_with_the_published_coefficients(self, shared_data: Path) -> None:
+        mapping = build(
+            {
+                "columns": {"time": "1", "x": "2", "y": "3", "z": "4"},
+                "units": {"output": "LSB"},
+                "unit": "MTi",
+                "local_gravity_m_s2": self.gravity,
+            },
+            "test",
+        )
+        table, _ = files.read(shared_data / "xsens-tumble" / "xsens_acc.mat.gz")
+        answer = norm(imported(table, mapping, "xsens_acc"), mapping)
+        assert answer.adequate is True
+        np.testing.assert_allclose(answer.document["scale_per_m_s2"], [414.4, 412.0, 414.6], atol=0.1)
+        assert answer.document["error"]["rms_ug"] * self.gravity * 1e-3 == pytest.approx(1.0, abs=0.15)  # mm/s²
+        assert answer.document["error"]["six_parameters_rms_ug"] * self.gravity * 1e-3 == pytest.approx(34.0, abs=1.0)
 
     def test_six_parameters_and_the_nominal_values_leave_what_was_found_by_others(self, means: np.ndarray) -> None:
         six = fit_ellipsoid(means, norm=self.gravity, shape="six")

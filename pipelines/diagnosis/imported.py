@@ -1,11 +1,11 @@
-"""Fits that need no station: gravity's norm, six faces, a temperature ramp; each with a verdict on its own adequacy."""
+"""The fits that an import may ask for, by name: labelled faces, a temperature ramp, or gravity's norm."""
 
 from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from pipelines.diagnosis.imported_norms import norm
 from pipelines.importers.faces import six_faces
-from pipelines.importers.norm import norm
 from pipelines.importers.pose_check import silent_axis
 from pipelines.importers.ramp import ramp
 from schemas.errors import DataRejected
@@ -21,7 +21,7 @@ METHODS: dict[str, Callable[[Imported, Mapping], FitAnswer]] = {"norm": norm, "f
 
 
 def judge(method: str, data: Imported, mapping: Mapping) -> FitAnswer:
-    """The fit called `method`, one of `METHODS`, of one unit's import."""
+    """The fit called ``method``, one of :data:`METHODS`, of one unit's import, with a verdict on its own adequacy."""
     silent = silent_axis(data.dwells) if method == "norm" and data.dwells is not None else ""
     if silent:  # more poses, which the fit would ask for, would not help
         raise DataRejected(

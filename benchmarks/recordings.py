@@ -1,0 +1,243 @@
+"""Recordings by hand-held placement, orientations unknown: `python benchmarks/recordings.py nulls bad --runs 40`.
+
+Every recording has its own number of positions (6-160), lengths of rest (one long first rest, then 2-60 s), order and noise.
+The force is turned by random rotations, the sensor is a full matrix with a bias in raw counts, and 1/f noise is made by
+fractional summation: nothing is shared with the estimator. Prints, with 95 % Clopper-Pearson intervals, how many adequate
+recordings were called inadequate or could not be judged, how many effects were named that are not there, and how many
+spoilt dwells were named. `--seeds development` are for setting constants, `judging` (the default) only for measuring.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import sys
+import time
+import warnings
+from collections import Counter
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+for _name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
+    os.environ.setdefault(_name, "1")  # before numpy
+HERE = Path(__file__).resolve().parent
+sys.path[:0] = [str(HERE.parent)]
+
+import numpy as np  # noqa: E402
+import pandas as pd  # noqa: E402
+from numpy.typing import NDArray  # noqa: E402
+from scipy import stats  # noqa: E402
+from scipy.spatial.transform import Rotation  # noqa: E402
+
+from benchmarks.worlds.noise import Noise, dwell_noise  # noqa: E402
+
+Floats = NDArray[np.float64]
+SEEDS = {"development": 52_000_000, "judging": 96_000_000}
+RATE_HZ = 100.0
+GRAVITY = 9.80665
+FIRST_REST_S = 50.0
+
+NOISES = {
+    "white 280": Noise(white=280.0, flicker=0.0),
+    "white 280, B 30": Noise(white=280.0, flicker=30.0),
+    "white 25, B 30": Noise(white=25.0, flicker=30.0),
+    "white 25, B 30, K 4": Noise(white=25.0, flicker=30.0, walk=4.0),
+    "white 100, axes 1:2:3": Noise(white=100.0, flicker=10.0, axis_factors=(1.0, 2.0, 3.0)),
+}
+POSITIONS = (30, 40, 60, 100, 160, 24, 18, 12, 6)
+
+
+@dataclass(frozen=True)
+class Recording:
+    """One recording to be made.
+
+    positions : dwells; noise : name in NOISES; long_first : whether a long rest begins it; cubic, warm_up : sizes of a hidden
+    cubic term (µg/g³ on z) and of a drift after switching on (µg, x); bad : how many dwells are off by bad_ug
+    sensor : seed of the sensor itself, so that another seed is another recording of it; its own for every recording where None
+    """
+
+    positions: int = 40
+    noise: str = "white 280"
+    long_first: bool = True
+    cubic: float = 0.0
+    warm_up: float = 0.0
+    warm_up_s: float = 250.0
+    bad: int = 0
+    bad_ug: float = 0.0
+    unit: str = "HAND-1"
+    sensor: int | None = None
+
+
+@dataclass(frozen=True)
+class Made:
+    """The dwells in the exchange format, and the truth behind them."""
+
+    dwells: pd.DataFrame
+    spoilt: tuple[int, ...]
+    bias: Floats
+    response: Floats
+
+
+def make(what: Recording, seed: int) -> Made:
+    """One recording: turned by hand, in raw counts, 100 Hz."""
+    rng = np.random.default_rng(seed)
+    n = what.positions
+    length = np.round(np.exp(rng.uniform(np.log(2.0), np.log(60.0), n)), 1)
+    if what.long_first:
+        length[0] = FIRST_REST_S
+    start = np.concatenate([[0.0], np.cumsum(length + rng.uniform(1.0, 5.0, n))[:-1]])
+    force = _placed(n, rng)
+    own = rng if what.sensor is None else np.random.default_rng(what.sensor)
+    bias = 32768.0 + own.uniform(-300.0, 300.0, 3)
+    response = 4080.0 * (np.diag(1.0 + own.uniform(-0.01, 0.01, 3)) + 0.004 * own.standard_normal((3, 3)))
+    error = dwell_noise(NOISES[what.noise], start, length, 1, rng)[0]
+    middle = start + 0.5 * length
+    error[:, 2] += what.cubic * force[:, 2] ** 3
+    error[:, 0] += what.warm_up * np.exp(-middle / what.warm_up_s)
+    spoilt = tuple(sorted(rng.choice(np.arange(1, n), what.bad, replace=False).tolist())) if what.bad else ()
+    for dwell in spoilt:
+        error[dwell] += what.bad_ug * _direction(force[dwell], rng)
+    output = bias + (force + 1e-6 * error) @ response.T
+    samples = np.round(RATE_HZ * length)
+    white = NOISES[what.noise].white * np.array(NOISES[what.noise].axis_factors)
+    sd = 4080.0 * 1e-6 * white * np.sqrt(RATE_HZ / 2.0)
+    sd = sd * np.sqrt(rng.chisquare(samples - 1.0, (3, n)).T / (samples - 1.0)[:, None])
+    frame = pd.DataFrame(
+        {"unit": what.unit, "dwell": np.arange(n), "time_s": middle, "duration_s": length, "n": samples}
+    )
+    for k, axis in enumerate("xyz"):
+        frame[f"out_{axis}"], frame[f"sd_{axis}"] = output[:, k], sd[:, k]
+    return Made(frame.assign(out_unit="LSB"), spoilt, bias, response)
+
+
+def _placed(n: int, rng: np.random.Generator) -> Floats:
+    """Directions of the force, (n, 3): faces put down by hand, and anything in between."""
+    faces = np.concatenate([np.eye(3), -np.eye(3)])
+    about = np.concatenate([faces[rng.permutation(6)] for _ in range(n // 6 + 1)])[:n]
+    tilt = np.where(rng.random(n) < 0.5, 0.15, 1.2)
+    return Rotation.from_rotvec(tilt[:, None] * rng.standard_normal((n, 3))).apply(about)
+
+
+def _direction(force: Floats, rng: np.random.Generator) -> Floats:
+    """Where a spoilt dwell is off: mostly along the force, as only that shows in the norm."""
+    way = force * rng.choice([-1.0, 1.0]) + 0.5 * rng.standard_normal(3)
+    return way / np.linalg.norm(way)
+
+
+def samples_of(what: Recording, seed: int) -> pd.DataFrame:
+    """The same as a record of samples at 100 Hz, moved by hand between the rests: time_s, x, y, z."""
+    made = make(what, seed)
+    rng = np.random.default_rng(seed + 1)
+    d = made.dwells
+    means, sd = d[["out_x", "out_y", "out_z"]].to_numpy(), d[["sd_x", "sd_y", "sd_z"]].to_numpy()
+    first, last = (d["time_s"] - 0.5 * d["duration_s"]).to_numpy(), (d["time_s"] + 0.5 * d["duration_s"]).to_numpy()
+    time_s = np.arange(0.0, last[-1], 1.0 / RATE_HZ)
+    place = np.clip(np.searchsorted(first, time_s, side="right") - 1, 0, len(d) - 1)
+    rows = means[place] + sd[place] * rng.standard_normal((len(time_s), 3))
+    moving = time_s > last[place]
+    rows[moving] += 400.0 * rng.standard_normal((int(moving.sum()), 3))
+    return pd.DataFrame({"time_s": time_s, "x": rows[:, 0], "y": rows[:, 1], "z": rows[:, 2]})
+
+
+def nulls(runs: int) -> list[Recording]:
+    """Recordings with nothing hidden: every number of positions with every noise in turn."""
+    names = list(NOISES)
+    return [Recording(POSITIONS[k % len(POSITIONS)], names[k % len(names)], long_first=k % 3 != 2) for k in range(runs)]
+
+
+def bad(runs: int) -> list[Recording]:
+    """24 positions, one or two of them off by 5 mg: a hand on the table, a unit that had not settled."""
+    names = list(NOISES)
+    return [Recording(24, names[k % 3], bad=1 + k % 2, bad_ug=5000.0) for k in range(runs)]
+
+
+def hidden(runs: int) -> list[Recording]:
+    """40-100 positions with a cubic term of 1 mg/g³, or a drift of 2 mg after switching on."""
+    found = [Recording((40, 60, 100)[k % 3], "white 280, B 30") for k in range(runs)]
+    return [replace(one, cubic=1000.0) if k % 2 else replace(one, warm_up=2000.0) for k, one in enumerate(found)]
+
+
+def interval(hits: int, runs: int) -> str:
+    """A rate with its Clopper-Pearson interval."""
+    low = float(stats.beta.ppf(0.025, hits, runs - hits + 1)) if hits else 0.0
+    high = float(stats.beta.ppf(0.975, hits + 1, runs - hits)) if hits < runs else 1.0
+    return f"{hits}/{runs} [{low:.3f}, {high:.3f}]"
+
+
+def judged(what: Recording, seed: int) -> dict[str, object]:
+    """What the diagnosis says of one recording."""
+    from pipelines.diagnosis.diagnose import diagnose
+    from schemas.errors import DataRejected
+
+    made = make(what, seed)
+    begin = time.process_time()
+    try:
+        document = diagnose(made.dwells)
+    except DataRejected:
+        return {
+            "adequate": None,
+            "physics": [],
+            "unexplained": False,
+            "named": set(),
+            "spoilt": set(made.spoilt),
+            "seconds": 0.0,
+            "p": None,
+        }
+    said = [(g["effects"], set(g.get("dwells") or ())) for g in document["classes"]]
+    physics = [effects for effects, _ in said if effects != ["bad_dwell"]]
+    named = set().union(*(dwells for effects, dwells in said if effects == ["bad_dwell"]), set())
+    return {
+        "adequate": document["adequate"],
+        "physics": physics,
+        "unexplained": document["unexplained"] is not None,
+        "named": named,
+        "spoilt": set(made.spoilt),
+        "seconds": time.process_time() - begin,
+        "p": document["error"]["p_value"],
+    }
+
+
+def main() -> None:
+    """Print the figures."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("sets", nargs="*", default=["nulls", "bad", "hidden"])
+    parser.add_argument("--runs", type=int, default=40)
+    parser.add_argument("--first", type=int, default=0, help="number of the first seed")
+    parser.add_argument("--seeds", choices=list(SEEDS), default="judging")
+    parser.add_argument("--verbose", action="store_true")
+    given = parser.parse_args()
+    warnings.simplefilter("ignore")
+    for name in given.sets:
+        kinds = {"nulls": nulls, "bad": bad, "hidden": hidden}[name](given.first + given.runs)[given.first :]
+        first = SEEDS[given.seeds] + 1000 * ["nulls", "bad", "hidden"].index(name) + given.first
+        rows = [(kind, judged(kind, first + k)) for k, kind in enumerate(kinds)]
+        print(f"{name}: {len(rows)} recordings, {sum(float(str(r['seconds'])) for _, r in rows):.0f} s of computing")
+        _print(name, rows)
+        if given.verbose:
+            for k, (kind, row) in enumerate(rows):
+                print(f"  {k:3d} {kind.positions:4d} {kind.noise:24s} {row}")
+
+
+def _print(name: str, rows: list[tuple[Recording, dict[str, object]]]) -> None:
+    verdicts = Counter(str(row["adequate"]) for _, row in rows)
+    able = len(rows) - verdicts["None"]
+    print(
+        f"  not judged {interval(verdicts['None'], len(rows))}; of the others not adequate {interval(verdicts['False'], able)}"
+    )
+    if name == "nulls":
+        print(f"  an effect named {interval(sum(bool(r['physics'] or r['unexplained']) for _, r in rows), len(rows))}")
+        print(f"  a dwell called bad {interval(sum(bool(r['named']) for _, r in rows), len(rows))}")
+    if name == "bad":
+        spoilt = sum(len(r["spoilt"]) for _, r in rows)  # type: ignore[arg-type]
+        hits = sum(len(r["spoilt"] & r["named"]) for _, r in rows)  # type: ignore[operator]
+        others = sum(len(r["named"] - r["spoilt"]) for _, r in rows)  # type: ignore[operator]
+        print(f"  spoilt dwells named {interval(hits, spoilt)}, other dwells named {others}")
+        print(f"  an effect named {interval(sum(bool(r['physics']) for _, r in rows), len(rows))}")
+    if name == "hidden":
+        own = [("third_order", "cubic") if kind.cubic else ("warm_up", "warm") for kind, _ in rows]
+        right = sum(any(o[0] in effects for effects in r["physics"]) for o, (_, r) in zip(own, rows, strict=True))  # type: ignore[union-attr]
+        print(f"  the hidden effect is in a class {interval(right, len(rows))}")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,197 @@
+"""What a verdict rests on: degrees of freedom, condition, single dwells, and the smallest effect that would have been seen."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import optimize, stats
+
+from inertial import effects as catalogue
+from inertial.criticism.field import Candidates
+from inertial.criticism.model import Model, Term
+from inertial.criticism.space import SEEN
+
+Array = NDArray[np.float64]
+
+FEWEST_DOF = 15
+"""Degrees of freedom from which on a verdict is given where the noise is known from the residuals alone.
+
+Below, a cubic term of 1 mg is missed in half of the runs, and "adequate" would say nothing.
+"""
+
+FEW_DOF = 60
+"""Degrees of freedom below which "adequate" states the smallest cubic term that would have been seen."""
+
+GROSS = 0.02
+"""Residual, g rms, that no noise of a usable sensor makes: the model is wrong however few the dwells are."""
+
+SMOOTH = 1e4
+"""Variance of a random walk over the record, over the white variance, from which dwells without recorded noise are a movement.
+
+A walk of 8 µg/√s over an hour beside 10 µg of white noise has 2300."""
+
+POWER = 0.5
+"""Probability with which the smallest cubic term would have been seen."""
+
+_LEVEL = 0.05
+_LARGEST = 1.0  # g/g³
+
+
+@dataclass(frozen=True)
+class Evidence:
+    """What a verdict rests on.
+
+    dof : degrees of freedom of the residuals; condition : of the scaled columns of the worst block
+    bias_spread : jackknife standard deviation of the bias, worst axis, g; bias_change : its largest change by one dwell, g
+    carrier : unit and dwell of that change; largest : studentised residual of the dwell that is farthest off, and where
+    cubic : smallest cubic coefficient that would have been seen with a probability of one half, g/g³; None where none would
+    """
+
+    dof: int
+    condition: float
+    bias_spread: float | None
+    bias_change: float | None
+    carrier: tuple[int, int] | None
+    largest: tuple[float, int, int] | None
+    cubic: float | None
+
+
+def evidence(model: Model, field: Candidates) -> Evidence:
+    """The evidence behind the verdict on a model."""
+    space = model.space
+    spread, change, carrier = _by_dwell(model)
+    return Evidence(
+        dof=space.dof,
+        condition=condition(model),
+        bias_spread=spread,
+        bias_change=change,
+        carrier=carrier,
+        largest=_largest(model),
+        cubic=_cubic(model, field),
+    )
+
+
+def not_judged(model: Model, rms: float) -> str:
+    """Why a verdict cannot be given; empty where it can."""
+    space = model.space
+    if rms > GROSS:
+        return ""
+    if not np.isfinite(space.rss) or not np.isfinite(rms):
+        return "the residuals are no numbers: the orientations leave the model undetermined; add poses in between"
+    if _is_movement(model):
+        return (
+            "what the model leaves goes on smoothly from dwell to dwell, as in samples of a movement, which are no dwells; "
+            "import the samples so that stretches at rest are found, or give each dwell with sd_x, sd_y, sd_z and n"
+        )
+    if space.dof < FEWEST_DOF:
+        count = model.problem.count
+        return (
+            f"{count} measurements and {count - space.dof} coefficients leave {space.dof} degrees of freedom, "
+            f"{FEWEST_DOF} are needed; measure {FEWEST_DOF - space.dof} more dwells, or judge a smaller model"
+        )
+    return ""
+
+
+def _is_movement(model: Model) -> bool:
+    """Whether dwells without recorded noise go on so smoothly that they are samples of a movement."""
+    lot = model.problem.lot
+    return lot.radial and not lot.recorded and model.noise.shares.walk >= SMOOTH
+
+
+def condition(model: Model) -> float:
+    """Largest singular value of the whitened columns of unit length over the smallest that the plan determines; worst block."""
+    local = model.space.local
+    if local.shape[-1] == 0:
+        return 1.0
+    size = np.sqrt(np.einsum("bnp,bnp->bp", local, local))
+    unit = local / np.where(size > 0.0, size, 1.0)[:, None, :]
+    values = np.linalg.svd(unit, compute_uv=False)
+    seen = np.where(values > 1e-4 * values[:, :1], values, np.inf)
+    return float(np.max(values[:, 0] / seen.min(axis=1)))
+
+
+def _by_dwell(model: Model) -> tuple[float | None, float | None, tuple[int, int] | None]:
+    """Jackknife of the bias, its largest change by leaving out one dwell, and which unit and dwell that is."""
+    columns = _bias_columns(model)
+    if not columns:
+        return None, None, None
+    space, axes = model.space, 1 if model.problem.lot.radial else 3
+    worst: tuple[float, float, tuple[int, int]] = (0.0, 0.0, (0, 0))
+    for block in range(space.local.shape[0]):
+        white, off, _ = _deleted(model, block)
+        local = space.local[block]
+        size = np.linalg.norm(local, axis=0)
+        size = np.where(size > 0.0, size, 1.0)
+        gain = (np.linalg.pinv(local / size, rcond=1e-5) / size[:, None]) @ white
+        moved = gain[columns] * off
+        count = max(int(np.count_nonzero(off)), 2)
+        spread = float(np.sqrt((count - 1.0) / count * np.sum(moved**2, axis=1)).max())
+        each = np.abs(moved).max(axis=0)
+        if spread > worst[0]:
+            worst = (spread, float(each.max()), (block // axes, int(np.argmax(each))))
+    return worst
+
+
+def _deleted(model: Model, block: int) -> tuple[Array, Array, Array]:
+    """Of one block: the whitener (n, n), how far each dwell is off when it is deleted (n,), g, and that over its error (n,).
+
+    With P = V⁻¹ − V⁻¹H(HᵀV⁻¹H)⁻¹HᵀV⁻¹ a dwell is off by (Py)_i/P_ii, with variance 1/P_ii.
+    """
+    space = model.space
+    eye = np.eye(space.local.shape[1])[None]
+    white = space.covariance.whiten(eye, space.noise.shares, np.array([block])) / space.noise.scale[block]
+    roots = space.project(white, np.array([block]))[0]
+    size = np.sum(roots**2, axis=0)
+    known = space.covariance.there[block] & (size > 1e-9 * size.max())
+    left = roots.T @ space.residual[block]
+    off = np.where(known, left / np.where(known, size, 1.0), 0.0)
+    return white[0], off, np.where(known, left / np.sqrt(np.where(known, size, 1.0)), 0.0)
+
+
+def _bias_columns(model: Model) -> list[int]:
+    """Places of the bias among the columns with coefficients by block."""
+    at = 0
+    for term in (t for t in model.terms if not t.shared):
+        width = model.problem.columns(term.effect, term.keywords)[..., : term.first].shape[-1]
+        if term.effect.id == "bias":
+            return list(range(at, at + width))
+        at += width
+    return []
+
+
+def _largest(model: Model) -> tuple[float, int, int] | None:
+    """The dwell that is farthest off its prediction by all others: externally studentised residual, unit, dwell."""
+    space, axes = model.space, 1 if model.problem.lot.radial else 3
+    blocks = space.local.shape[0]
+    each = np.stack([_deleted(model, block)[2] for block in range(blocks)])
+    squares = (each**2).reshape(blocks // axes, axes, -1).sum(axis=1)
+    unit, dwell = np.unravel_index(int(np.argmax(squares)), squares.shape)
+    rest = space.dof - axes
+    if rest < 1:
+        return None
+    variance = max(space.rss - float(squares[unit, dwell]), 1e-300) / rest
+    return float(np.sqrt(squares[unit, dwell] / axes / variance)), int(unit), int(dwell)
+
+
+def _cubic(model: Model, field: Candidates) -> float | None:
+    """Smallest cubic coefficient that would have been seen, g/g³, by the non-central F distribution over all looks."""
+    if any(t.effect.id == "third_order" for t in model.terms):
+        return None
+    effect = catalogue.get("third_order")
+    space, term = model.space, Term(effect)
+    columns = model.problem.candidate(effect, [dict(term.values)]).columns[:, :, 0, :]
+    after = space.project(space.whiten(columns))
+    rank = int(space.gain(term.candidate(model.problem)).rank[0])
+    left = space.dof - rank
+    if rank == 0 or left < 2:
+        return None
+    power = np.einsum("bnp,bnp->p", after, after) / max(space.variance, 1e-300)
+    power = power[power > SEEN**2]
+    limit = float(stats.f.isf(_LEVEL / max(len(field.effects), 1), rank, left))
+
+    def excess(size: float) -> float:
+        return float(stats.ncf.sf(limit, rank, left, size**2 * float(power.min()))) - POWER
+
+    if not power.size or excess(_LARGEST) <= 0.0:
+        return None
+    return float(optimize.brentq(excess, 1e-9, _LARGEST))  # pyright: ignore[reportArgumentType]

@@ -1,0 +1,270 @@
+"""A model of any of the sensor's effects fitted to dwells of unknown orientation, by the norm of gravity alone.
+
+The force of each dwell is the one that explains its output, f = M⁻¹(a), and the residual |f| − g. A rotation in front
+changes no norm, so x stays along the sensor's own x axis: the matrix K is upper triangular. Gauss–Newton with
+dρ/dc = −(uᵀK⁻¹)ᵢ·column for a coefficient c of axis i and the direction u of the force.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from inertial import design
+from inertial.correction import correct
+from inertial.design import Values
+from inertial.errors import NotIdentified
+from inertial.fits.linear import LotFit, response_matrix
+from inertial.fits.wander import student
+from inertial.state import State
+
+Array = NDArray[np.float64]
+
+_STEPS, _HALVINGS = 40, 12
+_SETTLED = 1e-10  # share of the cost that a step no longer takes off
+_SINGULAR = 1e-6  # smallest singular value of the whitened columns of unit length, over the largest
+_STEP = 1e-3  # relative, for the derivative by a nonlinear parameter
+
+
+@dataclass(frozen=True)
+class NormFit:
+    """A fit under the norm condition.
+
+    fit : coefficients (units, 3, p), output unit; its ``residuals`` (units, n, 3) lie along the force
+    force : (units, n, 3), g, with the axes of the sensor; left : (units, n), |f| − g
+    nonlinear_error : standard errors of nonlinear parameters, the largest over the units
+    """
+
+    fit: LotFit
+    force: Array
+    left: Array
+    dof: NDArray[np.int64]
+    nonlinear_error: dict[str, dict[str, float]]
+
+
+def fit_norms(
+    effects: Sequence[str],
+    state: State,
+    output: Array,
+    whiten: Array,
+    start: tuple[Array, Array],
+    *,
+    norm: float = 1.0,
+    nonlinear: Values | None = None,
+) -> NormFit:
+    """Coefficients of a model from dwells of unknown orientation.
+
+    Parameters
+    ----------
+    effects : ids of the model, all of the sensor; bias and scale among them
+    output : (units, n, 3), output unit; state : of the dwells, its force is not read
+    whiten : (units, n, n), inverse root of the covariance of the norms up to a factor, or (units, n) where it is diagonal; zeros
+        leave dwells out
+    start : bias (units, 3) and response (units, 3, 3) to begin with
+    norm : gravity in g
+    nonlinear : values of nonlinear parameters and constants by effect id
+
+    Raises
+    ------
+    NotIdentified
+        The model has effects of the station or no scale, or the dwells leave a coefficient undetermined; it is named.
+    """
+    sensor, station = design.split(effects)
+    _refuse(effects, [e.id for e in station])
+    values = design.starting_values(sensor, replace(state, force=output, memory={}))
+    for name, given in (nonlinear or {}).items():
+        values[name] = {**values.get(name, {}), **given}
+    work = _Work(tuple(effects), state, output, whiten, norm, values)
+    theta = work.begun(*start)
+    cost = work.cost(theta)
+    for _ in range(_STEPS):
+        theta, lower = work.advanced(theta, cost)
+        settled = bool(np.all(cost - lower <= _SETTLED * (cost + 1e-300)))
+        cost = lower
+        if settled:
+            break
+    return work.finished(theta)
+
+
+def _refuse(effects: Sequence[str], station: Sequence[str]) -> None:
+    if station:
+        raise NotIdentified(
+            f"fit: {', '.join(station)} is an effect of the station, and without commanded poses only the norm of gravity is "
+            "known; leave it out"
+        )
+    if not {"bias", "scale"} <= set(effects):
+        raise NotIdentified("fit: the norm of gravity needs bias and scale in the model; add them")
+
+
+class _Work:
+    """The fit of a lot: residuals, derivatives and steps of all units."""
+
+    def __init__(
+        self, effects: tuple[str, ...], state: State, output: Array, whiten: Array, norm: float, values: dict
+    ) -> None:
+        self.effects, self.state, self.output, self.whiten, self.norm = effects, state, output, whiten, norm
+        self.values = values
+        self.sensor = design.split(effects)[0]
+        self.names = tuple(design.local_names(self.sensor, axis, values) for axis in range(3))
+        self.free = np.array([[_is_free(axis, pair) for pair in self.names[axis]] for axis in range(3)])
+
+    def begun(self, bias: Array, response: Array) -> Array:
+        """Coefficients (units, 3, p) of the start: everything but bias and response is zero."""
+        theta = np.zeros((len(self.output), *self.free.shape))
+        for axis in range(3):
+            across = iter(((axis + 1) % 3, (axis + 2) % 3))
+            for column, (effect, _) in enumerate(self.names[axis]):
+                if effect == "bias":
+                    theta[:, axis, column] = bias[:, axis]
+                elif effect == "scale":
+                    theta[:, axis, column] = response[:, axis, axis]
+                elif effect == "misalignment":
+                    theta[:, axis, column] = response[:, axis, next(across)]
+        return np.where(self.free, theta, 0.0)
+
+    def force(self, theta: Array) -> Array:
+        """Force (units, n, 3), g, that explains the output."""
+        return correct(self.effects, self.state, self.output, theta, self.values)
+
+    def left(self, theta: Array) -> Array:
+        """|f| − g, (units, n)."""
+        return np.linalg.norm(self.force(theta), axis=-1) - self.norm
+
+    def white(self, columns: Array) -> Array:
+        """Columns (units, n, m) with white noise of one variance in them."""
+        return columns * self.whiten[..., None] if self.whiten.ndim == 2 else self.whiten @ columns
+
+    def cost(self, theta: Array) -> Array:
+        """Whitened sum of squares, (units,)."""
+        found = np.sum(self.white(self.left(theta)[..., None]) ** 2, axis=(-2, -1))
+        return np.where(np.isfinite(found), found, np.inf)
+
+    def rows(self, theta: Array) -> tuple[Array, Array]:
+        """Derivatives of the residuals by the free coefficients, (units, n, k), and by the nonlinear parameters."""
+        force = self.force(theta)
+        state = self._at(theta, force)
+        columns = design.local_columns(self.sensor, state, self.values)
+        columns = np.broadcast_to(columns, (len(self.output), *columns.shape[-3:]))
+        direction = force / np.linalg.norm(force, axis=-1, keepdims=True)
+        along = np.einsum("uni,uij->unj", direction, np.linalg.inv(response_matrix(theta, self.names)))
+        by_axis = -np.einsum("unj,ujnp->unjp", along, columns)
+        slopes = [self._slope(theta, state, along, *one) for one in self.parameters()]
+        return by_axis[:, :, self.free], np.stack(slopes, axis=-1) if slopes else np.zeros((*force.shape[:2], 0))
+
+    def parameters(self) -> list[tuple[str, str]]:
+        """Effect and name of the continuous nonlinear parameters with one value for all axes."""
+        return [
+            (effect.id, p.name)
+            for effect in self.sensor
+            for p in effect.parameters(self.state)
+            if not p.choices and isinstance(self.values.get(effect.id, {}).get(p.name), float)
+        ]
+
+    def _slope(self, theta: Array, state: State, along: Array, effect: str, name: str) -> Array:
+        middle = self.values[effect][name]
+        step = _STEP * max(abs(middle), 1e-6)
+        ends = []
+        for sign in (1.0, -1.0):
+            moved = {**self.values, effect: {**self.values[effect], name: middle + sign * step}}
+            columns = design.local_columns(self.sensor, replace(state, memory={}), moved)
+            ends.append(np.einsum("...jnp,...jp->...nj", columns, theta))
+        return -np.sum(along * (ends[0] - ends[1]) / (2.0 * step), axis=-1)
+
+    def _at(self, theta: Array, force: Array) -> State:
+        """The dwells with their force, also along the sensor's own axes."""
+        response = response_matrix(theta, self.names)
+        scale = np.diagonal(response, axis1=-2, axis2=-1)[..., None]
+        felt = np.einsum("uij,unj->uni", response / np.where(scale == 0.0, 1.0, scale), force)
+        return replace(self.state, force=force, felt=felt, memory={})
+
+    def advanced(self, theta: Array, cost: Array) -> tuple[Array, Array]:
+        """Coefficients and costs after a step that is halved for each unit until it does not harm."""
+        rows, _ = self.rows(theta)
+        white, left = self.white(rows), self.white(self.left(theta)[..., None])[..., 0]
+        step = np.zeros_like(theta)
+        for unit, (own, wanted) in enumerate(zip(white, left, strict=True)):
+            unscaled = self._solved(own, wanted)
+            step[unit][self.free] = -unscaled
+        length = np.ones((len(theta), 1, 1))
+        for _ in range(_HALVINGS):
+            trial = theta + length * step
+            lower = self.cost(trial)
+            worse = ~(lower <= cost)
+            if not worse.any():
+                return trial, lower
+            length[worse] *= 0.5
+        kept = (self.cost(theta + length * step) <= cost)[:, None, None]
+        trial = np.where(kept, theta + length * step, theta)
+        return trial, self.cost(trial)
+
+    def _solved(self, rows: Array, wanted: Array) -> Array:
+        """Least squares of one unit; refused where a direction of the coefficients does not show."""
+        size = np.linalg.norm(rows, axis=0)
+        unit = rows / np.where(size > 0.0, size, 1.0)
+        _, values, turn = np.linalg.svd(unit, full_matrices=False)
+        if np.any(size <= 0.0) or values.size < rows.shape[1] or values[-1] < _SINGULAR * values[0]:
+            share = np.where(size > 0.0, np.abs(turn[-1]), 2.0)
+            # of columns that stand for each other the one that was added last to the model
+            weak = np.argwhere(self.free)[share > 0.3 * share.max()]
+            axis, column = weak[int(np.argmax(weak[:, 1]))].tolist()
+            effect, name = self.names[axis][column]
+            raise NotIdentified(
+                f"fit: {name} of {effect} on axis {'xyz'[axis]} does not show in the norm of gravity over these dwells; leave "
+                f"{effect} out, or measure other orientations and conditions"
+            )
+        return np.linalg.lstsq(unit, wanted, rcond=None)[0] / size
+
+    def finished(self, theta: Array) -> NormFit:
+        """The fit with covariances, residuals and degrees of freedom."""
+        rows, more = self.rows(theta)
+        used = self.whiten != 0.0 if self.whiten.ndim == 2 else np.any(self.whiten != 0.0, axis=-1)
+        free, count = int(self.free.sum()), used.sum(axis=-1)
+        dof = count - free - more.shape[-1]
+        if np.any(dof < 1):
+            raise NotIdentified(
+                f"fit: {int(count.min())} dwells, more than {free + more.shape[-1]} are needed for this model; add poses, or "
+                "leave effects out"
+            )
+        left, force = self.left(theta), self.force(theta)
+        white_left = self.white(left[..., None])[..., 0]
+        whole_rows = self.white(np.concatenate([rows, more], axis=-1))
+        chi2 = np.sum(white_left**2, axis=-1)
+        covariance = np.zeros((*theta.shape, theta.shape[-1]))
+        nonlinear = np.zeros((len(theta), more.shape[-1]))
+        place = np.argwhere(self.free)
+        for unit in range(len(theta)):
+            own = whole_rows[unit]
+            size = np.linalg.norm(own, axis=0)
+            size = np.where(size > 0.0, size, 1.0)
+            inverse = np.linalg.pinv((own / size).T @ (own / size), rcond=1e-13) / np.outer(size, size)
+            whole = student(int(dof[unit])) ** 2 * chi2[unit] / dof[unit] * inverse
+            for axis in range(3):
+                mine = np.flatnonzero(place[:, 0] == axis)
+                covariance[unit, axis][np.ix_(place[mine, 1], place[mine, 1])] = whole[np.ix_(mine, mine)]
+            nonlinear[unit] = np.sqrt(np.maximum(np.diagonal(whole)[free:], 0.0))
+        errors: dict[str, dict[str, float]] = {}
+        for k, (effect, name) in enumerate(self.parameters()):
+            errors.setdefault(effect, {})[name] = float(nonlinear[:, k].max())
+        scale = np.abs(np.diagonal(response_matrix(theta, self.names), axis1=-2, axis2=-1))
+        direction = force / np.linalg.norm(force, axis=-1, keepdims=True)
+        fit = LotFit(
+            effects=self.effects,
+            coefficients=theta,
+            covariance=covariance,
+            names=self.names,
+            shared=np.zeros(0),
+            shared_covariance=np.zeros((0, 0)),
+            shared_names=(),
+            nonlinear=self.values,
+            residuals=left[..., None] * direction * scale[:, None, :],
+            chi2=np.repeat(chi2[:, None] / 3.0, 3, axis=1),
+            dof=np.repeat(dof[:, None], 3, axis=1),
+        )
+        return NormFit(fit, force, left, dof.astype(np.int64), errors)
+
+
+def _is_free(axis: int, pair: tuple[str, str]) -> bool:
+    """Whether a coefficient is fitted: those of K below the diagonal are a rotation, and zero."""
+    effect, name = pair
+    return effect not in {"misalignment", "misalignment_temperature"} or "xyz".index(name[2]) > axis

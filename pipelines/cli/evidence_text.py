@@ -1,0 +1,43 @@
+"""What a verdict rests on, for people."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from pipelines.cli.options import console, short
+
+
+def evidence_text(document: dict[str, Any]) -> str:
+    """What the verdict rests on, in a line; empty where nothing was judged."""
+    found = document.get("evidence")
+    if not found:
+        return ""
+    parts = [f"{found['degrees_of_freedom']} degrees of freedom"]
+    if found["condition"] is not None:
+        parts.append(f"condition {short(found['condition'])}")
+    if found["bias_jackknife_ug"] is not None and found["bias_change_by"] is not None:
+        by = found["bias_change_by"]
+        parts.append(
+            f"bias ± {short(found['bias_jackknife_ug'])} µg by leaving out single dwells (most by dwell {by['dwell']} "
+            f"of {by['unit']}: {short(found['bias_change_ug'])} µg)"
+        )
+    return "; ".join(parts)
+
+
+def print_evidence(document: dict[str, Any]) -> None:
+    """What the verdict rests on, and the smallest effect that would have been seen where the dwells are few."""
+    from inertial.criticism.evidence import FEW_DOF
+
+    found, out = document.get("evidence"), console()
+    if not found:
+        return
+    out.print(evidence_text(document), style="dim", markup=False, soft_wrap=True)
+    if document["adequate"] and found["degrees_of_freedom"] < FEW_DOF:
+        smallest = found["smallest_cubic_ug"]
+        seen = f"below {short(smallest)} µg/g³" if smallest is not None else "of any size"
+        out.print(
+            f"few dwells: a cubic term {seen} would not have been seen (probability 0.5)",
+            style="dim",
+            markup=False,
+            soft_wrap=True,
+        )

@@ -1,0 +1,101 @@
+"""``tumbleline fit`` of an import: a model fitted to its dwells, with the verdict and what the verdict rests on."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from pipelines.cli.options import console, error_console, print_json
+from schemas.errors import DONE, PART_FAILED
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from pipelines.archive import Run
+
+VERDICTS = {
+    True: ("adequate", "bold green"),
+    False: ("NOT ADEQUATE: this model does not describe these data", "bold red"),
+    None: ("CANNOT BE JUDGED: see above", "bold yellow"),
+}
+
+
+def fit_import(run: Run, change: tuple[str, Path | None, str], leave_out: str, *, as_json: bool) -> int:
+    """Fit a model to an import, keep it as a run of its own and print it; the exit status.
+
+    Parameters
+    ----------
+    change : effects, model file and limits as they were given; empty or None where not
+    leave_out : dwells as UNIT:DWELL,…
+    """
+    from pipelines.archive import Archive
+    from pipelines.jobs.model_change import wanted
+    from pipelines.rerun.rerun import again
+    from pipelines.tables.leave_out import named_dwells
+
+    effects, model, limits = change
+    with error_console().status("fitting and judging"):
+        outcome = again(
+            Archive(run.archive.root),
+            run.id,
+            wanted(effects, model, limits, where="fit"),
+            left_out=named_dwells(leave_out),
+        )
+        done = Archive(run.archive.root).run(outcome.new)
+        document = fit_document(done, run.id)
+    if as_json:
+        print_json(document)
+    else:
+        _print(document)
+    passed = all(unit["outcome"] == "pass" for unit in document["units"])
+    return DONE if document["adequate"] is True and passed else PART_FAILED
+
+
+def fit_document(done: Run, source: str) -> dict[str, Any]:
+    """What is known of the fit of an import: verdict, evidence, and decisions where there are limits."""
+    from pipelines.diagnosis.imported_norms import fitted
+    from pipelines.rerun.steps import gravity_of_import, has_poses
+    from pipelines.tables.frames import rows_of
+
+    dwells = done.table("dwells")
+    past = done.table("history") if "history" in done.tables() else None
+    effects = list(done.about["recipe"]["effects"])
+    if has_poses(dwells):
+        told = _known_poses(dwells, past, effects)
+    else:
+        answer = fitted(dwells, past, effects, gravity_of_import(done.about), str(dwells["out_unit"].iloc[0]))
+        told = {**answer.document, "lines": list(answer.lines)}
+    grades = rows_of(done.table("grades")) if "grades" in done.tables() else []
+    keys = ("adequate", "reason", "error", "evidence", "leave_out", "missing", "lines")
+    return {
+        "run": done.id,
+        "fit_of": source,
+        "effects": effects,
+        "left_out": list(done.about.get("left_out", [])),
+        "units": [{key: row[key] for key in ("unit", "outcome", "grade", "reasons")} for row in grades],
+        **{key: told[key] for key in keys},
+    }
+
+
+def _known_poses(dwells: Any, past: Any, effects: list[str]) -> dict[str, Any]:
+    """The verdict on a fit with commanded poses, and in lines what it rests on."""
+    from pipelines.cli.diagnosis_text import verdict
+    from pipelines.cli.evidence_text import evidence_text
+    from pipelines.diagnosis.diagnose import diagnose
+
+    document = diagnose(dwells, past, effects)
+    document["units"] = list(dict.fromkeys(dwells["unit"].astype(str)))
+    missing = [group["effects"] for group in document["classes"] if group["scope"] != "data"]
+    return {**document, "missing": missing, "lines": [verdict(document), *filter(None, [evidence_text(document)])]}
+
+
+def _print(document: dict[str, Any]) -> None:
+    out = console()
+    left = f", without {', '.join(document['left_out'])}" if document["left_out"] else ""
+    out.print(f"{', '.join(document['effects'])}{left}: kept as run {document['run']}", markup=False, soft_wrap=True)
+    for line in document["lines"]:
+        out.print(f"  {line}", markup=False, soft_wrap=True)
+    for unit in document["units"]:
+        reasons = f" ({unit['reasons']})" if unit["reasons"] else ""
+        out.print(f"  {unit['unit']}: {unit['outcome']}, grade {unit['grade']}{reasons}", markup=False, soft_wrap=True)
+    text, style = VERDICTS[document["adequate"]]
+    out.print(f"  {text}", style=style)

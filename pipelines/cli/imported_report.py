@@ -1,0 +1,46 @@
+"""The report of an import that was fitted: its coefficients, its verdict with pictures, and what the verdict rests on."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from schemas.errors import WrongUse
+
+if TYPE_CHECKING:
+    from pipelines.archive import Run
+
+MODULES = ("pipelines.report.diagnosis", "pipelines.diagnosis.diagnose", "schemas.tables")
+
+
+def make_imported_report(run: Run) -> bool:
+    """Whether the report of an import was there already, made from its tables as they are; it is now.
+
+    Raises
+    ------
+    WrongUse
+        The run has no coefficients, or none of a model of the catalogue.
+    """
+    from pipelines.archive import code_hash, stage_key
+    from pipelines.cli.diagnose import diagnosed
+    from pipelines.jobs.model_files import use_formulas_of
+    from pipelines.tables.frames import rows_of
+
+    effects = list((run.about.get("recipe") or {}).get("effects", ()))
+    names = ("dwells", "coefficients")
+    if not effects or not set(names) <= set(run.tables()):
+        raise WrongUse(
+            f"report: run {run.id} was imported and not fitted, coefficients are needed; fit it with 'tumbleline fit {run.id} "
+            "--effects bias,scale,misalignment' and ask for the report of the run that this makes"
+        )
+    use_formulas_of(run)
+    past = run.table("history") if "history" in run.tables() else None
+    inputs, code = {name: run.manifest(name)["sha256"] for name in names}, code_hash(MODULES)
+    parameters = {"effects": effects}
+    key = stage_key("report", inputs, parameters, code)
+    if run.has_report(key):
+        run.seal()
+        return True
+    rows = rows_of(run.table("coefficients"))
+    _, page = diagnosed(run.table("dwells"), past, effects, f"run {run.id}", wanted=True, coefficients=rows)
+    run.save_report(key, page, {"inputs": inputs, "parameters": parameters, "code": code})
+    return False

@@ -1,0 +1,150 @@
+"""``tumbleline psd``: power spectral density of a file or a run, and the Allan deviation that follows from it."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from pipelines.cli.allan import write_pictures
+from pipelines.cli.options import (
+    ArchiveOption,
+    JsonOption,
+    PageOption,
+    PlotOption,
+    RateOption,
+    SeriesArgument,
+    SeriesColumnsOption,
+    SeriesUnitOption,
+    StretchOption,
+    TimeColumnOption,
+    TimeUnitOption,
+    console,
+    error_console,
+    print_json,
+    print_table,
+    short,
+)
+from schemas.errors import WrongUse
+
+if TYPE_CHECKING:
+    from pipelines.importers.series import EvenSeries
+
+PART = "Results"
+ORDER = 375
+SUMMARY = "Compute the power spectral density of a record, and the Allan deviation from it."
+
+SHORTEST_SEGMENT = 64
+SHORTEST_TAU = 8
+"""Samples of the shortest averaging time from the spectrum: what lies above half the sampling rate is missing in it."""
+
+LONGEST_TAU = 8
+"""Parts of a segment that the longest averaging time from the spectrum is: slower is not resolved."""
+
+
+def command(
+    source: SeriesArgument,
+    columns: SeriesColumnsOption = "",
+    time: TimeColumnOption = "",
+    time_unit: TimeUnitOption = "s",
+    rate: RateOption = None,
+    unit: SeriesUnitOption = "",
+    segment: Annotated[
+        int | None,
+        typer.Option("--segment", metavar="N", help="Samples of a segment; an eighth of the record by default."),
+    ] = None,
+    stretch: StretchOption = None,
+    plot: PlotOption = None,
+    page: PageOption = None,
+    archive: ArchiveOption = None,
+    *,
+    as_json: JsonOption = False,
+) -> None:
+    """Compute the one-sided power spectral density by Welch's method, and σ(τ) from it beside that of the samples.
+
+    σ²(τ) = 2·∫ S(f)·sin⁴(πfτ)/(πfτ)² df (IEEE Std 952). Where the two differ, the record holds lines, jumps or a drift.
+    """
+    from pipelines.cli.series_options import even_series
+
+    found = even_series(source, columns, (time, time_unit, rate), unit, archive, stretch)
+    if found is None:
+        raise WrongUse(
+            f"psd: run {source} was captured, a file or an import is needed; export its samples, or see 'tumbleline allan'"
+        )
+    with error_console().status("averaging"):
+        document = psd_document(found, segment)
+    write_pictures(document, plot, page)
+    if as_json:
+        print_json(document)
+    else:
+        _print(document)
+
+
+def psd_document(series: EvenSeries, segment: int | None = None) -> dict[str, Any]:
+    """Spectra of every channel of a series, and σ(τ) from them and from the samples.
+
+    Raises
+    ------
+    DataRejected
+        The record is too short for a segment.
+    """
+    import numpy as np
+
+    from inertial.noise.allan import overlapping
+    from inertial.noise.psd import allan_variance, one_sided
+    from schemas.errors import DataRejected
+
+    n = series.values.shape[1]
+    length = n // 8 if segment is None else segment
+    if not SHORTEST_SEGMENT <= length <= n:
+        raise DataRejected(
+            f"{series.where}: segments of {length} samples in a record of {n}, {SHORTEST_SEGMENT} to {n} are possible; "
+            f"{'record longer' if segment is None else 'correct --segment'}"
+        )
+    spectrum = one_sided(series.values, series.rate_hz, segment=length)
+    m = SHORTEST_TAU * 2 ** np.arange(int(np.log2(max(length // LONGEST_TAU // SHORTEST_TAU, 1))) + 1)
+    m = m[2 * m <= n - 1]
+    direct = overlapping(series.values, series.rate_hz, m)
+    # the segment's mean is taken out: its zero frequency says nothing
+    density = spectrum.density.copy()
+    density[..., 0] = density[..., 1]
+    derived = np.sqrt(allan_variance(spectrum.frequency, density, direct.tau))
+    rows = [
+        {
+            "channel": name,
+            "density": spectrum.density[k].tolist(),
+            "median_amplitude": float(np.median(spectrum.amplitude[k, 1:])),
+            "tau_s": direct.tau.tolist(),
+            "deviation_from_density": derived[k].tolist(),
+            "deviation": direct.deviation[k].tolist(),
+        }
+        for k, name in enumerate(series.names)
+    ]
+    return {
+        "source": series.where,
+        "unit": series.unit,
+        "rate_hz": series.rate_hz,
+        "samples": n,
+        "segment": length,
+        "frequency_hz": spectrum.frequency.tolist(),
+        "spectra": rows,
+    }
+
+
+def _print(document: dict[str, Any]) -> None:
+    out = console()
+    out.print(
+        f"{document['source']}: {document['samples']} samples at {short(document['rate_hz'], 5)} Hz, segments of "
+        f"{document['segment']} samples, resolution {short(document['rate_hz'] / document['segment'])} Hz",
+        markup=False,
+        soft_wrap=True,
+    )
+    unit = document["unit"] or "unit"
+    lines = [[row["channel"], short(row["median_amplitude"], 4)] for row in document["spectra"]]
+    print_table(["channel", f"median noise density\n{unit}/√Hz, one-sided"], lines)
+    lines = [
+        [row["channel"], short(tau), short(derived, 4), short(direct, 4)]
+        for row in document["spectra"]
+        for tau, derived, direct in zip(row["tau_s"], row["deviation_from_density"], row["deviation"], strict=True)
+    ]
+    print_table(["channel", "τ\ns", f"σ from the density\n{unit}", f"σ of the samples\n{unit}"], lines)

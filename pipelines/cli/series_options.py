@@ -1,0 +1,47 @@
+"""The record that ``allan`` and ``psd`` are given: a file of samples, or a run of the archive."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from pipelines.cli.options import error_console
+from schemas.errors import WrongUse
+
+if TYPE_CHECKING:
+    from pipelines.importers.series import EvenSeries
+
+
+def even_series(
+    source: str,
+    columns: str,
+    clock: tuple[str, str, float | None],
+    unit: str,
+    archive: str | None,
+    stretch: int | None,
+) -> EvenSeries | None:
+    """The samples of a file or an import; None for a captured run, which has figures of its own.
+
+    Parameters
+    ----------
+    clock : column and unit of the time, and rate in Hz, as they were given
+
+    Raises
+    ------
+    WrongUse
+        An option of files was given for a run.
+    """
+    from pipelines.archive import Archive
+    from pipelines.importers.series import is_series_file, series_of_file, series_of_run
+
+    time, time_unit, rate = clock
+    if is_series_file(source):
+        named = [name.strip() for name in columns.split(",") if name.strip()]
+        with error_console().status(f"reading {Path(source).name}"):
+            return series_of_file(Path(source), named, time=time, time_unit=time_unit, rate_hz=rate, unit=unit)
+    if columns or time or rate is not None or unit:
+        raise WrongUse(
+            f"{source}: --columns, --time, --rate and --unit are for files, and there is no such file; correct one"
+        )
+    run = Archive(archive).run(source)
+    return None if run.about.get("capture") else series_of_run(run, stretch)

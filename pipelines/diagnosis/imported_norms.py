@@ -1,0 +1,194 @@
+"""A fit to dwells of unknown orientation with its verdict: the same fit, noise and verdict as ``fit`` and ``diagnose`` have."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from threadpoolctl import threadpool_limits
+
+from inertial.state import T_REFERENCE
+from pipelines.diagnosis.condense import MOST
+from pipelines.diagnosis.diagnose import default_model, diagnose
+from pipelines.importers.judged import FitAnswer, dwells_of, gravity_of
+from pipelines.stages.norm_fit import FittedNorms, bias_uncertainty, norm_tables, norms_fitted
+from schemas.errors import DataRejected
+from schemas.units import AXES, MICRO, STANDARD_GRAVITY_M_S2
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    import pandas as pd
+    from numpy.typing import NDArray
+
+    from pipelines.importers.mapping import Mapping
+    from pipelines.importers.record import Imported
+
+    Array = NDArray[np.float64]
+
+COVERAGE = 2.0
+TEMPERATURE = "bias_temperature"
+
+
+def norm(data: Imported, mapping: Mapping) -> FitAnswer:
+    """The answer of ``import --fit norm``: bias, scale and misalignment, with temperature terms where it moves by 5 °C."""
+    dwells = dwells_of(data)
+    effects = default_model(dwells)
+    answer = fitted(dwells, None, effects, gravity_of(mapping), str(data.out_unit))
+    tables = norm_tables(answer.fit, dwells)
+    rows = [{str(name): value for name, value in row.items()} for row in tables["coefficients"].to_dict("records")]
+    others = {name: tables[name] for name in ("covariance", "residuals", "predictions", "wander")}
+    return FitAnswer("norm", answer.adequate, answer.document, answer.lines, rows, tuple(effects), others)
+
+
+@dataclass(frozen=True)
+class NormAnswer:
+    """A fit under the norm condition: its verdict, its document for JSON, and lines for people."""
+
+    fit: FittedNorms
+    adequate: bool | None
+    document: dict[str, Any]
+    lines: tuple[str, ...]
+
+
+def fitted(
+    dwells: pd.DataFrame, history: pd.DataFrame | None, effects: Sequence[str], gravity: float, out_unit: str
+) -> NormAnswer:
+    """The fit of a model to dwells of unknown orientation and its verdict, of the first unit in words.
+
+    Parameters
+    ----------
+    gravity : where it was measured, g
+
+    Raises
+    ------
+    DataRejected
+        The dwells do not determine the model.
+    """
+    with threadpool_limits(1):
+        done = norms_fitted(dwells, history, effects, gravity)
+        smaller = _smaller(dwells, history, effects, gravity)
+    verdict = diagnose(dwells, history, list(effects))
+    document = _document(done, smaller, verdict)
+    return NormAnswer(done, verdict["adequate"], document, tuple(_lines(done, smaller, verdict, out_unit)))
+
+
+def _smaller(
+    dwells: pd.DataFrame, history: pd.DataFrame | None, effects: Sequence[str], gravity: float
+) -> FittedNorms | None:
+    """The same model with axes taken as square; None where it has no misalignment, or that is not determined."""
+    if "misalignment" not in effects:
+        return None
+    try:
+        left = [name for name in effects if name not in {"misalignment", "misalignment_temperature"}]
+        return norms_fitted(dwells, history, left, gravity)
+    except DataRejected:
+        return None
+
+
+def _bias(done: FittedNorms) -> Array:
+    """Bias of every unit, (units, 3), output unit."""
+    place = [[name for name, _ in names].index("bias") for names in done.fit.fit.names]
+    return np.stack([done.fit.fit.coefficients[:, axis, k] for axis, k in enumerate(place)], axis=1)
+
+
+def _document(done: FittedNorms, smaller: FittedNorms | None, verdict: dict[str, Any]) -> dict[str, Any]:
+    left = done.fit.left[done.found.readings.there] / done.gravity
+    spread = bias_uncertainty(done)
+    to_output = done.scale[0] / MICRO
+    difference = None if smaller is None else (_bias(done) - _bias(smaller))[0].tolist()
+    heat = [done.fit.fit.coefficients[0, axis, [n for n, _ in names].index(TEMPERATURE)] for axis, names in
+            enumerate(done.fit.fit.names)] if TEMPERATURE in done.fit.fit.effects else None  # fmt: skip
+    return {
+        "adequate": verdict["adequate"],
+        "reason": verdict["reason"],
+        "error": {
+            **verdict["error"],
+            "fit_rms_ug": MICRO * done.rms,
+            "mean_abs_ug": MICRO * float(np.mean(np.abs(left))),
+            "worst_ug": MICRO * float(np.max(np.abs(left))),
+            "six_parameters_rms_ug": None if smaller is None else MICRO * smaller.rms,
+            "dof": int(done.fit.dof[0]),
+            "coverage_factor": COVERAGE,
+        },
+        "evidence": verdict["evidence"],
+        "leave_out": verdict["leave_out"],
+        "missing": [group["effects"] for group in verdict["classes"] if group["scope"] != "data"],
+        "bias": _bias(done)[0].tolist(),
+        "bias_less_six_parameters": difference,
+        "bias_u_record": (spread["bias_record_u_ug"][0] * to_output).tolist(),
+        "bias_u_day": (spread["bias_long_u_ug"][0] * to_output).tolist(),
+        "response_per_g": done.fit.fit.response()[0].tolist(),
+        "scale_per_m_s2": (done.scale[0] / STANDARD_GRAVITY_M_S2).tolist(),
+        "temperature_offset_per_C": None if heat is None else [float(value) for value in heat],
+        "reference_C": None if heat is None else T_REFERENCE,
+    }
+
+
+def _lines(done: FittedNorms, smaller: FittedNorms | None, verdict: dict[str, Any], out_unit: str) -> list[str]:
+    """The fit and what its verdict rests on."""
+    error, evidence = verdict["error"], verdict["evidence"]
+    count = int(done.found.readings.there[0].sum())
+    free = count - int(done.fit.dof[0])
+    left = done.fit.left[done.found.readings.there] / done.gravity
+    worst = MICRO * float(np.max(np.abs(left)))
+    without = "" if smaller is None else f"; axes taken as square leave {MICRO * smaller.rms:.1f}"
+    lines = [
+        f"{free} parameters, {count} dwells: norm residual {MICRO * done.rms:.1f} µg rms, worst {worst:.1f} µg{without}",
+        _noise_line(error, count),
+    ]
+    if evidence is not None:
+        lines.append(_evidence_line(done, smaller, evidence, out_unit))
+    spread = bias_uncertainty(done)
+    units = range(len(done.found.units))
+    lines += [_axis_line(done, spread, (unit, k), out_unit) for unit in units for k in range(3)]
+    out = verdict["leave_out"]
+    if out is not None:
+        lines.append(_bad_line(out, verdict))
+    missing = [" or ".join(group["effects"]) for group in verdict["classes"] if group["scope"] != "data"]
+    if missing:
+        lines.append(f"missing: {', and '.join(missing)}")
+    if verdict["reason"] and out is None:
+        lines.append(f"cannot be judged: {verdict['reason']}")
+    return lines
+
+
+def _noise_line(error: dict[str, Any], count: int) -> str:
+    """Noise floor and probability; where a long record was judged by a part of its dwells, that part's residual too."""
+    white = "" if error.get("white_noise_ug") is None else f" (white noise alone {error['white_noise_ug']:.1f} µg)"
+    judged = f"; judged on {MOST} of the dwells, which leave {error['rms_ug']:.1f} µg" if count > MOST else ""
+    return f"noise floor between dwells {error['floor_ug']:.1f} µg{white}; p = {error['p_value']:.2g}{judged}"
+
+
+def _evidence_line(done: FittedNorms, smaller: FittedNorms | None, evidence: dict[str, Any], out_unit: str) -> str:
+    parts = [f"{evidence['degrees_of_freedom']} degrees of freedom"]
+    if evidence["condition"] is not None:
+        parts.append(f"condition {evidence['condition']:.2g}")
+    if evidence["bias_jackknife_ug"] is not None:
+        level = evidence["bias_jackknife_ug"] * float(np.mean(done.scale[0])) / MICRO
+        parts.append(f"bias ± {level:.2g} {out_unit} by leaving out single dwells")
+    if smaller is not None:
+        moved = float(np.max(np.abs((_bias(done) - _bias(smaller))[0])))
+        parts.append(f"bias differs by up to {moved:.2g} {out_unit} from the fit with square axes")
+    return "; ".join(parts)
+
+
+def _bad_line(out: dict[str, Any], verdict: dict[str, Any]) -> str:
+    names = ",".join(f"{d['unit']}:{d['dwell']}" for d in out["dwells"])
+    judged = {True: "adequate", False: "not adequate", None: "not to be judged"}[out["adequate_without"]]
+    why = f" ({verdict['reason']})" if verdict["reason"] else ""
+    left = f"the residual is {verdict['error']['rms_ug']:.1f} µg and the model is {judged}{why}"
+    return f"bad dwells: {names}; without them {left}; to leave them out: tumbleline fit RUN --leave-out {names}"
+
+
+def _axis_line(done: FittedNorms, spread: dict[str, Array], place: tuple[int, int], unit: str) -> str:
+    u, k = place
+    level = float(done.scale[u, k]) / MICRO
+    record, long = (COVERAGE * float(spread[name][u, k]) * level for name in ("bias_record_u_ug", "bias_long_u_ug"))
+    whose = f"{done.found.units[u]} " if len(done.found.units) > 1 else ""
+    later = f"± {long:.2g} over the next day" if np.isfinite(long) else "over the next day not known"
+    return (
+        f"{whose}{AXES[k]}: bias {_bias(done)[u, k]:.7g} ± {record:.2g} {unit} over the record ({later}; k = {COVERAGE:g}), "
+        f"scale {float(done.scale[u, k]) / STANDARD_GRAVITY_M_S2:.6g} {unit} per m/s²"
+    )

@@ -1,0 +1,148 @@
+"""A record of evenly spaced samples from a file or an import: what an Allan deviation or a spectrum is computed from."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pandas as pd
+
+from pipelines.importers import files
+from pipelines.importers.exchange import is_file
+from schemas.errors import DataRejected, WrongUse, did_you_mean
+from schemas.foreign import shown
+from schemas.units import AXES
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import NDArray
+
+    from pipelines.archive import Run
+
+    Array = NDArray[np.float64]
+
+UNEVEN = 0.5
+"""Part of a step by which a time may be off the even grid; beyond, a sample is missing or doubled."""
+
+TIME_UNITS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
+
+
+@dataclass(frozen=True)
+class EvenSeries:
+    """Evenly spaced samples.
+
+    names : of the channels; values : (channels, n), in ``unit``; where : the file or run, for messages
+    """
+
+    names: tuple[str, ...]
+    values: Array
+    rate_hz: float
+    unit: str
+    where: str
+
+
+def series_of_file(
+    path: Path,
+    columns: Sequence[str],
+    *,
+    time: str = "",
+    time_unit: str = "s",
+    rate_hz: float | None = None,
+    unit: str = "",
+) -> EvenSeries:
+    """The channels of a file of samples.
+
+    Parameters
+    ----------
+    columns : names, or numbers from 1 for a text file without a header; all columns of numbers but the time where none is given
+    time : column of the time, in ``time_unit``; rate_hz : Hz; one of the two is needed
+    unit : of the output, as it is to be printed
+
+    Raises
+    ------
+    WrongUse
+        Neither a time nor a rate, or both.
+    DataRejected
+        A column is not there or not of numbers, a value is not finite, or the samples are not evenly spaced.
+    """
+    if bool(time) == (rate_hz is not None):
+        raise WrongUse(f"{path.name}: one of --time COLUMN and --rate HZ is needed; give one of the two")
+    if time_unit not in TIME_UNITS:
+        raise WrongUse(f"--time-unit: found '{shown(time_unit)}', one of {', '.join(TIME_UNITS)} is needed; correct it")
+    table, _ = files.read(path)
+    table = table.set_axis([str(name) for name in table.columns], axis=1)
+    there = list(table.columns)
+    for name in (*columns, *([time] if time else [])):
+        if name not in there:
+            raise DataRejected(f"{path.name}: column '{shown(name)}' is not there; {did_you_mean(name, there)}")
+    chosen = list(columns) or [name for name in there if name != time and pd.api.types.is_numeric_dtype(table[name])]
+    if not chosen:
+        raise DataRejected(f"{path.name}: no column of numbers, one at least is needed; name one with --columns")
+    values = np.stack([_numbers(table[name], path.name) for name in chosen])
+    rate = (
+        rate_hz if rate_hz is not None else _rate(TIME_UNITS[time_unit] * _numbers(table[time], path.name), path.name)
+    )
+    return EvenSeries(tuple(chosen), values, float(rate), unit, path.name)
+
+
+def series_of_run(run: Run, record: int | None = None) -> EvenSeries:
+    """The longest stretch at rest of an import's samples, or the one of a number.
+
+    Raises
+    ------
+    WrongUse
+        The run has no samples of its own, or no such stretch.
+    """
+    if "samples" not in run.tables():
+        raise WrongUse(
+            f"run {run.id}: it has no samples, they are needed; name a file of samples, or a run with a static record"
+        )
+    samples = run.table("samples")
+    counts = samples.loc[samples["record"] > 0, "record"].value_counts()
+    if counts.empty or (record is not None and record not in counts.index):
+        known = ", ".join(map(str, sorted(counts.index)[:8])) or "none"
+        raise WrongUse(f"run {run.id}: no stretch at rest has the number {record}; there are {known}")
+    chosen = int(counts.index[0]) if record is None else record
+    own = samples[samples["record"] == chosen]
+    where = f"run {run.id}, stretch {chosen}"
+    rate = _rate(own["time_s"].to_numpy(dtype=np.float64), where)
+    unit = str(run.table("dwells")["out_unit"].iloc[0]) if "dwells" in run.tables() else ""
+    values = np.stack([own[axis].to_numpy(dtype=np.float64) for axis in AXES])
+    return EvenSeries(AXES, values, rate, unit, where)
+
+
+def is_series_file(source: str) -> bool:
+    """Whether a source names a file, and no run of the archive."""
+    return is_file(source) or Path(source).is_file()
+
+
+def _numbers(column: pd.Series, where: str) -> Array:
+    values = pd.to_numeric(column, errors="coerce").to_numpy(dtype=np.float64)
+    bad = np.flatnonzero(~np.isfinite(values))
+    if bad.size:
+        raise DataRejected(
+            f"{where}: row {bad[0] + 1}, column '{shown(str(column.name))}': found {shown(str(column.iloc[bad[0]]))}, a finite "
+            "number is needed; remove the gap, or cut the record there"
+        )
+    return values
+
+
+def _rate(time: Array, where: str) -> float:
+    """Rate of even times (n,), s; refused where samples are missing or doubled."""
+    if time.size < 2 or not time[-1] > time[0]:
+        raise DataRejected(
+            f"{where}: the time does not run forward, two samples at different times are needed; correct it"
+        )
+    step = float(np.median(np.diff(time)))
+    typical = (time[-1] - time[0]) / (time.size - 1)
+    off = np.flatnonzero(np.abs(np.diff(time) - step) > UNEVEN * step) if step > 0.0 else np.arange(1)
+    if off.size:
+        raise DataRejected(
+            f"{where}: after row {off[0] + 1} the time steps by {time[off[0] + 1] - time[off[0]]:.6g} s, {step:.6g} s is the "
+            f"step elsewhere ({off.size} such places), evenly spaced samples are needed; cut the record there, or give --rate "
+            "without --time if the times are only written late"
+        )
+    return 1.0 / float(typical)

@@ -1,0 +1,55 @@
+"""Dwells that a person leaves out: their names as they are given, and the table without them."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, TypeAlias
+
+import numpy as np
+
+from schemas.errors import DataRejected, WrongUse
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    import pandas as pd
+
+Dwells: TypeAlias = "tuple[tuple[str, int], ...]"
+"""Units and numbers of dwells."""
+
+
+def named_dwells(text: str) -> Dwells:
+    """The dwells of ``UNIT:DWELL,…``.
+
+    Raises
+    ------
+    WrongUse
+        A part is not of this form.
+    """
+    found: list[tuple[str, int]] = []
+    for part in filter(None, (piece.strip() for piece in text.split(","))):
+        unit, colon, dwell = part.rpartition(":")
+        if not (colon and unit and dwell.isdigit()):
+            raise WrongUse(f"--leave-out: found '{part[:60]}', UNIT:DWELL is needed, divided by commas; correct it")
+        found.append((unit, int(dwell)))
+    return tuple(dict.fromkeys(found))
+
+
+def leave_out(dwells: pd.DataFrame, named: Sequence[tuple[str, int]]) -> pd.DataFrame:
+    """The table without some dwells of some units.
+
+    Raises
+    ------
+    DataRejected
+        One of them is not there.
+    """
+    gone = np.zeros(len(dwells), dtype=bool)
+    for unit, dwell in named:
+        own = (dwells["unit"].astype(str) == unit).to_numpy() & (dwells["dwell"] == dwell).to_numpy()
+        if not own.any():
+            there = ", ".join(dict.fromkeys(dwells["unit"].astype(str)))
+            raise DataRejected(
+                f"--leave-out: dwell {dwell} of unit {unit} is not there (units {there}, dwells "
+                f"{int(dwells['dwell'].min())} to {int(dwells['dwell'].max())}); name another"
+            )
+        gone |= own
+    return dwells[~gone].reset_index(drop=True)

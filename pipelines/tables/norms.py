@@ -1,0 +1,150 @@
+"""Dwells of unknown orientation as a lot in g: corrected outputs and their directions by the norm of gravity.
+
+The lot is linear about one point, the fit of an ellipsoid with the noise between dwells. Dwells that are far off take no part in
+finding that point: it would carry their error into all the others.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from inertial.criticism.problem import Lot
+from inertial.errors import NotIdentified
+from inertial.fits.ellipsoid import EllipsoidFit, fit_ellipsoid
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from inertial.criticism.readings import Readings
+    from inertial.fits.ellipsoid import Shape
+    from inertial.state import State
+
+    Array = NDArray[np.float64]
+
+WARM = 5.0
+"""K over which a temperature must move for its own offset of the bias to be part of the point of expansion."""
+
+_FAR = 8.0
+"""Robust standard deviations beyond which a dwell takes no part in finding the point of expansion."""
+
+_SPARE, _ROUNDS = (
+    6,
+    4,
+)  # degrees of freedom from which on dwells are told from each other, and turns of leaving some out
+_WHITE_RANGE = 20.0
+"""Factor about the median beyond which a white standard error is taken for a slip: weights must not follow it."""
+
+
+def lot_of_norms(readings: Readings, state: State, like: Readings, *, square: bool) -> Lot:
+    """The radial lot of dwells whose poses are unknown: y = |C·(a − b)| − 1 in g, with white standard errors by axis.
+
+    Parameters
+    ----------
+    like : the run whose point of expansion is used: coefficients of one run apply to another only so
+    square : whether the model takes the axes as square, so that six parameters, not nine, give the directions
+
+    Raises
+    ------
+    NotIdentified
+        Fewer dwells of a unit than unknowns, or orientations that leave one of them undetermined.
+    """
+    forces, outputs, errors = [], [], []
+    for unit in range(len(readings.output)):
+        fit = expansion(like, unit, shape="six" if square else "nine")
+        there = readings.there[unit]
+        corrected = np.zeros((there.size, 3))
+        heat = _heat(readings, unit, there) if np.any(fit.temperature_offset) else None
+        corrected[there] = fit.apply(readings.output[unit, there], heat)
+        size = np.linalg.norm(corrected, axis=1, keepdims=True)
+        direction = np.where(size > 0.0, corrected / np.where(size > 0.0, size, 1.0), (0.0, 0.0, 1.0))
+        if heat is not None:
+            # what the temperature does is put back along the linear model: the model that is judged may lack it
+            rise = heat - float(fit.reference_temperature)
+            corrected[there] += rise[:, None] * (fit.correction @ fit.temperature_offset)
+        forces.append(direction)
+        outputs.append(corrected)
+        errors.append(np.where(there[:, None], _white(readings, unit, fit, size[:, 0]), np.inf))
+    eye = np.broadcast_to(np.eye(3), (len(forces), 3, 3))
+    recorded = readings.spread is not None and readings.count is not None
+    known = replace(state, force=np.stack(forces), memory={})
+    return Lot(known, np.stack(outputs), np.stack(errors), eye, radial=True, recorded=recorded)
+
+
+def expansion(readings: Readings, unit: int, *, shape: Shape = "nine") -> EllipsoidFit:
+    """The fit of an ellipsoid to a unit's dwells, weighted by their noise, without those that are far off.
+
+    Raises
+    ------
+    NotIdentified
+        As :func:`inertial.fits.ellipsoid.fit_ellipsoid`.
+    """
+    kept = readings.there[unit].copy()
+    heat = _heat(readings, unit, kept)
+    warm = heat is not None and float(np.ptp(heat)) > WARM and shape == "nine"
+    unknowns = {"six": 6, "nine": 9}[shape] + (3 if warm else 0)
+    if warm and int(kept.sum()) <= unknowns + _SPARE:
+        warm = False
+    fit = _fitted(readings, unit, kept, shape, warm=warm)
+    for _ in range(_ROUNDS):
+        if int(kept.sum()) < unknowns + _SPARE:
+            break
+        far = _far(readings, unit, fit, kept, warm=warm)
+        if not far.any() or int((kept & ~far).sum()) < unknowns + _SPARE:
+            break
+        try:
+            fit = _fitted(readings, unit, kept & ~far, shape, warm=warm)
+        except NotIdentified:
+            break
+        kept &= ~far
+    return fit
+
+
+def _far(readings: Readings, unit: int, fit: EllipsoidFit, kept: NDArray[np.bool_], *, warm: bool) -> NDArray[np.bool_]:
+    """The dwell that is farthest off among those kept, if it is far beyond the scatter of the others."""
+    heat = _heat(readings, unit, readings.there[unit]) if warm else None
+    left = np.zeros(kept.size)
+    left[readings.there[unit]] = np.abs(
+        np.linalg.norm(fit.apply(readings.output[unit, readings.there[unit]], heat), axis=1) - 1.0
+    )
+    typical = float(np.median(left[kept])) / 0.6745
+    worst = int(np.argmax(np.where(kept, left, 0.0)))
+    far = np.zeros(kept.size, dtype=bool)
+    far[worst] = left[worst] > _FAR * typical
+    return far
+
+
+def _fitted(readings: Readings, unit: int, kept: NDArray[np.bool_], shape: Shape, *, warm: bool) -> EllipsoidFit:
+    output = readings.output[unit, kept]
+    heat = _heat(readings, unit, kept) if warm else None
+    first = fit_ellipsoid(output, shape=shape, temperature=heat)
+    size = np.linalg.norm(first.apply(output, heat), axis=1)
+    axes = _white(readings, unit, first, np.ones(kept.size))[kept]
+    direction = first.apply(output, heat) / np.where(size > 0.0, size, 1.0)[:, None]
+    error = np.sqrt(np.sum((direction * axes) ** 2, axis=1))
+    return fit_ellipsoid(output, shape=shape, temperature=heat, time=readings.time[unit, kept], error=error)
+
+
+def _heat(readings: Readings, unit: int, there: NDArray[np.bool_]) -> Array | None:
+    """Temperatures of a unit's dwells; None where there are none, or one of them is missing."""
+    found = readings.temperature if readings.temperature is not None else readings.chamber
+    if found is None or not np.all(np.isfinite(found[unit, there])):
+        return None
+    return found[unit, there]
+
+
+def _white(readings: Readings, unit: int, fit: EllipsoidFit, size: Array) -> Array:
+    """White standard errors of a unit's dwells by axis, (n, 3), g: sd/√n where recorded, else from the scatter of the norms."""
+    scatter = max(float(fit.rms), 1e-12)
+    if readings.spread is None or readings.count is None:
+        return np.full((size.size, 3), scatter)
+    own = readings.spread[unit] / np.sqrt(np.maximum(readings.count[unit], 1.0))[:, None]
+    error = np.sqrt((own**2) @ (fit.correction**2).T)
+    known = np.isfinite(error).all(axis=1) & (error > 0.0).all(axis=1)
+    if not known.any():
+        return np.full((size.size, 3), scatter)
+    typical = np.median(error[known], axis=0)
+    error = np.where(known[:, None], error, typical)
+    return np.clip(error, typical / _WHITE_RANGE, typical * _WHITE_RANGE)

@@ -1,0 +1,132 @@
+"""``allan`` and ``psd`` of files and runs, against allantools and against each other."""
+
+import json
+import time
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import pytest
+from typer.testing import CliRunner, Result
+
+from benchmarks.worlds.noise import fractional
+from inertial.noise.allan import overlapping
+from inertial.noise.terms import fit_terms
+from pipelines.cli import app
+from schemas.errors import TumblelineError
+
+RATE = 100.0
+N = 0.002  # g/√Hz, two-sided as in IEEE Std 952
+
+
+def run(*words: object) -> Result:
+    return CliRunner().invoke(app, [str(word) for word in words])
+
+
+def document(*words: object) -> dict[str, Any]:
+    done = run(*words, "--json")
+    assert done.exit_code == 0, done.output
+    return json.loads(done.stdout)
+
+
+def refused(*words: object) -> str:
+    """The message with which a command refuses."""
+    problem = run(*words).exception
+    assert isinstance(problem, TumblelineError)
+    return str(problem)
+
+
+@pytest.fixture(scope="module")
+def record(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """400 s of white noise, and white noise with a random walk."""
+    rng = np.random.default_rng(5)
+    white = N * np.sqrt(RATE) * rng.standard_normal((40_000, 2))
+    white[:, 1] += 0.004 / np.sqrt(RATE) * np.cumsum(rng.standard_normal(40_000))
+    path = tmp_path_factory.mktemp("noise") / "rest.csv"
+    pd.DataFrame({"t": np.arange(40_000) / RATE, "ax": white[:, 0], "ay": 1.0 + white[:, 1]}).to_csv(path, index=False)
+    return path
+
+
+def test_the_deviations_are_those_of_allantools(record: Path) -> None:
+    allantools = pytest.importorskip("allantools")
+    found = document("allan", record, "--time", "t", "--unit", "g")
+    table = pd.read_csv(record)
+    assert found["samples"] == 40_000
+    assert found["rate_hz"] == pytest.approx(RATE)
+    for curve in found["curves"]:
+        values = table[curve["channel"]].to_numpy()
+        taus, peer, *_ = allantools.oadev(values, rate=RATE, data_type="freq", taus=curve["tau_s"])
+        np.testing.assert_allclose(curve["tau_s"], taus)
+        np.testing.assert_allclose(curve["deviation"], peer, rtol=1e-9)
+        assert all(
+            low < value < high
+            for low, value, high in zip(*(curve[k] for k in ("low", "deviation", "high")), strict=True)
+        )
+
+
+def test_terms_have_a_value_or_a_limit(record: Path) -> None:
+    terms = {
+        (row["channel"], row["term"]): row for row in document("allan", record, "--time", "t", "--unit", "g")["terms"]
+    }
+    assert len(terms) == 10
+    assert terms["ax", "N"]["low"] < N < terms["ax", "N"]["high"]
+    assert terms["ax", "N"]["unit"] == "g/√Hz"
+    assert terms["ay", "K"]["low"] < 0.004 < terms["ay", "K"]["high"]
+    assert terms["ax", "K"]["value"] is None
+    assert terms["ax", "K"]["high"] < 0.002
+    done = run("allan", record, "--time", "t", "--unit", "g")
+    assert "not identified" in done.stdout
+    assert "≤" in done.stdout
+
+
+def test_the_density_gives_the_deviation_and_the_level_of_white_noise(record: Path) -> None:
+    found = document("psd", record, "--rate", "100", "--columns", "ax", "--unit", "g")["spectra"][0]
+    assert found["median_amplitude"] == pytest.approx(N * np.sqrt(2.0), rel=0.03)
+    np.testing.assert_allclose(found["deviation_from_density"], found["deviation"], rtol=0.15)
+    np.testing.assert_allclose(found["deviation"], N / np.sqrt(found["tau_s"]), rtol=0.15)
+
+
+def test_plots_and_pages_are_written(record: Path, tmp_path: Path) -> None:
+    for command in ("allan", "psd"):
+        done = run(
+            command,
+            record,
+            "--time",
+            "t",
+            "--plot",
+            tmp_path / f"{command}.png",
+            "--page",
+            tmp_path / f"{command}.html",
+        )
+        assert done.exit_code == 0, done.output
+        assert (tmp_path / f"{command}.png").read_bytes().startswith(b"\x89PNG")
+        page = (tmp_path / f"{command}.html").read_text(encoding="utf-8")
+        assert page.count("<svg") == 1
+        assert "mathdefault" not in page
+    assert "name a .png, .svg or .pdf file" in refused("allan", record, "--time", "t", "--plot", tmp_path / "a.bmp")
+
+
+def test_a_gap_a_missing_rate_and_a_dead_channel_are_refused_or_told(record: Path, tmp_path: Path) -> None:
+    assert "one of --time COLUMN and --rate HZ is needed" in refused("allan", record)
+    table = pd.read_csv(record)
+    table.drop(index=700).to_csv(tmp_path / "gap.csv", index=False)
+    assert "after row 700 the time steps by 0.02 s" in refused("allan", tmp_path / "gap.csv", "--time", "t")
+    table.assign(ay=1.0).to_csv(tmp_path / "dead.csv", index=False)
+    assert document("allan", tmp_path / "dead.csv", "--time", "t")["notes"] == ["ay: the output never changes"]
+    assert "no channel ever changes" in refused("allan", tmp_path / "dead.csv", "--time", "t", "--columns", "ay")
+
+
+def test_flicker_made_by_fractional_summation_is_found(tmp_path: Path) -> None:
+    rng = np.random.default_rng(8)
+    x = 1e-3 * fractional(rng, 1, 60_000)[0] + 1e-4 * rng.standard_normal(60_000)
+    pd.DataFrame({"x": x}).to_csv(tmp_path / "flicker.csv", index=False)
+    terms = {row["term"]: row for row in document("allan", tmp_path / "flicker.csv", "--rate", "1")["terms"]}
+    assert 0.7e-3 < terms["B"]["value"] < 1.4e-3
+
+
+def test_a_million_samples_of_three_axes_take_no_more_than_three_seconds_of_computing() -> None:
+    x = np.random.default_rng(0).standard_normal((3, 1_000_000))
+    begin = time.process_time()
+    fit_terms(overlapping(x, RATE))
+    assert time.process_time() - begin < 3.0
