@@ -1,0 +1,82 @@
+"""What a job states of its uncertainty, and what is refused before anything moves."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, Protocol
+
+from pipelines.stages.budget_terms import BudgetTerms, terms_of
+from pipelines.stages.contributions import merged
+from schemas.errors import RecipeInvalid
+from schemas.reference import Reference
+from schemas.station import Pace, refuse_untraced
+from schemas.uncertainty import Uncertainty
+
+if TYPE_CHECKING:
+    from schemas.recipe import Recipe
+    from schemas.station import StationConfig
+
+GRAVITY_SIGMAS = 3.0
+
+
+class Measuring(Protocol):
+    """A recipe on a station."""
+
+    @property
+    def recipe(self) -> Recipe:
+        """What is measured."""
+        ...
+
+    @property
+    def station(self) -> StationConfig:
+        """Where."""
+        ...
+
+
+def budget_terms(job: Measuring) -> BudgetTerms:
+    """The terms of a job's budget; the station of an archived job may be its document, as it was written."""
+    station: Any = job.station
+    stated, pace = getattr(station, "uncertainty", None), getattr(station, "pace", None)
+    if isinstance(stated, dict):
+        stated = Uncertainty.model_validate(stated)
+    if isinstance(pace, dict):
+        pace = Pace.model_validate(pace)
+    given = getattr(station, "reference", None) or []
+    references = [Reference.model_validate(one) if isinstance(one, dict) else one for one in given]
+    return terms_of(job.recipe, stated, references, Pace().room_C if pace is None else pace.room_C)
+
+
+def with_stability(recipe: Recipe, station: StationConfig) -> Recipe:
+    """The recipe with the stability of its device's preset, on a simulated station with a budget; else as it is."""
+    stated = merged(station.uncertainty, recipe.uncertainty)
+    if recipe.stability is not None or station.simulation is None or stated is None:
+        return recipe
+    from stations.plant.preset import load_preset  # a station of hardware has no plant
+
+    preset = load_preset(recipe.device, station.simulation.preset_overrides)
+    return recipe.model_copy(update={"stability": preset.stability})
+
+
+def refuse_contradictions(recipe: Recipe, station: StationConfig) -> None:
+    """Refuse a recipe whose entries are not traced, or whose local gravity is not the station's.
+
+    Raises
+    ------
+    RecipeInvalid
+        With the key.
+    """
+    if recipe.uncertainty is not None:
+        try:
+            refuse_untraced(recipe.uncertainty, station.reference, simulated=station.kind == "simulated")
+        except ValueError as problem:
+            raise RecipeInvalid(f"recipe {recipe.name}: {problem}", key="uncertainty") from None
+    stated = merged(station.uncertainty, recipe.uncertainty)
+    if stated is None or stated.gravity is None:
+        return
+    value, u = stated.gravity.value, stated.gravity.relative().u
+    apart = recipe.local_gravity_m_s2 / value - 1.0
+    if abs(apart) > GRAVITY_SIGMAS * u and not stated.gravity.exact:
+        raise RecipeInvalid(
+            f"recipe {recipe.name}: key 'local_gravity_m_s2': {recipe.local_gravity_m_s2:g} m/s², station {station.name} states "
+            f"{value:.8g} m/s² ± {2e6 * u:.2g} ppm (k = 2), they differ by {1e6 * apart:.0f} ppm; use the station's value",
+            key="local_gravity_m_s2",
+        )
