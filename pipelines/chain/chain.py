@@ -96,7 +96,7 @@ def _noise(job: Job, run: Run) -> Tables:
     return noise(_records(run).samples(static), readings, *tables)
 
 
-_BUDGETED = ("dwells", "history", "coefficients", "covariance", "wander", "verification", "noise")
+_BUDGETED = ("dwells", "history", "coefficients", "covariance", "wander", "verification", "verification_poses", "noise")
 
 
 def _budget(job: Job, run: Run) -> Tables:

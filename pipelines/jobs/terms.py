@@ -7,11 +7,16 @@ from typing import TYPE_CHECKING, Any, Protocol
 from pipelines.stages.budget_terms import BudgetTerms, terms_of
 from pipelines.stages.contributions import merged
 from schemas.errors import RecipeInvalid
+from schemas.limits import VALIDITY_MONTHS
 from schemas.reference import Reference
 from schemas.station import Pace, refuse_untraced
 from schemas.uncertainty import Uncertainty
+from schemas.validity import CertificateTerms, Stability
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from schemas.limits import Limits
     from schemas.recipe import Recipe
     from schemas.station import StationConfig
 
@@ -24,6 +29,11 @@ class Measuring(Protocol):
     @property
     def recipe(self) -> Recipe:
         """What is measured."""
+        ...
+
+    @property
+    def limits(self) -> Limits:
+        """What is required."""
         ...
 
     @property
@@ -42,7 +52,32 @@ def budget_terms(job: Measuring) -> BudgetTerms:
         pace = Pace.model_validate(pace)
     given = getattr(station, "reference", None) or []
     references = [Reference.model_validate(one) if isinstance(one, dict) else one for one in given]
-    return terms_of(job.recipe, stated, references, Pace().room_C if pace is None else pace.room_C)
+    room = Pace().room_C if pace is None else pace.room_C
+    return terms_of(job.recipe, stated, references, room, job.limits.longest_validity_months)
+
+
+def archived_terms(about: Mapping[str, Any]) -> BudgetTerms | None:
+    """The terms of an archived run, from what is kept beside it; None for runs that state none."""
+    station, recipe = about.get("station") or {}, about.get("recipe") or {}
+    stated = merged(
+        *(
+            Uncertainty.model_validate(one["uncertainty"]) if one.get("uncertainty") else None
+            for one in (station, recipe)
+        )
+    )
+    if stated is None:
+        return None
+    months = (about.get("limits") or {}).get("validity_months") or VALIDITY_MONTHS
+    certificate, stability = recipe.get("certificate"), recipe.get("stability")
+    return BudgetTerms(
+        stated=stated,
+        stability=Stability.model_validate(stability) if stability else None,
+        certificate=CertificateTerms.model_validate(certificate or {"validity_months": months}),
+        references=tuple(Reference.model_validate(one) for one in station.get("reference", [])),
+        soak_min_s=float(recipe.get("soak_min_s", 0.0)),
+        dwell_s=float(recipe.get("dwell_s", 1.0)),
+        room_C=float((station.get("pace") or {}).get("room_C", Pace().room_C)),
+    )
 
 
 def with_stability(recipe: Recipe, station: StationConfig) -> Recipe:

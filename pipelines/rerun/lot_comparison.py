@@ -109,7 +109,7 @@ def _both(run: Run, wanted: ModelChange) -> tuple[Side, Side]:
     new = fit(dwells, history, job.recipe.effects)
     new |= verify(dwells, history, new["coefficients"], new["covariance"], new["predictions"])
     # the noise is in µg already, and the response by which it was made so hardly depends on the model
-    names = ("coefficients", "covariance", "wander", "verification")
+    names = ("coefficients", "covariance", "wander", "verification", "verification_poses")
     stated = budget(
         BudgetTables(dwells, history, *(new[name] for name in names), noise=old["noise"]), budget_terms(job)
     )

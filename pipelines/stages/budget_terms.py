@@ -28,6 +28,7 @@ class BudgetTables:
     covariance: pd.DataFrame
     wander: pd.DataFrame
     verification: pd.DataFrame
+    verification_poses: pd.DataFrame
     noise: pd.DataFrame
 
 
@@ -62,13 +63,18 @@ class BudgetTerms:
 
 
 def terms_of(
-    recipe: Recipe, station: Uncertainty | None, references: Sequence[Reference], room_c: float
+    recipe: Recipe, station: Uncertainty | None, references: Sequence[Reference], room_c: float, months: int
 ) -> BudgetTerms:
-    """What a recipe on a station states."""
+    """What a recipe on a station states.
+
+    Parameters
+    ----------
+    months : period of validity where the recipe states no certificate
+    """
     return BudgetTerms(
         stated=merged(station, recipe.uncertainty),
         stability=recipe.stability,
-        certificate=recipe.certificate or CertificateTerms(),
+        certificate=recipe.certificate or CertificateTerms(validity_months=months),
         references=tuple(references),
         soak_min_s=recipe.soak_min_s,
         dwell_s=recipe.dwell_s,

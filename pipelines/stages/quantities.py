@@ -217,9 +217,8 @@ def _verification(
             unseen=_all(rms_over(true[..., axis, :][..., hidden]), lot),
         )
     along = norm_errors(true / MICRO, force) * MICRO
-    norm = rows["error_ug"].to_numpy().reshape(len(lot.units), -1)
-    zero = np.zeros_like(norm)
-    worst = _worst("verification_norm", "norm", along, zero, np.max(np.abs(norm), axis=1), dof)
+    value, noise = _worst_pose(lot, tables)
+    worst = _worst("verification_norm", "norm", along, np.zeros(along.shape[:-1]) + noise[:, None] ** 2, value, dof)
     seen = norm_errors(shown / MICRO, force) * MICRO
     yield Quantity(
         **{
@@ -228,6 +227,17 @@ def _verification(
             "unseen": _all(np.sqrt(np.max(np.sum(along[..., hidden] ** 2, axis=-1), axis=-1)), lot),
         }
     )
+
+
+def _worst_pose(lot: LotArrays, tables: BudgetTables) -> tuple[Array, Array]:
+    """Magnitude of the largest error of a pose and its uncertainty by noise, of every unit, µg."""
+    rows = tables.verification_poses
+    found = np.zeros((2, len(lot.units)))
+    for place, unit in enumerate(lot.units):
+        own = rows[rows["unit"] == unit]
+        worst = int(np.argmax(np.abs(own["error_ug"].to_numpy())))
+        found[:, place] = abs(float(own["error_ug"].iloc[worst])), float(own["uncertainty_ug"].iloc[worst])
+    return found[0], found[1]
 
 
 def _all(values: Array, lot: LotArrays) -> Array:

@@ -13,10 +13,12 @@ LEVELS = 61
 
 def _value(tables: UnitTables) -> Value | None:
     """The uncertainty is that of the linear coefficient: the span is ruled by it."""
+    linear = tables.coefficients.nearest("bias_temperature", 1e6, tables.guard)
+    if linear is None or "unit_C" not in tables.residuals:
+        return None
     read = tables.residuals["unit_C"]
     read = read[np.isfinite(read)]
-    linear = tables.coefficients.nearest("bias_temperature", 1e6, tables.guard)
-    if linear is None or not read.size or not np.ptp(read) > 0.0:
+    if not read.size or not np.ptp(read) > 0.0:
         return None
     theta = np.linspace(read.min(), read.max(), LEVELS) - REFERENCE_C
     curve, errors = np.zeros((3, LEVELS)), np.zeros(3)
