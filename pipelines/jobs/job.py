@@ -10,7 +10,7 @@ from inertial.errors import InertialError
 from pipelines.archive.keys import digest
 from pipelines.jobs.model_files import read_model, refuse_unknown_effects, use_formulas
 from pipelines.jobs.recipes import MAIN_JOB, load_limits, load_recipe, lot_of, units_of
-from pipelines.jobs.terms import refuse_contradictions, with_stability
+from pipelines.jobs.terms import refuse_contradictions, refuse_unreachable, with_stability
 from pipelines.schedule.planned_state import refuse_unidentified
 from pipelines.stages.figures import UNITS
 from pipelines.stages.grade import refuse_limits_without_figures
@@ -140,6 +140,7 @@ class Request:
         _refuse_unknown_device(job)
         _refuse_beyond_station(job)
         _refuse_inconsistent(job, recorded_columns(station.devices.reader))
+        refuse_unreachable(job)
         return job
 
     def _line_model(self, archive: Archive | None, device: str) -> dict[str, Any]:

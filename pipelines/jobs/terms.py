@@ -4,8 +4,12 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any, Protocol
 
+import numpy as np
+
+from pipelines.schedule.planned_dwells import planned_dwells
 from pipelines.stages.budget_terms import BudgetTerms, terms_of
 from pipelines.stages.contributions import merged
+from pipelines.stages.reachable import PlannedDwells, reachable, unreachable
 from schemas.errors import RecipeInvalid
 from schemas.limits import VALIDITY_MONTHS
 from schemas.reference import Reference
@@ -54,6 +58,33 @@ def budget_terms(job: Measuring) -> BudgetTerms:
     references = [Reference.model_validate(one) if isinstance(one, dict) else one for one in given]
     room = Pace().room_C if pace is None else pace.room_C
     return terms_of(job.recipe, stated, references, room, job.limits.longest_validity_months)
+
+
+def planned_terms(recipe: Recipe, station: StationConfig, limits: Limits | None) -> BudgetTerms:
+    """The terms of a recipe that is planned on a station."""
+    months = VALIDITY_MONTHS if limits is None else limits.longest_validity_months
+    return terms_of(
+        with_stability(recipe, station), station.uncertainty, station.reference, station.pace.room_C, months
+    )
+
+
+def refuse_unreachable(job: Measuring) -> None:
+    """Refuse limits that the stated references and the stability of the device cannot meet, before anything moves.
+
+    The noise of the device is left out: what is refused here would fail with a device of no noise.
+    """
+    terms = planned_terms(job.recipe, job.station, job.limits)
+    if terms.stated is None:
+        return
+    dwells = planned_dwells(job.recipe, job.station)
+    quiet = PlannedDwells(*dwells, covariance=np.eye(dwells.fit.time.size), run_ug=0.0, instability_ug=0.0)
+    wrong = unreachable(reachable(quiet, terms, job.recipe.effects), job.limits, terms.certificate.validity_months)
+    if wrong:
+        raise RecipeInvalid(
+            f"recipe {job.recipe.name} on station {job.station.name}: {wrong[0]}; raise the limit, or improve what rules it (see "
+            "'tumbleline plan')",
+            key="limits",
+        )
 
 
 def archived_terms(about: Mapping[str, Any]) -> BudgetTerms | None:
