@@ -26,11 +26,8 @@ def shares_plot(shares: Mapping[str, Mapping[str, float]]) -> str:
     ----------
     shares : by title of the quantity, then by contribution; each sums to 1
     """
-    names = [
-        n
-        for n in dict.fromkeys(n for one in shares.values() for n in one)
-        if max(o.get(n, 0.0) for o in shares.values()) >= SMALLEST
-    ]
+    every = dict.fromkeys(name for one in shares.values() for name in one)
+    names = [name for name in every if max(one.get(name, 0.0) for one in shares.values()) >= SMALLEST]
     names.sort(key=lambda name: -sum(one.get(name, 0.0) for one in shares.values()))
     with mpl.rc_context({**STYLE, "axes.grid": False}):
         figure = Figure(figsize=(WIDTH_IN, 1.1 + 0.34 * len(shares) + 0.22 * -(-len(names) // 3)), layout="constrained")
