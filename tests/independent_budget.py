@@ -43,7 +43,7 @@ def felt(outer: Array, inner: Array, d: dict[str, Array]) -> Array:
     rx = np.array([[one, zero, zero], [zero, np.cos(a), -np.sin(a)], [zero, np.sin(a), np.cos(a)]])
     rz = np.array([[np.cos(b), -np.sin(b), zero], [np.sin(b), np.cos(b), zero], [zero, zero, one]])
     table = np.einsum("ijn,jk,kln->nil", rx, ry, rz)
-    return np.einsum("ij,nkj,k->ni", slot, np.swapaxes(table, 1, 2), up)
+    return np.einsum("ij,nkj,k->ni", slot, table, up)
 
 
 def _waves(sizes: Array, angle: Array) -> Array:
