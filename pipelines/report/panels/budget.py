@@ -41,7 +41,7 @@ TEMPLATE = """\
 <tr><th>unit</th><th>axis</th><th class="n">verification shows<br><small>u of the references, µg</small></th><th class="n">a user meets<br><small>u of the references, µg</small></th><th class="n">verification cannot show<br><small>u, µg</small></th></tr>
 {% for row in seen %}<tr><td>{{ row.unit }}</td><td>{{ row.axis }}</td><td class="n">{{ row.shown }}</td><td class="n">{{ row.met }}</td><td class="n">{{ row.unseen }}</td></tr>{% endfor %}
 </table>
-<p class="note">Verification on the same station repeats its errors: local gravity, thermometer, seat, supply and gain cancel in it and come from the budget alone.</p>{% endif %}
+<p class="note">Verification on the same station repeats its errors: local gravity, thermometer, seat, supply and gain cancel in it and come from the budget alone. Worst axis of each unit; what verification shows is in the frame of the fixture.</p>{% endif %}
 {% endif %}
 {% if risks %}<table>
 <tr><th>figure</th><th class="n">limit</th><th class="n">accepted up to<br><small>mean</small></th><th class="n">lot mean</th><th class="n">process σ</th><th class="n">u</th><th class="n">PFA, %</th><th class="n">PFR, %</th><th class="n">largest PFA of an accepted unit, %</th><th>unit</th></tr>
@@ -91,6 +91,8 @@ def _shares(budget: pd.DataFrame, unit: str) -> dict[str, dict[str, float]]:
 
 def _seen(sums: pd.DataFrame) -> list[dict[str, str]]:
     rows = sums[sums["quantity"] == "bias_error"] if len(sums) else sums
+    if len(rows):  # the worst axis of each unit
+        rows = rows.loc[rows.groupby("unit", sort=False)["u_b"].idxmax()]
     return [
         {
             "unit": str(row["unit"]),
