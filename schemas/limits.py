@@ -159,7 +159,7 @@ class Decision:
     def sentence(self) -> str:
         """The decision for people: figure, value, uncertainty, limit and margin."""
         unit = "" if self.unit == "1" else f" {self.unit}"
-        spread = f" ± {self.uncertainty:.2g}" if self.uncertainty > 0.0 else ""
+        spread = f" ± {float(f'{self.uncertainty:.2g}'):g}" if self.uncertainty > 0.0 else ""
         what = f"{self.value:.4g}{spread}{unit}, limit {self.limit:.4g}{unit}"
         if self.outcome.startswith("conditional"):
             risk = f"probability of exceeding it {100.0 * self.risk:.2g} %"

@@ -20,7 +20,9 @@ def print_reach(found: dict[str, Any] | None) -> None:
     """A table of the quantities with what rules them, limits that cannot be met, and remarks."""
     out = console()
     if found is None:
-        out.print("uncertainty: noise only, the station states no [uncertainty]; no grade above consumer, no certificate")
+        out.print(
+            "uncertainty: noise only, the station states no [uncertainty]; no grade above consumer, no certificate"
+        )
         return
     worst: dict[str, dict[str, Any]] = {}
     for row in found["quantities"]:

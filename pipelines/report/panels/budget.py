@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+import pandas as pd
 
 from pipelines.report.budget_plots import shares_plot
 from pipelines.report.numbers import plain
@@ -14,8 +15,6 @@ from pipelines.stages.figures import FIGURES
 from pipelines.tables.frames import rows_of
 
 if TYPE_CHECKING:
-    import pandas as pd
-
     from pipelines.report.context import ReportContext
 
 ORDER = 45
@@ -51,11 +50,9 @@ TEMPLATE = """\
 """
 
 
-def render(report: ReportContext) -> str | None:
-    """The budget; for runs without one a notice, and nothing for runs of earlier versions."""
-    if "uncertainties" not in report.tables:
-        return None
-    sums, station = report.tables["uncertainties"], report.about.get("station") or {}
+def render(report: ReportContext) -> str:
+    """The budget; a notice for runs that state none, as runs of earlier versions do."""
+    sums, station = report.tables.get("uncertainties", pd.DataFrame()), report.about.get("station") or {}
     recipe = report.recipe
     entries = {**(station.get("uncertainty") or {}), **(recipe.get("uncertainty") or {})}
     first = str(sums["unit"].iloc[0]) if len(sums) else ""
