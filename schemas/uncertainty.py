@@ -51,7 +51,7 @@ class Entry(Strict):
     distribution: Distribution | None = None
     scope: Scope = "station"
     reference: Text = ""
-    source: Text = ""
+    source: str = ""
     exact: bool = False
 
     def standard(self, part: str = "") -> StandardUncertainty:
@@ -159,7 +159,7 @@ class Gravity(Entry):
     value_m_s2: Annotated[Number, Field(gt=9.7, lt=9.9)] | None = None
     latitude_deg: Annotated[Degrees, Field(ge=-90.0, le=90.0)] | None = None
     height_m: Annotated[Number, Field(ge=-500.0, le=9000.0)] | None = None
-    source: Literal["survey", "formula"] = "survey"
+    source: Literal["survey", "formula"] = "survey"  # pyright: ignore[reportIncompatibleVariableOverride] - frozen
     standard_gravity_meant: bool = False
     u_ppm: Stated = None
     U_ppm: Stated = None

@@ -45,11 +45,19 @@ class Errors:
 
     def times(self, size: float) -> "Errors":
         """The same errors, scaled."""
-        scaled = {
-            name: tuple(size * v for v in value) if isinstance(value, tuple) else size * value
-            for name, value in self.__dict__.items()
-        }
-        return Errors(**scaled)
+        x, y, z = self.seat
+        a, b, c = self.offset
+        return Errors(
+            gravity=size * self.gravity,
+            level=(size * self.level[0], size * self.level[1]),
+            orthogonality=size * self.orthogonality,
+            outer=size * self.outer,
+            inner=size * self.inner,
+            temperature=size * self.temperature,
+            seat=(size * x, size * y, size * z),
+            gain=size * self.gain,
+            offset=(size * a, size * b, size * c),
+        )
 
 
 @dataclass(frozen=True)
@@ -170,9 +178,9 @@ def sensitivity(
     for one in influences:
         enter(one.u * difference(model, state, one.errors)[..., None], one)
     for one in scattered:
-        for size, which in ((one.outer, "outer"), (one.inner, "inner")):
+        for size, errors in ((one.outer, Errors(outer=1.0)), (one.inner, Errors(inner=1.0))):
             if size > 0.0:
-                change = size * difference(model, state, Errors(**{which: 1.0}))
+                change = size * difference(model, state, errors)
                 enter(np.einsum("...nk,nm->...nkm", change, np.eye(change.shape[-2])), one)
     shape = predict(model.effects, state, model.coefficients, model.nonlinear).shape
     columns = [np.broadcast_to(c, (*shape, c.shape[-1])) for c in columns]

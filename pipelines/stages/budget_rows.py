@@ -83,10 +83,15 @@ def rows_of_quantities(
         for one in quantities:
             parts = _parts(one, number, groups, places)
             head = {"unit": unit, "quantity": one.name, "axis": one.axis, "unit_text": one.unit}
-            own = [{**head, **_about(name, u, one, number, found, places, known, terms)} for name, u in parts.items()]
-            whole = float(np.sqrt(sum(row["u"] ** 2 for row in own)))
-            for row in own:
-                row["share"] = row["u"] ** 2 / whole**2 if whole > 0.0 else 0.0
+            square = sum(u**2 for u in parts.values())
+            own: list[dict[str, Any]] = [
+                {
+                    **head,
+                    **_about(name, u, one, number, found, places, known, terms),
+                    "share": u**2 / square if square > 0.0 else 0.0,
+                }
+                for name, u in parts.items()
+            ]
             rows += own
             sums.append(_sum(unit, one, number, own, terms))
     return {"budget": pd.DataFrame(rows), "uncertainties": pd.DataFrame(sums)}
@@ -107,7 +112,7 @@ def _about(
     known: Mapping[str, Source], terms: BudgetTerms,
 ) -> dict[str, Any]:  # fmt: skip
     """What a contribution rests on."""
-    plain = {"contribution": name, "u": u, "share": 0.0, "visible": float("nan"), "sensitivity": float("nan")}
+    plain = {"contribution": name, "u": u, "visible": float("nan"), "sensitivity": float("nan")}
     if name == NOISE or name in BEYOND:
         dof = float(one.dof_noise[unit]) if name in {NOISE, "run"} else float("inf")
         kind = "A" if name in {NOISE, "run", "flicker"} else "B"

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -220,12 +220,10 @@ def _verification(
     value, noise = _worst_pose(lot, tables)
     worst = _worst("verification_norm", "norm", along, np.zeros(along.shape[:-1]) + noise[:, None] ** 2, value, dof)
     seen = norm_errors(shown / MICRO, force) * MICRO
-    yield Quantity(
-        **{
-            **worst.__dict__,
-            "shown": _all(np.sqrt(np.max(np.sum(seen**2, axis=-1), axis=-1)), lot),
-            "unseen": _all(np.sqrt(np.max(np.sum(along[..., hidden] ** 2, axis=-1), axis=-1)), lot),
-        }
+    yield replace(
+        worst,
+        shown=_all(np.sqrt(np.max(np.sum(seen**2, axis=-1), axis=-1)), lot),
+        unseen=_all(np.sqrt(np.max(np.sum(along[..., hidden] ** 2, axis=-1), axis=-1)), lot),
     )
 
 
@@ -258,11 +256,11 @@ def _period(
         if len(whole) != len(lot.units):
             return
         variance = np.sum(own.parts**2, axis=-1)
-        shown = own.shown if own.shown is not None else np.zeros_like(variance)
-        fixed = np.sqrt(np.maximum(variance - shown**2, 0.0))
+        shown, unseen = (np.zeros_like(variance) if part is None else part for part in (own.shown, own.unseen))
+        fixed = np.sqrt(np.maximum(variance - shown**2, unseen**2))
         later = {name: np.array([one.parts[name] for one in whole]) for name in whole[0].parts}
         ageing = later.get("ageing", np.zeros_like(fixed))
-        value = np.sqrt(own.value**2 + fixed**2 + sum(part**2 for part in later.values()))
+        value = np.sqrt(own.value**2 + fixed**2 + np.sum([part**2 for part in later.values()], axis=0))
         # of a square: that of the run by its own uncertainty, of what is fixed for a unit by its distribution
         square = 4.0 * (own.value * own.noise) ** 2 + 2.0 * fixed**4 / _dimensions(own.parts) + 2.0 * ageing**4
         noise = np.sqrt(square) / (2.0 * np.maximum(value, np.finfo(float).tiny))

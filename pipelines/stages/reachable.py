@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from inertial.state import State
+    from inertial.uncertainty.propagation import Propagated
     from pipelines.stages.budget_terms import BudgetTerms
     from schemas.limits import Limits
 
@@ -92,7 +93,7 @@ def reachable(planned: PlannedDwells, terms: BudgetTerms, effects: Sequence[str]
                 own = float(np.sqrt(noise[axis, column, column]))
                 out.append(_reach(effect, letter, unit, own, found.coefficients[axis, column], names))
     if planned.verification is not None:
-        out += _errors(planned, terms, nominal, found.user_errors, names)
+        out += _errors(planned, terms, nominal, found, names)
     return out
 
 
@@ -111,13 +112,13 @@ def _reach(quantity: str, axis: str, unit: str, noise: float, errors: Array, nam
     return Reach(quantity, axis, unit, float(np.sqrt(sum(v**2 for v in parts.values()))), parts)
 
 
-def _errors(planned: PlannedDwells, terms: BudgetTerms, model: Model, errors_at, names: Array) -> list[Reach]:  # noqa: ANN001 - a method
+def _errors(planned: PlannedDwells, terms: BudgetTerms, model: Model, found: Propagated, names: Array) -> list[Reach]:
     """RMS error as a user meets it, by the references alone, and over the period."""
     state = planned.verification
     if state is None:
         return []
     columns = design.local_columns(design.split(model.effects)[0], state, model.nonlinear)
-    errors = errors_at(columns, state.force, intrinsic=terms.certificate.frame == "intrinsic")
+    errors = found.user_errors(columns, state.force, intrinsic=terms.certificate.frame == "intrinsic")
     out: list[Reach] = []
     for axis, letter in enumerate(AXES):
         parts = {

@@ -48,7 +48,7 @@ def render(unit: UnitContext) -> str | None:
     return fill(TEMPLATE, lines=[_line(row) for row in rows_of(rows)])
 
 
-def _line(row: dict[str, Any]) -> dict[str, str]:
+def _line(row: dict[str, Any]) -> dict[str, Any]:
     value, expanded = rounded(float(row["value"]), float(row["expanded"]))
     return {
         "name": NAMES.get(row["quantity"], row["quantity"]),
