@@ -1,16 +1,18 @@
 """What is stated of references, device and certificate: what is refused, what is missing, and what a decision then says."""
 
+import json
 import tomllib
 from pathlib import Path
 
 import numpy as np
 import pytest
 from capture_double import small_run
-from pydantic import ValidationError
+from pydantic import TypeAdapter, ValidationError
 from small_station import short_recipe
 from typer.testing import CliRunner
 
 from pipelines.archive import Run
+from pipelines.certificates.stated_budget import StatedBudget, stated_budget
 from pipelines.cli import app
 from pipelines.jobs.recipe_text import recipe_text
 from pipelines.jobs.recipes import load_recipe, resolved
@@ -18,7 +20,7 @@ from pipelines.jobs.terms import budget_terms, refuse_contradictions
 from pipelines.schedule.steps import steps
 from pipelines.stages.contributions import merged, sources
 from pipelines.stages.figures import UNITS
-from schemas.errors import RecipeInvalid
+from schemas.errors import RecipeInvalid, WrongUse
 from schemas.limits import decide, parse_limits
 from schemas.recipe import parse_recipe
 from schemas.station import StationConfig, load_station
@@ -243,3 +245,15 @@ def test_a_station_without_a_statement_is_planned_as_noise_only() -> None:
     planned = CliRunner().invoke(app, ["plan", "--station", str(station)])
     assert planned.exit_code == 0
     assert "noise only" in planned.output
+
+
+def test_what_a_certificate_states_is_a_typed_document(run: Run) -> None:
+    document = stated_budget(run, "A1")
+    TypeAdapter(StatedBudget).validate_json(json.dumps(document), strict=True, extra="forbid")
+    error = next(one for one in document["quantities"] if one["quantity"] == "bias_error" and one["axis"] == "x")
+    assert {one["name"] for one in error["contributions"]} >= {"noise", "seat", "pose"}
+    assert error["u"] == pytest.approx(np.hypot(error["u_a"], error["u_b"]))
+    assert error["shown"] is not None
+    assert {one["outcome"] for one in document["decisions"]} == {"pass"}
+    with pytest.raises(WrongUse, match="no uncertainty budget of unit"):
+        stated_budget(run, "A9")
