@@ -292,7 +292,9 @@ def main() -> int:
     parser.add_argument("--recipe", action="append", choices=list(RECIPES))
     parser.add_argument("--preset", action="append", choices=PRESETS)
     options = parser.parse_args()
-    print("share of errors within the stated 95 % interval, %; wrong acceptances of accepted figures (stated probabilities)")
+    print(
+        "share of errors within the stated 95 % interval, %; wrong acceptances of accepted figures (stated probabilities)"
+    )
     print("simple: limit at the median of error + u; guarded: error + 2u, limit at its median")
     heads = ("recipe", "device", "units", "coefficients", "outputs", "noise only", "simple", "guarded, w = U", "s")
     print("{:18} {:8} {:>5} {:>12} {:>8} {:>10} {:>22} {:>22} {:>5}".format(*heads))
