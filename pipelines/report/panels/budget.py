@@ -27,6 +27,7 @@ PICTURED = {
     ("bias_error", "z"): "error of z, as a user meets it",
     ("bias_error_period", "z"): "error of z over the period",
 }
+NO_REFERENCE = dict.fromkeys(("what", "laboratory", "U", "k", "unit"), "")
 TEMPLATE = """\
 {% if not stated %}<p><b>Noise only:</b> the station states no [uncertainty]. Uncertainties are those of noise and fit; no grade above consumer, no certificate.</p>{% else %}
 <p>Frame {{ frame }}; figures of the references by {{ source }}. Unit {{ unit }}: share of each contribution in u².</p>
@@ -64,7 +65,7 @@ def render(report: ReportContext) -> str:
         source=str(entries.get("grade_source", "assumed")).replace("_", " "),
         plot=shares_plot(_shares(report.tables["budget"], first)) if len(sums) else "",
         missing=_missing(entries) if len(sums) else {},
-        references=station.get("reference", []),
+        references=[{**NO_REFERENCE, **one} for one in station.get("reference", [])],
         seen=_seen(sums),
         risks=_risks(report.tables.get("lot_risks")),
     )
