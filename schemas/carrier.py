@@ -7,7 +7,7 @@ from typing import Annotated, Literal
 from pydantic import Field, model_validator
 
 from schemas.profile import Carrier, WordOrder
-from schemas.recipe import Strict
+from schemas.strict import Strict
 
 SERIAL = ("serial", "baud", "parity", "stop_bits")
 SECURE = ("ca_file", "certificate_file", "key_file", "server_name")

@@ -2,12 +2,14 @@
 
 The rule is agreed before anything is measured (ISO/IEC 17025:2017, 7.1.3) and is named in every decision. With
 ``guarded_acceptance`` the guard band is the expanded uncertainty, w = U (ILAC-G8:09/2019, 4.2.2 and 4.2.3), and there
-are four outcomes; with ``simple_acceptance`` (4.2.1) the limit itself decides.
+are four outcomes; with ``simple_acceptance`` (4.2.1) the limit itself decides; with ``allowed_pfa`` the guard band is as wide as
+an allowed probability of false acceptance needs (JCGM 106:2012, 8.3.3).
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from statistics import NormalDist
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from pydantic import (
@@ -22,7 +24,8 @@ from pydantic import (
 
 from schemas.bounds import Name, Number, Positive
 from schemas.errors import RecipeInvalid, close_matches, did_you_mean
-from schemas.recipe import Strict, explain, parse_toml
+from schemas.recipe import explain, parse_toml
+from schemas.strict import Strict
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -31,7 +34,9 @@ VALIDITY_MONTHS = 12
 """Longest that a certificate may hold where the limits file does not say: a year, the usual first interval (ILAC-G24:2022)."""
 MOST_MONTHS = 120
 
-Rule = Literal["guarded_acceptance", "simple_acceptance"]
+Rule = Literal["guarded_acceptance", "simple_acceptance", "allowed_pfa"]
+LARGEST_PFA = 0.02
+"""Largest probability of false acceptance of one decision that limits may allow."""
 Outcome = Literal["pass", "conditional pass", "conditional fail", "fail"]
 
 # The notes give the grades by the bias that is left: consumer to 1000 µg, industrial to 200 µg, navigation under 50 µg.
@@ -41,6 +46,8 @@ GRADES: Mapping[str, float] = {
     "consumer": 1000.0,
 }
 GRADE_FIGURE = "bias_error_ug"
+PERIOD_FIGURE = "bias_error_period_ug"
+"""The figure that a grade rests on where it is known: the error over the period of validity."""
 
 
 class Limit(Strict):
@@ -56,6 +63,7 @@ class Limits(Strict):
     Parameters
     ----------
     validity_months : longest that a certificate by these limits may hold; :data:`VALIDITY_MONTHS` where it is not stated.
+    pfa_max : probability of false acceptance that the rule ``allowed_pfa`` allows; 2 % where it is not stated.
     """
 
     name: Name
@@ -63,7 +71,15 @@ class Limits(Strict):
     coverage_factor: Annotated[Number, Field(ge=1.0, le=4.0)] = 2.0
     grade: Literal["navigation", "industrial", "consumer"] = "consumer"
     validity_months: Annotated[int, Field(strict=True, ge=1, le=MOST_MONTHS)] | None = None
+    pfa_max: Annotated[Number, Field(gt=0.0, le=LARGEST_PFA)] | None = None
     figures: Annotated[dict[str, Limit], Field(min_length=1)]
+
+    @property
+    def guard_factor(self) -> float:
+        """Guard band of the rule over standard uncertainty."""
+        if self.rule == "allowed_pfa":
+            return -NormalDist().inv_cdf(self.pfa_max or LARGEST_PFA)
+        return self.coverage_factor if self.rule == "guarded_acceptance" else 0.0
 
     @property
     def longest_validity_months(self) -> int:
@@ -74,7 +90,8 @@ class Limits(Strict):
     def _as_before(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
         """Without what is not stated: runs are named for their limits, and those of earlier versions keep their names."""
         content = handler(self)
-        return {name: value for name, value in content.items() if name != "validity_months" or value is not None}
+        later = ("validity_months", "pfa_max")
+        return {name: value for name, value in content.items() if name not in later or value is not None}
 
     @field_validator("figures")
     @classmethod
@@ -115,6 +132,18 @@ class Decision:
     unit: str
     rule: str
     outcome: Outcome
+    risk: float = 0.0
+    accept: float = float("nan")
+
+    @property
+    def pfa(self) -> float:
+        """Probability of false acceptance of an accepted unit: that its figure is beyond the limit (JCGM 106, 7.4)."""
+        return self.risk if self.passed else 0.0
+
+    @property
+    def pfr(self) -> float:
+        """Probability of false rejection of a unit that is not accepted: that its figure is within the limit."""
+        return 0.0 if self.passed else 1.0 - self.risk
 
     @property
     def passed(self) -> bool:
@@ -130,12 +159,12 @@ class Decision:
     def sentence(self) -> str:
         """The decision for people: figure, value, uncertainty, limit and margin."""
         unit = "" if self.unit == "1" else f" {self.unit}"
-        spread = f" ± {self.uncertainty:.2g}" if self.uncertainty > 0.0 else ""
-        within = ", less than U: measure longer, or again" if self.outcome.startswith("conditional") else ""
-        return (
-            f"{self.figure} {self.outcome}: {self.value:.4g}{spread}{unit}, "
-            f"limit {self.limit:.4g}{unit}, margin {self.margin:.3g}{unit}{within}"
-        )
+        spread = f" ± {float(f'{self.uncertainty:.2g}'):g}" if self.uncertainty > 0.0 else ""
+        what = f"{self.value:.4g}{spread}{unit}, limit {self.limit:.4g}{unit}"
+        if self.outcome.startswith("conditional"):
+            risk = f"probability of exceeding it {100.0 * self.risk:.2g} %"
+            return f"{self.figure} not accepted: inside the guard band, {what}, {risk}: measure longer, or again"
+        return f"{self.figure} {self.outcome}: {what}, margin {self.margin:.3g}{unit}"
 
 
 def decide(limits: Limits, figure: str, value: float, standard_uncertainty: float) -> Decision:
@@ -146,6 +175,7 @@ def decide(limits: Limits, figure: str, value: float, standard_uncertainty: floa
     figure : a key of ``limits.figures``.
     value, standard_uncertainty : in the figure's unit; the rule's coverage factor is applied here.
     """
+    guard = limits.guard_factor * standard_uncertainty
     expanded = limits.coverage_factor * standard_uncertainty
     limit = limits.figures[figure].max
     return Decision(
@@ -155,12 +185,21 @@ def decide(limits: Limits, figure: str, value: float, standard_uncertainty: floa
         limit=limit,
         unit=limits.figures[figure].unit,
         rule=describe_rule(limits),
-        outcome=_outcome(limits.rule, abs(value), limit, expanded),
+        outcome=_outcome(abs(value), limit, guard),
+        risk=outside(value, standard_uncertainty, limit),
+        accept=limit - guard,
     )
 
 
-def _outcome(rule: Rule, magnitude: float, limit: float, expanded: float) -> Outcome:
-    guard = expanded if rule == "guarded_acceptance" else 0.0
+def outside(value: float, u: float, limit: float) -> float:
+    """Probability that a figure measured as ``value`` with standard uncertainty ``u`` lies beyond ± limit (JCGM 106, 7.4)."""
+    if not u > 0.0:
+        return float(not abs(value) <= limit)
+    normal = NormalDist()
+    return normal.cdf((-limit - value) / u) + normal.cdf((value - limit) / u)
+
+
+def _outcome(magnitude: float, limit: float, guard: float) -> Outcome:
     if magnitude <= limit - guard:
         return "pass"
     if magnitude > limit + guard:
@@ -172,13 +211,24 @@ def describe_rule(limits: Limits) -> str:
     """The decision rule in the words that stand beside every result."""
     if limits.rule == "simple_acceptance":
         return f"ILAC-G8:09/2019 simple acceptance, U with k = {limits.coverage_factor:g}"
+    if limits.rule == "allowed_pfa":
+        allowed = 100.0 * (limits.pfa_max or LARGEST_PFA)
+        return (
+            f"JCGM 106:2012 guard band {limits.guard_factor:.3f}·u, probability of false acceptance at most {allowed:g} %, "
+            f"U with k = {limits.coverage_factor:g}"
+        )
     return f"ILAC-G8:09/2019 guarded acceptance, w = U with k = {limits.coverage_factor:g}"
 
 
 def grade_of(value_ug: float, expanded_ug: float, rule: Rule) -> str | None:
-    """The best grade whose bias limit accepts the value under the rule; None where not even the lowest does."""
+    """The best grade whose bias limit accepts the value under the rule with w = U; None where not even the lowest does."""
+    return grade_with(value_ug, 0.0 if rule == "simple_acceptance" else expanded_ug)
+
+
+def grade_with(value_ug: float, guard_ug: float) -> str | None:
+    """The best grade whose bias limit accepts the value with a guard band; None where not even the lowest does."""
     for name, limit in GRADES.items():
-        if _outcome(rule, abs(value_ug), limit, expanded_ug) == "pass":
+        if _outcome(abs(value_ug), limit, guard_ug) == "pass":
             return name
     return None
 

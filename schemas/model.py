@@ -9,7 +9,8 @@ from typing import Annotated
 from pydantic import Field, ValidationError, model_validator
 
 from schemas.bounds import Name, Text
-from schemas.recipe import FormulaSpec, Strict, explain, parse_toml, read_text
+from schemas.recipe import FormulaSpec, explain, parse_toml, read_text
+from schemas.strict import Strict
 
 MOST_VERSIONS = 1_000_000
 

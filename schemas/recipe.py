@@ -8,15 +8,16 @@ from __future__ import annotations
 
 import tomllib
 from itertools import pairwise
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from pydantic import (
     BaseModel,
-    ConfigDict,
     Field,
     FiniteFloat,
+    SerializerFunctionWrapHandler,
     ValidationError,
     field_validator,
+    model_serializer,
     model_validator,
 )
 
@@ -41,6 +42,9 @@ from schemas.errors import RecipeInvalid, close_matches, did_you_mean
 from schemas.fault import FaultOrder
 from schemas.foreign import foreign, shown
 from schemas.serials import LONGEST_SERIAL, SERIAL_PATTERN
+from schemas.strict import Strict
+from schemas.uncertainty import Uncertainty
+from schemas.validity import CertificateTerms, Stability
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -58,12 +62,6 @@ DEEPEST = 16  # tables and lists inside one another; the deepest of our files ha
 
 Angles = Annotated[list[Degrees], Field(min_length=2, max_length=2)]
 Gravity = Annotated[FiniteFloat, Field(gt=9.7, lt=9.9)]  # every place on earth lies between 9.76 and 9.84 m/s²
-
-
-class Strict(BaseModel):
-    """A part of a file in which an unknown key is an error, not something to skip."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True)
 
 
 class Pose(Strict):
@@ -133,7 +131,9 @@ class _Measurement(Strict):
     ``zero_output`` is the nominal output at 0 g, in the output's unit; the zero-g offset is counted from it.
     ``soaks`` say soak by soak which poses are measured; ``temperatures_C`` are theirs then and may be left out.
     ``span_min_g`` is how far the poses must reach on every axis, largest minus smallest. ``faults`` are trouble for a
-    simulated station, to try what a recipe does then.
+    simulated station, to try what a recipe does then. ``verification_order``: at the end of each soak, or spread among the poses
+    of the fit; it is part of the recipe because it moves the figure of verification. ``uncertainty`` states what the recipe's own
+    fixture adds to the station's, ``stability`` what this kind of device does beyond a run, ``certificate`` what is certified.
     """
 
     name: Annotated[Name, Field(pattern=r"^[a-z0-9][a-z0-9._-]*$")]
@@ -156,6 +156,17 @@ class _Measurement(Strict):
     units: Annotated[list[str], Field(max_length=MOST_UNITS)] = []
     seed: Seed = 0
     faults: list[FaultOrder] = []
+    verification_order: Literal["last", "interleaved"] = "last"
+    uncertainty: Uncertainty | None = None
+    stability: Stability | None = None
+    certificate: CertificateTerms | None = None
+
+    @model_serializer(mode="wrap")
+    def _as_before(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
+        """Without what is not stated: runs and captures of earlier versions keep their names."""
+        content = handler(self)
+        later = {"verification_order": "last", "uncertainty": None, "stability": None, "certificate": None}
+        return {name: value for name, value in content.items() if name not in later or value != later[name]}
 
     @model_validator(mode="before")
     @classmethod

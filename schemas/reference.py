@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
-from datetime import date
-from typing import Annotated
+from datetime import date as Day  # noqa: N812 - a field has its name
+from typing import Annotated, Any, Literal
 
-from pydantic import Field
+from pydantic import Field, SerializerFunctionWrapHandler, model_serializer, model_validator
 
-from schemas.recipe import Strict
+from schemas.bounds import Number, Positive, Text
+from schemas.strict import Strict
+from schemas.uncertainty import TO_SI
+
+Unit = Literal["urad", "arcsec", "deg", "ppm", "percent", "ug", "K", "s", "g", "m_s2"]
 
 
 class Reference(Strict):
@@ -18,12 +22,42 @@ class Reference(Strict):
     id : the standard's own number.
     what : what it stands for: local gravity, angle, temperature, frequency, …
     certificate : number of its certificate.
-    laboratory : who gave it.
-    due : the first day on which it has to be calibrated again.
+    laboratory, accreditation : who gave it, and the number of their accreditation.
+    date, due : day of the certificate, and the first day on which it has to be calibrated again.
+    U, k, unit : its expanded uncertainty; drift_per_year : in the same unit.
+    sha256 : of the certificate's file.
     """
 
     id: Annotated[str, Field(min_length=1)]
     what: str = ""
     certificate: Annotated[str, Field(min_length=1)]
     laboratory: str = ""
-    due: date
+    accreditation: Text = ""
+    date: Day | None = None
+    due: Day
+    U: Positive | None = None
+    k: Annotated[Number, Field(ge=1.0, le=4.0)] | None = None
+    unit: Unit | None = None
+    drift_per_year: Number | None = None
+    sha256: Annotated[str, Field(pattern=r"^([0-9a-f]{64})?$")] = ""
+
+    @model_validator(mode="after")
+    def _complete(self) -> Reference:
+        if self.U is not None and (self.k is None or self.unit is None):
+            raise ValueError("k, unit: needed beside U; add the coverage factor and the unit of the certificate")
+        return self
+
+    @model_serializer(mode="wrap")
+    def _as_before(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
+        """Without what is not stated: stations of earlier versions keep their content."""
+        content = handler(self)
+        later = ("accreditation", "date", "U", "k", "unit", "drift_per_year", "sha256")
+        return {name: value for name, value in content.items() if name not in later or value not in {None, ""}}
+
+    def standard(self, unit: str) -> float | None:
+        """Standard uncertainty in rad, K, … where the certificate states it in a unit of the same kind; else None."""
+        if self.U is None or self.k is None or self.unit is None or not unit:
+            return None
+        kinds = ({"urad", "arcsec", "deg"}, {"ppm", "percent"}, {"ug", "g"})
+        same = self.unit == unit or any({self.unit, unit} <= kind for kind in kinds)
+        return self.U / self.k * TO_SI[self.unit] if same else None

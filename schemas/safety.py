@@ -7,7 +7,7 @@ from typing import Annotated, Literal
 from pydantic import Field, model_validator
 
 from schemas.bounds import Celsius, Degrees, Number, Positive, Rate, Seconds, Wait
-from schemas.recipe import Strict
+from schemas.strict import Strict
 
 Bounds = tuple[Number, Number]
 SAFE_WITHIN_S = 60.0  # by then a station that nobody drives is in its safe state, and its lease is free

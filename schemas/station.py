@@ -3,17 +3,25 @@
 from __future__ import annotations
 
 from importlib.resources import files
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
-from pydantic import Field, ValidationError, model_validator
+from pydantic import (
+    Field,
+    SerializerFunctionWrapHandler,
+    ValidationError,
+    model_serializer,
+    model_validator,
+)
 
 from schemas.bounds import Celsius, Degrees, Name, NotNegative, Number, Positive, Rate, Seconds, Seed, Text, Wait
 from schemas.carrier import Carried
 from schemas.errors import WrongUse
 from schemas.fault import FaultOrder
-from schemas.recipe import Strict, explain, parse_toml, read_text
+from schemas.recipe import explain, parse_toml, read_text
 from schemas.reference import Reference
 from schemas.safety import Safety, SelfTest, Suspenders
+from schemas.strict import Strict
+from schemas.uncertainty import TO_SI, Uncertainty
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -123,6 +131,24 @@ class Hidden(Strict):
     figures: dict[str, Number] = Field(default_factory=dict[str, float])
 
 
+class ReferenceErrors(Strict):
+    """Standard deviations of the simulated station's own errors; each station draws its errors from its seed, once.
+
+    ``pose_urad`` is drawn at every move, the thermometer's for the station, ``soak_K`` at every soak, ``slot_gradient_K`` of the
+    element against its thermometer for each slot.
+    """
+
+    gravity_ppm: NotNegative = 0.0
+    level_urad: NotNegative = 0.0
+    orthogonality_urad: NotNegative = 0.0
+    outer_offset_urad: NotNegative = 0.0
+    inner_offset_urad: NotNegative = 0.0
+    harmonics_urad: NotNegative = 0.0
+    pose_urad: NotNegative = 0.0
+    thermometer_offset_K: NotNegative = 0.0
+    thermometer_slope_percent: NotNegative = 0.0
+
+
 class Simulation(Strict):
     """How the simulated station is made."""
 
@@ -136,6 +162,13 @@ class Simulation(Strict):
     preset_overrides: dict[str, Number] = Field(default_factory=dict[str, float])
     hidden: list[Hidden] = Field(default_factory=list[Hidden])
     faults: list[FaultOrder] = Field(default_factory=list[FaultOrder])
+    reference_errors: ReferenceErrors | None = None
+
+    @model_serializer(mode="wrap")
+    def _as_before(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
+        """Without what is not stated: captures of earlier versions keep their names."""
+        content = handler(self)
+        return {name: value for name, value in content.items() if name != "reference_errors" or value is not None}
 
 
 class StationConfig(Strict):
@@ -154,6 +187,19 @@ class StationConfig(Strict):
     self_test: SelfTest = SelfTest()
     simulation: Simulation | None = None
     reference: list[Reference] = Field(default_factory=list[Reference])
+    uncertainty: Uncertainty | None = None
+
+    @model_serializer(mode="wrap")
+    def _as_before(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
+        """Without what is not stated: captures of earlier versions keep their names."""
+        content = handler(self)
+        return {name: value for name, value in content.items() if name != "uncertainty" or value is not None}
+
+    @model_validator(mode="after")
+    def _budget_is_traced(self) -> StationConfig:
+        if self.uncertainty is not None:
+            refuse_untraced(self.uncertainty, self.reference, simulated=self.kind == "simulated")
+        return self
 
     @model_validator(mode="after")
     def _can_be_safe(self) -> StationConfig:
@@ -174,6 +220,36 @@ class StationConfig(Strict):
                 if missing := getattr(self.devices, name).missing():
                     raise ValueError(f"devices.{name}.{missing}: empty, a station of kind modbus needs one; add it")
         return self
+
+
+def refuse_untraced(stated: Uncertainty, references: Sequence[Reference], *, simulated: bool) -> None:
+    """Refuse a budget that names a reference standard that is not there, claims more than it, or is exact on hardware.
+
+    Raises
+    ------
+    ValueError
+        With the entry.
+    """
+    known = {one.id: one for one in references}
+    for name, entry in stated.entries.items():
+        if entry.exact and not simulated:
+            raise ValueError(
+                f"uncertainty.{name}.exact: true, a station of kind simulated is needed; state its standard uncertainty"
+            )
+        if not entry.reference:
+            continue
+        if entry.reference not in known:
+            named = ", ".join(known) or "none"
+            raise ValueError(
+                f"uncertainty.{name}.reference: no [[reference]] is called '{entry.reference}' (there are: {named}); add it"
+            )
+        own, claimed = known[entry.reference], entry.standard("offset" if name == "thermometer" else "")
+        least = own.standard(claimed.unit)
+        if least is not None and claimed.unit and least > claimed.u * (1.0 + 1e-9):
+            raise ValueError(
+                f"uncertainty.{name}: u = {claimed.u / TO_SI[claimed.unit]:.3g} {claimed.unit}, reference {own.id} has "
+                f"{least / TO_SI[claimed.unit]:.3g} {claimed.unit}; state at least that"
+            )
 
 
 def with_faults(config: StationConfig, faults: Sequence[FaultOrder]) -> StationConfig:

@@ -288,6 +288,45 @@ TABLES: dict[str, Table] = {
         finite=("value", "uncertainty"),
         key=("unit", "figure"),
     ),
+    # one row per unit, quantity and contribution
+    "budget": Table(
+        {
+            **{name: _text() for name in ("unit", "quantity", "axis", "contribution", "type", "distribution", "scope")},
+            **{name: pa.Column(str) for name in ("unit_text", "input_unit", "source")},
+            **_numbers(("u", "share", "divisor", "stated")),
+            **_gaps(("dof", "sensitivity", "visible")),
+        },
+        finite=("u", "share"),
+        key=("unit", "quantity", "axis", "contribution"),
+    ),
+    "uncertainties": Table(
+        {
+            **{name: _text() for name in ("unit", "quantity", "axis", "frame")},
+            **{name: pa.Column(str) for name in ("unit_text", "largest")},
+            **_numbers(("value", "u_a", "u_b", "u", "k", "expanded")),
+            **_gaps(("dof", "shown", "unseen")),
+        },
+        finite=("value", "u_a", "u_b", "u", "k", "expanded"),
+        key=("unit", "quantity", "axis"),
+    ),
+    # of the coefficients of all axes in one vector, x before y before z, lower triangle
+    "budget_covariance": Table(
+        {"unit": _text(), "row": _whole(), "column": _whole(), "value": _number()},
+        finite=("value",),
+        key=("unit", "row", "column"),
+    ),
+    # risks of the decisions over the production that a lot stands for
+    "lot_risks": Table(
+        {
+            "figure": _text(),
+            "unit_text": pa.Column(str),
+            "units": _whole(1),
+            **_numbers(("mean", "u", "limit", "accept")),
+            **_gaps(("process", "pfa", "pfr", "accepted", "largest_pfa")),
+        },
+        finite=("mean", "u", "limit", "accept"),
+        key=("figure",),
+    ),
     "grades": Table(
         {
             "unit": _text(),

@@ -51,7 +51,9 @@ def refuse_period(run: Run, first: str, last: str) -> None:
 def allowed_months(run: Run) -> int:
     """Longest that a certificate of a run may hold, months: by its limits, else by policy."""
     stated = (run.about.get("limits") or {}).get("validity_months")
-    return stated if type(stated) is int and 1 <= stated <= MOST_MONTHS else VALIDITY_MONTHS
+    allowed = stated if type(stated) is int and 1 <= stated <= MOST_MONTHS else VALIDITY_MONTHS
+    figures = ((run.about.get("recipe") or {}).get("certificate") or {}).get("validity_months")
+    return min(allowed, figures) if type(figures) is int and figures >= 1 else allowed
 
 
 def refuse_serial(serial: str, where: str) -> None:

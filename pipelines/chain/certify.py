@@ -13,6 +13,8 @@ from pipelines.certificates.entries import FOLDER, LedgerEntry
 from pipelines.certificates.measured import END, measured_span
 from pipelines.certificates.refusals import allowed_months, refuse_period
 from pipelines.integrity import verify
+from pipelines.jobs.terms import archived_terms
+from pipelines.stages.grade import BUDGET
 from pipelines.tables.frames import rows_of
 from schemas.errors import ArchiveUnusable, WrongUse, did_you_mean
 
@@ -23,6 +25,8 @@ if TYPE_CHECKING:
 
     from pipelines.certificates.ledger import Ledger
 
+NEVER_LEFT_OUT = ("gravity", "level", "orthogonality", "outer_offset", "harmonics", "pose", "thermometer")
+"""Entries of [uncertainty] without which nothing is certified; without the seat the misalignment to the case is not."""
 EVIDENCE = ("dwells", "coefficients", "covariance", "grades")
 
 
@@ -108,6 +112,7 @@ def _proposals(
     grades = {str(row["unit"]): row for row in rows_of(_grades(run))}
     refuse_overdue(run)
     refuse_inadequate_import(run)
+    refuse_unstated(run)
     about, result = run.about, Certified()
     evidence = tuple(sorted((name, files.sha256(run.path / f"{name}.json")) for name in EVIDENCE))
     station = (about.get("station") or {}).get("name", IMPORTED)
@@ -215,6 +220,33 @@ def refuse_inadequate_import(run: Run) -> None:
         raise WrongUse(
             f"certify: run {run.id} was imported and its model {why}, an adequate one is needed; see 'tumbleline diagnose "
             f"{run.id}'"
+        )
+
+
+def refuse_unstated(run: Run) -> None:
+    """Refuse a run whose figures rest on noise only, on assumed figures, or on no figure over the period of validity.
+
+    A run that is made again from archived data keeps what its station stated when it measured: it states no more than before.
+    """
+    terms, grades = archived_terms(run.about), run.table("grades")
+    if terms is None or terms.stated is None or "basis" not in grades or set(grades["basis"]) != {BUDGET}:
+        raise WrongUse(
+            f"certify: run {run.id} states no uncertainty of its references (noise only), a certificate needs the whole budget; "
+            "add [uncertainty] to the station's file and measure again"
+        )
+    if terms.stated.grade_source == "assumed":
+        raise WrongUse(
+            f'certify: run {run.id} rests on assumed uncertainties (grade_source = "assumed"), certificates or data sheets are '
+            "needed; state where the figures of [uncertainty] come from and measure again"
+        )
+    missing = {name: rules for name, rules in terms.stated.not_stated.items() if name in NEVER_LEFT_OUT}
+    if missing:
+        listed = ", ".join(f"{name} (rules {rules})" for name, rules in missing.items())
+        raise WrongUse(f"certify: run {run.id}: not stated: {listed}; add it to [uncertainty] and measure again")
+    if not run.table("uncertainties")["quantity"].eq("bias_error_period").any():
+        raise WrongUse(
+            f"certify: run {run.id} has no error over the period of validity ({terms.certificate.validity_months} months): state "
+            "[stability] of the device with a horizon_days that reaches so far, and verification poses, and measure again"
         )
 
 

@@ -5,6 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
+from pipelines.jobs.terms import budget_terms
+from pipelines.stages.budget import budget
+from pipelines.stages.budget_terms import BudgetTables
 from pipelines.stages.fit import fit
 from pipelines.stages.grade import Evidence, grade
 from pipelines.stages.noise import noise
@@ -93,11 +96,24 @@ def _noise(job: Job, run: Run) -> Tables:
     return noise(_records(run).samples(static), readings, *tables)
 
 
-_EVIDENCE = ("verdicts", "coefficients", "covariance", "residuals", "verification", "verification_poses", "noise")
+_BUDGETED = ("dwells", "history", "coefficients", "covariance", "wander", "verification", "verification_poses", "noise")
+
+
+def _budget(job: Job, run: Run) -> Tables:
+    return budget(BudgetTables(*(run.table(name) for name in _BUDGETED)), budget_terms(job))
+
+
+_EVIDENCE = (
+    *("verdicts", "coefficients", "covariance", "residuals", "verification", "verification_poses", "noise"),
+    *("uncertainties", "budget_covariance"),
+)
 
 
 def _grade(job: Job, run: Run) -> Tables:
-    return grade(Evidence(*(run.table(name) for name in _EVIDENCE)), job.limits, job.recipe.zero_output)
+    readings = run.table("readings").drop_duplicates("unit")
+    full_scale = dict(zip(readings["unit"].astype(str), readings["full_scale"].astype(float), strict=True))
+    evidence = Evidence(*(run.table(name) for name in _EVIDENCE), full_scale=full_scale)
+    return grade(evidence, job.limits, job.recipe.zero_output)
 
 
 def _none(job: Job) -> dict[str, Any]:
@@ -152,9 +168,17 @@ STAGES: tuple[Stage, ...] = (
         modules=("pipelines.stages.noise", _TABLES),
     ),
     Stage(
+        name="budget",
+        inputs=_BUDGETED,
+        outputs=("budget", "uncertainties", "budget_covariance"),
+        parameters=lambda job: budget_terms(job).document(),
+        call=_budget,
+        modules=("pipelines.stages.budget", _TABLES),
+    ),
+    Stage(
         name="grade",
-        inputs=_EVIDENCE,
-        outputs=("figures", "grades"),
+        inputs=(*_EVIDENCE, "readings"),
+        outputs=("figures", "grades", "lot_risks"),
         parameters=lambda job: {
             "limits": job.limits.model_dump(mode="json"),
             "zero_output": job.recipe.zero_output,

@@ -19,6 +19,9 @@ class FigureDocument(TypedDict):
     unit_text: str
     outcome: str
     rule: str
+    accept: NotRequired[Annotated[float | None, "largest value that is accepted; null: no limit"]]
+    pfa: NotRequired[Annotated[float | None, "probability of false acceptance; null: no limit"]]
+    pfr: NotRequired[Annotated[float | None, "probability of false rejection; null: no limit"]]
 
 
 class UnitDocument(TypedDict):
@@ -31,6 +34,7 @@ class UnitDocument(TypedDict):
     reasons: Annotated[str, "separated by `; `; empty if it passed"]
     rule: str
     figures: Annotated[dict[str, FigureDocument], "by [name](../reference/figures.md); empty if refused"]
+    basis: NotRequired[Annotated[str, "what the uncertainties rest on: `budget` or `noise only`"]]
 
 
 RunDocument = TypedDict(

@@ -19,12 +19,15 @@ from pipelines.cli.options import (
     print_table,
     short,
 )
+from pipelines.cli.reach_text import print_reach
+from schemas.errors import PART_FAILED
 
 if TYPE_CHECKING:
     from typer._click import Context
 
     from inertial.noise.dwells import DwellNoise
     from pipelines.planning.plan import PlanContext
+    from schemas.limits import Limits
     from schemas.recipe import Recipe
 
 PART = "Measure"
@@ -107,13 +110,15 @@ def command(
 
     For effects that are not visible: the reason, and what to add to the recipe.
     """
+    from pipelines.jobs.terms import planned_terms
     from pipelines.planning.plan import plan, plan_context
     from schemas.station import load_station
 
     config = load_station(station)
     found = with_model(recipe, effects, model, archive, config.name)
     context = plan_context(found, config, noise_of(found, device or found.device, noise, wander))
-    document = plan(context)
+    limits = _limits(found, Path(recipe).parent)
+    document = plan(context, planned_terms(found, config, limits), limits)
     if page is not None:
         _write(page, document, context)
         document["page"] = str(page)
@@ -123,6 +128,9 @@ def command(
         print_json(document)
     else:
         _print(document)
+    stated = document.get("uncertainty")
+    if stated is not None and stated["unreachable"]:
+        raise typer.Exit(PART_FAILED)
 
 
 @app.command()
@@ -244,6 +252,17 @@ def optimise(
         print_optimum(document)
 
 
+def _limits(recipe: Recipe, home: Path) -> Limits | None:
+    """The limits that a recipe names; None where they are not there, which a plan does not need."""
+    from pipelines.jobs.recipes import load_limits
+    from schemas.errors import RecipeInvalid
+
+    try:
+        return load_limits(recipe, home)
+    except RecipeInvalid:
+        return None
+
+
 def _save(path: Path, text: str) -> None:
     """Write a file; a folder that does not exist or cannot be written to is wrong use."""
     from schemas.errors import WrongUse
@@ -324,10 +343,14 @@ def _print(document: dict[str, Any]) -> None:
     print_table(["coefficient", "error x, 1σ", "y", "z", "unit"], _coefficient_lines(document["coefficients"]))
     if document["bias"] is not None:
         bias = document["bias"]
+        again = (
+            "no repeatability is stated" if bias["switch_on_u_ug"] is None else f"{short(bias['switch_on_u_ug'])} µg"
+        )
         out.print(
             f"bias, 1σ of the worst axis: as the mean of the record {short(bias['record_u_ug'])} µg, of the day after it "
-            f"{short(bias['long_u_ug'])} µg; after the next switch-on: no repeatability is stated"
+            f"{short(bias['long_u_ug'])} µg; after the next switch-on: {again}"
         )
+    print_reach(document.get("uncertainty"))
     seen = [row for row in document["effects"] if row["seen"]]
     print_table(
         ["visible effect", "v", "1/v²", "floor, µg", "coefficient", "unit", "confounded with"],

@@ -21,13 +21,21 @@ SHOWN = (
     ("residual_rms_ug", "fit\nµg"),
     ("verification_norm_ug", "verify\nµg"),
     ("bias_error_ug", "error\nµg"),
+    ("bias_error_period_ug", "period\nµg"),
     ("velocity_random_walk_ug_rtHz", "N\nµg/√Hz"),
     ("bias_instability_ug", "B\nµg"),
 )
 
+FIXED = ("value", "uncertainty", "limit", "unit_text", "outcome", "rule")
+RISKS = ("accept", "pfa", "pfr")  # runs of earlier versions have none
+NOISE_ONLY = (
+    "uncertainty: noise only, the station states no [uncertainty]: no grade above consumer, no certificate "
+    "(docs/how-to/state-the-uncertainty.md)"
+)
+
 LEGEND = (
     "fit: rms residual · verify: largest | |a| − g | of a pose not used, mean of its dwells · error: rms of the worst axis "
-    "there\n"
+    "there · period: the same, expected over the period of validity\n"
     "N, B: noise of the worst axis, an upper limit where a term is not identified"
 )
 
@@ -58,10 +66,7 @@ def _unit(row: dict[str, Any], figures: pd.DataFrame) -> dict[str, Any]:
     return json_value(
         {
             **row,
-            "figures": {
-                f["figure"]: {k: f[k] for k in ("value", "uncertainty", "limit", "unit_text", "outcome", "rule")}
-                for f in rows_of(own)
-            },
+            "figures": {f["figure"]: {k: f[k] for k in (*FIXED, *RISKS) if k in f} for f in rows_of(own)},
         }
     )
 
@@ -87,6 +92,8 @@ def print_summary(document: dict[str, Any]) -> None:
         if unit["reasons"]:
             out.print(f"  {unit['unit']}: {unit['reasons']}", markup=False)
     out.print(f"  decided by {document['rule']}", markup=False, style="dim")
+    if any(unit.get("basis") != "budget" for unit in document["units"]):
+        out.print(f"  {NOISE_ONLY}", markup=False, style="dim", soft_wrap=True)
     for line in _interrupted(document["interruptions"]):
         out.print(line, markup=False, soft_wrap=True)
     total = len(document["units"])

@@ -10,6 +10,7 @@ from inertial.errors import InertialError
 from pipelines.archive.keys import digest
 from pipelines.jobs.model_files import read_model, refuse_unknown_effects, use_formulas
 from pipelines.jobs.recipes import MAIN_JOB, load_limits, load_recipe, lot_of, units_of
+from pipelines.jobs.terms import refuse_contradictions, refuse_unreachable, with_stability
 from pipelines.schedule.planned_state import refuse_unidentified
 from pipelines.stages.figures import UNITS
 from pipelines.stages.grade import refuse_limits_without_figures
@@ -37,6 +38,9 @@ ANALYSIS_KEYS = {
     "zero_output",
     "model_name",
     "model_version",
+    "uncertainty",  # states what is known, and drives nothing; so do the next two
+    "stability",
+    "certificate",
     "faults",  # they are the station's, which is in the capture's name
 }
 
@@ -72,7 +76,7 @@ class Job:
         measured = self.recipe.model_dump(mode="json", exclude=ANALYSIS_KEYS)
         if not measured["soaks"]:  # recipes without them keep the names that their captures had before there were any
             del measured["soaks"]
-        unmoved = {"pace", "reference", *GUARDS}  # plan time, name standards, guard: they drive nothing
+        unmoved = {"pace", "reference", "uncertainty", *GUARDS}  # plan time, state standards, guard: they drive nothing
         station = self.station.model_dump(mode="json", exclude=unmoved)
         after = {"parents": list(self.parents)} if self.parents else {}
         content = {"recipe": measured, "lot": self.lot.model_dump(), "station": station, **after}
@@ -130,11 +134,13 @@ class Request:
         limits = load_limits(recipe, Path(self.recipe).parent)
         lot = lot_of(recipe, self.units, self.slots, seed=self.seed, repeat=self.repeat)
         station = with_faults(load_station(self.station), [*recipe.faults, *map(parse_fault, self.faults)])
-        job = Job(recipe, limits, lot, station)
+        refuse_contradictions(recipe, station)
+        job = Job(with_stability(recipe, station), limits, lot, station)
         _refuse_more_units_than_slots(job)
         _refuse_unknown_device(job)
         _refuse_beyond_station(job)
         _refuse_inconsistent(job, recorded_columns(station.devices.reader))
+        refuse_unreachable(job)
         return job
 
     def _line_model(self, archive: Archive | None, device: str) -> dict[str, Any]:

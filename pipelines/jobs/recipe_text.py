@@ -48,6 +48,7 @@ def recipe_text(recipe: Recipe, remarks: Iterable[str] = ()) -> str:
     tables = {key for key, value in written.items() if isinstance(value, list) and value and isinstance(value[0], dict)}
     if "soaks" in tables:
         written.pop("temperatures_C", None)  # the soaks say them
+    tables |= {key for key, value in written.items() if isinstance(value, dict)}
     # a key behind a table would belong to the table
     for key in sorted(written, key=lambda key: key in tables):
         if key == "poses":

@@ -82,6 +82,30 @@ class PlannedBias(TypedDict):
     switch_on_why: NotRequired[Annotated[str, "why that is not stated"]]
 
 
+class ReachableQuantity(TypedDict):
+    """What can be reached of one quantity."""
+
+    quantity: Annotated[str, "`bias_error`: by the references alone; `bias_error_period`: RMS expected over the period"]
+    axis: str
+    unit: str
+    u: Annotated[float, "standard uncertainty, in `unit`"]
+    expanded: Annotated[float, "k·u"]
+    shares: Annotated[dict[str, float], "contribution to u², by name, the largest first"]
+
+
+class ReachableUncertainty(TypedDict):
+    """Uncertainty that the recipe can reach with what station and device state."""
+
+    k: float
+    frame: Annotated[str, "`intrinsic` or `fixture`"]
+    validity_months: int
+    grade_source: str
+    not_stated: Annotated[dict[str, str], "entries of `[uncertainty]` that are missing, with what each rules"]
+    quantities: list[ReachableQuantity]
+    unreachable: Annotated[list[str], "limits that cannot be met, and why; empty: none"]
+    remarks: list[str]
+
+
 class PlanDocument(TypedDict):
     """``plan --json``: what a recipe can determine, with its station time and expected uncertainties."""
 
@@ -98,4 +122,5 @@ class PlanDocument(TypedDict):
     minutes: NotRequired[StationMinutes]
     coefficients: NotRequired[list[PlannedCoefficient]]
     bias: NotRequired[Annotated[PlannedBias | None, "null: the model has no bias"]]
+    uncertainty: NotRequired[Annotated[ReachableUncertainty | None, "null: noise only, no `[uncertainty]` is stated"]]
     page: NotRequired[Annotated[str, "path of the page that `--page` wrote"]]

@@ -15,6 +15,7 @@ from inertial.noise.measurands import DAY_S, between_means, walked
 from inertial.planning.expected import expected_errors
 from inertial.planning.reasons import reason
 from inertial.planning.visibility import SEEN, visibilities
+from pipelines.planning.reach import reach
 from pipelines.schedule.planned_state import state_of
 from pipelines.schedule.steps import steps
 from pipelines.schedule.timing import schedule, spent
@@ -31,6 +32,8 @@ if TYPE_CHECKING:
     from inertial.planning.visibility import Visibility
     from inertial.state import State
     from pipelines.schedule.timing import Activity
+    from pipelines.stages.budget_terms import BudgetTerms
+    from schemas.limits import Limits
     from schemas.recipe import Recipe
     from schemas.station import StationConfig
 
@@ -62,8 +65,13 @@ def plan_context(recipe: Recipe, station: StationConfig, noise: DwellNoise, *, s
     return PlanContext(recipe, station, noise, whole, state, covariance)
 
 
-def plan(context: PlanContext) -> dict[str, Any]:
+def plan(context: PlanContext, terms: BudgetTerms | None = None, limits: Limits | None = None) -> dict[str, Any]:
     """Document of a recipe: visibility of every effect of the catalogue, expected errors, station time; keys for other programs.
+
+    Parameters
+    ----------
+    terms : what station and device state of their uncertainty; without them the document has no ``uncertainty``
+    limits : that the uncertainty must allow
 
     Raises
     ------
@@ -71,7 +79,8 @@ def plan(context: PlanContext) -> dict[str, Any]:
         The recipe cannot identify its own model; the message says what is missing.
     """
     recipe, noise = context.recipe, context.noise
-    expected = identified(replace(context, covariance=_of_record(context)))
+    of_record = _of_record(context)
+    expected = identified(replace(context, covariance=of_record))
     found = visibilities(context.state, recipe.effects, noise.error(recipe.dwell_s), covariance=context.covariance)
     fast = visibilities(context.state, recipe.effects, noise.white(recipe.dwell_s), [s.effect for s in found if s.seen])
     alone = {s.effect: MICRO * s.size for s in fast if np.isfinite(s.size)}
@@ -88,8 +97,9 @@ def plan(context: PlanContext) -> dict[str, Any]:
         "dwell_s": {"planned": recipe.dwell_s, "white_as_large_as_wander": noise.balanced()},
         "minutes": spent(context.activities).document(),
         "coefficients": _coefficient_rows(expected),
-        "bias": _bias(context, expected),
+        "bias": _bias(context, expected, terms),
         "effects": [_row(s, context.state, recipe.effects) | {"floor_white_ug": alone.get(s.effect)} for s in found],
+        **({} if terms is None else {"uncertainty": reach(context, of_record, terms, limits)}),
     }
 
 
@@ -99,7 +109,7 @@ def _of_record(context: PlanContext) -> NDArray[np.float64]:
     return dwell_covariance(time, length, context.noise, since=float(time.min()) - 0.5 * length)
 
 
-def _bias(context: PlanContext, expected: Expected) -> dict[str, float | str | None] | None:
+def _bias(context: PlanContext, expected: Expected, terms: BudgetTerms | None) -> dict[str, float | str | None] | None:
     """Standard uncertainty of the bias by measurand, of the worst axis, as the fit will state it; None for a model without one.
 
     See :func:`pipelines.stages.bias_measurands.bias_measurands`.
@@ -117,12 +127,14 @@ def _bias(context: PlanContext, expected: Expected) -> dict[str, float | str | N
     if span > 0.0:
         flicker = noise.instability * np.sqrt(between_means(span, DAY_S))
         apart = float(np.hypot(flicker, noise.walk * np.sqrt(walked(span, DAY_S))))
+    long = MICRO * float(np.hypot(max(own), apart))
+    again = None if terms is None or terms.stability is None else terms.stability.switch_on_ug
     return {
         "record_u_ug": MICRO * float(np.hypot(max(own), noise.walk * np.sqrt(walked(span)))),
-        "long_u_ug": MICRO * float(np.hypot(max(own), apart)),
+        "long_u_ug": long,
         "long_s": DAY_S,
-        "switch_on_u_ug": None,
-        "switch_on_why": NO_SWITCH_ON,
+        "switch_on_u_ug": None if again is None else float(np.hypot(long, again)),
+        **({"switch_on_why": NO_SWITCH_ON} if again is None else {}),
     }
 
 

@@ -18,7 +18,7 @@ INPUTS = (
     *("verdicts", "dwells", "coefficients", "residuals", "verification", "verification_poses"),
     *("allan", "noise", "figures", "grades"),
 )
-OPTIONAL = ("wander",)
+OPTIONAL = ("wander", "budget", "uncertainties", "lot_risks")
 MODULES = ("schemas.limits", "schemas.tables", "pipelines.report")
 
 

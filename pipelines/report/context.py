@@ -21,7 +21,7 @@ TABLES = (
     *("verdicts", "dwells", "coefficients", "residuals", "verification", "verification_poses"),
     *("allan", "noise", "figures", "grades"),
 )
-OPTIONAL = ("wander",)  # runs of earlier versions have none
+OPTIONAL = ("wander", "budget", "uncertainties", "lot_risks")  # runs of earlier versions have none
 
 
 class ReportContext:
@@ -80,4 +80,6 @@ class UnitContext:
     @cached_property
     def tables(self) -> dict[str, pd.DataFrame]:
         """The rows of this unit in the run's tables."""
-        return {name: table[table["unit"] == self.unit] for name, table in self.report.tables.items()}
+        return {
+            name: table[table["unit"] == self.unit] for name, table in self.report.tables.items() if "unit" in table
+        }

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Any
 
+from pipelines.report.budget_plots import shares_plot
 from pipelines.report.numbers import plain
 from pipelines.report.plan_plots import alias_plot, sight_plot, sphere_plot, temperature_plot
 from pipelines.report.templates import template
@@ -40,7 +41,22 @@ def pictures(document: dict[str, Any], context: PlanContext) -> dict[str, str]:
         "temperature": temperature_plot(context),
         "sights": sight_plot(document["effects"]),
         "aliases": alias_plot(context),
+        "budget": _budget(document.get("uncertainty")),
     }
+
+
+def _budget(found: dict[str, Any] | None) -> str:
+    """Shares of the contributions to what can be reached, of the worst axis of each quantity; empty where nothing is stated."""
+    if found is None:
+        return ""
+    worst: dict[str, dict[str, Any]] = {}
+    for row in found["quantities"]:
+        if row["quantity"] not in worst or row["u"] > worst[row["quantity"]]["u"]:
+            worst[row["quantity"]] = row
+    titles = {"bias_error": "error by the references", "bias_error_period": "error over the period"}
+    return shares_plot(
+        {f"{titles.get(q, q)}, {row['axis']}": row["shares"] for q, row in worst.items() if row["shares"]}
+    )
 
 
 def scientific(value: float) -> str:

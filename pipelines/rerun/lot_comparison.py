@@ -11,8 +11,11 @@ from threadpoolctl import threadpool_limits
 from inertial.correction import correct
 from inertial.errors import InertialError
 from pipelines.archive import Archive, Run
+from pipelines.jobs.terms import budget_terms
 from pipelines.rerun.selection import entry_of
 from pipelines.rerun.steps import archived_job
+from pipelines.stages.budget import budget
+from pipelines.stages.budget_terms import BudgetTables
 from pipelines.stages.fit import KINDS, fit
 from pipelines.stages.grade import Evidence, grade
 from pipelines.stages.verify import verify
@@ -106,10 +109,16 @@ def _both(run: Run, wanted: ModelChange) -> tuple[Side, Side]:
     new = fit(dwells, history, job.recipe.effects)
     new |= verify(dwells, history, new["coefficients"], new["covariance"], new["predictions"])
     # the noise is in µg already, and the response by which it was made so hardly depends on the model
+    names = ("coefficients", "covariance", "wander", "verification", "verification_poses")
+    stated = budget(
+        BudgetTables(dwells, history, *(new[name] for name in names), noise=old["noise"]), budget_terms(job)
+    )
     evidence = Evidence(
         old["verdicts"],
         *(new[name] for name in ("coefficients", "covariance", "residuals", "verification", "verification_poses")),
         noise=old["noise"],
+        uncertainties=stated["uncertainties"],
+        budget_covariance=stated["budget_covariance"],
     )
     new |= grade(evidence, job.limits, job.recipe.zero_output)
     return _side(old), _side(new)

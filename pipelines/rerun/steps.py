@@ -282,7 +282,7 @@ def _grade_step(limits: Limits) -> StageCall:
     names = ("coefficients", "covariance", "residuals", "verification", "verification_poses")
 
     def call(run: Run) -> Tables:
-        tables = {name: run.table(name) for name in names}
+        tables: dict[str, Any] = {name: run.table(name) for name in names}
         units = list(dict.fromkeys(tables["coefficients"]["unit"].astype(str)))
         sound = {"unit": units, "slot": range(len(units)), "refused": False, "fault": "", "reason": ""}
         noise = empty_table(texts="unit axis term unit_text", numbers="value low high", flags="identified")

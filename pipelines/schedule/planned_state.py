@@ -59,9 +59,10 @@ def state_of(
     *,
     history: bool = False,
     recorded: Iterable[str] | None = None,
+    kind: str = "dwell",
 ) -> State:
-    """The dwells of the fit among what a station does, see :func:`planned_state`."""
-    dwells = [s for s in stretches if s.kind == "dwell"]
+    """The dwells of the fit, or of another kind, among what a station does, see :func:`planned_state`."""
+    dwells = [s for s in stretches if s.kind == kind]
     outer, inner = np.radians([(s.step.pose.outer_deg, s.step.pose.inner_deg) for s in dwells]).T
     time = np.array([s.start + 0.5 * s.seconds for s in dwells])
     settled = np.array([s.step.settled for s in dwells])

@@ -2,28 +2,43 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 import numpy as np
 import pandas as pd
 
 from pipelines.stages.figures import FIGURES, Figure, LotCoefficients, UnitTables, figures_of
+from pipelines.stages.figures.base import BudgetRow
+from pipelines.stages.lot_risks import lot_risks
 from pipelines.tables.calibration import read_calibration
 from pipelines.tables.frames import ByUnit, empty_table
 from schemas.errors import RecipeInvalid
-from schemas.limits import GRADE_FIGURE, GRADES, Decision, Limits, decide, describe_rule, grade_of
+from schemas.limits import GRADE_FIGURE, GRADES, PERIOD_FIGURE, Decision, Limits, decide, describe_rule, grade_with
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from numpy.typing import NDArray
+
     from schemas.recipe import Recipe
 
 NO_GRADE = "none"
-FIGURE_TEXTS, FIGURE_NUMBERS = "unit figure unit_text outcome rule", "value uncertainty limit"
+FIGURE_TEXTS, FIGURE_NUMBERS = "unit figure unit_text outcome rule", "value uncertainty limit accept pfa pfr"
+
+
+NOISE_ONLY, BUDGET = "noise only", "budget"
+BEST_OF_NOISE = "consumer"
+"""The best grade that a run without a stated uncertainty may have."""
 
 
 @dataclass(frozen=True)
 class Evidence:
-    """The tables that a decision rests on."""
+    """The tables that a decision rests on.
+
+    uncertainties, budget_covariance : of the uncertainty budget; None, or without rows, where nothing is stated
+    full_scale : largest excursion of the output from 0 g by unit, output unit
+    """
 
     verdicts: pd.DataFrame
     coefficients: pd.DataFrame
@@ -32,6 +47,14 @@ class Evidence:
     verification: pd.DataFrame
     verification_poses: pd.DataFrame
     noise: pd.DataFrame
+    uncertainties: pd.DataFrame | None = None
+    budget_covariance: pd.DataFrame | None = None
+    full_scale: Mapping[str, float] = field(default_factory=dict[str, float])
+
+    @property
+    def basis(self) -> str:
+        """What the uncertainties rest on."""
+        return NOISE_ONLY if self.uncertainties is None or self.uncertainties.empty else BUDGET
 
 
 def refuse_limits_without_figures(limits: Limits, recipe: Recipe) -> None:
@@ -46,14 +69,18 @@ def refuse_limits_without_figures(limits: Limits, recipe: Recipe) -> None:
 
 
 def grade(evidence: Evidence, limits: Limits, zero_g: float = 0.0) -> dict[str, pd.DataFrame]:
-    """Tables ``figures`` (one row per unit and figure) and ``grades`` (one row per unit).
+    """Tables ``figures`` (one row per unit and figure), ``grades`` (one row per unit) and ``lot_risks`` (one per limited figure).
+
+    With an uncertainty budget the grade rests on the error expected over the period of validity, where that is known; without one
+    no unit has a grade above consumer.
 
     Parameters
     ----------
     zero_g : nominal output at 0 g, output unit.
     """
     rule = describe_rule(limits)
-    guard = limits.coverage_factor if limits.rule == "guarded_acceptance" else 0.0
+    guard = limits.guard_factor
+    by_unit = _budget(evidence.uncertainties)
     coefficients, places = _coefficients(evidence, zero_g)
     residuals, verification, verification_poses, noise = map(
         ByUnit, (evidence.residuals, evidence.verification, evidence.verification_poses, evidence.noise)
@@ -72,6 +99,8 @@ def grade(evidence: Evidence, limits: Limits, zero_g: float = 0.0) -> dict[str, 
             noise.of(unit),
             coefficients.of(places[unit]),
             guard,
+            by_unit.get(unit, {}),
+            evidence.full_scale.get(unit, float("nan")),
         )
         figures = list(figures_of(own))
         decisions = [
@@ -80,11 +109,37 @@ def grade(evidence: Evidence, limits: Limits, zero_g: float = 0.0) -> dict[str, 
             if f.name in limits.figures and not f.why_not
         ]
         figure_rows += [_figure_row(unit, figure, decisions, limits) for figure in figures if not figure.why_not]
-        grade_rows.append(_decided(verdict, figures, decisions, limits))
+        grade_rows.append(_decided(verdict, figures, decisions, limits, evidence.basis))
+    found = _table(figure_rows) if figure_rows else empty_table(texts=FIGURE_TEXTS, numbers=FIGURE_NUMBERS)
     return {
-        "figures": _table(figure_rows) if figure_rows else empty_table(texts=FIGURE_TEXTS, numbers=FIGURE_NUMBERS),
-        "grades": _table(grade_rows).assign(rule=rule),
+        "figures": found,
+        "grades": _table(grade_rows).assign(rule=rule, basis=evidence.basis),
+        "lot_risks": lot_risks(found, limits, evidence.uncertainties),
     }
+
+
+def _budget(table: pd.DataFrame | None) -> dict[str, dict[tuple[str, str], BudgetRow]]:
+    """The quantities of the budget by unit."""
+    found: dict[str, dict[tuple[str, str], BudgetRow]] = {}
+    if table is None:
+        return found
+    for row in table.to_dict("records"):
+        own = found.setdefault(str(row["unit"]), {})
+        own[str(row["quantity"]), str(row["axis"])] = BudgetRow(row["value"], row["u_a"], row["u_b"], row["u"])
+    return found
+
+
+def _stated(table: pd.DataFrame | None, units: int) -> NDArray[np.float64] | None:
+    """Covariance of the coefficients by the budget, (units, 3p, 3p)."""
+    if table is None or table.empty:
+        return None
+    size = int(table["row"].max()) + 1
+    out = np.zeros((units, size, size))
+    row, column = np.tril_indices(size)
+    values = table["value"].to_numpy().reshape(units, -1)
+    out[:, row, column] = values
+    out[:, column, row] = values
+    return out
 
 
 def _coefficients(evidence: Evidence, zero_g: float) -> tuple[LotCoefficients | None, dict[str, int]]:
@@ -92,7 +147,8 @@ def _coefficients(evidence: Evidence, zero_g: float) -> tuple[LotCoefficients | 
     if evidence.coefficients.empty:
         return None, {}
     calibration = read_calibration(evidence.coefficients, evidence.covariance)
-    return LotCoefficients(calibration, zero_g), {unit: place for place, unit in enumerate(calibration.units)}
+    stated = _stated(evidence.budget_covariance, len(calibration.units))
+    return LotCoefficients(calibration, zero_g, stated), {unit: place for place, unit in enumerate(calibration.units)}
 
 
 def _table(rows: list[dict[str, object]]) -> pd.DataFrame:
@@ -100,7 +156,9 @@ def _table(rows: list[dict[str, object]]) -> pd.DataFrame:
     return pd.DataFrame({name: [row[name] for row in rows] for name in (rows[0] if rows else ())})
 
 
-def _decided(verdict: dict, figures: list[Figure], decisions: list[Decision], limits: Limits) -> dict[str, object]:
+def _decided(
+    verdict: dict, figures: list[Figure], decisions: list[Decision], limits: Limits, basis: str
+) -> dict[str, object]:
     best = NO_GRADE
     reasons = [decision.sentence for decision in decisions if not decision.passed]
     reasons += [
@@ -108,12 +166,28 @@ def _decided(verdict: dict, figures: list[Figure], decisions: list[Decision], li
         for figure in figures
         if figure.why_not and figure.name in limits.figures
     ]
-    for figure in figures:
-        if figure.name == GRADE_FIGURE:
-            best = grade_of(figure.value, limits.coverage_factor * figure.uncertainty, limits.rule) or NO_GRADE
-            if not _good_enough(best, limits.grade):
-                reasons.append(f"grade {best}: grade {limits.grade} is needed")
+    by_name = {figure.name: figure for figure in figures}
+    figure = by_name.get(PERIOD_FIGURE, by_name.get(GRADE_FIGURE))
+    if figure is not None:
+        best = grade_with(figure.value, limits.guard_factor * figure.uncertainty) or NO_GRADE
+        known = figure.name == PERIOD_FIGURE
+        if not known and _good_enough(best, BEST_OF_NOISE):
+            best = BEST_OF_NOISE
+        if not _good_enough(best, limits.grade):
+            reasons.append(f"grade {best}{_why(figure, best, basis, limits)}: grade {limits.grade} is needed")
     return _grade_row(verdict, "fail" if reasons else "pass", best, "; ".join(reasons))
+
+
+def _why(figure: Figure, best: str, basis: str, limits: Limits) -> str:
+    """Why a grade is no better, in brackets."""
+    if figure.name == PERIOD_FIGURE:
+        expanded = limits.coverage_factor * figure.uncertainty
+        return f" (error expected over the period of validity {figure.value:.3g} ± {expanded:.2g} µg)"
+    if best != BEST_OF_NOISE:
+        return ""
+    if basis == NOISE_ONLY:
+        return " (noise only: no [uncertainty] is stated, no grade above consumer)"
+    return " (the error over the period of validity is not known: state [stability] of the device)"
 
 
 def _good_enough(grade: str, required: str) -> bool:
@@ -142,4 +216,7 @@ def _figure_row(unit: str, figure: Figure, decisions: list[Decision], limits: Li
         "unit_text": figure.unit,
         "outcome": decision.outcome if decision else "no limit",
         "rule": decision.rule if decision else "",
+        "accept": decision.accept if decision else np.nan,
+        "pfa": decision.pfa if decision else np.nan,
+        "pfr": decision.pfr if decision else np.nan,
     }

@@ -10,6 +10,7 @@ import pandas as pd
 
 from inertial.noise.allan import AllanCurve, overlapping
 from inertial.noise.terms import FLICKER_FLOOR, NoiseTerms, fit_terms, model_deviation
+from pipelines.stages.bias_stability import TERM, bias_stability
 from pipelines.stages.coarse_digits import Coarse, told, without_digits
 from pipelines.stages.static_record import Series, Warmed, warmed
 from pipelines.tables.calibration import read_calibration
@@ -78,6 +79,7 @@ def noise(
         terms = without_digits(terms, [one.digits for one in group], rate)
         curves.append(_curve_rows(group, curve, terms))
         rows += [row for place, one in enumerate(group) for row in _term_rows(one, terms, place)]
+        rows += [row for one in group for row in _stability_row(one, rate / series.size)]
     rows += [row for one in channels if one.silent for row in _silent_rows(one)]
     order = {(one.unit, one.axis): place for place, one in enumerate(channels)}
     rows.sort(key=lambda row: order[str(row[0]), str(row[1])])
@@ -217,6 +219,13 @@ def _term_rows(channel: _Channel, terms: NoiseTerms, place: int) -> list[tuple[o
             rows.append((*where, N_ONE_SIDED, *ends, term.identified, "µg/√Hz", note))
     bound = float(terms.bias_instability_bound[place])
     return [*rows, (channel.unit, channel.axis, B_BOUND, np.nan, 0.0, bound, False, "µg", "")]
+
+
+def _stability_row(channel: _Channel, rate: float) -> list[tuple[object, ...]]:
+    """The bias stability over the last hour of the record; none where it is shorter."""
+    found = bias_stability(channel.record, rate)
+    where = (channel.unit, channel.axis, TERM)
+    return [] if found is None else [(*where, *found, True, "µg", channel.warmth)]
 
 
 def _silent_rows(channel: _Channel) -> list[tuple[object, ...]]:

@@ -52,6 +52,7 @@ class Physics:
         self._hidden = list(hidden)
         self._sampled_until = 0.0
         self._up = np.array([0.0, 0.0, gravity])
+        self.orthogonality = 0.0  # rad, of the table's axes
         for effect in self._hidden:
             self._up = effect.up(self._up)
         self.dead_from = np.full(len(rotations), math.inf)
@@ -63,7 +64,7 @@ class Physics:
         outer, inner = np.deg2rad(self._outer.shaft(time)), np.deg2rad(self._inner.shaft(time))
         for effect in self._hidden:
             outer, inner = effect.table(outer, inner)
-        force = rotate(self._rotations, turn(self._up, outer, inner)[:, None, :])
+        force = rotate(self._rotations, turn(self._up, outer, inner, self.orthogonality)[:, None, :])
         for effect in self._hidden:
             force = effect.force(force)
         return force

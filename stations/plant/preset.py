@@ -9,7 +9,9 @@ from typing import TYPE_CHECKING, Annotated, Literal
 from pydantic import Field, FiniteFloat, ValidationError
 
 from schemas.errors import RecipeInvalid, did_you_mean
-from schemas.recipe import Strict, explain
+from schemas.recipe import explain
+from schemas.strict import Strict
+from schemas.validity import Stability
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -49,6 +51,7 @@ class Preset(Strict):
     supply_V: Positive
     thermometer_resolution_K: Positive
     thermometer_noise_K: NotNegative
+    stability: Stability | None = None
 
     @property
     def largest_count(self) -> int:

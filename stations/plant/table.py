@@ -78,6 +78,8 @@ class Axis:
     def __init__(self, seed: int, channel: int) -> None:
         self._seed, self._channel = seed, channel
         self._moves = 0
+        self.scatter_deg = 0.0  # shaft against encoder, drawn at every move
+        self._off = 0.0
         self.move = Move(-1e9, 0.0, 0.0, 0.0, 1.0, 1.0)
         self.zero_deg, self.play_deg = 0.0, 0.0
         self.stuck_at: float | None = None
@@ -92,6 +94,8 @@ class Axis:
             self._held = target, speed, acceleration
             return
         self._moves += 1
+        if self.scatter_deg > 0.0:
+            self._off = self.scatter_deg * float(keyed_normal(self._seed, self._channel + 2, self._moves, 1)[0])
         slip = HOLD_DEG * float(keyed_normal(self._seed, self._channel, self._moves, 1)[0])
         origin = float(self.angle(np.array([now]))[0])
         if abs(target - origin) > self.play_deg:
@@ -131,7 +135,7 @@ class Axis:
 
     def shaft(self, time: Array) -> Array:
         """The shaft's true angle, degrees."""
-        return self.angle(time) - self.zero_deg - 0.5 * self._side * self.play_deg
+        return self.angle(time) - self.zero_deg - 0.5 * self._side * self.play_deg + self._off
 
     def moving(self, now: float) -> bool:
         """Whether the profile is running, or held up."""
@@ -150,15 +154,18 @@ class Axis:
         return round(angle / ENCODER_STEP_DEG) * ENCODER_STEP_DEG
 
 
-def turn(up: Array, outer: Array, inner: Array) -> Array:
+def turn(up: Array, outer: Array, inner: Array, orthogonality: float = 0.0) -> Array:
     """Specific force in the fixture, (n, 3) in g: first the inner axis, then the outer one turned back.
 
     Parameters
     ----------
     up : (3,), the direction opposite to gravity in the laboratory, g
-    outer, inner : (n,), rad
+    outer, inner : (n,), rad; orthogonality : rad, turn about y between the two axes
     """
     y = np.cos(outer) * up[1] + np.sin(outer) * up[2]
     z = np.cos(outer) * up[2] - np.sin(outer) * up[1]
     x = np.full_like(y, up[0])
+    if orthogonality:
+        c, s = math.cos(orthogonality), math.sin(orthogonality)
+        x, z = c * x - s * z, s * x + c * z
     return np.stack((np.cos(inner) * x + np.sin(inner) * y, np.cos(inner) * y - np.sin(inner) * x, z), axis=-1)

@@ -24,6 +24,7 @@ from stations.plant.moisture import Moisture
 from stations.plant.noise import Noise
 from stations.plant.physics import Physics
 from stations.plant.preset import Preset, load_preset
+from stations.plant.reference_errors import StationErrors
 from stations.plant.sampler import Sampler
 from stations.plant.table import Axis
 from stations.profile_files import load_profile
@@ -64,6 +65,11 @@ class World:
         effects = [*hidden, *(hidden_effect(h.kind, h.figures) for h in sim.hidden)]
         for number, effect in enumerate(effects):
             effect.begin(len(self.slots), stream(lot.seed, "hidden", number))
+        own = sim.reference_errors
+        self.station_errors = None if own is None else StationErrors(own, stream(sim.seed, "references"))
+        if self.station_errors is not None:
+            effects.append(self.station_errors)
+            self.outer.scatter_deg = self.inner.scatter_deg = self.station_errors.pose_deg
         air, water = (stream(sim.seed, lot.seed, lot.repeat, name) for name in ("air", "moisture"))
         self.fixture = Fixture(sim, self.slots, air, effects, Moisture(water))
         self._supply = 1.0 + sim.supply_spread * stream(sim.seed, "supply").standard_normal(64)[self.slots]
@@ -81,6 +87,7 @@ class World:
             effects,
             sim.local_gravity_m_s2 / STANDARD_G,
         )
+        self.physics.orthogonality = 0.0 if self.station_errors is None else self.station_errors.orthogonality
         fifo = load_profile(config.devices.slots.profile).fifo
         registers = fifo.registers if fifo is not None else 0
         self.sampler = Sampler(self.physics, len(self.slots), self.preset.packing, registers)
@@ -159,6 +166,8 @@ class World:
     def temperature_reading(self) -> list[float]:
         """Readings of the slots' thermometers, °C; those of empty slots read the air."""
         element = self.fixture.temperature.at(np.array([self.now]))[0]
+        if self.station_errors is not None:
+            element = self.station_errors.reading(element)
         raw = element + self.preset.thermometer_noise_K * self._noise(THERMOMETER, len(element))
         step = self.preset.thermometer_resolution_K
         readings = self._by_slot(np.round(raw / step) * step, float(self.fixture.air.at(np.array([self.now]))[0]))

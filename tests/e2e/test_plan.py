@@ -139,7 +139,7 @@ def test_the_page_of_a_plan_opens_without_a_network(faces, tmp_path):
     done = CliRunner().invoke(app, ["plan", str(faces), "--page", str(page)])
     assert done.exit_code == 0
     text = page.read_text(encoding="utf-8")
-    assert text.count("<svg") == 4
+    assert text.count("<svg") == 5
     assert not re.search(r"(src|href)=.http", text)
     assert "β in 90° steps" in text
 

@@ -57,5 +57,5 @@ def test_pictures_are_drawn_by_the_command_of_the_page(tmp_path):
     done = CliRunner().invoke(app, ["plan", "production", "--pictures", str(tmp_path), "--json"])
     assert done.exit_code == 0
     drawn = sorted(path.name for path in tmp_path.iterdir())
-    assert drawn == [f"production-{name}.svg" for name in ("aliases", "sights", "sphere", "temperature")]
+    assert drawn == [f"production-{name}.svg" for name in ("aliases", "budget", "sights", "sphere", "temperature")]
     assert all(path.read_text(encoding="utf-8").startswith("<svg") for path in tmp_path.iterdir())

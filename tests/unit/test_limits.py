@@ -40,7 +40,10 @@ def test_names_value_uncertainty_limit_margin_and_rule() -> None:
     decision = decide(limits(), "bias_error_ug", 130.0, 5.0)
     assert decision.sentence == "bias_error_ug fail: 130 ± 10 µg, limit 100 µg, margin -30 µg"
     undecided = decide(limits(), "bias_error_ug", 95.0, 5.0)
-    assert undecided.sentence.endswith("margin 5 µg, less than U: measure longer, or again")
+    assert undecided.sentence == (
+        "bias_error_ug not accepted: inside the guard band, 95 ± 10 µg, limit 100 µg, probability of exceeding it 16 %: "
+        "measure longer, or again"
+    )
     assert decision.rule == "ILAC-G8:09/2019 guarded acceptance, w = U with k = 2"
 
 

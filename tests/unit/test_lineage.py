@@ -127,8 +127,8 @@ def test_a_unit_without_certificate_is_followed_from_its_grades(run: Run, tmp_pa
 
 
 def test_what_is_neither_unit_nor_run_nor_file_is_told(run: Run) -> None:
-    with pytest.raises(WrongUse, match="'small-0' is neither a unit, a run nor a file"):
-        lineage(run.archive, "small-0")
+    with pytest.raises(WrongUse, match="'small-x' is neither a unit, a run nor a file"):
+        lineage(run.archive, "small-x")
 
 
 def read_back(found: Lineage) -> Rdf:

@@ -10,13 +10,14 @@ from capture_double import CaptureDouble
 from pipelines.archive import Archive, Run, parquet
 from pipelines.certificates import Ledger
 from pipelines.certificates.measured import measured_on
+from pipelines.chain import certify as certifying
 from pipelines.chain.certify import certify
 from pipelines.chain.runner import Runner
 from pipelines.integrity import verify
 from pipelines.jobs.job import job_of_run
 from pipelines.lineage import lineage
 from schemas import upgrades, version
-from schemas.errors import ArchiveUnusable
+from schemas.errors import ArchiveUnusable, WrongUse
 
 KEPT = sorted((Path(__file__).resolve().parents[1] / "archives").glob("v*.tar.xz"))
 FRAME = pd.DataFrame({"unit": ["A", "B"], "value": [1.0, 2.0]})
@@ -60,7 +61,12 @@ def test_a_changed_byte_and_an_edited_manifest_are_found_there_too(run: Run) -> 
     assert {("changed", "grades.parquet"), ("edited", "coefficients.json")} <= kinds
 
 
-def test_its_units_are_certified_and_traced(run: Run) -> None:
+def test_nothing_new_is_certified_on_noise_only_and_what_was_certified_then_is_traced(
+    run: Run, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with pytest.raises(WrongUse, match=r"states no uncertainty of its references \(noise only\)"):
+        certify(Ledger(run.archive), run, start=measured_on(run))
+    monkeypatch.setattr(certifying, "refuse_unstated", lambda run: None)  # as versions before did
     certify(Ledger(run.archive), run, start=measured_on(run))
     found = lineage(run.archive, "A1")
     kinds = {node.kind for node in found.graph.nodes.values()}

@@ -32,7 +32,7 @@ def test_opens_without_a_network(page: str) -> None:
 def test_shows_every_unit_with_plots_figures_and_coefficients(page: str) -> None:
     for unit in ("A1", "A2", "A3"):
         assert f'id="{unit}"' in page
-    assert page.count("<svg") == 1 + 2 * 3
+    assert page.count("<svg") == 2 + 2 * 3
     assert "Allan deviation" in page
     assert "scale_temperature" in page
 

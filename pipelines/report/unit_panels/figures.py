@@ -18,12 +18,13 @@ ORDER = 20
 TITLE = "Figures and limits"
 TEMPLATE = """\
 <table>
-<tr><th>figure</th><th class="n">value</th><th class="n">± U <small>(k = {{ coverage }})</small></th><th class="n">limit</th><th class="n">margin</th><th>unit</th><th>result</th></tr>
+<tr><th>figure</th><th class="n">value</th><th class="n">± U <small>(k = {{ coverage }})</small></th><th class="n">limit</th><th class="n">margin</th><th>unit</th><th>result</th><th class="n">false decision, %</th></tr>
 {% for figure in figures %}
 <tr><td>{{ figure.title }}</td><td class="n">{{ figure.value }}</td><td class="n">{{ figure.uncertainty }}</td><td class="n">{{ figure.limit }}</td><td class="n">{{ figure.margin }}</td>
-<td>{{ figure.unit }}</td><td>{% if figure.outcome %}<span class="tag {{ figure.outcome.split(" ")[0] }}">{{ figure.outcome }}</span>{% else %}<small>no limit</small>{% endif %}</td></tr>
+<td>{{ figure.unit }}</td><td>{% if figure.outcome %}<span class="tag {{ figure.outcome.split(" ")[0] }}">{{ figure.outcome }}</span>{% else %}<small>no limit</small>{% endif %}</td><td class="n">{{ figure.risk }}</td></tr>
 {% endfor %}
 </table>
+<p class="note">False decision: probability that an accepted figure is beyond its limit (PFA), or one that is not accepted within it (PFR); JCGM 106, for this unit.</p>
 """
 
 
@@ -44,4 +45,13 @@ def _line(row: dict[str, Any]) -> dict[str, Any]:
         "margin": plain(row["limit"] - abs(row["value"])) if limited else "",
         "unit": "" if row["unit_text"] == "1" else row["unit_text"],
         "outcome": row["outcome"] if limited else "",
+        "risk": _risk(row) if limited else "",
     }
+
+
+def _risk(row: dict[str, Any]) -> str:
+    """PFA of an accepted figure, PFR of one that is not; empty for runs of earlier versions."""
+    if not np.isfinite(row.get("pfa", np.nan)):
+        return ""
+    name, value = ("PFA", row["pfa"]) if row["outcome"] == "pass" else ("PFR", row["pfr"])
+    return f"{name} < 0.01" if value < 1e-4 else f"{name} {100.0 * value:.2g}"

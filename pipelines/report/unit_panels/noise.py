@@ -24,6 +24,7 @@ NAMES = {
     "K": "K, rate random walk",
     "Q": "Q, quantisation",
     "R": "R, ramp",
+    "stability_1h": "bias stability over the last hour, standard deviation of 100 s means",
 }
 TEMPLATE = """\
 <table>

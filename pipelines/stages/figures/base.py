@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from types import MappingProxyType
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -10,7 +11,7 @@ import numpy as np
 from pipelines.stages.noise import B_BOUND
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Mapping
 
     from numpy.typing import NDArray
 
@@ -42,10 +43,12 @@ class LotCoefficients:
     Parameters
     ----------
     zero_g : nominal output at 0 g, output unit.
+    stated : covariance of the coefficients by the uncertainty budget, (units, 3p, 3p); None: noise only.
     """
 
-    def __init__(self, calibration: Calibration, zero_g: float) -> None:
+    def __init__(self, calibration: Calibration, zero_g: float, stated: NDArray[np.float64] | None = None) -> None:
         self.zero_g = zero_g
+        self.stated = stated
         self._calibration = calibration
         self._scale = np.abs(np.diagonal(calibration.response, axis1=-2, axis2=-1))[..., None]
         self._values: dict[str, NDArray[np.float64]] = {}
@@ -59,8 +62,35 @@ class LotCoefficients:
         """Coefficients (3, columns) and standard errors (3, columns) of an effect, and the scale (3, 1) in output per g."""
         if effect not in self._values:
             self._values[effect] = self._calibration.value(effect)
-            self._errors[effect] = self._calibration.standard_error(effect)
+            self._errors[effect] = self._with_budget().standard_error(effect)
         return self._values[effect][unit], self._errors[effect][unit], self._scale[unit]
+
+    def _with_budget(self) -> Calibration:
+        """The calibration with the budget's covariance of each axis added to that of the noise."""
+        if self.stated is None:
+            return self._calibration
+        p = self._calibration.covariance.shape[-1]
+        own = np.stack([self.stated[:, a * p : (a + 1) * p, a * p : (a + 1) * p] for a in range(3)], axis=1)
+        return replace(self._calibration, covariance=self._calibration.covariance + own)
+
+    def angle(self, unit: int, first: int, second: int) -> tuple[float, float] | None:
+        """Deviation from 90° of the angle between two axes and its standard uncertainty, rad; None without misalignment."""
+        names, p = self._calibration.names, self._calibration.covariance.shape[-1]
+        columns = []
+        for axis, other in ((first, second), (second, first)):
+            own = [k for k, (effect, _) in enumerate(names[axis]) if effect == "misalignment"]
+            if not own:
+                return None
+            columns.append((axis, own[(other - axis - 1) % 3]))
+        scale = np.abs(np.diagonal(self._calibration.response[unit]))
+        value = sum(self._calibration.coefficients[unit, axis, k] / scale[axis] for axis, k in columns)
+        variance = sum(self._calibration.covariance[unit, axis, k, k] / scale[axis] ** 2 for axis, k in columns)
+        if self.stated is not None:
+            weights = np.zeros(3 * p)
+            for axis, k in columns:
+                weights[axis * p + k] = 1.0 / scale[axis]
+            variance += weights @ self.stated[unit] @ weights
+        return float(value), float(np.sqrt(variance))
 
 
 class UnitCoefficients(NamedTuple):
@@ -87,11 +117,22 @@ class UnitCoefficients(NamedTuple):
         return Value(float(values[place]), float(spread[place]))
 
 
+class BudgetRow(NamedTuple):
+    """A quantity of the uncertainty budget of one unit: its value, and its standard uncertainty of both types and in all."""
+
+    value: float
+    u_a: float
+    u_b: float
+    u: float
+
+
 class UnitTables(NamedTuple):
     """The rows of one unit in the tables that figures are computed from, and its coefficients.
 
     guard : width of the guard band in standard uncertainties, zero under simple acceptance; of several axes, poses or
         coefficients the one that comes nearest to a limit with it is judged
+    budget : quantities of the uncertainty budget; empty: noise only
+    full_scale : largest excursion of the output from 0 g, output unit; nan where it is not known
     """
 
     residuals: UnitRows
@@ -100,6 +141,13 @@ class UnitTables(NamedTuple):
     noise: UnitRows
     coefficients: UnitCoefficients
     guard: float
+    budget: Mapping[tuple[str, str], BudgetRow] = MappingProxyType({})
+    full_scale: float = float("nan")
+
+    def stated_u(self, quantity: str, axis: str) -> float:
+        """Standard uncertainty of a quantity by the budget, besides noise; zero where nothing is stated."""
+        row = self.budget.get((quantity, axis))
+        return 0.0 if row is None else row.u_b
 
 
 def nothing(recipe: Recipe) -> str:

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from pipelines.stages.figures.base import FigureKind, UnitTables, Value, rms, verification_poses
 from schemas.units import AXES
 
@@ -14,7 +16,13 @@ if TYPE_CHECKING:
 def _value(tables: UnitTables) -> Value | None:
     if not len(tables.verification):
         return None
-    return max((_of_axis(tables.verification, axis) for axis in AXES), key=lambda value: value.reach(tables.guard))
+    return max((_as_met(tables, axis) for axis in AXES), key=lambda value: value.reach(tables.guard))
+
+
+def _as_met(tables: UnitTables, axis: str) -> Value:
+    """RMS error of one axis with the uncertainty of what a user meets: verification's own, and that of the references."""
+    shown = _of_axis(tables.verification, axis)
+    return shown._replace(uncertainty=float(np.hypot(shown.uncertainty, tables.stated_u("bias_error", axis))))
 
 
 def _of_axis(rows: UnitRows, axis: str) -> Value:

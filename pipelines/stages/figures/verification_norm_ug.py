@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from pipelines.stages.figures.base import FigureKind, UnitTables, Value, largest_error, verification_poses
 
 
 def _value(tables: UnitTables) -> Value | None:
     if not len(tables.verification):
         return None
-    return largest_error(tables.verification_poses, "uncertainty_ug", tables.guard)
+    shown = largest_error(tables.verification_poses, "uncertainty_ug", tables.guard)
+    return shown._replace(uncertainty=float(np.hypot(shown.uncertainty, tables.stated_u("verification_norm", "norm"))))
 
 
 FIGURE = FigureKind(

@@ -1,0 +1,201 @@
+"""Influences of a station on dwells: what each does to force, temperature and output, and the sensitivity of the outputs to it.
+
+Angles, directions and equations: δ1, δ2 tilt the base, up = (δ1, δ2, 1); η turns about y between the outer and the inner axis;
+encoder errors add to the angles; the seat turns the fixture's slot; the thermometer reads true + e + κ·θ.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from inertial.correction import predict
+from inertial.design import Values
+from inertial.frames import rotation_x, rotation_z
+from inertial.state import T_REFERENCE, State
+
+Array = NDArray[np.float64]
+
+STEP = 1e-6
+"""Of the central differences: rad, or relative."""
+STEP_K = 1e-3
+
+
+@dataclass(frozen=True)
+class Errors:
+    """Errors of a station at n dwells; zero where nothing is stated.
+
+    gravity : relative; level : (2,), δ1 and δ2, rad; orthogonality : rad
+    outer, inner : (n,) or a number, true angle minus reading, rad
+    temperature : (n,) or a number, reading minus true, K
+    seat : (3,), rotation vector of the slot, rad
+    gain : relative error of the output; offset : (3,), output unit
+    """
+
+    gravity: float = 0.0
+    level: tuple[float, float] = (0.0, 0.0)
+    orthogonality: float = 0.0
+    outer: Array | float = 0.0
+    inner: Array | float = 0.0
+    temperature: Array | float = 0.0
+    seat: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    gain: float = 0.0
+    offset: tuple[float, float, float] = (0.0, 0.0, 0.0)
+
+    def times(self, size: float) -> "Errors":
+        """The same errors, scaled."""
+        x, y, z = self.seat
+        a, b, c = self.offset
+        return Errors(
+            gravity=size * self.gravity,
+            level=(size * self.level[0], size * self.level[1]),
+            orthogonality=size * self.orthogonality,
+            outer=size * self.outer,
+            inner=size * self.inner,
+            temperature=size * self.temperature,
+            seat=(size * x, size * y, size * z),
+            gain=size * self.gain,
+            offset=(size * a, size * b, size * c),
+        )
+
+
+@dataclass(frozen=True)
+class Influence:
+    """One input quantity with its standard uncertainty.
+
+    contribution : the entry of the budget that it belongs to; several influences may belong to one
+    errors : of size one, in the unit of ``u``
+    u : standard uncertainty; scope : for whom the value is common; dof : degrees of freedom of ``u``
+    seen : whether the scatter of the dwells shows it already, so that it is not counted again
+    """
+
+    contribution: str
+    errors: Errors
+    u: float
+    scope: str = "station"
+    dof: float = float("inf")
+    seen: bool = False
+
+
+@dataclass(frozen=True)
+class Scattered:
+    """An error of the angles that is drawn anew at every dwell: standard uncertainties of outer and inner angle, rad."""
+
+    contribution: str
+    outer: float
+    inner: float
+    scope: str = "pose"
+    dof: float = float("inf")
+    seen: bool = False
+
+
+@dataclass(frozen=True)
+class Sensitivity:
+    """Change of the outputs per standard uncertainty of every influence.
+
+    changes : (..., n, 3, q), output unit: J·u
+    contributions, scopes, dof, seen : of the q columns
+    """
+
+    changes: Array
+    contributions: tuple[str, ...]
+    scopes: tuple[str, ...]
+    dof: tuple[float, ...]
+    seen: tuple[bool, ...]
+    names: tuple[str, ...] = field(default=())
+
+
+@dataclass(frozen=True)
+class Model:
+    """A calibrated model: its output under any force and temperature.
+
+    effects : ids; coefficients : (..., 3, p); nonlinear : by effect id
+    """
+
+    effects: Sequence[str]
+    coefficients: Array
+    nonlinear: Values
+
+    def output(self, state: State, errors: Errors) -> Array:
+        """True output (..., n, 3) of dwells that are recorded as ``state`` while the station has these errors."""
+        force = true_force(state, errors)
+        moved = replace(state, force=force, memory={})
+        if state.temperature is not None and np.any(errors.temperature):
+            moved = replace(moved, temperature=state.temperature - errors.temperature)
+        out = predict(self.effects, moved, self.coefficients, self.nonlinear)
+        return out * (1.0 + errors.gain) + np.asarray(errors.offset)
+
+
+def true_force(state: State, errors: Errors) -> Array:
+    """True specific force, (..., n, 3), g, of dwells recorded as ``state``: (Rx(α')·Ry(η)·Rz(β'))ᵀ·up, then the slot."""
+    if state.outer is None or state.inner is None:
+        raise ValueError("dwells without angles: the station's errors cannot be propagated")
+    size = np.linalg.norm(state.force, axis=-1, keepdims=True)
+    alpha, beta = state.outer + errors.outer, state.inner + errors.inner
+    up = np.array([errors.level[0], errors.level[1], 1.0])
+    c, s = np.cos(errors.orthogonality), np.sin(errors.orthogonality)
+    between = np.array([[c, 0.0, s], [0.0, 1.0, 0.0], [-s, 0.0, c]])
+    turned = np.einsum("...ji,j->...i", rotation_x(alpha) @ between @ rotation_z(beta), up)
+    return (1.0 + errors.gravity) * size * (turned @ slot_rotation(errors.seat).T)
+
+
+def slot_rotation(vector: Sequence[float]) -> Array:
+    """Rotation (3, 3) of a small rotation vector, to second order, rad."""
+    x, y, z = vector
+    k = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+    return np.eye(3) + k + 0.5 * k @ k
+
+
+def harmonic(angle: Array, order: int, phase: str) -> Array:
+    """sin(n·angle) or cos(n·angle), the shape of an eccentric encoder."""
+    return np.sin(order * angle) if phase == "sin" else np.cos(order * angle)
+
+
+def sensitivity(
+    model: Model, state: State, influences: Sequence[Influence], scattered: Sequence[Scattered] = ()
+) -> Sensitivity:
+    """J·u of all influences, by central differences of the predicted output at the fitted coefficients.
+
+    Parameters
+    ----------
+    scattered : errors of single dwells; each gives two columns per dwell
+    """
+    columns: list[Array] = []
+    contributions: list[str] = []
+    scopes: list[str] = []
+    dof: list[float] = []
+    seen: list[bool] = []
+
+    def enter(changes: Array, one: Influence | Scattered) -> None:
+        count = changes.shape[-1]
+        columns.append(changes)
+        contributions.extend([one.contribution] * count)
+        scopes.extend([one.scope] * count)
+        dof.extend([one.dof] * count)
+        seen.extend([one.seen] * count)
+
+    for one in influences:
+        enter(one.u * difference(model, state, one.errors)[..., None], one)
+    for one in scattered:
+        for size, errors in ((one.outer, Errors(outer=1.0)), (one.inner, Errors(inner=1.0))):
+            if size > 0.0:
+                change = size * difference(model, state, errors)
+                enter(np.einsum("...nk,nm->...nkm", change, np.eye(change.shape[-2])), one)
+    shape = predict(model.effects, state, model.coefficients, model.nonlinear).shape
+    columns = [np.broadcast_to(c, (*shape, c.shape[-1])) for c in columns]
+    changes = np.concatenate(columns, axis=-1) if columns else np.zeros((*shape, 0))
+    return Sensitivity(changes, tuple(contributions), tuple(scopes), tuple(dof), tuple(seen))
+
+
+def difference(model: Model, state: State, errors: Errors) -> Array:
+    """Change of the outputs (..., n, 3) per unit of some errors."""
+    step = STEP_K if np.any(errors.temperature) else STEP
+    return (model.output(state, errors.times(step)) - model.output(state, errors.times(-step))) / (2.0 * step)
+
+
+def theta(state: State) -> Array:
+    """θ = T − 25 °C as it is read, (..., n); zero without a thermometer."""
+    if state.temperature is None:
+        return np.zeros(state.force.shape[:-1])
+    return state.temperature - T_REFERENCE

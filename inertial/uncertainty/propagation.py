@@ -1,0 +1,152 @@
+"""Propagation of influences through the fit's own design: errors of coefficients, of corrected outputs, of verification.
+
+y = H·c + J·δ + ε, with the fit ĉ = G·y and G = (HᵀWH)⁻¹HᵀW: the coefficients are wrong by G·J·δ, an output that is corrected with
+them by −K⁻¹·H·G·J·δ, and a verification on the same station shows K⁻¹·(J_v − H_v·G·J)·δ of it (JCGM 102, 6.2).
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from inertial import design
+from inertial.fits.linear import response_matrix
+from inertial.noise.dwells import whitener
+from inertial.state import State
+from inertial.uncertainty.influences import Model, Sensitivity
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class FitDesign:
+    """The fit as a linear map.
+
+    columns : (..., 3, n, p), H; gain : (..., 3, p, n), G; names : per axis, (effect id, coefficient) of the p columns
+    shared : (..., 3, n, s), columns of parameters that the lot shares; none where s = 0
+    whitening : (n, n), root of the weights
+    """
+
+    columns: Array
+    gain: Array
+    names: tuple[tuple[tuple[str, str], ...], ...]
+    shared: Array
+    whitening: Array
+
+    def coefficient_errors(self, changes: Array) -> Array:
+        """Errors of the coefficients, (..., 3, p, q), of changes of the outputs (..., n, 3, q)."""
+        along = np.moveaxis(changes, -2, -3)
+        if self.shared.shape[-1]:
+            along = along - self.shared @ self._shared_errors(along)
+        return self.gain @ along
+
+    def _shared_errors(self, along: Array) -> Array:
+        """Errors (s, q) of the parameters that all units share; the changes are taken to be the same influences for the lot."""
+        white, columns = self.whitening, self.columns
+        h, s, j = white @ columns, white @ self.shared, white @ along
+        inner = np.linalg.inv(np.swapaxes(h, -1, -2) @ h) @ np.swapaxes(h, -1, -2)
+        left, target = s - h @ (inner @ s), j - h @ (inner @ j)
+        flat = np.broadcast_to(left, (*target.shape[:-1], left.shape[-1])).reshape(-1, left.shape[-1])
+        return np.asarray(np.linalg.lstsq(flat, target.reshape(-1, target.shape[-1]), rcond=None)[0], dtype=np.float64)
+
+    def visible_share(self, changes: Array) -> Array:
+        """‖(1 − P_H)·J‖/‖J‖ of every influence, (q,), over all units and axes: what residuals can show of it."""
+        along = np.moveaxis(changes, -2, -3)
+        left = along - self.columns @ self.coefficient_errors(changes)
+        axes = tuple(range(along.ndim - 1))
+        whole = np.sqrt(np.sum(along**2, axis=axes))
+        return np.sqrt(np.sum(left**2, axis=axes)) / np.where(whole > 0.0, whole, 1.0)
+
+
+def fit_design(model: Model, state: State, covariance: Array, used: NDArray[np.bool_] | None = None) -> FitDesign:
+    """The map of a generalised least-squares fit.
+
+    Parameters
+    ----------
+    covariance : (n, n), of the noise of the dwells of the fit; its scale does not matter
+    used : the dwells of the fit; all where None
+    """
+    sensor, station = design.split(model.effects)
+    columns = design.local_columns(sensor, state, model.nonlinear)
+    there = np.ones(columns.shape[-2], dtype=bool) if used is None else used
+    columns = columns[..., there, :]
+    names = tuple(design.local_names(sensor, axis, model.nonlinear) for axis in range(3))
+    white = whitener(covariance)
+    h = white @ columns
+    scale = np.linalg.norm(h, axis=-2, keepdims=True)
+    scaled = h / scale
+    gram = np.swapaxes(scaled, -1, -2) @ scaled
+    gain = np.linalg.solve(gram, np.swapaxes(scaled, -1, -2)) @ white / np.swapaxes(scale, -1, -2)
+    shared = np.zeros((*columns.shape[:-1], 0))
+    if station:
+        response = response_matrix(model.coefficients, names)
+        shared = design.shared_columns(station, state, model.nonlinear, response)[..., there, :]
+    return FitDesign(columns, gain, names, shared, white)
+
+
+@dataclass(frozen=True)
+class Propagated:
+    """Errors per standard uncertainty of every influence.
+
+    coefficients : (..., 3, p, q); names : per axis, (effect id, coefficient)
+    source : the influences, of the same q columns
+    """
+
+    coefficients: Array
+    names: tuple[tuple[tuple[str, str], ...], ...]
+    source: Sensitivity
+    response: Array
+
+    def covariance(self) -> Array:
+        """Covariance of the coefficients of all axes in one vector, (..., 3p, 3p)."""
+        flat = self.coefficients.reshape(*self.coefficients.shape[:-3], -1, self.coefficients.shape[-1])
+        return flat @ np.swapaxes(flat, -1, -2)
+
+    def output_errors(self, columns: Array) -> Array:
+        """Errors of a corrected output, (..., m, 3, q), g, at m conditions with the columns (..., 3, m, p)."""
+        raw = np.moveaxis(columns @ self.coefficients, -3, -2)
+        return -np.einsum("...ij,...mjq->...miq", np.linalg.inv(self.response), raw)
+
+    def rotation(self) -> Array:
+        """The antisymmetric part of K⁻¹·δK at 25 °C, (..., 3, 3, q): a rotation of the whole unit."""
+        moved = np.moveaxis(response_matrix(np.moveaxis(self.coefficients, -1, 0), self.names), 0, -1)
+        relative = np.einsum("...ij,...jkq->...ikq", np.linalg.inv(self.response), moved)
+        return 0.5 * (relative - np.swapaxes(relative, -3, -2))
+
+    def user_errors(self, columns: Array, force: Array, *, intrinsic: bool = False) -> Array:
+        """Errors that a user meets, (..., m, 3, q), g, at forces (m, 3) with the columns (..., 3, m, p).
+
+        Parameters
+        ----------
+        intrinsic : whether the frame is the unit's own, in which a rotation of the whole unit is no error
+        """
+        errors = self.output_errors(columns)
+        if not intrinsic:
+            return errors
+        return errors + np.einsum("...ijq,...mj->...miq", self.rotation(), force)
+
+    def shown_errors(self, columns: Array, changes: Array) -> Array:
+        """What a verification on the same station shows, (..., m, 3, q), g, with its own changes J_v·u (..., m, 3, q)."""
+        seen = np.einsum("...ij,...mjq->...miq", np.linalg.inv(self.response), changes)
+        return self.output_errors(columns) + seen
+
+
+def propagated(design_: FitDesign, source: Sensitivity, response: Array) -> Propagated:
+    """The influences through a fit.
+
+    Parameters
+    ----------
+    response : (..., 3, 3), output per g
+    """
+    return Propagated(design_.coefficient_errors(source.changes), design_.names, source, response)
+
+
+def norm_errors(errors: Array, force: Array) -> Array:
+    """Errors of the magnitude, (..., m, q), of errors (..., m, 3, q) at forces (m, 3)."""
+    along = force / np.linalg.norm(force, axis=-1, keepdims=True)
+    return np.einsum("...mi,...miq->...mq", along, errors)
+
+
+def rms_over(errors: Array) -> Array:
+    """Root of the mean over m conditions of the variance over q influences, (...), of errors (..., m, q)."""
+    return np.sqrt(np.mean(np.sum(errors**2, axis=-1), axis=-1))

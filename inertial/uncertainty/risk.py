@@ -1,0 +1,118 @@
+"""Risk of decisions: probability of false acceptance and false rejection, for one unit and for production (JCGM 106:2012).
+
+Specific risk (7.3, 7.4): what is known of one unit after its measurement. Global risk (9): over units X ~ N(μ, σ_p) that are
+measured as Y = X + N(0, u) and accepted where A_L ≤ Y ≤ A_U.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.special import ndtr, ndtri
+
+_NODES, _WEIGHTS = np.polynomial.legendre.leggauss(64)
+_REACH = 9.0
+"""Standard deviations beyond which a normal density is nothing."""
+_PIECES = 12
+
+
+@dataclass(frozen=True)
+class GlobalRisk:
+    """Probabilities over a production.
+
+    pfa : accepted although outside its limits; pfr : rejected although inside; accepted, conforming : in all
+    """
+
+    pfa: float
+    pfr: float
+    accepted: float
+    conforming: float
+
+
+def outside(value: float, u: float, lower: float, upper: float) -> float:
+    """Probability that a quantity measured as ``value`` with standard uncertainty ``u`` lies outside limits (JCGM 106, 7.4)."""
+    if not u > 0.0:
+        return float(not lower <= value <= upper)
+    return float(ndtr((lower - value) / u) + ndtr((value - upper) / u))
+
+
+def posterior(value: float, u: float, mean: float, process: float) -> tuple[float, float]:
+    """Mean and standard deviation of a quantity after its measurement, with a prior N(mean, process²) (JCGM 106, A.4.4)."""
+    precision = 1.0 / u**2 + 1.0 / process**2
+    return (value / u**2 + mean / process**2) / precision, precision**-0.5
+
+
+def global_risk(
+    mean: float, process: float, u: float, limits: tuple[float, float], accepted: tuple[float, float]
+) -> GlobalRisk:
+    """Risks over a production (JCGM 106, 9.3), by quadrature over the true values.
+
+    Parameters
+    ----------
+    mean, process : of the units' true values; u : standard uncertainty of a measurement
+    limits, accepted : lower and upper tolerance limit, and acceptance limit
+    """
+    lower, upper = limits
+    inside = float(ndtr((upper - mean) / process) - ndtr((lower - mean) / process))
+    whole = float(np.hypot(process, u))
+    taken = float(ndtr((accepted[1] - mean) / whole) - ndtr((accepted[0] - mean) / whole))
+    if not u > 0.0:
+        low, high = max(lower, accepted[0]), min(upper, accepted[1])
+        good = max(float(ndtr((high - mean) / process) - ndtr((low - mean) / process)), 0.0)
+    else:
+        good = _both(mean, process, u, limits, accepted)
+    return GlobalRisk(max(taken - good, 0.0), max(inside - good, 0.0), taken, inside)
+
+
+def _both(mean: float, process: float, u: float, limits: tuple[float, float], accepted: tuple[float, float]) -> float:
+    """Probability that a unit conforms and is accepted."""
+    low, high = max(limits[0], mean - _REACH * process), min(limits[1], mean + _REACH * process)
+    if not low < high:
+        return 0.0
+    # panels end where the probability of acceptance turns, so that each is smooth on its own scale
+    turns = [a + k * u for a in accepted for k in (-8.0, -4.0, -2.0, -1.0, 0.0, 1.0, 2.0, 4.0, 8.0)]
+    turns += [mean + k * process for k in (-4.0, -2.0, -1.0, 0.0, 1.0, 2.0, 4.0)]
+    edges = np.unique(np.clip([*np.linspace(low, high, _PIECES + 1), *turns], low, high))
+    half, middle = 0.5 * np.diff(edges)[:, None], 0.5 * (edges[1:] + edges[:-1])[:, None]
+    x = middle + half * _NODES
+    density = np.exp(-0.5 * ((x - mean) / process) ** 2) / (process * np.sqrt(2.0 * np.pi))
+    chance = ndtr((accepted[1] - x) / u) - ndtr((accepted[0] - x) / u)
+    return float(np.sum(half * _WEIGHTS * density * chance))
+
+
+def process_for(in_tolerance: float, tolerance: float) -> float:
+    """Standard deviation of a centred production of which so large a share lies within ± tolerance."""
+    return tolerance / float(ndtri(0.5 * (1.0 + in_tolerance)))
+
+
+def guard_factor(allowed: float) -> float:
+    """Guard band over standard uncertainty with which the specific risk at the acceptance limit is ``allowed``."""
+    return float(-ndtri(allowed))
+
+
+def acceptance_for(allowed: float, process: float, u: float, tolerance: float) -> float:
+    """Largest acceptance limit over tolerance, at most 1, with a global PFA of a centred production of at most ``allowed``."""
+
+    def pfa(share: float) -> float:
+        a = share * tolerance
+        return global_risk(0.0, process, u, (-tolerance, tolerance), (-a, a)).pfa
+
+    if pfa(1.0) <= allowed:
+        return 1.0
+    low, high = 0.0, 1.0
+    for _ in range(60):
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if pfa(middle) <= allowed else (low, middle)
+    return low
+
+
+def of_several(pfa: list[float], accepted: list[float]) -> tuple[float, float]:
+    """PFA and probability of acceptance of a unit with several independent figures: Π a_i − Π (a_i − PFA_i)."""
+    whole = float(np.prod(accepted))
+    return whole - float(np.prod(np.array(accepted) - np.array(pfa))), whole
+
+
+def process_deviation(values: list[float], independent: float) -> float:
+    """σ_p of a production by the scatter of its values: σ_p² = s² − u², of uncertainties that are not common to the lot."""
+    if len(values) < 2:
+        return float("nan")
+    return float(np.sqrt(max(float(np.var(values, ddof=1)) - independent**2, 0.0)))

@@ -1,0 +1,47 @@
+"""The uncertainty that a plan can reach, for people."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from pipelines.cli.options import console, print_table, short
+
+TITLES = {
+    "bias": "bias",
+    "scale": "scale",
+    "bias_error": "error by the references alone",
+    "bias_error_period": "error over the period, RMS",
+}
+LEAST = 0.01
+"""Share of a contribution from which it is named."""
+
+
+def print_reach(found: dict[str, Any] | None) -> None:
+    """A table of the quantities with what rules them, limits that cannot be met, and remarks."""
+    out = console()
+    if found is None:
+        out.print(
+            "uncertainty: noise only, the station states no [uncertainty]; no grade above consumer, no certificate"
+        )
+        return
+    worst: dict[str, dict[str, Any]] = {}
+    for row in found["quantities"]:
+        if row["quantity"] not in worst or row["u"] > worst[row["quantity"]]["u"]:
+            worst[row["quantity"]] = row
+    print_table(["quantity, worst axis", "axis", "u", "U, k = 2", "unit"], [_line(row) for row in worst.values()])
+    for row in worst.values():
+        rulers = ", ".join(f"{name} {100.0 * share:.0f} %" for name, share in row["shares"].items() if share >= LEAST)
+        out.print(f"{TITLES[row['quantity']]}: {rulers or 'no contribution'}", markup=False, soft_wrap=True)
+    period = f"period of validity {found['validity_months']} months, frame {found['frame']}"
+    out.print(f"{period}; references by {found['grade_source'].replace('_', ' ')}", style="dim", markup=False)
+    if found["grade_source"] == "assumed":
+        out.print("references: assumed figures, nothing is certified with them", markup=False)
+    for name, rules in found["not_stated"].items():
+        out.print(f"not stated: {name} (rules {rules})", markup=False)
+    for line in (*found["remarks"], *(f"cannot be met: {one}" for one in found["unreachable"])):
+        out.print(line, markup=False, soft_wrap=True)
+
+
+def _line(row: dict[str, Any]) -> list[str]:
+    expanded = "" if row["quantity"] == "bias_error_period" else short(row["expanded"])
+    return [TITLES[row["quantity"]], row["axis"], short(row["u"]), expanded, row["unit"]]

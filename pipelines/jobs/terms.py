@@ -1,0 +1,148 @@
+"""What a job states of its uncertainty, and what is refused before anything moves."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, Protocol
+
+import numpy as np
+
+from pipelines.schedule.planned_dwells import planned_dwells
+from pipelines.stages.budget_terms import BudgetTerms, terms_of
+from pipelines.stages.contributions import merged
+from pipelines.stages.reachable import PlannedDwells, reachable, unreachable
+from schemas.errors import RecipeInvalid
+from schemas.limits import VALIDITY_MONTHS
+from schemas.reference import Reference
+from schemas.station import Pace, refuse_untraced
+from schemas.uncertainty import Uncertainty
+from schemas.validity import CertificateTerms, Stability
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from schemas.limits import Limits
+    from schemas.recipe import Recipe
+    from schemas.station import StationConfig
+
+GRAVITY_SIGMAS = 3.0
+
+
+class Measuring(Protocol):
+    """A recipe on a station."""
+
+    @property
+    def recipe(self) -> Recipe:
+        """What is measured."""
+        ...
+
+    @property
+    def limits(self) -> Limits:
+        """What is required."""
+        ...
+
+    @property
+    def station(self) -> StationConfig:
+        """Where."""
+        ...
+
+
+def budget_terms(job: Measuring) -> BudgetTerms:
+    """The terms of a job's budget; the station of an archived job may be its document, as it was written."""
+    station: Any = job.station
+    stated, pace = getattr(station, "uncertainty", None), getattr(station, "pace", None)
+    if isinstance(stated, dict):
+        stated = Uncertainty.model_validate(stated)
+    if isinstance(pace, dict):
+        pace = Pace.model_validate(pace)
+    given = getattr(station, "reference", None) or []
+    references = [Reference.model_validate(one) if isinstance(one, dict) else one for one in given]
+    room = Pace().room_C if pace is None else pace.room_C
+    return terms_of(job.recipe, stated, references, room, job.limits.longest_validity_months)
+
+
+def planned_terms(recipe: Recipe, station: StationConfig, limits: Limits | None) -> BudgetTerms:
+    """The terms of a recipe that is planned on a station."""
+    months = VALIDITY_MONTHS if limits is None else limits.longest_validity_months
+    return terms_of(
+        with_stability(recipe, station), station.uncertainty, station.reference, station.pace.room_C, months
+    )
+
+
+def refuse_unreachable(job: Measuring) -> None:
+    """Refuse limits that the stated references and the stability of the device cannot meet, before anything moves.
+
+    The noise of the device is left out: what is refused here would fail with a device of no noise.
+    """
+    terms = planned_terms(job.recipe, job.station, job.limits)
+    if terms.stated is None:
+        return
+    dwells = planned_dwells(job.recipe, job.station)
+    quiet = PlannedDwells(*dwells, covariance=np.eye(dwells.fit.time.size), run_ug=0.0, instability_ug=0.0)
+    wrong = unreachable(reachable(quiet, terms, job.recipe.effects), job.limits, terms.certificate.validity_months)
+    if wrong:
+        raise RecipeInvalid(
+            f"recipe {job.recipe.name} on station {job.station.name}: {wrong[0]}; raise the limit, or improve what rules it (see "
+            "'tumbleline plan')",
+            key="limits",
+        )
+
+
+def archived_terms(about: Mapping[str, Any]) -> BudgetTerms | None:
+    """The terms of an archived run, from what is kept beside it; None for runs that state none."""
+    station, recipe = about.get("station") or {}, about.get("recipe") or {}
+    stated = merged(
+        *(
+            Uncertainty.model_validate(one["uncertainty"]) if one.get("uncertainty") else None
+            for one in (station, recipe)
+        )
+    )
+    if stated is None:
+        return None
+    months = (about.get("limits") or {}).get("validity_months") or VALIDITY_MONTHS
+    certificate, stability = recipe.get("certificate"), recipe.get("stability")
+    return BudgetTerms(
+        stated=stated,
+        stability=Stability.model_validate(stability) if stability else None,
+        certificate=CertificateTerms.model_validate(certificate or {"validity_months": months}),
+        references=tuple(Reference.model_validate(one) for one in station.get("reference", [])),
+        soak_min_s=float(recipe.get("soak_min_s", 0.0)),
+        dwell_s=float(recipe.get("dwell_s", 1.0)),
+        room_C=float((station.get("pace") or {}).get("room_C", Pace().room_C)),
+    )
+
+
+def with_stability(recipe: Recipe, station: StationConfig) -> Recipe:
+    """The recipe with the stability of its device's preset, on a simulated station with a budget; else as it is."""
+    stated = merged(station.uncertainty, recipe.uncertainty)
+    if recipe.stability is not None or station.simulation is None or stated is None:
+        return recipe
+    from stations.plant.preset import load_preset  # a station of hardware has no plant
+
+    preset = load_preset(recipe.device, station.simulation.preset_overrides)
+    return recipe.model_copy(update={"stability": preset.stability})
+
+
+def refuse_contradictions(recipe: Recipe, station: StationConfig) -> None:
+    """Refuse a recipe whose entries are not traced, or whose local gravity is not the station's.
+
+    Raises
+    ------
+    RecipeInvalid
+        With the key.
+    """
+    if recipe.uncertainty is not None:
+        try:
+            refuse_untraced(recipe.uncertainty, station.reference, simulated=station.kind == "simulated")
+        except ValueError as problem:
+            raise RecipeInvalid(f"recipe {recipe.name}: {problem}", key="uncertainty") from None
+    stated = merged(station.uncertainty, recipe.uncertainty)
+    if stated is None or stated.gravity is None:
+        return
+    value, u = stated.gravity.value, stated.gravity.relative().u
+    apart = recipe.local_gravity_m_s2 / value - 1.0
+    if abs(apart) > GRAVITY_SIGMAS * u and not stated.gravity.exact:
+        raise RecipeInvalid(
+            f"recipe {recipe.name}: key 'local_gravity_m_s2': {recipe.local_gravity_m_s2:g} m/s², station {station.name} states "
+            f"{value:.8g} m/s² ± {2e6 * u:.2g} ppm (k = 2), they differ by {1e6 * apart:.0f} ppm; use the station's value",
+            key="local_gravity_m_s2",
+        )

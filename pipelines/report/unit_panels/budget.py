@@ -1,0 +1,64 @@
+"""Uncertainty of every quantity of a unit, with what rules it."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from inertial.uncertainty.degrees import rounded
+from pipelines.report.numbers import plain
+from pipelines.report.templates import fill
+from pipelines.tables.frames import rows_of
+
+if TYPE_CHECKING:
+    from pipelines.report.context import UnitContext
+
+ORDER = 32
+TITLE = "Uncertainty"
+NAMES = {
+    "bias": "bias",
+    "scale": "scale, relative",
+    "misalignment": "misalignment",
+    "bias_temperature": "bias over temperature",
+    "scale_temperature": "scale over temperature",
+    "orthogonality": "angle between axes, from 90°",
+    "output": "corrected output, worst of the certified range",
+    "bias_error": "error on poses not used, as a user meets it",
+    "verification_norm": "error of the magnitude, worst pose",
+    "bias_error_period": "error expected over the period of validity",
+}
+WITHOUT_VALUE = ("scale", "output")
+TEMPLATE = """\
+<table>
+<tr><th>quantity</th><th>axis</th><th class="n">value</th><th class="n">u, type A</th><th class="n">u, type B</th><th class="n">ν<sub>eff</sub></th><th class="n">k</th><th class="n">U</th><th>unit</th><th>largest contributions</th></tr>
+{% for line in lines %}
+<tr><td>{{ line.name }}</td><td>{{ line.axis }}</td><td class="n">{{ line.value }}</td><td class="n">{{ line.a }}</td><td class="n">{{ line.b }}</td><td class="n">{{ line.dof }}</td><td class="n">{{ line.k }}</td><td class="n">{{ line.expanded }}</td><td>{{ line.unit }}</td><td><small>{{ line.largest }}</small></td></tr>
+{% endfor %}
+</table>
+<p class="note">Type A: noise of the run. Type B: references, station and device as they are stated. U = k·u, coverage about 95 %.</p>
+"""
+
+
+def render(unit: UnitContext) -> str | None:
+    """One line per quantity and axis; None where no uncertainty is stated."""
+    rows = unit.tables.get("uncertainties")
+    if rows is None or rows.empty:
+        return None
+    return fill(TEMPLATE, lines=[_line(row) for row in rows_of(rows)])
+
+
+def _line(row: dict[str, Any]) -> dict[str, Any]:
+    value, expanded = rounded(float(row["value"]), float(row["expanded"]))
+    return {
+        "name": NAMES.get(row["quantity"], row["quantity"]),
+        "axis": row["axis"],
+        "value": "" if row["quantity"] in WITHOUT_VALUE else value,
+        "a": plain(row["u_a"]),
+        "b": plain(row["u_b"]),
+        "dof": "∞" if not np.isfinite(row["dof"]) or row["dof"] > 1e4 else f"{int(row['dof'])}",
+        "k": f"{row['k']:.2f}",
+        "expanded": expanded,
+        "unit": row["unit_text"],
+        "largest": row["largest"],
+    }

@@ -1,0 +1,106 @@
+"""The uncertainty budget of every unit: contributions to coefficients, corrected output and verification, and their sum."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pandas as pd
+
+from inertial.fits.wander import wander_kernels
+from inertial.uncertainty.influences import Model, sensitivity
+from inertial.uncertainty.propagation import fit_design, propagated
+from pipelines.stages.budget_rows import covariance_rows, empty, rows_of_quantities
+from pipelines.stages.budget_terms import BudgetTables, BudgetTerms
+from pipelines.stages.contributions import Conditions, influences, sources
+from pipelines.stages.quantities import Split, quantities_of
+from pipelines.tables.calibration import Calibration, read_calibration
+from pipelines.tables.dwells import KINDS, LotArrays, lot_arrays
+from schemas.units import MICRO
+from schemas.validity import Stability
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    Array = NDArray[np.float64]
+
+
+def budget(tables: BudgetTables, terms: BudgetTerms) -> dict[str, pd.DataFrame]:
+    """Tables ``budget``, ``uncertainties`` and ``budget_covariance``; without rows where no uncertainty is stated.
+
+    ``budget`` has one row per unit, quantity and contribution, ``uncertainties`` one per unit and quantity: value, u of type A
+    and B, effective degrees of freedom, k and U, and for verification what the station's own verification shows of it.
+    """
+    angles = {"outer_deg", "inner_deg"} <= set(tables.dwells.columns)
+    if terms.stated is None or tables.coefficients.empty or not angles:
+        return empty()
+    lot = lot_arrays(tables.dwells, tables.history, KINDS)
+    calibration = read_calibration(tables.coefficients, tables.covariance)
+    at = conditions(lot, tables.dwells, calibration.response, terms)
+    found = propagate(lot, calibration, tables.wander, terms, at)
+    quantities = list(quantities_of(lot, calibration, tables, terms, found))
+    return {
+        **rows_of_quantities(calibration.units, quantities, found, terms, sources(terms.stated)),
+        "budget_covariance": covariance_rows(calibration.units, found.fit.covariance()),
+    }
+
+
+def conditions(lot: LotArrays, dwells: pd.DataFrame, response: Array, terms: BudgetTerms) -> Conditions:
+    """The dwells of a lot as the influences see them."""
+    first = dwells[dwells["unit"] == lot.units[0]].set_index("dwell").reindex(lot.dwells)
+    soak = first["soak"].to_numpy(dtype=np.int64) if "soak" in first else np.zeros(lot.dwells.size, dtype=np.int64)
+    read = lot.state.temperature if lot.state.temperature is not None else np.full(lot.dwells.size, terms.room_C)
+    mean = np.broadcast_to(read, (len(lot.units), lot.dwells.size)).mean(axis=0)
+    target = np.array([mean[soak == one].mean() for one in soak])
+    scale = np.abs(np.diagonal(response, axis1=-2, axis2=-1)).reshape(-1, 3).mean(axis=0)
+    return Conditions(lot.state, soak, target, terms.soak_min_s, terms.room_C, scale)
+
+
+def propagate(
+    lot: LotArrays, calibration: Calibration, wander: pd.DataFrame, terms: BudgetTerms, at: Conditions
+) -> Split:
+    """The influences through the fit of a lot."""
+    if terms.stated is None:
+        raise ValueError("no uncertainty is stated")
+    used = lot.of_kind("dwell")
+    model = Model(calibration.effects, calibration.coefficients, calibration.nonlinear)
+    physical = with_device_temperature(model, calibration.response, terms.stability)
+    own, scattered = influences(terms.stated, at, terms.stability)
+    whole = sensitivity(physical, lot.state, own, scattered)
+    design = fit_design(model, lot.state, dwell_noise(lot, wander, used), used)
+    fitted = replace(whole, changes=whole.changes[..., used, :, :])
+    return Split(
+        fit=propagated(design, fitted, calibration.response),
+        verification=whole.changes[..., ~used, :, :],
+        visible=design.visible_share(fitted.changes),
+    )
+
+
+def with_device_temperature(model: Model, response: Array, stability: Stability | None) -> Model:
+    """The model with the temperature coefficients that its device is stated to have, where it has no terms for them itself."""
+    if stability is None:
+        return model
+    effects, coefficients = list(model.effects), model.coefficients
+    for effect, value in (
+        ("bias_temperature", stability.bias_temperature_ug_K),
+        ("scale_temperature", stability.scale_temperature_ppm_K),
+    ):
+        if effect not in effects and value > 0.0:
+            own = value / MICRO * np.abs(np.diagonal(response, axis1=-2, axis2=-1))[..., None]
+            coefficients = np.concatenate([coefficients, own], axis=-1)
+            effects.append(effect)
+    return Model(effects, coefficients, model.nonlinear)
+
+
+def dwell_noise(lot: LotArrays, wander: pd.DataFrame, used: NDArray[np.bool_]) -> Array:
+    """Covariance (n, n) of the noise of the fit's dwells as the fit weighed them; its scale is arbitrary."""
+    error = np.broadcast_to(lot.standard_error, lot.output.shape)[:, used]
+    profile = np.sqrt(np.mean(error**2 / np.mean(error**2, axis=1, keepdims=True), axis=(0, 2)))
+    white, flicker, walk = (
+        float(np.mean(np.asarray(wander[name], dtype=float) ** 2)) for name in ("white_ug", "flicker_ug", "walk_ug")
+    )
+    time = np.broadcast_to(lot.state.time, (len(lot.units), used.size))[0]
+    kernels = [kernel[np.ix_(used, used)] for kernel in wander_kernels(time)]
+    total = np.diag(profile**2) * (white if white > 0.0 else 1.0) + flicker * kernels[0] + walk * kernels[1]
+    return total / np.mean(np.diagonal(total))

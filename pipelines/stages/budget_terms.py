@@ -1,0 +1,82 @@
+"""What a budget is computed from: the tables of a run, and what station, device and certificate state."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from pipelines.stages.contributions import merged
+from schemas.validity import CertificateTerms, Stability
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    import pandas as pd
+
+    from schemas.recipe import Recipe
+    from schemas.reference import Reference
+    from schemas.uncertainty import Uncertainty
+
+
+@dataclass(frozen=True)
+class BudgetTables:
+    """The tables that a budget is computed from."""
+
+    dwells: pd.DataFrame
+    history: pd.DataFrame
+    coefficients: pd.DataFrame
+    covariance: pd.DataFrame
+    wander: pd.DataFrame
+    verification: pd.DataFrame
+    verification_poses: pd.DataFrame
+    noise: pd.DataFrame
+
+
+@dataclass(frozen=True)
+class BudgetTerms:
+    """What is stated of station, device and certificate; JSON-able, part of the stage's key.
+
+    stated : ``[uncertainty]`` of station and recipe together; None: noise only
+    """
+
+    stated: Uncertainty | None
+    stability: Stability | None
+    certificate: CertificateTerms
+    references: tuple[Reference, ...]
+    soak_min_s: float
+    dwell_s: float
+    room_C: float
+
+    def document(self) -> dict[str, Any]:
+        """As JSON values."""
+        if self.stated is None:
+            return {"uncertainty": None}
+        return {
+            "uncertainty": self.stated.model_dump(mode="json"),
+            "stability": None if self.stability is None else self.stability.model_dump(mode="json"),
+            "certificate": self.certificate.model_dump(mode="json"),
+            "reference": [one.model_dump(mode="json") for one in self.references],
+            "soak_min_s": self.soak_min_s,
+            "dwell_s": self.dwell_s,
+            "room_C": self.room_C,
+        }
+
+
+def terms_of(
+    recipe: Recipe, station: Uncertainty | None, references: Sequence[Reference], room_c: float, months: int
+) -> BudgetTerms:
+    """What a recipe on a station states.
+
+    Parameters
+    ----------
+    months : period of validity where the recipe states no certificate
+    """
+    return BudgetTerms(
+        stated=merged(station, recipe.uncertainty),
+        stability=recipe.stability,
+        certificate=recipe.certificate or CertificateTerms(validity_months=months),
+        references=tuple(references),
+        soak_min_s=recipe.soak_min_s,
+        dwell_s=recipe.dwell_s,
+        room_C=room_c,
+    )

@@ -1,0 +1,66 @@
+"""Risk of the decisions on a lot: false acceptance and false rejection over the production that it stands for (JCGM 106, 9)."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pandas as pd
+
+from inertial.uncertainty.risk import global_risk, process_deviation
+from pipelines.tables.frames import empty_table
+
+if TYPE_CHECKING:
+    from schemas.limits import Limits
+
+TEXTS, NUMBERS = "figure unit_text", "mean process u limit accept pfa pfr accepted largest_pfa"
+FEWEST = 3
+"""Units from which the scatter of a production is estimated."""
+
+
+def lot_risks(figures: pd.DataFrame, limits: Limits, uncertainties: pd.DataFrame | None) -> pd.DataFrame:
+    """One row per figure with a limit: mean, process standard deviation, uncertainty, PFA and PFR.
+
+    σ_p² = s² − u² of what differs between units; what is common to the lot is not in s. nan where fewer than three units were
+    judged. ``largest_pfa`` is the largest specific probability of a unit that was accepted.
+    """
+    rows: list[dict[str, Any]] = []
+    limited = figures[np.isfinite(np.asarray(figures["limit"], dtype=float))]
+    for name, own in limited.groupby("figure", sort=False):
+        values = own["value"].to_numpy(dtype=float)
+        u = float(np.sqrt(np.mean((own["uncertainty"].to_numpy(dtype=float) / limits.coverage_factor) ** 2)))
+        limit, accept = float(own["limit"].iloc[0]), float(np.mean(own["accept"]))
+        process = process_deviation(values.tolist(), _independent(str(name), u, uncertainties))
+        rows.append(
+            {
+                "figure": name,
+                "unit_text": own["unit_text"].iloc[0],
+                "units": len(own),
+                "mean": float(values.mean()),
+                "process": process,
+                "u": u,
+                "limit": limit,
+                "accept": accept,
+                **_risks(float(values.mean()), process, u, limit, accept, len(own)),
+                "largest_pfa": float(own["pfa"].max()),
+            }
+        )
+    return pd.DataFrame(rows) if rows else empty_table(texts=TEXTS, whole="units", numbers=NUMBERS)
+
+
+def _independent(figure: str, u: float, uncertainties: pd.DataFrame | None) -> float:
+    """The part of u that differs between units: that of noise, where the budget tells the two apart."""
+    quantity = {"bias_error_ug": "bias_error", "verification_norm_ug": "verification_norm"}.get(figure)
+    if uncertainties is None or quantity is None:
+        return u
+    own = uncertainties[uncertainties["quantity"] == quantity]
+    return float(np.sqrt(np.mean(own["u_a"].to_numpy(dtype=float) ** 2))) if len(own) else u
+
+
+def _risks(mean: float, process: float, u: float, limit: float, accept: float, units: int) -> dict[str, float]:
+    if units < FEWEST or not np.isfinite(process) or not accept > 0.0:
+        return {"pfa": float("nan"), "pfr": float("nan"), "accepted": float("nan")}
+    if not process > 0.0:  # the units differ by no more than their measurement: all are taken to be as their mean
+        process = 1e-6 * limit
+    found = global_risk(mean, process, u, (-limit, limit), (-accept, accept))
+    return {"pfa": found.pfa, "pfr": found.pfr, "accepted": found.accepted}

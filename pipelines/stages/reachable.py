@@ -1,0 +1,176 @@
+"""Uncertainty that a recipe can reach on its station, before it is measured, and the contributions that rule it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from inertial import design
+from inertial.uncertainty.influences import Model, sensitivity
+from inertial.uncertainty.period import MONTH_S, Windows, flicker_later, flicker_within
+from inertial.uncertainty.propagation import fit_design, propagated, rms_over
+from pipelines.stages.budget import with_device_temperature
+from pipelines.stages.contributions import Conditions, influences
+from pipelines.stages.period import ageing_u
+from schemas.limits import GRADES
+from schemas.units import AXES, MICRO
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import NDArray
+
+    from inertial.state import State
+    from inertial.uncertainty.propagation import Propagated
+    from pipelines.stages.budget_terms import BudgetTerms
+    from schemas.limits import Limits
+
+    Array = NDArray[np.float64]
+
+DAY_S = 86_400.0
+FIGURES = {"bias_error": "bias_error_ug", "bias_error_period": "bias_error_period_ug"}
+
+
+@dataclass(frozen=True)
+class PlannedDwells:
+    """The dwells that a recipe plans.
+
+    fit, verification : states, (n,) and (m,); soak, target_C : (n,), of the fit's
+    covariance : (n, n), of the dwells of the fit, g²; run_ug : expected error of a dwell within the run
+    instability_ug : bias instability B of the device
+    """
+
+    fit: State
+    verification: State | None
+    soak: NDArray[np.int64]
+    target_C: Array
+    covariance: Array
+    run_ug: float
+    instability_ug: float
+
+
+@dataclass(frozen=True)
+class Reach:
+    """A quantity and what can be reached of it.
+
+    u : standard uncertainty, or the expected RMS of an error; parts : by contribution, in ``unit``
+    """
+
+    quantity: str
+    axis: str
+    unit: str
+    u: float
+    parts: dict[str, float]
+
+    @property
+    def shares(self) -> dict[str, float]:
+        """Share of each contribution in u², the largest first."""
+        found = {name: part**2 / self.u**2 for name, part in self.parts.items()} if self.u > 0.0 else {}
+        return dict(sorted(found.items(), key=lambda item: -item[1]))
+
+
+def reachable(planned: PlannedDwells, terms: BudgetTerms, effects: Sequence[str]) -> list[Reach]:
+    """What a recipe can reach; nothing where no uncertainty is stated.
+
+    The device is nominal: response 1, with the temperature coefficients that its stability states.
+    """
+    if terms.stated is None:
+        return []
+    nominal = _nominal(effects, planned.fit)
+    model = with_device_temperature(nominal, np.eye(3), terms.stability)
+    at = Conditions(planned.fit, planned.soak, planned.target_C, terms.soak_min_s, terms.room_C, np.ones(3))
+    source = sensitivity(model, planned.fit, *influences(terms.stated, at, terms.stability))
+    fit = fit_design(nominal, planned.fit, planned.covariance)
+    found = propagated(fit, source, np.eye(3))
+    names = np.array(source.contributions, dtype=object)
+    noise = fit.gain @ planned.covariance @ np.swapaxes(fit.gain, -1, -2)
+    out: list[Reach] = []
+    for effect, unit in (("bias", "µg"), ("scale", "ppm")):
+        for axis, letter in enumerate(AXES):
+            for column in [k for k, (name, _) in enumerate(fit.names[axis]) if name == effect]:
+                own = float(np.sqrt(noise[axis, column, column]))
+                out.append(_reach(effect, letter, unit, own, found.coefficients[axis, column], names))
+    if planned.verification is not None:
+        out += _errors(planned, terms, nominal, found, names)
+    return out
+
+
+def _nominal(effects: Sequence[str], state: State) -> Model:
+    sensor, station = design.split(effects)
+    values = design.starting_values([*sensor, *station], state)
+    names = [design.local_names(sensor, axis, values) for axis in range(3)]
+    coefficients = np.array([[1.0 if effect == "scale" else 0.0 for effect, _ in own] for own in names])
+    return Model(tuple(effects), coefficients, values)
+
+
+def _reach(quantity: str, axis: str, unit: str, noise: float, errors: Array, names: Array) -> Reach:
+    parts = {"noise": MICRO * noise}
+    for group in dict.fromkeys(names.tolist()):
+        parts[group] = MICRO * float(np.sqrt(np.sum(errors[names == group] ** 2)))
+    return Reach(quantity, axis, unit, float(np.sqrt(sum(v**2 for v in parts.values()))), parts)
+
+
+def _errors(planned: PlannedDwells, terms: BudgetTerms, model: Model, found: Propagated, names: Array) -> list[Reach]:
+    """RMS error as a user meets it, by the references alone, and over the period."""
+    state = planned.verification
+    if state is None:
+        return []
+    columns = design.local_columns(design.split(model.effects)[0], state, model.nonlinear)
+    errors = found.user_errors(columns, state.force, intrinsic=terms.certificate.frame == "intrinsic")
+    out: list[Reach] = []
+    for axis, letter in enumerate(AXES):
+        parts = {
+            group: MICRO * float(rms_over(errors[..., axis, :][..., names == group]))
+            for group in dict.fromkeys(names.tolist())
+        }
+        u = float(np.sqrt(sum(v**2 for v in parts.values())))
+        out.append(Reach("bias_error", letter, "µg", u, parts))
+        later = _later(planned, terms)
+        if later is not None:
+            whole = {"run": planned.run_ug, "budget": u, **later}
+            out.append(
+                Reach("bias_error_period", letter, "µg", float(np.sqrt(sum(v**2 for v in whole.values()))), whole)
+            )
+    return out
+
+
+def _later(planned: PlannedDwells, terms: BudgetTerms) -> dict[str, float] | None:
+    """Contributions beyond the run, µg; None where the device's stability is not stated for so long."""
+    stability, months = terms.stability, terms.certificate.validity_months
+    if stability is None or months * MONTH_S > stability.horizon_days * DAY_S * 1.001:
+        return None
+    span = float(np.ptp(planned.fit.time)) + terms.dwell_s
+    windows = Windows(span, terms.certificate.use_window_s or terms.dwell_s, months * MONTH_S)
+    later, within = (f(windows, stability.flicker_slowest_s) for f in (flicker_later, flicker_within))
+    parts = {
+        "flicker": planned.instability_ug * float(np.sqrt(max(later**2 - within**2, 0.0))),
+        "switch_on": stability.switch_on_ug,
+        "switch_on_scale": stability.switch_on_ppm / float(np.sqrt(3.0)),
+    }
+    if stability.ageing is not None:
+        parts["ageing"] = ageing_u(stability.ageing, windows)
+    return {name: value for name, value in parts.items() if value > 0.0}
+
+
+def unreachable(found: Sequence[Reach], limits: Limits, months: int) -> list[str]:
+    """Why limits cannot be met, a sentence each: U of the references, or the error expected over the period, is beyond them."""
+    from pipelines.stages.budget_rows import LABELS
+
+    out: list[str] = []
+    worst = {q: max((r for r in found if r.quantity == q), key=lambda r: r.u, default=None) for q in FIGURES}
+    for quantity, figure in FIGURES.items():
+        one = worst[quantity]
+        needed = limits.figures[figure].max if figure in limits.figures else None
+        if quantity == "bias_error_period":
+            needed = min(needed or GRADES[limits.grade], GRADES[limits.grade])
+        if one is None or needed is None:
+            continue
+        period = quantity == "bias_error_period"
+        reached = one.u if period else limits.coverage_factor * one.u
+        if reached > needed:
+            what = f"error expected over {months} months" if period else f"U (k = {limits.coverage_factor:g})"
+            rulers = ", ".join(f"{LABELS[name]} {100.0 * share:.0f} %" for name, share in list(one.shares.items())[:3])
+            out.append(f"{figure}: limit {needed:.3g} µg, {what} {reached:.3g} µg ({rulers})")
+    return out

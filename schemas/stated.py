@@ -1,0 +1,134 @@
+"""A stated standard uncertainty: u, or U with its k, or a half-width with its distribution; the unit stands in the key."""
+
+from __future__ import annotations
+
+import math
+import re
+from typing import Annotated, Any, ClassVar, Literal, NamedTuple
+
+from pydantic import Field, SerializerFunctionWrapHandler, model_serializer, model_validator
+
+from schemas.bounds import NotNegative, Number, Positive, Text
+from schemas.strict import Strict
+
+Scope = Literal["station", "run", "soak", "pose", "slot", "mount", "unit", "dwell"]
+Distribution = Literal["normal", "rectangular", "triangular", "arcsine"]
+DIVISORS = {"normal": 1.0, "rectangular": math.sqrt(3.0), "triangular": math.sqrt(6.0), "arcsine": math.sqrt(2.0)}
+TO_SI = {
+    "urad": 1e-6, "arcsec": math.pi / 648000.0, "deg": math.pi / 180.0, "ppm": 1e-6, "percent": 1e-2, "ug": 1e-6, "K": 1.0,
+    "s": 1.0, "g": 1.0, "m_s2": 1.0,
+}  # fmt: skip
+"""Factors to rad, 1, g, K and s."""
+SHARED_SCOPES = ("station", "run", "slot", "mount")
+_STATED = re.compile(r"^(?:(?P<part>[a-z]+)_)?(?P<form>u|U|half_width)_(?P<unit>[A-Za-z0-9_]+)$")
+
+
+class StandardUncertainty(NamedTuple):
+    """A standard uncertainty in rad, g, K, s or relative, and how it was stated.
+
+    unit : of the entry's key; stated : the value there; divisor : k, or that of the distribution
+    """
+
+    u: float
+    unit: str
+    stated: float
+    distribution: str
+    divisor: float
+
+
+class Entry(Strict):
+    """One entry of the budget."""
+
+    parts: ClassVar[tuple[str, ...]] = ("",)
+
+    k: Annotated[Number, Field(ge=1.0, le=4.0)] | None = None
+    dof: Positive | None = None
+    distribution: Distribution | None = None
+    scope: Scope = "station"
+    reference: Text = ""
+    source: str = ""
+    exact: bool = False
+
+    def standard(self, part: str = "") -> StandardUncertainty:
+        """The standard uncertainty of a part of the entry; 0 where the entry is exact or the part is not stated."""
+        for name, form, unit in _forms(self):
+            if _part_of(name) == part:
+                return self._converted(form, unit, float(getattr(self, name)))
+        return StandardUncertainty(0.0, "", 0.0, "normal", 1.0)
+
+    def _converted(self, form: str, unit: str, value: float) -> StandardUncertainty:
+        if form == "U":
+            divisor, kind = float(self.k or 1.0), "normal"
+        elif form == "half_width":
+            kind = self.distribution or "rectangular"
+            divisor = DIVISORS[kind]
+        else:
+            divisor, kind = 1.0, self.distribution or "normal"
+        return StandardUncertainty(value * TO_SI[unit] / divisor, unit, value, kind, divisor)
+
+    @model_validator(mode="after")
+    def _stated_once(self) -> Entry:
+        given = list(_forms(self))
+        parts = [_part_of(name) for name, _, _ in given]
+        twice = sorted({part for part in parts if parts.count(part) > 1})
+        if twice:
+            both = ", ".join(name for name, _, _ in given if _part_of(name) == twice[0])
+            raise ValueError(f"{both}: the same uncertainty stated twice, one is needed; leave one out")
+        if any(form == "U" for _, form, _ in given) and self.k is None:
+            raise ValueError("k: missing beside an expanded uncertainty U; add the coverage factor of its certificate")
+        if any(form == "half_width" for _, form, _ in given) and self.distribution is None:
+            raise ValueError("distribution: missing beside a half_width; add rectangular, triangular or arcsine")
+        if self.exact and given:
+            raise ValueError("exact: true beside an uncertainty; leave one of the two out")
+        if not self.exact and not given and self._needs_value:
+            raise ValueError("no uncertainty is stated; add u_…, U_… with k, or half_width_… with distribution")
+        positive = any(getattr(self, name) > 0.0 for name, _, _ in given)
+        if positive and self.scope in SHARED_SCOPES and not (self.reference or self.origin):
+            raise ValueError("reference: missing; name the reference standard by its id, or give a source")
+        return self
+
+    @property
+    def _needs_value(self) -> bool:
+        return True
+
+    @property
+    def origin(self) -> str:
+        """Where the figure comes from, if from no reference standard."""
+        return self.source
+
+    @model_serializer(mode="wrap")
+    def _only_stated(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
+        content = handler(self)
+        return {name: value for name, value in content.items() if name in self.model_fields_set}
+
+
+def _forms(entry: Entry) -> list[tuple[str, str, str]]:
+    """(key, form, unit) of the uncertainties that an entry states."""
+    found: list[tuple[str, str, str]] = []
+    for name in type(entry).model_fields:
+        match = _STATED.match(name)
+        if match and match["unit"] in TO_SI and getattr(entry, name) is not None:
+            found.append((name, match["form"], match["unit"]))
+    return found
+
+
+def _part_of(name: str) -> str:
+    match = _STATED.match(name)
+    return "" if match is None else match["part"] or ""
+
+
+Stated = NotNegative | None
+
+
+class AngleEntry(Entry):
+    """An angle: level, orthogonality, encoder offset, harmonic, pose, seat."""
+
+    u_urad: Stated = None
+    U_urad: Stated = None
+    half_width_urad: Stated = None
+    u_arcsec: Stated = None
+    U_arcsec: Stated = None
+    half_width_arcsec: Stated = None
+    u_deg: Stated = None
+    U_deg: Stated = None
+    half_width_deg: Stated = None
