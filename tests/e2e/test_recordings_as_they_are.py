@@ -265,7 +265,7 @@ def test_the_export_of_an_import_says_how_to_fit_it(record, monkeypatch, capsys,
     run = imported(_written(recordings.table(record), tmp_path / "a.csv"), tmp_path, *MAPPED)["run"]
     status, _, err = told(monkeypatch, capsys, "export", run, "--archive", tmp_path / "archive")
     assert status in {2, 3}
-    assert f"run {run} was imported and has no table 'grades'" in err
+    assert f"tumbleline fit {run} --effects" in err
     assert "give its command again" not in err
 
 
