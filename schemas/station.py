@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from importlib.resources import files
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
-from pydantic import Field, ValidationError, model_validator
+from pydantic import Field, SerializerFunctionWrapHandler, ValidationError, model_serializer, model_validator
 
 from schemas.bounds import Celsius, Degrees, Name, NotNegative, Number, Positive, Rate, Seconds, Seed, Text, Wait
 from schemas.carrier import Carried
@@ -57,6 +57,20 @@ class Devices(Strict):
     chamber: Device
     reader: Device
     slots: Slots
+
+
+class Equipment(Strict):
+    """Equipment for test procedures besides table, chamber and reader, by the role that it has; none where it is left out."""
+
+    exciter: Device | None = None
+    shock_machine: Device | None = None
+    centrifuge: Device | None = None
+    power_supply: Device | None = None
+
+    def there(self) -> dict[str, Device]:
+        """The equipment that the station has, by role."""
+        found = {role: getattr(self, role) for role in type(self).model_fields}
+        return {role: device for role, device in found.items() if device is not None}
 
 
 class Limits(Strict):
@@ -145,6 +159,7 @@ class StationConfig(Strict):
     kind: Literal["simulated", "modbus"]
     description: Text = ""
     devices: Devices
+    equipment: Equipment = Equipment()
     limits: Limits = Limits()
     soak: Soak = Soak()
     pace: Pace = Pace()
@@ -154,6 +169,14 @@ class StationConfig(Strict):
     self_test: SelfTest = SelfTest()
     simulation: Simulation | None = None
     reference: list[Reference] = Field(default_factory=list[Reference])
+
+    @model_serializer(mode="wrap")
+    def _as_before(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
+        """Without equipment where there is none: captures of earlier versions keep their names."""
+        content = handler(self)
+        if not any((content.get("equipment") or {}).values()):
+            content.pop("equipment", None)
+        return content
 
     @model_validator(mode="after")
     def _can_be_safe(self) -> StationConfig:
@@ -173,6 +196,9 @@ class StationConfig(Strict):
             for name in Devices.model_fields:
                 if missing := getattr(self.devices, name).missing():
                     raise ValueError(f"devices.{name}.{missing}: empty, a station of kind modbus needs one; add it")
+            for role, device in self.equipment.there().items():
+                if missing := device.missing():
+                    raise ValueError(f"equipment.{role}.{missing}: empty, a station of kind modbus needs one; add it")
         return self
 
 

@@ -8,9 +8,11 @@ from typing import TYPE_CHECKING, Any
 from pipelines.stages.fit import fit
 from pipelines.stages.grade import Evidence, grade
 from pipelines.stages.noise import noise
+from pipelines.stages.procedures import procedures
 from pipelines.stages.reduce import dwells_of
 from pipelines.stages.validate import verdicts
 from pipelines.stages.verify import verify
+from pipelines.tables.samples import PROCEDURE
 from pipelines.tables.summaries import summarised
 
 if TYPE_CHECKING:
@@ -23,6 +25,7 @@ if TYPE_CHECKING:
 
 Tables = dict[str, "pd.DataFrame"]
 RECORDS = "records"
+NOT_OF_PROCEDURES = ("limits", "effects", "model_name", "model_version", "formulas", "description", "units", "seed")
 
 
 @dataclass(frozen=True)
@@ -59,7 +62,10 @@ def _summaries(job: Job, run: Run) -> pd.DataFrame:
     key = (str(records.path), records.hash(), job.recipe.zero_output)
     found = _looked_at.get(key)
     if found is None:
-        found = summarised(records.samples(), run.table("readings"), job.recipe.zero_output)
+        readings = run.table("readings")
+        tumbled = set(readings.loc[readings["kind"] != PROCEDURE, "record"])
+        wanted = None if len(tumbled) == readings["record"].nunique() else tumbled
+        found = summarised(records.samples(wanted), readings, job.recipe.zero_output)
         _looked_at.clear()
         _looked_at[key] = found
     return found
@@ -93,11 +99,30 @@ def _noise(job: Job, run: Run) -> Tables:
     return noise(_records(run).samples(static), readings, *tables)
 
 
-_EVIDENCE = ("verdicts", "coefficients", "covariance", "residuals", "verification", "verification_poses", "noise")
+_EVIDENCE = (
+    *("verdicts", "coefficients", "covariance", "residuals", "verification", "verification_poses", "noise"),
+    "procedure_figures",
+)
 
 
 def _grade(job: Job, run: Run) -> Tables:
-    return grade(Evidence(*(run.table(name) for name in _EVIDENCE)), job.limits, job.recipe.zero_output)
+    return grade(
+        Evidence(*(run.table(name) for name in _EVIDENCE)),
+        job.limits,
+        job.recipe.zero_output,
+        tumbles=job.recipe.tumbles,
+    )
+
+
+def _procedures(job: Job, run: Run) -> Tables:
+    tables = (run.table(name) for name in ("readings", "verdicts", "coefficients", "covariance"))
+    return procedures(job.recipe, _records(run).samples, *tables)
+
+
+def _listed(job: Job) -> dict[str, Any]:
+    if not job.recipe.procedures:
+        return {}
+    return {"recipe": job.recipe.model_dump(mode="json", exclude=set(NOT_OF_PROCEDURES))}
 
 
 def _none(job: Job) -> dict[str, Any]:
@@ -152,12 +177,21 @@ STAGES: tuple[Stage, ...] = (
         modules=("pipelines.stages.noise", _TABLES),
     ),
     Stage(
+        name="procedures",
+        inputs=(RECORDS, "readings", "verdicts", "coefficients", "covariance"),
+        outputs=("procedure_points", "procedure_figures", "procedure_findings"),
+        parameters=_listed,
+        call=_procedures,
+        modules=("pipelines.stages.procedures", _TABLES),
+    ),
+    Stage(
         name="grade",
         inputs=_EVIDENCE,
         outputs=("figures", "grades"),
         parameters=lambda job: {
             "limits": job.limits.model_dump(mode="json"),
             "zero_output": job.recipe.zero_output,
+            **({} if job.recipe.tumbles else {"tumbles": False}),
         },
         call=_grade,
         modules=("pipelines.stages.grade", _TABLES),

@@ -18,8 +18,8 @@ INPUTS = (
     *("verdicts", "dwells", "coefficients", "residuals", "verification", "verification_poses"),
     *("allan", "noise", "figures", "grades"),
 )
-OPTIONAL = ("wander",)
-MODULES = ("schemas.limits", "schemas.tables", "pipelines.report")
+OPTIONAL = ("wander", "procedure_points", "procedure_figures", "procedure_findings")
+MODULES = ("schemas.limits", "schemas.tables", "pipelines.report", "pipelines.procedures")
 
 
 def make_report(run: Run) -> bool:

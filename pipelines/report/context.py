@@ -21,7 +21,12 @@ TABLES = (
     *("verdicts", "dwells", "coefficients", "residuals", "verification", "verification_poses"),
     *("allan", "noise", "figures", "grades"),
 )
-OPTIONAL = ("wander",)  # runs of earlier versions have none
+OPTIONAL = (
+    "wander",
+    "procedure_points",
+    "procedure_figures",
+    "procedure_findings",
+)  # runs of earlier versions have none
 
 
 class ReportContext:

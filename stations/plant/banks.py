@@ -11,7 +11,7 @@ from stations.profile_files import profile_of
 
 if TYPE_CHECKING:
     from schemas.profile import Profile
-    from schemas.station import Devices
+    from schemas.station import Devices, Equipment
     from stations.plant.line_device import LineDevice
     from stations.plant.world import World
 
@@ -32,10 +32,14 @@ def build_banks(world: World, devices: Devices) -> dict[int, Bank]:
     return banks
 
 
-def build_line_devices(world: World, devices: Devices) -> dict[int, LineDevice]:
+def build_line_devices(world: World, devices: Devices, equipment: Equipment | None = None) -> dict[int, LineDevice]:
     """Devices with a text protocol, by device id."""
     profile = profile_of(devices.chamber)
-    return {devices.chamber.device_id: chamber_line_device(world, profile)} if profile.commands else {}
+    found = {devices.chamber.device_id: chamber_line_device(world, profile)} if profile.commands else {}
+    if equipment is not None:
+        for device in equipment.there().values():
+            found[device.device_id] = chamber_line_device(world, profile_of(device))
+    return found
 
 
 def _reader(world: World, profile: Profile, slots: int) -> Bank:
