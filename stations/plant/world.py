@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from schemas.errors import WrongUse
 from schemas.station import MOST_SLOTS, Simulation, StationConfig
+from stations.plant.bench import Bench
 from stations.plant.device import Devices, Truth, draw_truth, rotation, stream
 from stations.plant.dynamics import Dynamics
 from stations.plant.fixture import Fixture
@@ -80,6 +81,15 @@ class World:
             Noise(self.preset, noise),
             effects,
             sim.local_gravity_m_s2 / STANDARD_G,
+        )
+        self.bench = Bench(
+            self.preset,
+            self._truths,
+            self.physics.devices,
+            sim.local_gravity_m_s2 / STANDARD_G,
+            sim.seed,
+            lot.seed,
+            self._key,
         )
         fifo = load_profile(config.devices.slots.profile).fifo
         registers = fifo.registers if fifo is not None else 0

@@ -1,0 +1,42 @@
+"""Result files of the simulated equipment, in a folder of their own that goes with the plant."""
+
+from __future__ import annotations
+
+import tempfile
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from scipy.io import savemat
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from stations.plant.bench import Waveforms
+
+
+class ResultFiles:
+    """Writes one file a recording; only the last is kept."""
+
+    def __init__(self) -> None:
+        self._folder: tempfile.TemporaryDirectory[str] | None = None
+        self._last: Path | None = None
+
+    def write(self, number: int, made: Waveforms, slots: Sequence[int]) -> str:
+        """The path of the file of a recording."""
+        if self._folder is None:
+            self._folder = tempfile.TemporaryDirectory(prefix="tumbleline-results-")
+        path = Path(self._folder.name) / f"test{number:06d}.mat"
+        if path == self._last:
+            return str(path)
+        content: dict[str, Any] = {
+            "rate_hz": made.rate_hz,
+            "reference": made.reference,
+            "reference_rate_hz": made.reference_rate_hz,
+            "reference_unit": "g",
+            **{f"slot_{slot}": made.outputs[:, k] for k, slot in enumerate(slots)},
+        }
+        savemat(path, content)
+        if self._last is not None:
+            self._last.unlink(missing_ok=True)
+        self._last = path
+        return str(path)
