@@ -173,6 +173,27 @@ def fit_transfer(points: Points, effects: Sequence[str], near: Mapping[str, floa
     )
 
 
+def exchanged(points: Points, fit: TransferFit) -> TransferFit | None:
+    """The solution in which sprung mass and two-pole low-pass change places; None where the model has not both.
+
+    At ζ near 0.7071 both are alike, and a sweep hardly tells which of them is the mass.
+    """
+    if not (fit.has("natural_hz") and fit.has("two_pole_hz")):
+        return None
+    near = {p.name: float(v) for p, v in zip(fit.parameters, fit.values, strict=True)}
+    near |= {"natural_hz": near["two_pole_hz"], "two_pole_hz": near["natural_hz"], "damping": float(np.sqrt(0.5))}
+    return fit_transfer(points, fit.effects, near)
+
+
+def best_of_exchange(points: Points, fit: TransferFit) -> tuple[TransferFit, TransferFit | None]:
+    """The better of both solutions, and the other one where the points do not exclude it (χ² less than 9 larger)."""
+    other = exchanged(points, fit)
+    if other is None or abs(np.log(other.of("natural_hz")[0] / fit.of("natural_hz")[0])) < 0.02:
+        return fit, None
+    first, second = sorted((fit, other), key=lambda one: one.chi_square)
+    return first, second if second.chi_square - first.chi_square < 9.0 else None
+
+
 def _bounds(parameters: Sequence[Parameter]) -> tuple[Array, Array]:
     low = [-np.inf, *(np.log(p.low) if p.log else p.low for p in parameters)]
     high = [np.inf, *(np.log(p.high) if p.log else p.high for p in parameters)]

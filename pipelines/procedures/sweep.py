@@ -62,7 +62,7 @@ class SweepPart(Part):
     high_hz: Annotated[Positive, Field(le=10000.0)] = 1000.0
     per_octave: Annotated[int, Field(ge=1, le=24)] = 6
     frequencies_hz: Annotated[list[Positive], Field(max_length=400)] = []
-    level_g: Annotated[Positive, Field(le=50.0)] = 1.0
+    level_g: Annotated[Positive, Field(le=50.0)] = 0.5
     other_levels_g: Annotated[list[Positive], Field(max_length=10)] = []
     level_frequency_hz: Positive = 160.0
     axis: Literal["x", "y", "z"] = "z"

@@ -9,7 +9,7 @@ from scipy.optimize import brentq
 
 from inertial.dynamics.spectra import folded_share
 from inertial.dynamics.transfer_effects import Conditions
-from inertial.dynamics.transfer_model import IDENTIFIED_SHARE, TransferFit, factor
+from inertial.dynamics.transfer_model import IDENTIFIED_SHARE, TransferFit, best_of_exchange, factor
 from pipelines.procedures.base import FigureValue
 
 if TYPE_CHECKING:
@@ -39,19 +39,29 @@ def figures_of_transfer(part: Any, found: Diagnosis, points: Points, static: Arr
             for name in ("sweep_bandwidth_hz", "sweep_natural_hz", "sweep_damping")
         ]
         return [*lost, _flatness(part, points), _sensitivity(part, fit, static)]
+    fit, other = best_of_exchange(points, fit)
     return [
         _bandwidth(axis, fit, points),
-        _parameter("sweep_natural_hz", "natural_hz", axis, fit),
-        _parameter("sweep_damping", "damping", axis, fit),
+        _parameter("sweep_natural_hz", "natural_hz", axis, fit, other),
+        _parameter("sweep_damping", "damping", axis, fit, other),
         _flatness(part, points),
         _sensitivity(part, fit, static),
     ]
 
 
-def _parameter(figure: str, name: str, axis: str, fit: TransferFit) -> FigureValue:
+def _parameter(
+    figure: str, name: str, axis: str, fit: TransferFit, other: TransferFit | None = None
+) -> FigureValue:
     if not fit.has(name):
         return FigureValue(figure, axis, np.nan, np.nan, identified=False, note=f"the model has no {WORD.get(name, name)}")
     value, error, low, high = fit.of(name)
+    if other is not None:
+        ends = sorted((*fit.of(name)[2:], *other.of(name)[2:]))
+        note = (
+            f"two solutions fit alike, {value:.4g} and {other.of(name)[0]:.4g}: sprung mass and two-pole low-pass can change places; "
+            "state the low-pass, or excite the mass alone"
+        )
+        return FigureValue(figure, axis, np.nan, np.nan, ends[0], ends[-1], identified=False, note=note)
     if not fit.identified(name):
         note = f"not identified by this sweep: 95 % interval {low:.4g} … {high:.4g}; sweep to higher frequencies"
         return FigureValue(figure, axis, np.nan, np.nan, low, high, identified=False, note=note)

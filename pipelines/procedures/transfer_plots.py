@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
+from matplotlib.ticker import FuncFormatter
 
 from inertial.dynamics.transfer_effects import Conditions
 
@@ -58,10 +59,18 @@ def draw_bode(drawing: Drawing, points: Points, found: Diagnosis, coherence: Arr
     left.legend(frameon=False, loc="upper left", fontsize=8)
     for one in (size, phase, left, bond):
         one.minorticks_off()
+        one.xaxis.set_major_formatter(FuncFormatter(_plain))
+    for one in (left, bond):
+        one.yaxis.set_major_formatter(FuncFormatter(_plain))
     empty.axis("off")
     lines = [f"{p.name}: {_text(found, p.name, p.unit)}" for p in found.extended.parameters]
     verdict = {True: "model adequate", False: "model not adequate", None: "model cannot be judged"}[found.adequate]
     empty.text(0.0, 0.95, "\n".join([verdict, *lines]), va="top", fontsize=8.5)
+
+
+def _plain(value: float, _: int) -> str:
+    """A tick as a plain number."""
+    return f"{value:g}"
 
 
 def _text(found: Diagnosis, name: str, unit: str) -> str:

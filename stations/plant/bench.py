@@ -240,7 +240,8 @@ class Bench:
         for k in self.broken:
             noisy[:, k] = 0.0
         inside = np.clip(noisy, -preset.range_g, preset.range_g)
-        return np.rint((preset.zero_level + preset.scale * inside) / preset.lsb) * preset.lsb
+        counts = np.rint((preset.zero_level + preset.scale * inside) / preset.lsb)
+        return np.clip(counts, -preset.largest_count - 1, preset.largest_count) * preset.lsb
 
     def _as_reference(self, reference: Array, rng: np.random.Generator) -> Array:
         """What the reference sensor reads of (n, 3) g: its error of calibration, noise, and a range that may clip."""

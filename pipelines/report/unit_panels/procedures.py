@@ -79,11 +79,11 @@ def _line(unit: UnitContext, row: dict[str, Any], meanings: dict[str, str]) -> d
     limit = unit.report.limit(row["figure"])
     decided = unit.tables["figures"]
     outcome = decided.loc[decided["figure"] == row["figure"], "outcome"].tolist()
-    interval = f"{plain(row['low'])} … {plain(row['high'])}" if np.isfinite([row["low"], row["high"]]).all() else ""
+    interval = f"{row['low']:.5g} … {row['high']:.5g}" if np.isfinite([row["low"], row["high"]]).all() else ""
     return {
         "meaning": meanings.get(row["figure"], row["figure"]),
         "axis": row["axis"],
-        "value": plain(row["value"]) if known else "not determined",
+        "value": f"{row['value']:.5g}" if known else "not determined",
         "spread": plain(unit.report.coverage * row["uncertainty"]) if known else "",
         "interval": interval,
         "unit": row["unit_text"],
