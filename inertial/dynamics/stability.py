@@ -86,6 +86,29 @@ def _correlated(values: Array) -> float:
     return float(np.sqrt((1.0 + rho) / (1.0 - rho)))
 
 
+def white_and_flicker(record: Array, rate_hz: float) -> tuple[float, float]:
+    """White noise N² (per s) and flicker F² of a short record, from Allan variances N²/τ + F² at a thirtieth and a sixth of it.
+
+    Of one record both are rough; means over channels and records are of use.
+    """
+    span = len(record) / rate_hz
+    values: list[float] = []
+    taus = (span / 30.0, span / 6.0)
+    for tau in taus:
+        means = block_means(record, max(1, round(tau * rate_hz)))
+        values.append(float(np.mean(np.diff(means) ** 2) / 2.0))
+    white = (values[0] - values[1]) / (1.0 / taus[0] - 1.0 / taus[1])
+    return white, values[1] - white / taus[1]
+
+
+def difference_error(white: float, flicker: float, window_s: float) -> float:
+    """Standard uncertainty of the difference of the means of two windows: 2N²/T + 2·1.2·F².
+
+    For adjacent windows of flicker B the difference scatters by 0.99·B, with F = 0.664·B; a fifth is added for the gap.
+    """
+    return float(np.sqrt(2.0 * max(white, 0.0) / window_s + 2.4 * max(flicker, 0.0)))
+
+
 def warm_up_time(time: Array, record: Array, *, band: float, window_s: float) -> tuple[float, float]:
     """Time in s from power-on until the smoothed output stays within ± band of its final value; and that final value.
 

@@ -47,7 +47,7 @@ class CentrifugePart(NominalScale):
     """Speeds up and down again, with the units mounted one way and reversed.
 
     ``radius_m`` is the nominal radius to the proof mass and ``radius_um`` its standard uncertainty: with one radius it is the
-    sensitivity's, in full. ``point_ppm`` is the standard uncertainty of a point's acceleration besides (rate, trend), of the largest.
+    sensitivity's, in full. ``point_ppm`` is the standard uncertainty of a point's acceleration besides (rate, trend), of itself.
     """
 
     kind: Literal["centrifuge"]
@@ -111,7 +111,6 @@ class CentrifugeTest(Procedure):
     def reduce(self, part: CentrifugePart, records: Sequence[ProcedureRecord], device: Device) -> pd.DataFrame:
         """Mean output in g over the acceleration by the measured rate."""
         rows: list[dict[str, Any]] = []
-        largest = max(part.forces_g)
         for k, record in enumerate(records):
             rate = np.radians(record.samples[REFERENCE].output[:, 0].mean())
             force = record.step.setting["direction"] * part.radius_m * rate**2 / 9.80665
@@ -122,7 +121,7 @@ class CentrifugeTest(Procedure):
                 raw = own.output[:, INPUT]
                 output = raw / scale_of(part, device, str(unit))[INPUT]
                 clipped = bool(np.max(np.abs(raw)) >= device.full_scale)
-                error = float(np.hypot(output.std(ddof=1) / np.sqrt(output.size), 1e-6 * part.point_ppm * largest))
+                error = float(np.hypot(output.std(ddof=1) / np.sqrt(output.size), 1e-6 * part.point_ppm * abs(force)))
                 rows.append(
                     {
                         "unit": unit, "axis": "z", "series": "output", "point": k, "setting": float(force),

@@ -10,6 +10,7 @@ from scipy.signal import butter, sosfiltfilt
 
 from inertial.dynamics.pulses import Pulse, measured_pulse, velocity_change
 from inertial.dynamics.shock_spectrum import octave_frequencies, shock_spectrum
+from inertial.dynamics.stability import difference_error, white_and_flicker
 from inertial.errors import NotIdentified
 from pipelines.procedures.base import (
     REFERENCE,
@@ -74,7 +75,7 @@ class ShockTest(Procedure):
     part: ClassVar[type[Part]] = ShockPart
     figures: ClassVar[tuple[FigureSpec, ...]] = (
         FigureSpec("shock_sensitivity_percent", "%", "departure of the peak ratio to the reference from the static or nominal scale"),
-        FigureSpec("shock_undershoot_percent", "%", "largest excursion against the pulse after it, of the peak; the reference's is not taken off"),
+        FigureSpec("shock_undershoot_percent", "%", "largest excursion against the pulse after it, of the peak, beyond that of the reference"),
         FigureSpec("shock_bias_shift_ug", "µg", "bias after the shocks minus before, same pose and temperature, worst axis"),
     )
 
@@ -145,8 +146,8 @@ class ShockTest(Procedure):
                 findings.append(Finding(name, "survival", "the output is constant after the shocks: the unit has not survived"))
             reference = rows[rows["series"] == "reference"]
             if len(reference):
-                peak, lasting = float(reference["value"].mean()), float(reference["duration_s"].mean())
-                ideal = velocity_change(abs(peak), lasting)
+                peak, lasting = float(reference["value"].abs().mean()), float(reference["duration_s"].mean())
+                ideal = velocity_change(peak, lasting)
                 text = (
                     f"reference {peak:.4g} g, {1e3 * lasting:.3g} ms, velocity change {float(reference['velocity_m_s'].mean()):.3g} m/s "
                     f"(half sine: {ideal:.3g} m/s; IEC 60068-2-27 allows ± 15 %)"
@@ -157,11 +158,11 @@ class ShockTest(Procedure):
     def draw(self, drawing: Drawing, part: ShockPart, points: pd.DataFrame) -> None:
         """First shock of reference and unit, and their shock response spectra."""
         left, right = drawing.subplots(1, 2)
-        for name, colour in (("reference", "#d55e00"), ("unit", "#0072b2")):
+        for name, colour, width in (("reference", "#f0a070", 3.2), ("unit", "#0072b2", 1.1)):
             wave = points[points["series"] == f"wave_{name}"]
-            left.plot(1e3 * wave["setting"], wave["value"], lw=1.2, c=colour, label=name)
+            left.plot(1e3 * wave["setting"], wave["value"], lw=width, c=colour, label=name)
             spectrum = points[points["series"] == f"spectrum_{name}"]
-            right.plot(spectrum["setting"], spectrum["value"], lw=1.2, c=colour, label=name)
+            right.plot(spectrum["setting"], spectrum["value"], lw=width, c=colour, label=name)
         left.set(xlabel="time / ms", ylabel=f"acceleration on {part.axis} / g")
         right.set(xscale="log", xlabel="natural frequency / Hz", ylabel="maximax response, Q = 10 / g")
         right.xaxis.set_major_formatter("{x:g}")
@@ -207,7 +208,7 @@ def _pulse(part: ShockPart, number: int, record: ProcedureRecord, own: UnitRecor
             answer = None
     ratio = np.nan if answer is None else answer.peak / drive.peak
     error = np.nan if answer is None else abs(ratio) * float(np.hypot(answer.peak_error / answer.peak, drive.peak_error / drive.peak))
-    under = np.nan if answer is None else 100.0 * answer.undershoot
+    under = np.nan if answer is None else 100.0 * (answer.undershoot - drive.undershoot)
     row = {
         "series": "ratio", "point": number, "setting": record.step.setting["direction"], "value": ratio, "uncertainty": error,
         "undershoot_percent": under, "clipped": float(clipped), "noise_g": np.nan if answer is None else answer.noise,
@@ -242,9 +243,13 @@ def _bias(unit: str, number: int, record: ProcedureRecord, own: UnitRecord, scal
     output = own.output / scale * MICRO
     tenths = np.array([piece.mean(axis=0) for piece in np.array_split(output, 10)])
     error = tenths.std(axis=0, ddof=1) / np.sqrt(10.0)
+    noise = [white_and_flicker(output[:, i], own.rate_hz) for i in range(3)]
     after = 0.0 if record.step.name == "before" else 1.0
     return [
-        {"unit": unit, "axis": axis, "series": "bias", "point": number, "setting": after, "value": float(output[:, i].mean()), "uncertainty": float(error[i])}
+        {
+            "unit": unit, "axis": axis, "series": "bias", "point": number, "setting": after, "value": float(output[:, i].mean()),
+            "uncertainty": float(error[i]), "white": noise[i][0], "flicker": noise[i][1], "window_s": len(output) / own.rate_hz,
+        }
         for i, axis in enumerate(AXES)
     ]  # fmt: skip
 
@@ -268,15 +273,17 @@ def _ratio_figures(part: ShockPart, ratio: pd.DataFrame, good: pd.DataFrame) -> 
 
 
 def _shift(rows: pd.DataFrame) -> FigureValue:
-    """Bias after minus before of the axis with the largest shift; the windows' own scatter is a lower bound of what flicker does."""
+    """Bias after minus before of the axis with the largest shift; the uncertainty holds white noise and flicker."""
     found: list[FigureValue] = []
+    bias = rows[rows["series"] == "bias"]
+    pooled = difference_error(float(bias["white"].mean()), float(bias["flicker"].mean()), float(bias["window_s"].mean())) if len(bias) else 0.0
     for axis, own in rows[rows["series"] == "bias"].groupby("axis", sort=False):
         before, after = own[own["setting"] == 0.0], own[own["setting"] > 0.0]
         if before.empty or after.empty:
             continue
         value = float(after["value"].iloc[0] - before["value"].iloc[0])
-        error = float(np.hypot(after["uncertainty"].iloc[0], before["uncertainty"].iloc[0]))
-        stuck = error <= STUCK or float(after["uncertainty"].iloc[0]) <= STUCK
+        error = max(pooled, float(np.hypot(after["uncertainty"].iloc[0], before["uncertainty"].iloc[0])))
+        stuck = float(after["uncertainty"].iloc[0]) <= STUCK
         note = "the output is constant after the shocks: the unit has not survived" if stuck else ""
         found.append(FigureValue("shock_bias_shift_ug", str(axis), value, error, identified=not stuck, note=note))
     if not found:

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.fft import next_fast_len
 
 from stations.plant.device import stream
 
@@ -177,32 +178,41 @@ class Bench:
                 outputs[:, k] += rig.hum_g * np.cos(2.0 * np.pi * 50.0 * time + 1.0)[:, None]
         return Waveforms(self._converted(outputs, rng), self.rate_hz, reference, ANALOGUE_HZ)
 
-    def transient(self, force: Array, axis: int, tick: int, *, gravity: bool = True) -> Waveforms:
-        """Response to a force (n,) in g along an axis at :data:`FINE_HZ`, which begins and ends at rest."""
+    def transient(self, force: Array, axis: int, tick: int, fine_hz: float = FINE_HZ, slow_hz: float = 0.0) -> Waveforms:
+        """Response to a force (n,) in g along an axis at a fine rate, which begins and ends at rest.
+
+        Parameters
+        ----------
+        fine_hz : of the force
+        slow_hz : rate of the recorder for a long recording; its usual one where 0
+        """
         rng = self._rng(tick, 2)
         n = len(force)
-        f = np.fft.rfftfreq(2 * n, 1.0 / FINE_HZ)
-        padded = np.zeros((2 * n, 3))
+        whole = int(next_fast_len(n + round(0.05 * fine_hz), real=True))
+        f = np.fft.rfftfreq(whole, 1.0 / fine_hz)
+        padded = np.zeros((whole, 3))
         padded[:n, axis] = force
         rest = np.zeros(3)
-        rest[axis] = self.gravity if gravity else 0.0
-        seconds = n / FINE_HZ
-        count = int(seconds * self.rate_hz * 0.985)
+        rest[axis] = self.gravity
+        seconds = n / fine_hz
+        rate = min(self.rate_hz, slow_hz or self.rate_hz)
+        count = int(seconds * rate * 0.985)
         outputs = np.zeros((count, len(self.units), 3))
         spectrum = np.fft.rfft(padded, axis=0)
-        fine = np.arange(n) / FINE_HZ
+        fine = np.arange(n) / fine_hz
         for k, (unit, truth) in enumerate(zip(self.units, self.truths, strict=True)):
-            moved = np.fft.irfft(spectrum * unit.mass(f)[:, None], 2 * n, axis=0) + rest
+            moved = np.fft.irfft(spectrum * unit.mass(f)[:, None], whole, axis=0) + rest
             bent = self._bent(truth, unit, moved)
             floor = bent[-1]
             late = unit.behind(f) * np.exp(-2j * np.pi * f * unit.delay_s)
-            after = np.fft.irfft(np.fft.rfft(bent - floor, axis=0) * late[:, None], 2 * n, axis=0)[:n] + floor
-            time = np.arange(count) / (self.rate_hz * (1.0 + unit.clock))
+            after = np.fft.irfft(np.fft.rfft(bent - floor, axis=0) * late[:, None], whole, axis=0)[:n] + floor
+            time = np.arange(count) / (rate * (1.0 + unit.clock))
             outputs[:, k] = np.stack([np.interp(time, fine, after[:, i]) for i in range(3)], axis=1)
         reference = np.zeros((n, 3))
         reference[:, axis] = force
-        reference = self._as_reference(reference[:: round(FINE_HZ / ANALOGUE_HZ)], rng)
-        return Waveforms(self._converted(outputs, rng), self.rate_hz, reference, ANALOGUE_HZ)
+        recorder = slow_hz or ANALOGUE_HZ
+        reference = self._as_reference(reference[:: round(fine_hz / recorder)], rng)
+        return Waveforms(self._converted(outputs, rng, rate), rate, reference, recorder)
 
     def steady(self, force: Array, axis: int, seconds: float, rate_hz: float, tick: int) -> Array:
         """Outputs (n, units, 3) under steady forces (units,) in g along an axis."""

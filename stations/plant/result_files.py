@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import shutil
 import tempfile
+import weakref
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -18,14 +20,15 @@ class ResultFiles:
     """Writes one file a recording; only the last is kept."""
 
     def __init__(self) -> None:
-        self._folder: tempfile.TemporaryDirectory[str] | None = None
+        self._folder: Path | None = None
         self._last: Path | None = None
 
     def write(self, number: int, made: Waveforms, slots: Sequence[int]) -> str:
         """The path of the file of a recording."""
         if self._folder is None:
-            self._folder = tempfile.TemporaryDirectory(prefix="tumbleline-results-")
-        path = Path(self._folder.name) / f"test{number:06d}.mat"
+            self._folder = Path(tempfile.mkdtemp(prefix="tumbleline-results-"))
+            weakref.finalize(self, shutil.rmtree, self._folder, ignore_errors=True)
+        path = self._folder / f"test{number:06d}.mat"
         if path == self._last:
             return str(path)
         content: dict[str, Any] = {

@@ -324,3 +324,22 @@ def test_own_error_of_the_cycles_is_removed(rng: np.random.Generator) -> None:
     assert np.mean([one.value == 0.0 for one in found]) == pytest.approx(0.05, abs=0.03)
     assert np.sqrt(np.mean([one.value**2 for one in found])) == pytest.approx(20.0, rel=0.06)
     assert np.mean([one.low <= 20.0 <= one.high for one in found]) == pytest.approx(0.95, abs=0.03)
+
+
+OVERALL = {
+    "flat_20_2000": 8.90, "mil_std_810_truck_vertical": 1.043, "mil_std_810_truck_transverse": 0.2035,
+    "mil_std_810_truck_longitudinal": 0.7402, "navmat_p9492": 6.06, "gevs_qualification": 14.14, "gevs_acceptance": 10.00,
+    "do160_curve_c": 4.13, "do160_curve_d1": 7.95, "rideshare_2022": 5.57, "astm_d4169_truck_2": 0.517,
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", OVERALL)
+def test_overall_level_of_the_profiles(name: str) -> None:
+    from schemas.vibration_profile import load_vibration_profile, vibration_profiles
+
+    assert set(OVERALL) == set(vibration_profiles())
+    points = np.array(load_vibration_profile(name).breakpoints)
+    assert random_vibration.overall_level(points[:, 0], points[:, 1]) == pytest.approx(OVERALL[name], rel=2e-3)
+    fine = np.geomspace(points[0, 0], points[-1, 0], 200_001)
+    by_sum = np.trapezoid(random_vibration.interpolated(fine, points[:, 0], points[:, 1]), fine)
+    assert np.sqrt(by_sum) == pytest.approx(OVERALL[name], rel=2e-3)

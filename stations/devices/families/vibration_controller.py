@@ -51,7 +51,13 @@ class VibrationController(Equipment):
         self.values.write("profile", profile)
         for name, value in (("level", level), ("duration", seconds), ("axis", float(axis))):
             self.values.write(name, value)
-        return self._run("RANDOM", seconds, slots)
+        recording = self._run("RANDOM", seconds, slots)
+        driven = recording.reference[:, axis]
+        n = len(driven)
+        reached = float(np.std(driven[n // 4 : 3 * n // 4]))
+        if not abs(reached / level - 1.0) <= LEVEL_SHARE:
+            raise RecordingSpoilt(f"{self.name}: {reached:.4g} g rms, {level:g} g rms was ordered; check amplifier and fixture")
+        return recording
 
     def make_safe(self) -> None:
         """Stops the exciter."""

@@ -6,7 +6,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from stations.plant.bench import FINE_HZ
 from stations.plant.result_files import ResultFiles
 
 if TYPE_CHECKING:
@@ -18,6 +17,7 @@ UNKNOWN, WRONG, BUSY = "NA:CMD ERR", "NA:PARA ERR", "NA:BUSY"
 STROKE_M, VELOCITY_M_S, ACCELERATION_G = 0.0127, 1.5, 50.0
 STANDARD_G = 9.80665
 SETTLE_S = 0.5
+RANDOM_FINE_HZ, RANDOM_HZ = 25600.0, 12800.0
 
 
 def simulated(world: World, profile: Profile) -> Controller:
@@ -103,11 +103,12 @@ class Controller:
         tick = self._start_us
         if self._kind == "SINE":
             return bench.sine(self._set["FREQ"], self._set["LEVEL"], axis, seconds, tick)
-        return bench.transient(self._random(seconds, tick), axis, tick)
+        return bench.transient(self._random(seconds, tick), axis, tick, RANDOM_FINE_HZ, RANDOM_HZ)
 
     def _random(self, seconds: float, tick: int) -> np.ndarray:
         """Gaussian vibration along the axis at the fine rate, at rest at both ends."""
         from stations.plant.densities import random_force  # noqa: PLC0415 - read from files when it is needed
 
         rng = np.random.Generator(np.random.Philox(key=tick + 1))
-        return random_force(self._density, self._set["LEVEL"], round((seconds + 0.2) * FINE_HZ), FINE_HZ, rng)
+        share = 0.3 if "level_not_reached" in self._world.bench.troubles else 1.0
+        return random_force(self._density, share * self._set["LEVEL"], seconds, RANDOM_FINE_HZ, rng)
