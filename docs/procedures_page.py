@@ -45,9 +45,16 @@ def _section(one: Procedure) -> str:
 
 def _effects() -> str:
     lines = ["## Effects on a transfer function", ""]
-    lines += ["The model of a sweep is a sensitivity times effects; the diagnosis names those that are missing, and those that the points do not tell", "apart.", ""]
+    lines += [
+        "The model of a sweep is a sensitivity times effects; the diagnosis names those that are missing, and those that the points do not tell",
+        "apart.",
+        "",
+    ]
     lines += ["| effect | factor | meaning | measurement that tells it from others |", "|---|---|---|---|"]
-    lines += [f"| `{one.id}` | {one.equation} | {(type(one).__doc__ or '').strip()} | {one.breaker} |" for one in EFFECTS.values()]
+    lines += [
+        f"| `{one.id}` | {one.equation} | {(type(one).__doc__ or '').strip()} | {one.breaker} |"
+        for one in EFFECTS.values()
+    ]
     return "\n".join([*lines, ""])
 
 
@@ -56,7 +63,9 @@ def main(arguments: list[str]) -> int:
     text = page()
     if "--check" in arguments:
         same = PAGE.is_file() and PAGE.read_text(encoding="utf-8") == text
-        sys.stdout.write("" if same else f"{PAGE.name} is out of date; write it again with 'python -m docs.procedures_page'\n")
+        sys.stdout.write(
+            "" if same else f"{PAGE.name} is out of date; write it again with 'python -m docs.procedures_page'\n"
+        )
         return 0 if same else 1
     PAGE.write_text(text, encoding="utf-8")
     return 0

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import cache
 from importlib.resources import files
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
@@ -22,6 +23,7 @@ if TYPE_CHECKING:
 Bounds = tuple[Number, Number]
 Angles = tuple[Degrees, Degrees]
 SIMULATED = "simulated.toml"
+SIMULATED_EQUIPMENT = "simulated_equipment.toml"
 MOST_SLOTS = 32  # the reader's registers name that many
 LAST_DEVICE_ID = 247  # Modbus over serial line 1.02, 2.2
 
@@ -60,8 +62,12 @@ class Devices(Strict):
 
 
 class Equipment(Strict):
-    """Equipment for test procedures besides table, chamber and reader, by the role that it has; none where it is left out."""
+    """Equipment for test procedures besides table, chamber and reader, by the role that it has; none where it is left out.
 
+    A simulated station has the built-in equipment besides, unless ``built_in`` is false.
+    """
+
+    built_in: bool = True
     exciter: Device | None = None
     shock_machine: Device | None = None
     centrifuge: Device | None = None
@@ -69,8 +75,16 @@ class Equipment(Strict):
 
     def there(self) -> dict[str, Device]:
         """The equipment that the station has, by role."""
-        found = {role: getattr(self, role) for role in type(self).model_fields}
+        found = {role: getattr(self, role) for role in type(self).model_fields if role != "built_in"}
         return {role: device for role, device in found.items() if device is not None}
+
+
+@cache
+def built_in_equipment() -> Equipment:
+    """The test equipment of a simulated station whose file has none of its own."""
+    source = f"stations/{SIMULATED_EQUIPMENT}"
+    content = parse_toml(files("stations").joinpath(SIMULATED_EQUIPMENT).read_text("utf-8"), source)
+    return Equipment.model_validate(content["equipment"])
 
 
 class Limits(Strict):
@@ -174,9 +188,15 @@ class StationConfig(Strict):
     def _as_before(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
         """Without equipment where there is none: captures of earlier versions keep their names."""
         content = handler(self)
-        if not any((content.get("equipment") or {}).values()):
+        if content.get("equipment") in ({}, Equipment().model_dump(), None):
             content.pop("equipment", None)
         return content
+
+    def fitted(self) -> dict[str, Device]:
+        """The equipment of the station by role; a simulated one has the built-in equipment where its file names none."""
+        found = self.equipment.there()
+        built_in = built_in_equipment().there() if self.kind == "simulated" and self.equipment.built_in else {}
+        return {**built_in, **found}
 
     @model_validator(mode="after")
     def _can_be_safe(self) -> StationConfig:

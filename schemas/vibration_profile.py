@@ -26,7 +26,9 @@ class VibrationProfile(Strict):
     def _in_order(cls, points: list[tuple[float, float]]) -> list[tuple[float, float]]:
         for (first, _), (second, _) in pairwise(points):
             if second <= first:
-                raise ValueError(f"breakpoints: {second:g} Hz follows {first:g} Hz, rising frequencies are needed; order them")
+                raise ValueError(
+                    f"breakpoints: {second:g} Hz follows {first:g} Hz, rising frequencies are needed; order them"
+                )
         return points
 
 
@@ -41,7 +43,9 @@ def load_vibration_profile(name: str) -> VibrationProfile:
     if name not in vibration_profiles():
         known = vibration_profiles()
         raise RecipeInvalid(
-            f"profile: no vibration profile '{name}'; {did_you_mean(name, known)}", key="profile", close=close_matches(name, known)
+            f"profile: no vibration profile '{name}'; {did_you_mean(name, known)}",
+            key="profile",
+            close=close_matches(name, known),
         )
     source = f"vibration/{name}.toml"
     text = files("schemas").joinpath("vibration", f"{name}.toml").read_text("utf-8")

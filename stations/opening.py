@@ -126,7 +126,7 @@ def serve_devices(config: StationConfig, plant: Plant, roles: Sequence[str] = ()
             "tcp": stack.enter_context(on_the_wire(plant, plant.faults, server.host, server.port))
         }
         lines_at: dict[int, tuple[str, int]] = {}
-        wanted = {device.device_id for role, device in config.equipment.there().items() if role in roles}
+        wanted = {device.device_id for role, device in config.fitted().items() if role in roles}
         for device_id in plant.line_devices:
             if device_id in wanted or device_id == config.devices.chamber.device_id:
                 lines = stack.enter_context(LineServer(plant, device_id))
@@ -156,7 +156,7 @@ def _assemble(
         role: equipment_adapter(role, profile_of(device))(
             Commands(role.replace("_", " "), links.lines(role), profile_of(device)), clock
         )
-        for role, device in config.equipment.there().items()
+        for role, device in config.fitted().items()
         if role in roles
     }
     steps = [*equipment_steps(equipment), *safe_steps(config.safety, axes, *parts[1:])]

@@ -181,7 +181,7 @@ def main() -> None:
     leases = Leases(Path(order["folder"]), holder, order["wanted"], config.safety.lapse_s)
     os.set_blocking(1, False)
     with open_devices(
-        config, (), roles=tuple(config.equipment.there())
+        config, (), roles=tuple(config.fitted())
     ) as station:  # connects later, but all modules are loaded
         watch = Watch(config, leases, os.getppid(), [_sturdy(step) for step in station.safe_steps])
         _send(READY)

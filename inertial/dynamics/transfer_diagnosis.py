@@ -203,7 +203,10 @@ def _next_frequencies(
     low, top = float(c.frequency.min()), float(c.frequency.max())
     grid = np.geomspace(low, max(highest, top), 200)
     plan = Conditions(
-        grid, np.full(200, np.median(c.level)), np.full(200, np.median(c.temperature)), np.full(200, np.median(c.record_s))
+        grid,
+        np.full(200, np.median(c.level)),
+        np.full(200, np.median(c.temperature)),
+        np.full(200, np.median(c.record_s)),
     )
     rivals = next((one.effects for one in classes if len(one.effects) > 1), ())
     if rivals:

@@ -85,7 +85,12 @@ class TransferFit:
         value, error = float(self.values[k]), float(self.errors[k])
         if not self.parameters[k].log:
             return value, error, value - 1.96 * error, value + 1.96 * error
-        return value, value * error, value * float(np.exp(-1.96 * min(error, 20.0))), value * float(np.exp(1.96 * min(error, 20.0)))
+        return (
+            value,
+            value * error,
+            value * float(np.exp(-1.96 * min(error, 20.0))),
+            value * float(np.exp(1.96 * min(error, 20.0))),
+        )
 
     def identified(self, name: str) -> bool:
         """Whether a log parameter is known to a fifth, or another differs from 0 by three standard uncertainties."""

@@ -137,7 +137,7 @@ def refuse_unusable(recipe: Recipe, station: StationConfig) -> None:
     for number, part in enumerate(parts_of(recipe), start=1):
         procedure = PROCEDURES[part.kind]
         for role in procedure.roles:
-            if getattr(station.equipment, role, None) is None:
+            if role not in station.fitted():
                 raise RecipeInvalid(
                     f"recipe: procedures, number {number} ({part.kind}): station {station.name} has no {role}, one is needed; add "
                     f"[equipment.{role}] to the station's file, or measure on another station",

@@ -51,7 +51,16 @@ class CentrifugePart(NominalScale):
     """
 
     kind: Literal["centrifuge"]
-    forces_g: Annotated[list[Positive], Field(min_length=4, max_length=50)] = [1.0, 3.0, 5.0, 10.0, 15.0, 20.0, 25.0, 30.0]
+    forces_g: Annotated[list[Positive], Field(min_length=4, max_length=50)] = [
+        1.0,
+        3.0,
+        5.0,
+        10.0,
+        15.0,
+        20.0,
+        25.0,
+        30.0,
+    ]
     down_again: bool = True
     reversed: bool = True
     radius_m: Positive = 0.5
@@ -68,15 +77,25 @@ class CentrifugeTest(Procedure):
     name: ClassVar[str] = "centrifuge"
     title: ClassVar[str] = "Centrifuge"
     order: ClassVar[int] = 130
-    states: ClassVar[str] = "linearity in % of full scale, K2, K3, sensitivity by the radius; arm stretch against Koq as one class"
+    states: ClassVar[str] = (
+        "linearity in % of full scale, K2, K3, sensitivity by the radius; arm stretch against Koq as one class"
+    )
     source: ClassVar[str] = "IEEE Std 836 (centrifuge), IEEE Std 1293"
     roles: ClassVar[tuple[str, ...]] = ("centrifuge",)
     part: ClassVar[type[Part]] = CentrifugePart
     figures: ClassVar[tuple[FigureSpec, ...]] = (
-        FigureSpec("centrifuge_linearity_percent", "%", "largest departure from the least-squares line over ± full scale, of the one-sided range"),
+        FigureSpec(
+            "centrifuge_linearity_percent",
+            "%",
+            "largest departure from the least-squares line over ± full scale, of the one-sided range",
+        ),
         FigureSpec("centrifuge_second_order_ug_g2", "µg/g²", "K2"),
         FigureSpec("centrifuge_third_order_ug_g3", "µg/g³", "K3"),
-        FigureSpec("centrifuge_sensitivity_percent", "%", "departure of the sensitivity from the static or nominal scale; the radius' uncertainty is its own"),
+        FigureSpec(
+            "centrifuge_sensitivity_percent",
+            "%",
+            "departure of the sensitivity from the static or nominal scale; the radius' uncertainty is its own",
+        ),
     )
 
     def steps(self, part: CentrifugePart, recipe: Recipe) -> list[ProcedureStep]:
@@ -146,7 +165,9 @@ class CentrifugeTest(Procedure):
             elif _responds(rows) < 0.5:
                 note = "the output does not follow the acceleration; check cable and mounting"
             if note:
-                figures[name] = [FigureValue(f.name, "z", np.nan, np.nan, identified=False, note=note) for f in self.figures]
+                figures[name] = [
+                    FigureValue(f.name, "z", np.nan, np.nan, identified=False, note=note) for f in self.figures
+                ]
                 continue
             try:
                 fit = fitted(part, rows)
@@ -165,11 +186,20 @@ class CentrifugeTest(Procedure):
         force, value = points["setting"].to_numpy(dtype=float), points["value"].to_numpy(dtype=float)
         line = np.polyfit(force, value, 1)
         place.errorbar(
-            force, 1e3 * (value - np.polyval(line, force)), 2e3 * points["uncertainty"], fmt="o", ms=3.5, lw=0.9, c="#0072b2", label="measured, U (k = 2)"
+            force,
+            1e3 * (value - np.polyval(line, force)),
+            2e3 * points["uncertainty"],
+            fmt="o",
+            ms=3.5,
+            lw=0.9,
+            c="#0072b2",
+            label="measured, U (k = 2)",
         )
         fit = fitted(part, points)
         x = np.linspace(force.min(), force.max(), 300)
-        place.plot(x, 1e3 * (columns(x, fit.names) @ fit.value - np.polyval(line, x)), lw=1.1, c="#d55e00", label="polynomial")
+        place.plot(
+            x, 1e3 * (columns(x, fit.names) @ fit.value - np.polyval(line, x)), lw=1.1, c="#d55e00", label="polynomial"
+        )
         place.set(xlabel="acceleration / g", ylabel="departure from the straight line / mg")
         place.legend(frameon=False)
 
@@ -201,20 +231,33 @@ def _figures(part: CentrifugePart, fit: Polynomial) -> list[FigureValue]:
         FigureValue("centrifuge_linearity_percent", "z", linearity, spread),
         FigureValue("centrifuge_second_order_ug_g2", "z", MICRO * k2[0], MICRO * k2[1]),
         FigureValue("centrifuge_third_order_ug_g3", "z", MICRO * k3[0], MICRO * k3[1]),
-        FigureValue("centrifuge_sensitivity_percent", "z", 100.0 * (k1[0] - 1.0), float(np.hypot(100.0 * k1[1], radius))),
+        FigureValue(
+            "centrifuge_sensitivity_percent", "z", 100.0 * (k1[0] - 1.0), float(np.hypot(100.0 * k1[1], radius))
+        ),
     ]
 
 
 def _texts(part: CentrifugePart, rows: pd.DataFrame, fit: Polynomial) -> list[tuple[str, str]]:
     p = float(chi2.sf(fit.chi_square, fit.dof)) if fit.dof > 0 else float("nan")
     verdict = "cannot be judged" if not np.isfinite(p) else "adequate" if p >= 0.005 else "not adequate"
-    out = [("model", f"polynomial {' + '.join(fit.names)} is {verdict}: χ² {fit.chi_square:.1f} for {fit.dof} degrees of freedom, p = {p:.2g}")]
+    out = [
+        (
+            "model",
+            f"polynomial {' + '.join(fit.names)} is {verdict}: χ² {fit.chi_square:.1f} for {fit.dof} degrees of freedom, p = {p:.2g}",
+        )
+    ]
     if not part.reversed:
         text = "arm stretch, Koq and the offset of the proof mass are not told from K2, K3 and bias; measure with the units reversed"
         return [*out, ("not determined", text)]
     for name, text in (
-        ("arm_stretch_or_odd_quadratic", "arm stretch or Koq, one class: tell them apart by the optical radius at speed"),
-        ("mass_offset_or_asymmetry", "offset of the proof mass from the turning centre, or a scale that differs by sign, one class"),
+        (
+            "arm_stretch_or_odd_quadratic",
+            "arm stretch or Koq, one class: tell them apart by the optical radius at speed",
+        ),
+        (
+            "mass_offset_or_asymmetry",
+            "offset of the proof mass from the turning centre, or a scale that differs by sign, one class",
+        ),
     ):
         value, error = fit.of(name)
         if abs(value) > 4.0 * error:

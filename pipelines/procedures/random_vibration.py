@@ -71,12 +71,20 @@ class RandomVibration(Procedure):
     name: ClassVar[str] = "random_vibration"
     title: ClassVar[str] = "Random vibration"
     order: ClassVar[int] = 115
-    states: ClassVar[str] = "vibration rectification over g rms² at three levels or more; density of the reference against tolerance"
-    source: ClassVar[str] = "IEC 60068-2-64 (tolerances), IEEE Std 1293 (rectification); profiles as files in schemas/vibration"
+    states: ClassVar[str] = (
+        "vibration rectification over g rms² at three levels or more; density of the reference against tolerance"
+    )
+    source: ClassVar[str] = (
+        "IEC 60068-2-64 (tolerances), IEEE Std 1293 (rectification); profiles as files in schemas/vibration"
+    )
     roles: ClassVar[tuple[str, ...]] = ("exciter",)
     part: ClassVar[type[Part]] = RandomVibrationPart
     figures: ClassVar[tuple[FigureSpec, ...]] = (
-        FigureSpec("vibration_rectification_ug_g2", "µg/g²", "shift of the mean by vibration over g rms², line through the origin"),
+        FigureSpec(
+            "vibration_rectification_ug_g2",
+            "µg/g²",
+            "shift of the mean by vibration over g rms², line through the origin",
+        ),
     )
 
     def steps(self, part: RandomVibrationPart, recipe: Recipe) -> list[ProcedureStep]:
@@ -90,7 +98,11 @@ class RandomVibration(Procedure):
                 part.temperature_C,
                 lasting_s=part.seconds,
                 role="exciter",
-                setting={"level_g": level, "axis": float(AXES.index(part.axis)), "profile": float(vibration_profiles().index(part.profile))},
+                setting={
+                    "level_g": level,
+                    "axis": float(AXES.index(part.axis)),
+                    "profile": float(vibration_profiles().index(part.profile)),
+                },
             )
             for level in part.levels_g
         ]
@@ -113,7 +125,9 @@ class RandomVibration(Procedure):
         for k, record in enumerate(records):
             reference = record.samples[REFERENCE]
             rate = reference.rate_hz
-            driven = reference.output[round((1.0 + GUARD_S) * rate) : round((1.0 + part.seconds - GUARD_S) * rate), axis]
+            driven = reference.output[
+                round((1.0 + GUARD_S) * rate) : round((1.0 + part.seconds - GUARD_S) * rate), axis
+            ]
             level = float(np.sqrt(np.mean((driven - driven.mean()) ** 2)))
             for unit in record.readings["unit"]:
                 own = record.samples.get(str(unit))
@@ -153,7 +167,9 @@ class RandomVibration(Procedure):
             level, shift, error = (rows[one].to_numpy(dtype=float) for one in ("setting", "value", "uncertainty"))
             value, spread, chi_square = rectification(level, shift, error)
             figures[str(unit)] = [FigureValue(name, part.axis, value, spread)]
-            text = f"χ² {chi_square:.2g} for {len(rows) - 1} degrees of freedom of the line through the origin over g rms²"
+            text = (
+                f"χ² {chi_square:.2g} for {len(rows) - 1} degrees of freedom of the line through the origin over g rms²"
+            )
             findings.append(Finding(str(unit), "straightness", text))
         findings += _tolerance(part, points)
         return Outcome(figures, findings)
@@ -164,7 +180,9 @@ class RandomVibration(Procedure):
         density = points[points["series"] == "density"]
         f = density["setting"].to_numpy(dtype=float)
         target = _target(part, points, f)
-        left.fill_between(f, target * 10.0 ** (-LINE_DB / 10.0), target * 10.0 ** (LINE_DB / 10.0), color="#dddddd", label="± 3 dB")
+        left.fill_between(
+            f, target * 10.0 ** (-LINE_DB / 10.0), target * 10.0 ** (LINE_DB / 10.0), color="#dddddd", label="± 3 dB"
+        )
         left.plot(f, density["value"], lw=0.9, c="#0072b2", label="reference")
         left.set(xscale="log", yscale="log", xlabel="frequency / Hz", ylabel="density / (g²/Hz)")
         for axis in (left.xaxis, left.yaxis):
@@ -173,7 +191,16 @@ class RandomVibration(Procedure):
         left.legend(frameon=False, loc="lower left")
         shift = points[points["series"] == "shift"]
         x = shift["setting"].to_numpy(dtype=float) ** 2
-        right.errorbar(x, shift["value"], 2.0 * shift["uncertainty"], fmt="o", ms=4, lw=0.9, c="#0072b2", label="measured, U (k = 2)")
+        right.errorbar(
+            x,
+            shift["value"],
+            2.0 * shift["uncertainty"],
+            fmt="o",
+            ms=4,
+            lw=0.9,
+            c="#0072b2",
+            label="measured, U (k = 2)",
+        )
         if bool(shift["value"].notna().all()):
             level, value, error = (shift[one].to_numpy(dtype=float) for one in ("setting", "value", "uncertainty"))
             slope = rectification(level, value, error)[0]
@@ -190,7 +217,9 @@ def _shift(output: np.ndarray, rate_hz: float, seconds: float) -> tuple[float, f
     rest = 0.5 * (before.mean() + after.mean())
     noise = float(np.hypot(before.std(ddof=1) / np.sqrt(before.size), after.std(ddof=1) / np.sqrt(after.size)) / 2.0)
     during = float(hann_mean(output[begin:end][:, None])[0])
-    white = float(before.std(ddof=1)) * np.sqrt(1.5 / (end - begin))  # a Hann weight has 1.5 times the variance of a plain mean
+    white = float(before.std(ddof=1)) * np.sqrt(
+        1.5 / (end - begin)
+    )  # a Hann weight has 1.5 times the variance of a plain mean
     return during - rest, float(np.hypot(noise, white))
 
 

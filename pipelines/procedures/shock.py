@@ -69,14 +69,26 @@ class ShockTest(Procedure):
     name: ClassVar[str] = "shock"
     title: ClassVar[str] = "Half-sine shock"
     order: ClassVar[int] = 120
-    states: ClassVar[str] = "sensitivity by comparison, undershoot after the pulse, bias shift, survival; spectrum of reference and unit"
+    states: ClassVar[str] = (
+        "sensitivity by comparison, undershoot after the pulse, bias shift, survival; spectrum of reference and unit"
+    )
     source: ClassVar[str] = "ISO 16063-22 (comparison), IEC 60068-2-27 (pulse), ISO 18431-4 (shock response spectrum)"
     roles: ClassVar[tuple[str, ...]] = ("shock_machine",)
     part: ClassVar[type[Part]] = ShockPart
     figures: ClassVar[tuple[FigureSpec, ...]] = (
-        FigureSpec("shock_sensitivity_percent", "%", "departure of the peak ratio to the reference from the static or nominal scale"),
-        FigureSpec("shock_undershoot_percent", "%", "largest excursion against the pulse after it, of the peak, beyond that of the reference"),
-        FigureSpec("shock_bias_shift_ug", "µg", "bias after the shocks minus before, same pose and temperature, worst axis"),
+        FigureSpec(
+            "shock_sensitivity_percent",
+            "%",
+            "departure of the peak ratio to the reference from the static or nominal scale",
+        ),
+        FigureSpec(
+            "shock_undershoot_percent",
+            "%",
+            "largest excursion against the pulse after it, of the peak, beyond that of the reference",
+        ),
+        FigureSpec(
+            "shock_bias_shift_ug", "µg", "bias after the shocks minus before, same pose and temperature, worst axis"
+        ),
     )
 
     def steps(self, part: ShockPart, recipe: Recipe) -> list[ProcedureStep]:
@@ -96,7 +108,12 @@ class ShockTest(Procedure):
                 part.temperature_C,
                 lasting_s=5.0,
                 role="shock_machine",
-                setting={"peak_g": part.peak_g, "duration_s": 1e-3 * part.duration_ms, "direction": sign, "axis": float(AXES.index(part.axis))},
+                setting={
+                    "peak_g": part.peak_g,
+                    "duration_s": 1e-3 * part.duration_ms,
+                    "direction": sign,
+                    "axis": float(AXES.index(part.axis)),
+                },
             )
             for sign in signs
             for k in range(part.shocks)
@@ -143,7 +160,9 @@ class ShockTest(Procedure):
             figures[name] = [*_ratio_figures(part, ratio, good), _shift(rows)]
             bias = rows[rows["series"] == "bias"]
             if len(bias) and bool((bias.loc[bias["setting"] > 0.0, "uncertainty"] <= STUCK).any()):
-                findings.append(Finding(name, "survival", "the output is constant after the shocks: the unit has not survived"))
+                findings.append(
+                    Finding(name, "survival", "the output is constant after the shocks: the unit has not survived")
+                )
             reference = rows[rows["series"] == "reference"]
             if len(reference):
                 peak, lasting = float(reference["value"].abs().mean()), float(reference["duration_s"].mean())
@@ -177,7 +196,9 @@ def _filtered(record: np.ndarray, rate_hz: float, duration_s: float) -> np.ndarr
     return np.asarray(sosfiltfilt(butter(2, corner, fs=rate_hz, output="sos"), record))
 
 
-def _both(part: ShockPart, record: ProcedureRecord, own: UnitRecord, scale: np.ndarray) -> tuple[tuple[np.ndarray, float], tuple[np.ndarray, float]]:
+def _both(
+    part: ShockPart, record: ProcedureRecord, own: UnitRecord, scale: np.ndarray
+) -> tuple[tuple[np.ndarray, float], tuple[np.ndarray, float]]:
     """Filtered reference and unit in g along the axis, with their rates."""
     axis, duration = AXES.index(part.axis), 1e-3 * part.duration_ms
     reference = record.samples[REFERENCE]
@@ -186,7 +207,9 @@ def _both(part: ShockPart, record: ProcedureRecord, own: UnitRecord, scale: np.n
     return (first, reference.rate_hz), (second, own.rate_hz)
 
 
-def _pulse(part: ShockPart, number: int, record: ProcedureRecord, own: UnitRecord, scale: np.ndarray, device: Device) -> list[dict[str, Any]]:
+def _pulse(
+    part: ShockPart, number: int, record: ProcedureRecord, own: UnitRecord, scale: np.ndarray, device: Device
+) -> list[dict[str, Any]]:
     """Reference pulse and the unit's ratio to it; no value where a pulse is not found or the unit clips."""
     axis = AXES.index(part.axis)
     (reference, rate), (unit, unit_rate) = _both(part, record, own, scale)
@@ -200,14 +223,20 @@ def _pulse(part: ShockPart, number: int, record: ProcedureRecord, own: UnitRecor
     answer: Pulse | None = None
     raw = own.output[:, axis]
     limit = device.full_scale
-    clipped = bool(np.max(np.abs(raw - np.median(raw[: int(BEFORE_S * unit_rate)]))) >= limit or np.max(np.abs(raw)) >= limit)
+    clipped = bool(
+        np.max(np.abs(raw - np.median(raw[: int(BEFORE_S * unit_rate)]))) >= limit or np.max(np.abs(raw)) >= limit
+    )
     if not clipped:
         try:
             answer = measured_pulse(unit, unit_rate, before_s=BEFORE_S)
         except NotIdentified:
             answer = None
     ratio = np.nan if answer is None else answer.peak / drive.peak
-    error = np.nan if answer is None else abs(ratio) * float(np.hypot(answer.peak_error / answer.peak, drive.peak_error / drive.peak))
+    error = (
+        np.nan
+        if answer is None
+        else abs(ratio) * float(np.hypot(answer.peak_error / answer.peak, drive.peak_error / drive.peak))
+    )
     under = np.nan if answer is None else 100.0 * (answer.undershoot - drive.undershoot)
     row = {
         "series": "ratio", "point": number, "setting": record.step.setting["direction"], "value": ratio, "uncertainty": error,
@@ -258,7 +287,11 @@ def _ratio_figures(part: ShockPart, ratio: pd.DataFrame, good: pd.DataFrame) -> 
     names = ("shock_sensitivity_percent", "shock_undershoot_percent")
     if len(good) < len(ratio) or ratio.empty:
         clipped = int((ratio["clipped"] > 0.0).sum()) if len(ratio) else 0
-        why = f"{clipped} of {len(ratio)} shocks clip the output" if clipped else f"{len(ratio) - len(good)} of {len(ratio)} shocks show no pulse"
+        why = (
+            f"{clipped} of {len(ratio)} shocks clip the output"
+            if clipped
+            else f"{len(ratio) - len(good)} of {len(ratio)} shocks show no pulse"
+        )
         note = f"{why}; lower the peak, or choose a wider range" if clipped else f"{why}; check cable and mounting"
         return [FigureValue(name, part.axis, np.nan, np.nan, identified=False, note=note) for name in names]
     value, each = good["value"].to_numpy(dtype=float), good["uncertainty"].to_numpy(dtype=float)
@@ -267,8 +300,18 @@ def _ratio_figures(part: ShockPart, ratio: pd.DataFrame, good: pd.DataFrame) -> 
     under = good["undershoot_percent"].to_numpy(dtype=float)
     floor = 100.0 * float(good["noise_g"].mean()) / part.peak_g
     return [
-        FigureValue(names[0], part.axis, float(100.0 * (value.mean() - 1.0)), float(np.hypot(100.0 * spread, part.reference_percent))),
-        FigureValue(names[1], part.axis, float(under.max()), float(np.hypot(floor, under.std(ddof=1) if under.size > 1 else 0.0))),
+        FigureValue(
+            names[0],
+            part.axis,
+            float(100.0 * (value.mean() - 1.0)),
+            float(np.hypot(100.0 * spread, part.reference_percent)),
+        ),
+        FigureValue(
+            names[1],
+            part.axis,
+            float(under.max()),
+            float(np.hypot(floor, under.std(ddof=1) if under.size > 1 else 0.0)),
+        ),
     ]
 
 
@@ -276,7 +319,11 @@ def _shift(rows: pd.DataFrame) -> FigureValue:
     """Bias after minus before of the axis with the largest shift; the uncertainty holds white noise and flicker."""
     found: list[FigureValue] = []
     bias = rows[rows["series"] == "bias"]
-    pooled = difference_error(float(bias["white"].mean()), float(bias["flicker"].mean()), float(bias["window_s"].mean())) if len(bias) else 0.0
+    pooled = (
+        difference_error(float(bias["white"].mean()), float(bias["flicker"].mean()), float(bias["window_s"].mean()))
+        if len(bias)
+        else 0.0
+    )
     for axis, own in rows[rows["series"] == "bias"].groupby("axis", sort=False):
         before, after = own[own["setting"] == 0.0], own[own["setting"] > 0.0]
         if before.empty or after.empty:

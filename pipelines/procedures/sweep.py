@@ -113,7 +113,9 @@ class Sweep(Procedure):
     name: ClassVar[str] = "sweep"
     title: ClassVar[str] = "Sine comparison"
     order: ClassVar[int] = 110
-    states: ClassVar[str] = "transfer function with uncertainty, natural frequency, damping, −3 dB bandwidth, flatness, missing effects"
+    states: ClassVar[str] = (
+        "transfer function with uncertainty, natural frequency, damping, −3 dB bandwidth, flatness, missing effects"
+    )
     source: ClassVar[str] = "ISO 16063-21 (comparison), ISO 16063-11 method 3 and IEEE Std 1057 (sine fit)"
     roles: ClassVar[tuple[str, ...]] = ("exciter",)
     part: ClassVar[type[Part]] = SweepPart
@@ -122,8 +124,16 @@ class Sweep(Procedure):
         FigureSpec("sweep_bandwidth_hz", "Hz", "frequency at which the magnitude is 3 dB below that at low frequency"),
         FigureSpec("sweep_natural_hz", "Hz", "undamped natural frequency of the adequate model"),
         FigureSpec("sweep_damping", "1", "damping ratio of the adequate model"),
-        FigureSpec("sweep_flatness_percent", "%", "largest departure of the magnitude from that at low frequency, up to flat_to_hz"),
-        FigureSpec("sweep_sensitivity_percent", "%", "departure of the sensitivity from the static scale, or from nominal_scale"),
+        FigureSpec(
+            "sweep_flatness_percent",
+            "%",
+            "largest departure of the magnitude from that at low frequency, up to flat_to_hz",
+        ),
+        FigureSpec(
+            "sweep_sensitivity_percent",
+            "%",
+            "departure of the sensitivity from the static scale, or from nominal_scale",
+        ),
     )
 
     def steps(self, part: SweepPart, recipe: Recipe) -> list[ProcedureStep]:
@@ -170,7 +180,9 @@ class Sweep(Procedure):
                 own = record.samples.get(unit)
                 if own is not None:
                     rows.append(
-                        _point(part, k, record.step.setting, (reference, own), axis, clocks.get(unit, (0.0, 0.0)), device)
+                        _point(
+                            part, k, record.step.setting, (reference, own), axis, clocks.get(unit, (0.0, 0.0)), device
+                        )
                         | {"unit": unit, "temperature_C": float(reading["unit_C"])}
                     )
         return point_table(rows)
@@ -188,13 +200,17 @@ class Sweep(Procedure):
                 findings.append(Finding(name, "points without a value", text))
             if len(kept) < max(FEWEST_POINTS, 0.8 * len(rows)):
                 note = f"{len(kept)} of {len(rows)} points have a value, four fifths are needed; check cable and range"
-                figures[name] = [FigureValue(f.name, part.axis, np.nan, np.nan, identified=False, note=note) for f in self.figures]
+                figures[name] = [
+                    FigureValue(f.name, part.axis, np.nan, np.nan, identified=False, note=note) for f in self.figures
+                ]
                 continue
             try:
                 found = judged(part, kept)
             except NotIdentified as problem:
                 note = str(problem)
-                figures[name] = [FigureValue(f.name, part.axis, np.nan, np.nan, identified=False, note=note) for f in self.figures]
+                figures[name] = [
+                    FigureValue(f.name, part.axis, np.nan, np.nan, identified=False, note=note) for f in self.figures
+                ]
                 continue
             figures[name] = figures_of_transfer(part, found, transfer_points(kept), device.scale.get(name))
             findings += [Finding(name, subject, text) for subject, text in diagnosis_text(found)]
@@ -286,7 +302,8 @@ def _point(
         "level_g": level,
         "record_s": len(own.output) / own.rate_hz,
         "coherence": power / (power + float(tone.sigma[0]) ** 2),
-        "distortion_percent": 100.0 * float(harmonic_distortion(reference.output[:, [axis]], reference.rate_hz, frequency)[0]),
+        "distortion_percent": 100.0
+        * float(harmonic_distortion(reference.output[:, [axis]], reference.rate_hz, frequency)[0]),
         "transverse_percent": 100.0 * across,
         "clock_ppm": 1e6 * clock[0],
         "clock_uncertainty_ppm": 1e6 * clock[1],

@@ -49,11 +49,11 @@ def figures_of_transfer(part: Any, found: Diagnosis, points: Points, static: Arr
     ]
 
 
-def _parameter(
-    figure: str, name: str, axis: str, fit: TransferFit, other: TransferFit | None = None
-) -> FigureValue:
+def _parameter(figure: str, name: str, axis: str, fit: TransferFit, other: TransferFit | None = None) -> FigureValue:
     if not fit.has(name):
-        return FigureValue(figure, axis, np.nan, np.nan, identified=False, note=f"the model has no {WORD.get(name, name)}")
+        return FigureValue(
+            figure, axis, np.nan, np.nan, identified=False, note=f"the model has no {WORD.get(name, name)}"
+        )
     value, error, low, high = fit.of(name)
     if other is not None:
         ends = sorted((*fit.of(name)[2:], *other.of(name)[2:]))
@@ -112,7 +112,9 @@ def _bandwidth(axis: str, fit: TransferFit, points: Points) -> FigureValue:
     low, high = value * np.exp(-1.96 * error / value), value * np.exp(1.96 * min(error / value, 10.0))
     if error > IDENTIFIED_SHARE * value or value > 2.5 * top:
         note = f"not identified by this sweep to {top:.4g} Hz: 95 % interval {low:.4g} … {high:.4g}; sweep to higher frequencies"
-        return FigureValue("sweep_bandwidth_hz", axis, np.nan, np.nan, float(low), float(high), identified=False, note=note)
+        return FigureValue(
+            "sweep_bandwidth_hz", axis, np.nan, np.nan, float(low), float(high), identified=False, note=note
+        )
     return FigureValue("sweep_bandwidth_hz", axis, value, error, float(low), float(high))
 
 
@@ -124,7 +126,9 @@ def _flatness(part: Any, points: Points) -> FigureValue:
     inside = f <= (part.flat_to_hz or f.max())
     departure = 100.0 * (size[inside] / rest - 1.0)
     k = int(np.argmax(np.abs(departure)))
-    error = 100.0 * float(np.hypot(points.magnitude_error[inside][k], np.median(points.magnitude_error[low]) / np.sqrt(len(low))))
+    error = 100.0 * float(
+        np.hypot(points.magnitude_error[inside][k], np.median(points.magnitude_error[low]) / np.sqrt(len(low)))
+    )
     return FigureValue("sweep_flatness_percent", part.axis, float(departure[k]), error)
 
 
@@ -150,7 +154,10 @@ def diagnosis_text(found: Diagnosis) -> list[tuple[str, str]]:
     text = f"{model} is {verdict}: χ² {fit.chi_square:.1f} for {fit.dof} degrees of freedom, p = {fit.p_value:.2g}, rms residual {found.error_percent:.2g} %"
     out.append(("model", text))
     if found.where:
-        places = [f"{w.part} from {w.low_hz:.4g} to {w.high_hz:.4g} Hz ({100.0 * w.share:.0f} % of χ²)" for w in found.where[:3]]
+        places = [
+            f"{w.part} from {w.low_hz:.4g} to {w.high_hz:.4g} Hz ({100.0 * w.share:.0f} % of χ²)"
+            for w in found.where[:3]
+        ]
         out.append(("where the model fails", ", ".join(places)))
     for one in found.classes:
         alike = f"; not told apart from {', '.join(one.effects[1:])}" if len(one.effects) > 1 else ""

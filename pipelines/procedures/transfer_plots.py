@@ -36,8 +36,25 @@ def draw_bode(drawing: Drawing, points: Points, found: Diagnosis, coherence: Arr
     if found.classes:
         curves.append(("with " + ", ".join(found.recommended), found.extended, EXTENDED, "-"))
     size, phase, left, bond, plane, empty = places.ravel()
-    size.errorbar(f, np.abs(value), k * points.magnitude_error[order] * np.abs(value), fmt="o", ms=2.8, lw=0.8, c=MEASURED, label="measured, U (k = 2)")
-    phase.errorbar(f, np.degrees(np.unwrap(np.angle(value))), np.degrees(k * points.phase_error[order]), fmt="o", ms=2.8, lw=0.8, c=MEASURED)
+    size.errorbar(
+        f,
+        np.abs(value),
+        k * points.magnitude_error[order] * np.abs(value),
+        fmt="o",
+        ms=2.8,
+        lw=0.8,
+        c=MEASURED,
+        label="measured, U (k = 2)",
+    )
+    phase.errorbar(
+        f,
+        np.degrees(np.unwrap(np.angle(value))),
+        np.degrees(k * points.phase_error[order]),
+        fmt="o",
+        ms=2.8,
+        lw=0.8,
+        c=MEASURED,
+    )
     plane.plot(value.real, value.imag, "o", ms=2.8, c=MEASURED)
     for name, fit, colour, style in curves:
         y = fit.response(plan) * sign / rest
@@ -46,7 +63,13 @@ def draw_bode(drawing: Drawing, points: Points, found: Diagnosis, coherence: Arr
         plane.plot(y.real, y.imag, style, lw=1.1, c=colour)
         ratio = points.value[order] / fit.response(c)[order] - 1.0
         left.plot(f, 100.0 * np.abs(ratio), "o" + style, ms=2.2, lw=0.8, c=colour, label=name)
-    left.plot(f, 100.0 * k * np.hypot(points.magnitude_error, points.phase_error)[order], c="#999999", lw=0.8, label="U (k = 2)")
+    left.plot(
+        f,
+        100.0 * k * np.hypot(points.magnitude_error, points.phase_error)[order],
+        c="#999999",
+        lw=0.8,
+        label="U (k = 2)",
+    )
     size.axhline(np.sqrt(0.5), c="#999999", lw=0.8, ls=":")
     bond.plot(f, 1.0 - coherence[order], "o-", ms=2.2, lw=0.8, c=MEASURED)
     size.set(xscale="log", ylabel="|H| over its value at rest", xlabel="frequency / Hz")

@@ -29,12 +29,18 @@ def read_recording(path: Path, slots: list[int], name: str) -> Recording:
         raise StationRefused(f"{name}: result file {path.name} cannot be read ({problem}); check the share") from None
     missing = [key for key in NEEDED if key not in content]
     if missing:
-        raise StationRefused(f"{name}: result file {path.name} lacks {', '.join(missing)}; set up the export of the recorder")
+        raise StationRefused(
+            f"{name}: result file {path.name} lacks {', '.join(missing)}; set up the export of the recorder"
+        )
     unit = str(content["reference_unit"])
     if unit not in STANDARD_GRAVITY:
-        raise StationRefused(f"{name}: reference in '{unit}', {' or '.join(STANDARD_GRAVITY)} is needed; correct the set-up")
+        raise StationRefused(
+            f"{name}: reference in '{unit}', {' or '.join(STANDARD_GRAVITY)} is needed; correct the set-up"
+        )
     outputs = {
-        slot: np.atleast_2d(np.asarray(content[f"slot_{slot}"], dtype=np.float64)) for slot in slots if f"slot_{slot}" in content
+        slot: np.atleast_2d(np.asarray(content[f"slot_{slot}"], dtype=np.float64))
+        for slot in slots
+        if f"slot_{slot}" in content
     }
     reference = np.asarray(content["reference"], dtype=np.float64) / STANDARD_GRAVITY[unit]
     return Recording(outputs, float(content["rate_hz"]), reference, float(content["reference_rate_hz"]))

@@ -91,7 +91,7 @@ class Links:
 
     def _device(self, place: str) -> Carried:
         """The device at a place, or the equipment in a role."""
-        found = self.config.equipment.there().get(place)
+        found = self.config.fitted().get(place)
         return getattr(self.config.devices, place) if found is None else found
 
     def _key(self, device: Carried) -> Key:

@@ -151,7 +151,11 @@ class Bench:
         phase = 2.0 * math.pi * rng.uniform()
         share, skew = rig.repeatability * rng.standard_normal(), rig.repeatability * rng.standard_normal()
         turn = 2.0 * math.pi * np.arange(PERIOD_POINTS) / PERIOD_POINTS + phase
-        along = a * np.cos(turn) + a * rig.distortion * np.cos(2.0 * turn + 0.7) + 0.4 * a * rig.distortion * np.cos(3.0 * turn)
+        along = (
+            a * np.cos(turn)
+            + a * rig.distortion * np.cos(2.0 * turn + 0.7)
+            + 0.4 * a * rig.distortion * np.cos(3.0 * turn)
+        )
         r = frequency / rig.fixture_hz
         fixture = abs(1.0 + r**2 / (1.0 - r**2 + 2j * rig.fixture_damping * r))
         cross = a * rig.transverse * min(fixture, 1.0 / rig.transverse) * np.cos(turn + 1.0)
@@ -178,7 +182,9 @@ class Bench:
                 outputs[:, k] += rig.hum_g * np.cos(2.0 * np.pi * 50.0 * time + 1.0)[:, None]
         return Waveforms(self._converted(outputs, rng), self.rate_hz, reference, ANALOGUE_HZ)
 
-    def transient(self, force: Array, axis: int, tick: int, fine_hz: float = FINE_HZ, slow_hz: float = 0.0) -> Waveforms:
+    def transient(
+        self, force: Array, axis: int, tick: int, fine_hz: float = FINE_HZ, slow_hz: float = 0.0
+    ) -> Waveforms:
         """Response to a force (n,) in g along an axis at a fine rate, which begins and ends at rest.
 
         Parameters

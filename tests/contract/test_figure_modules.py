@@ -54,7 +54,9 @@ def test_the_table_has_the_figures_in_their_order(table) -> None:
 @pytest.mark.parametrize("name", FIGURES)
 def test_a_figure_says_what_a_recipe_lacks(name: str) -> None:
     missing = FIGURES[name].missing(SimpleNamespace(static_record_s=0.0, verification=[], effects=[], tumbles=True))
-    full = SimpleNamespace(static_record_s=1.0, verification=["v1"], effects=[missing.split()[1]] if missing else [], tumbles=True)
+    full = SimpleNamespace(
+        static_record_s=1.0, verification=["v1"], effects=[missing.split()[1]] if missing else [], tumbles=True
+    )
     assert FIGURES[name].missing(full) == ""
     limits = limits_of({"name": "one", "figures": {name: {"max": 1.0, "unit": UNITS[name]}}}, UNITS)
     refuse_limits_without_figures(limits, full)

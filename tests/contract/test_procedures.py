@@ -62,7 +62,8 @@ def lot() -> Lot:
 def job_of(folder: Path, names: list[str]) -> Job:
     recipe = recipe_of(folder, names)
     limits = limits_of(
-        {"name": "wide", "figures": {f.name: {"max": 1e9, "unit": f.unit} for f in figures_of_recipe(recipe).values()}}, UNITS
+        {"name": "wide", "figures": {f.name: {"max": 1e9, "unit": f.unit} for f in figures_of_recipe(recipe).values()}},
+        UNITS,
     )
     return Job(recipe, limits, lot(), load_station())
 
@@ -110,7 +111,7 @@ def test_a_figure_of_a_procedure_may_have_a_limit_and_is_decided(name: str, run)
 def test_a_station_without_the_equipment_is_refused(name: str, tmp_path: Path) -> None:
     from pipelines.procedures import refuse_unusable
 
-    bare = load_station().model_copy(update={"equipment": Equipment()})
+    bare = load_station().model_copy(update={"equipment": Equipment(built_in=False)})
     with pytest.raises(RecipeInvalid, match=f"no {PROCEDURES[name].roles[0]}, one is needed"):
         refuse_unusable(recipe_of(tmp_path, [name]), bare)
 
@@ -146,7 +147,13 @@ def test_figures_agree_with_what_the_simulated_units_really_are(run) -> None:
         for name, true in truth_of(plant, k).items():
             row = figures[(figures["unit"] == unit) & (figures["figure"] == name)].iloc[0]
             if row["identified"]:
-                assert abs(row["value"] - true) < 4.5 * row["uncertainty"], (unit, name, row["value"], true, row["uncertainty"])
+                assert abs(row["value"] - true) < 4.5 * row["uncertainty"], (
+                    unit,
+                    name,
+                    row["value"],
+                    true,
+                    row["uncertainty"],
+                )
             elif np.isfinite(row["low"]):
                 assert row["low"] <= true <= row["high"], (unit, name)
     assert figures["identified"].mean() > 0.8

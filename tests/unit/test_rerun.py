@@ -74,7 +74,13 @@ def test_other_limits_only_grade_again(run: Run) -> None:
 def test_another_model_begins_at_the_fit_and_says_so(run: Run) -> None:
     outcome = again(run.archive, run.id, wanted(effects=LARGER))
     new = run.archive.run(outcome.new)
-    assert {name for name, how in outcome.stages.items() if how == "computed"} == {"fit", "verify", "noise", "procedures", "grade"}
+    assert {name for name, how in outcome.stages.items() if how == "computed"} == {
+        "fit",
+        "verify",
+        "noise",
+        "procedures",
+        "grade",
+    }
     assert "third_order" in set(new.table("coefficients")["effect"])
     assert new.manifest("dwells")["taken_from"] == run.id
     assert outcome.because[0]["what"] == "model"

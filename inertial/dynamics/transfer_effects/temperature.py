@@ -24,9 +24,7 @@ class Temperature(TransferEffect):
 
     def factor(self, points: Conditions, values: Array) -> Complex:
         """The factor (n,) at the points."""
-        return np.asarray(
-            1.0 + values[0] * (points.temperature - points.temperature.mean()), dtype=np.complex128
-        )
+        return np.asarray(1.0 + values[0] * (points.temperature - points.temperature.mean()), dtype=np.complex128)
 
     def seen(self, points: Conditions) -> bool:
         """Whether the temperature moved by 0.5 K or more."""

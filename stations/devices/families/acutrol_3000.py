@@ -21,7 +21,16 @@ STANDING_DEG_S = 0.01
 class Acutrol(Equipment):
     """Absolute rates, each read back; standing means below 0.01 °/s, then the interlock opens."""
 
-    needs: ClassVar[tuple[str, ...]] = ("rate", "interlock", "mode", "rate_read", "fault", "record", "direction", "file")
+    needs: ClassVar[tuple[str, ...]] = (
+        "rate",
+        "interlock",
+        "mode",
+        "rate_read",
+        "fault",
+        "record",
+        "direction",
+        "file",
+    )
 
     def spin(self, rate_deg_s: float, direction: int, seconds: float, slots: Sequence[int]) -> Recording:
         """A record at a constant rate in °/s; ``direction`` says which way the units are mounted (1 or −1).
@@ -45,7 +54,9 @@ class Acutrol(Equipment):
         self._require_no_fault()
         found = self.values.number("rate_read")
         if not abs(found - rate_deg_s) <= 10.0 * REACHED * max(rate_deg_s, 1.0):
-            raise RecordingSpoilt(f"{self.name}: {found:g} °/s after the record, {rate_deg_s:g} °/s is needed; check the drive")
+            raise RecordingSpoilt(
+                f"{self.name}: {found:g} °/s after the record, {rate_deg_s:g} °/s is needed; check the drive"
+            )
         path = self.values.text("file")
         if path in {before, "NONE"}:
             raise RecordingSpoilt(f"{self.name}: no recording, the trigger was missed; check the recorder")
@@ -73,7 +84,9 @@ class Acutrol(Equipment):
     def _require_no_fault(self) -> None:
         state = self.values.text("fault")
         if state.startswith("Fault"):
-            raise OperatorNeeded(f"{self.name}: interlock {state}; remove the cause, reset the interlock and give the command again")
+            raise OperatorNeeded(
+                f"{self.name}: interlock {state}; remove the cause, reset the interlock and give the command again"
+            )
 
 
 def rate_of(force_g: float, radius_m: float) -> float:

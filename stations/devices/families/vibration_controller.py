@@ -16,13 +16,25 @@ from stations.devices.result_files import read_recording
 POLL_S = 0.5
 GRACE_S = 30.0
 LEVEL_SHARE = 0.3  # by which the level that was reached may depart from the order
-FLAT_TOP = 0.02  # share of the samples within a thousandth of the extremes: a sine has a tenth of it, a clipped one more
+FLAT_TOP = (
+    0.02  # share of the samples within a thousandth of the extremes: a sine has a tenth of it, a clipped one more
+)
 
 
 class VibrationController(Equipment):
     """Runs its own closed loop; the host orders finite tests, so that an exciter that is left alone stops by itself."""
 
-    needs: ClassVar[tuple[str, ...]] = ("frequency", "level", "duration", "axis", "start", "stop", "state", "reason", "file")
+    needs: ClassVar[tuple[str, ...]] = (
+        "frequency",
+        "level",
+        "duration",
+        "axis",
+        "start",
+        "stop",
+        "state",
+        "reason",
+        "file",
+    )
 
     def sine(self, frequency: float, level: float, axis: int, seconds: float, slots: Sequence[int]) -> Recording:
         """A dwell at one frequency in Hz with a peak level in g, along an axis (0 to 2) of the units.
@@ -56,7 +68,9 @@ class VibrationController(Equipment):
         n = len(driven)
         reached = float(np.std(driven[n // 4 : 3 * n // 4]))
         if not abs(reached / level - 1.0) <= LEVEL_SHARE:
-            raise RecordingSpoilt(f"{self.name}: {reached:.4g} g rms, {level:g} g rms was ordered; check amplifier and fixture")
+            raise RecordingSpoilt(
+                f"{self.name}: {reached:.4g} g rms, {level:g} g rms was ordered; check amplifier and fixture"
+            )
         return recording
 
     def make_safe(self) -> None:
@@ -90,4 +104,6 @@ def _refuse_clipped(driven: np.ndarray, name: str) -> None:
     top = float(np.max(np.abs(driven)))
     share = float(np.mean(np.abs(driven) > 0.999 * top))
     if share > 0.1:
-        raise RecordingSpoilt(f"{name}: the reference is clipped at {top:.4g} g; choose a larger range of its conditioner")
+        raise RecordingSpoilt(
+            f"{name}: the reference is clipped at {top:.4g} g; choose a larger range of its conditioner"
+        )

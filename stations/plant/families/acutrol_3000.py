@@ -95,7 +95,11 @@ class Centrifuge:
             return f"Fault {self._tripped}" if self._tripped else ("Closed" if self._closed else "Open")
         if line == ":rec:file?":
             over = self._world.now_us >= self._start_us + round(1e6 * self._seconds)
-            return self._files.write(self._number, self._recorded(), self._world.slots) if self._number and over else "NONE"
+            return (
+                self._files.write(self._number, self._recorded(), self._world.slots)
+                if self._number and over
+                else "NONE"
+            )
         return "rate" if line == ":mode? 1" else ("close" if self._closed else "open")
 
     def _recorded(self) -> Waveforms:

@@ -21,7 +21,17 @@ PEAK_SHARE = 0.2  # IEC 60068-2-27: peak within ± 20 %
 class ShockMachine(Equipment):
     """One shock an order: set, armed, released; the machine disarms itself after the shock."""
 
-    needs: ClassVar[tuple[str, ...]] = ("peak", "duration", "axis", "direction", "arm", "release", "door", "state", "file")
+    needs: ClassVar[tuple[str, ...]] = (
+        "peak",
+        "duration",
+        "axis",
+        "direction",
+        "arm",
+        "release",
+        "door",
+        "state",
+        "file",
+    )
 
     def shock(self, peak: float, seconds: float, axis: int, direction: int, slots: Sequence[int]) -> Recording:
         """A half sine with a peak in g along an axis (0 to 2), up or against it (direction 1 or −1).
@@ -34,8 +44,15 @@ class ShockMachine(Equipment):
             Missed trigger, clipped reference, or a peak outside ± 20 %.
         """
         if self.values.text("door") != "CLOSED":
-            raise OperatorNeeded(f"{self.name}: the guard door is open, closed is needed; close it and give the command again")
-        for name, value in (("peak", peak), ("duration", 1e3 * seconds), ("axis", float(axis)), ("direction", float(direction))):
+            raise OperatorNeeded(
+                f"{self.name}: the guard door is open, closed is needed; close it and give the command again"
+            )
+        for name, value in (
+            ("peak", peak),
+            ("duration", 1e3 * seconds),
+            ("axis", float(axis)),
+            ("direction", float(direction)),
+        ):
             self.values.write(name, value)
         before = self.values.text("file")
         self.values.write("arm", "ON")
@@ -47,7 +64,9 @@ class ShockMachine(Equipment):
                 raise StationTimeout(f"{self.name}: no shock within {PATIENCE_S:g} s of the release; check the machine")
             self.clock.sleep(POLL_S)
         if state == "DOOR":
-            raise OperatorNeeded(f"{self.name}: the guard door was opened, the shock was not released; close it, then again")
+            raise OperatorNeeded(
+                f"{self.name}: the guard door was opened, the shock was not released; close it, then again"
+            )
         path = self.values.text("file")
         if path in {before, "NONE"}:
             raise RecordingSpoilt(f"{self.name}: no recording of the shock, the trigger was missed; check the recorder")
@@ -65,6 +84,8 @@ def _refuse_wrong_pulse(driven: np.ndarray, peak: float, name: str) -> None:
     found = float(driven.max())
     flat = int(np.count_nonzero(driven > 0.9999 * found))
     if flat > max(20, 0.02 * int(np.count_nonzero(driven > 0.1 * found))):
-        raise RecordingSpoilt(f"{name}: the reference is clipped at {found:.4g} g; choose a larger range of its conditioner")
+        raise RecordingSpoilt(
+            f"{name}: the reference is clipped at {found:.4g} g; choose a larger range of its conditioner"
+        )
     if not abs(found / peak - 1.0) <= PEAK_SHARE:
         raise RecordingSpoilt(f"{name}: peak {found:.4g} g, {peak:g} g ± 20 % was ordered; check height or pressure")
