@@ -142,11 +142,19 @@ class Bench:
         """Nominal rate at which the outputs are recorded, Hz."""
         return DIGITAL_HZ if self.preset.output_unit == "LSB" else ANALOGUE_HZ
 
-    def sine(self, frequency: float, level: float, axis: int, seconds: float, tick: int) -> Waveforms:
+    def sine(
+        self,
+        frequency: float,
+        level: float,
+        axis: int,
+        seconds: float,
+        tick: int,
+        troubles: frozenset[str] = frozenset(),
+    ) -> Waveforms:
         """Steady vibration along an axis, which points up: the record of ``seconds`` from a common trigger."""
         rng, rig = self._rng(tick, 1), self.rig
         a = level * (1.0 + 0.02 * rng.standard_normal())
-        if "level_not_reached" in self.troubles:
+        if "level_not_reached" in troubles:
             a *= 0.3
         phase = 2.0 * math.pi * rng.uniform()
         share, skew = rig.repeatability * rng.standard_normal(), rig.repeatability * rng.standard_normal()
@@ -165,7 +173,7 @@ class Bench:
         base[:, (axis + 2) % 3] = cross * math.sin(rig.transverse_angle)
         n_ref = round(seconds * ANALOGUE_HZ)
         reference = self._harmonics(np.fft.rfft(base, axis=0), frequency, np.arange(n_ref) / ANALOGUE_HZ)
-        reference = self._as_reference(reference, rng)
+        reference = self._as_reference(reference, rng, troubles)
         felt = base.copy()
         felt[:, axis] = along * (1.0 + share) + self.gravity
         spectrum = np.fft.rfft(felt, axis=0)
@@ -183,7 +191,13 @@ class Bench:
         return Waveforms(self._converted(outputs, rng), self.rate_hz, reference, ANALOGUE_HZ)
 
     def transient(
-        self, force: Array, axis: int, tick: int, fine_hz: float = FINE_HZ, slow_hz: float = 0.0
+        self,
+        force: Array,
+        axis: int,
+        tick: int,
+        fine_hz: float = FINE_HZ,
+        slow_hz: float = 0.0,
+        troubles: frozenset[str] = frozenset(),
     ) -> Waveforms:
         """Response to a force (n,) in g along an axis at a fine rate, which begins and ends at rest.
 
@@ -217,7 +231,7 @@ class Bench:
         reference = np.zeros((n, 3))
         reference[:, axis] = force
         recorder = slow_hz or ANALOGUE_HZ
-        reference = self._as_reference(reference[:: round(fine_hz / recorder)], rng)
+        reference = self._as_reference(reference[:: round(fine_hz / recorder)], rng, troubles)
         return Waveforms(self._converted(outputs, rng, rate), rate, reference, recorder)
 
     def steady(self, force: Array, axis: int, seconds: float, rate_hz: float, tick: int) -> Array:
@@ -259,10 +273,10 @@ class Bench:
         counts = np.rint((preset.zero_level + preset.scale * inside) / preset.lsb)
         return np.clip(counts, -preset.largest_count - 1, preset.largest_count) * preset.lsb
 
-    def _as_reference(self, reference: Array, rng: np.random.Generator) -> Array:
+    def _as_reference(self, reference: Array, rng: np.random.Generator, troubles: frozenset[str]) -> Array:
         """What the reference sensor reads of (n, 3) g: its error of calibration, noise, and a range that may clip."""
         read = reference * (1.0 + self.rig.reference_error) + 2e-4 * rng.standard_normal(reference.shape)
-        if "clipped_reference" in self.troubles:
+        if "clipped_reference" in troubles:
             top = 0.6 * float(np.max(np.abs(read)))
             read = np.clip(read, -top, top)
         return read

@@ -34,7 +34,7 @@ class Machine:
         self._set = {"PEAK": 50.0, "DUR": 11.0, "AXIS": 2.0, "DIR": 1.0}
         self._armed, self._number, self._start_us, self._until_us = False, 0, 0, 0
         self._recorded_one, self._refused = False, False
-        self._shape = (0.0, 0.0)
+        self._shape, self._troubles = (0.0, 0.0), frozenset[str]()
         self._files = ResultFiles()
 
     def answer(self, line: str) -> tuple[str, bool]:
@@ -82,7 +82,7 @@ class Machine:
             share * self._set["PEAK"] * (1.0 + JITTER * float(rng.standard_normal())),
             1e-3 * self._set["DUR"] * (1.0 + JITTER * float(rng.standard_normal())),
         )
-        self._start_us = world.now_us
+        self._start_us, self._troubles = world.now_us, frozenset(world.bench.troubles)
         self._until_us = world.now_us + round(1e6 * FALL_S)
         world.bench.hit(self._shape[0])
         if "missed_trigger" not in world.bench.troubles:
@@ -94,4 +94,6 @@ class Machine:
         peak, duration = self._shape
         t = np.arange(round((BEFORE_S + duration + AFTER_S) * FINE_HZ)) / FINE_HZ - BEFORE_S
         pulse = np.where((t >= 0.0) & (t <= duration), peak * np.sin(np.pi * t / duration), 0.0)
-        return self._world.bench.transient(self._set["DIR"] * pulse, int(self._set["AXIS"]), self._start_us)
+        return self._world.bench.transient(
+            self._set["DIR"] * pulse, int(self._set["AXIS"]), self._start_us, troubles=self._troubles
+        )

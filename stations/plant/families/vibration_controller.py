@@ -33,7 +33,7 @@ class Controller:
         self._set = {"FREQ": 160.0, "LEVEL": 1.0, "DUR": 1.0, "AXIS": 2.0}
         self._density = "flat_20_2000"
         self._kind, self._start_us, self._until_us, self._number = "", 0, 0, 0
-        self._aborted = ""
+        self._aborted, self._troubles = "", frozenset[str]()
         self._files = ResultFiles()
 
     def answer(self, line: str) -> tuple[str, bool]:
@@ -80,7 +80,7 @@ class Controller:
             self._aborted = "limit of stroke velocity or acceleration"
         if self._aborted:
             return "OK", True
-        self._kind, self._start_us = kind, world.now_us
+        self._kind, self._start_us, self._troubles = kind, world.now_us, frozenset(troubles)
         self._until_us = world.now_us + round(1e6 * (self._set["DUR"] + SETTLE_S))
         if "missed_trigger" in troubles:
             self._kind = ""
@@ -102,13 +102,13 @@ class Controller:
         bench, axis, seconds = self._world.bench, int(self._set["AXIS"]), self._set["DUR"]
         tick = self._start_us
         if self._kind == "SINE":
-            return bench.sine(self._set["FREQ"], self._set["LEVEL"], axis, seconds, tick)
-        return bench.transient(self._random(seconds, tick), axis, tick, RANDOM_FINE_HZ, RANDOM_HZ)
+            return bench.sine(self._set["FREQ"], self._set["LEVEL"], axis, seconds, tick, self._troubles)
+        return bench.transient(self._random(seconds, tick), axis, tick, RANDOM_FINE_HZ, RANDOM_HZ, self._troubles)
 
     def _random(self, seconds: float, tick: int) -> np.ndarray:
         """Gaussian vibration along the axis at the fine rate, at rest at both ends."""
         from stations.plant.densities import random_force  # noqa: PLC0415 - read from files when it is needed
 
         rng = np.random.Generator(np.random.Philox(key=tick + 1))
-        share = 0.3 if "level_not_reached" in self._world.bench.troubles else 1.0
+        share = 0.3 if "level_not_reached" in self._troubles else 1.0
         return random_force(self._density, share * self._set["LEVEL"], seconds, RANDOM_FINE_HZ, rng)
