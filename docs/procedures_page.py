@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from inertial.dynamics.transfer_effects import EFFECTS
 from pipelines.procedures import PROCEDURES
@@ -16,8 +16,9 @@ PAGE = Path(__file__).resolve().parent / "reference" / "procedures.md"
 HEAD = """\
 # Test procedures
 
-Written by `python -m docs.procedures_page` from `pipelines/procedures/` and `inertial/dynamics/transfer_effects/`; change those files, not this
-page. A recipe lists the procedures of a lot in order, as tables `[[procedures]]` with the key `kind`; [how to](../how-to/list-procedures.md).
+Written by `python -m docs.procedures_page` from `pipelines/procedures/` and `inertial/dynamics/transfer_effects/`; change those
+files, not this page. A recipe lists the procedures of a lot in order, as tables `[[procedures]]` with the key `kind`;
+[how to](../how-to/list-procedures.md).
 """
 
 
@@ -34,7 +35,9 @@ def _section(one: Procedure) -> str:
     fields = {name: field for name, field in one.part.model_fields.items() if name != "kind"}
     if fields:
         lines += ["| key | default |", "|---|---|"]
-        lines += [f"| `{name}` | {'required' if f.is_required() else f'`{f.default}`'} |" for name, f in fields.items()]
+        lines += [
+            f"| `{name}` | {'required' if f.is_required() else f'`{_default(f)}`'} |" for name, f in fields.items()
+        ]
         lines.append("")
     if one.figures:
         lines += ["| figure for limits | unit | meaning |", "|---|---|---|"]
@@ -43,13 +46,17 @@ def _section(one: Procedure) -> str:
     return "\n".join(lines)
 
 
+def _default(field: Any) -> Any:
+    """The default of a key, also of one that is made anew each time."""
+    return field.get_default(call_default_factory=True)
+
+
 def _effects() -> str:
     lines = ["## Effects on a transfer function", ""]
     lines += [
-        "The model of a sweep is a sensitivity times effects; the diagnosis names those that are missing, and those that the points do not tell",
-        "apart.",
-        "",
+        "The model of a sweep is a sensitivity times effects; the diagnosis names those that are missing, and those that"
     ]
+    lines += ["the points do not tell apart.", ""]
     lines += ["| effect | factor | meaning | measurement that tells it from others |", "|---|---|---|---|"]
     lines += [
         f"| `{one.id}` | {one.equation} | {(type(one).__doc__ or '').strip()} | {one.breaker} |"

@@ -74,7 +74,8 @@ class Polynomial:
     """Coefficients of a centrifuge test in g of indicated acceleration, with their covariance.
 
     The indicated acceleration is the output over the sensitivity; terms are named in :data:`TERMS`. Arm stretch and Koq·a|a| are
-    one parameter of such a test, and so are the offset of the proof mass from the turning centre and a scale that differs by sign.
+    one parameter of such a test, and so are the offset of the proof mass from the turning centre and a scale that differs by
+    sign.
     """
 
     names: tuple[str, ...]

@@ -122,7 +122,10 @@ def measured_pulse(record: Array, rate_hz: float, *, before_s: float) -> Pulse:
     y = sign * y
     top = int(np.argmax(y))
     if not y[top] > 8.0 * noise:
-        msg = f"shock: the largest excursion is {y[top]:.3g}, {8.0 * noise:.3g} is needed above a noise of {noise:.3g}; check the trigger"
+        msg = (
+            f"shock: the largest excursion is {y[top]:.3g}, {8.0 * noise:.3g} is needed above a noise of "
+            f"{noise:.3g}; check the trigger"
+        )
         raise NotIdentified(msg)
     low, high = _span(y, top, TOP * y[top])
     places = np.arange(low, high + 1)

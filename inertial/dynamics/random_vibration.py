@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.stats import norm
 
 Array = NDArray[np.float64]
 
@@ -60,7 +61,6 @@ def rectification(level_g: Array, shift_g: Array, error_g: Array) -> tuple[float
 
 def gaussian_clipping(level_g: float, mean_g: float, range_g: float) -> float:
     """Shift in g of the mean of Gaussian vibration around ``mean_g`` by clipping at ± ``range_g``."""
-    from scipy.stats import norm
 
     def excess(distance: float) -> float:
         u = distance / level_g

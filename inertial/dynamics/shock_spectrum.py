@@ -49,7 +49,8 @@ def shock_spectrum(record: Array, rate_hz: float, natural_hz: Array, q: float = 
     highest = float(np.max(natural_hz))
     if rate_hz < FEWEST_PER_PERIOD * highest:
         msg = (
-            f"shock spectrum: {rate_hz:g} Hz for {highest:g} Hz, at least {FEWEST_PER_PERIOD * highest:g} Hz is needed; lower the "
+            f"shock spectrum: {rate_hz:g} Hz for {highest:g} Hz, at least "
+            f"{FEWEST_PER_PERIOD * highest:g} Hz is needed; lower the "
             "highest frequency, or sample faster"
         )
         raise NotIdentified(msg)

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from scipy import signal
 from scipy.stats import chi2
 
+from inertial.dynamics.second_order import bandwidth, transfer
 from inertial.errors import NotIdentified
 
 Array = NDArray[np.float64]
@@ -69,16 +70,17 @@ def response(reference: Array, output: Array, rate_hz: float, *, segment: int, d
     coherence = np.clip(np.abs(sxy) ** 2 / (sxx * syy), 0.0, 1.0)
     averages = HANN_HALF * count
     turn = np.exp(-2j * np.pi * f * shift / rate_hz)
-    h1 = sxy / sxx * turn
+    h1 = np.asarray(sxy / sxx * turn, dtype=np.complex128)
     with np.errstate(all="ignore"):
-        h2 = syy / np.conj(sxy) * turn
+        h2 = np.asarray(syy / np.conj(sxy) * turn, dtype=np.complex128)
         error = np.sqrt((1.0 - coherence) / (2.0 * coherence * averages))
     return Response(f, h1, h2, coherence, averages, error)
 
 
 def delay_bias(delay_s: float, span_s: float, window: str = "hann", points: int = 20001) -> float:
     """Factor by which a delay between the channels lowers |H|: the window's correlation with itself, 1 − τ/T without one."""
-    w = signal.get_window("boxcar" if window == "none" else window, points, fftbins=False)
+    made: Any = signal.get_window("boxcar" if window == "none" else window, points, fftbins=False)
+    w = np.asarray(made, dtype=np.float64)
     lag = round(delay_s / span_s * (points - 1))
     return float(np.sum(w[lag:] * w[: points - lag]) / np.sum(w**2))
 
@@ -92,13 +94,15 @@ def density_confidence(averages: float, level: float = 0.99) -> tuple[float, flo
 
 def hann_mean(record: Array) -> Array:
     """Mean (channels,) of a record (n, channels) with a Hann weight: vibration without power near 0 Hz hardly leaks into it."""
-    w = signal.get_window("hann", len(record), fftbins=False)
+    made: Any = signal.get_window("hann", len(record), fftbins=False)
+    w = np.asarray(made, dtype=np.float64)
     return np.asarray(w @ record / w.sum())
 
 
 def butterworth(order: int) -> tuple[float, float, float]:
     """Noise bandwidth over f_c, delay at 0 Hz times ω_c, and overshoot of the step as a share, of a Butterworth low-pass."""
-    b, a = signal.butter(order, 1.0, analog=True)
+    made: Any = signal.butter(order, 1.0, analog=True)
+    b, a = made
     noise = float(np.pi / 2.0 / order / np.sin(np.pi / 2.0 / order))
     delay = float(np.real(a[-2] / a[-1]))
     _, y = signal.step((b, a), T=np.linspace(0.0, 60.0, 60001))
@@ -116,7 +120,5 @@ def folded_share(rate_hz: float, bandwidth_hz: float, order: int, damping: float
     if order == 1:
         return float(1.0 / np.hypot(1.0, f / bandwidth_hz))
     if order == 2:
-        from inertial.dynamics.second_order import bandwidth, transfer
-
         return float(np.abs(transfer(f, bandwidth_hz / bandwidth(1.0, damping), damping)))
     return float(1.0 / np.sqrt(1.0 + (f / bandwidth_hz) ** (2 * order)))

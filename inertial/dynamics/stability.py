@@ -174,8 +174,8 @@ def repeatability(means: Array, own_error: float) -> Repeatability:
     def reduced(value: float) -> float:
         return float(np.sqrt(max(0.0, value - own_error**2)))
 
-    low, high = (reduced(s2 * dof / chi2.ppf(p, dof)) for p in (0.975, 0.025))
-    return Repeatability(reduced(s2), low, high, reduced(s2 * dof / chi2.ppf(0.05, dof)), n)
+    low, high = (reduced(float(s2 * dof / chi2.ppf(p, dof))) for p in (0.975, 0.025))
+    return Repeatability(reduced(s2), low, high, reduced(float(s2 * dof / chi2.ppf(0.05, dof))), n)
 
 
 def sigma_factors(n: int) -> tuple[float, float, float]:

@@ -79,10 +79,11 @@ def fit_tilt(angle: Array, output: Array, error: Array, *, orders: int = 1) -> T
         msg = f"tilt: {len(angle)} angles do not tell {', '.join(names)} apart; add angles over the whole turn"
         raise NotIdentified(msg)
     c = np.linalg.lstsq(weighted, output / error, rcond=None)[0]
-    return TiltFit(names, c, np.linalg.inv(weighted.T @ weighted), output - rows @ c, angle)
+    covariance = np.asarray(np.linalg.inv(weighted.T @ weighted), dtype=np.float64)
+    return TiltFit(names, np.asarray(c, dtype=np.float64), covariance, output - rows @ c, angle)
 
 
-def left_open(in_plane: bool) -> tuple[str, ...]:
+def left_open(*, in_plane: bool) -> tuple[str, ...]:
     """What one plane leaves open for an axis that lies in it, or that is the axis of rotation."""
     if in_plane:
         return (

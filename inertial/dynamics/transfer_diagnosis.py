@@ -1,4 +1,4 @@
-"""Whether a model of a transfer function is good enough, where it fails, which effects would mend it, and what to measure next."""
+"""Whether a model of a transfer function is good enough, where it fails, which effects are missing, what to measure next."""
 
 from __future__ import annotations
 

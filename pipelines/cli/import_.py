@@ -55,7 +55,8 @@ def command(
     ] = None,
     fit: Annotated[str, typer.Option("--fit", metavar="norm|faces|temperature", help="Fit and judge at once.")] = "",
     procedure: Annotated[
-        str, typer.Option("--procedure", metavar="sweep", help="A dynamic measurement: the transfer function of a sweep.")
+        str,
+        typer.Option("--procedure", metavar="sweep", help="A dynamic measurement: the transfer function of a sweep."),
     ] = "",
     effects: Annotated[
         str, typer.Option("--effects", metavar="a,b,…", help="Model of the transfer function; second_order,delay.")
@@ -102,14 +103,14 @@ def command(
     raise typer.Exit(DONE if adequate is True else PART_FAILED)
 
 
-def _transfer(
-    files: list[Path], procedure: str, unit: str, effects: str, archive: str | None, *, as_json: bool
-) -> int:
+def _transfer(files: list[Path], procedure: str, unit: str, effects: str, archive: str | None, *, as_json: bool) -> int:
     """Judge and keep transfer functions; the exit status: part failed where one is not adequate, or cannot be judged."""
     from pipelines.importers.transfer import import_transfer
 
     if procedure != "sweep":
-        raise WrongUse(f"--procedure: found '{shown(procedure)}', sweep is what can be imported; measure others with a recipe")
+        raise WrongUse(
+            f"--procedure: found '{shown(procedure)}', sweep is what can be imported; measure others with a recipe"
+        )
     if not unit:
         raise WrongUse("import: no serial number, a transfer function needs one; add --unit SN")
     model = [part.strip() for part in effects.split(",")] if effects else ["second_order", "delay"]

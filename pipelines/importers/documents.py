@@ -33,7 +33,7 @@ class TransferClass(TypedDict):
 
 
 class TransferImport(TypedDict):
-    """``tumbleline import --procedure sweep``: the diagnosis of a transfer function."""
+    """``import FILE --procedure sweep``: the diagnosis of a transfer function."""
 
     run: str
     unit: str

@@ -13,7 +13,7 @@ from inertial.dynamics.transfer_model import Points
 from inertial.errors import InertialError
 from pipelines.archive import Archive, code_hash, stage_key
 from pipelines.importers import files
-from pipelines.importers.documents import TransferImport
+from pipelines.importers.documents import TransferImport, TransferParameter
 from pipelines.procedures.columns import finding_table, gathered_points
 from pipelines.procedures.transfer_figures import bandwidth_of, diagnosis_text
 from schemas.errors import DataRejected, WrongUse, did_you_mean
@@ -55,7 +55,9 @@ def transfer_points(table: pd.DataFrame, name: str) -> Points:
         columns[one] = values.to_numpy(dtype=float)
         bad = np.flatnonzero(~np.isfinite(columns[one])) if there else np.zeros(0)
         if bad.size:
-            raise DataRejected(f"{name}: row {int(bad[0]) + 1}, column {one}: a finite number is needed; correct the row")
+            raise DataRejected(
+                f"{name}: row {int(bad[0]) + 1}, column {one}: a finite number is needed; correct the row"
+            )
     for one in ("frequency_hz", "magnitude", "magnitude_uncertainty_percent", "phase_uncertainty_deg"):
         if not np.all(columns[one] > 0.0):
             row = int(np.flatnonzero(columns[one] <= 0.0)[0]) + 1
@@ -91,10 +93,13 @@ def import_transfer(
         raise DataRejected(f"{path.name}: {problem}") from None
     fit = found.extended
     bandwidth = bandwidth_of(fit, fit.values, float(points.conditions.frequency.max()))
-    parameters = {}
+    parameters: dict[str, TransferParameter] = {}
     for p in fit.parameters:
         value, error, low, high = fit.of(p.name)
-        parameters[p.name] = {"value": value, "uncertainty": error, "low": low, "high": high, "unit": p.unit, "identified": fit.identified(p.name)}
+        known = fit.identified(p.name)
+        parameters[p.name] = TransferParameter(
+            value=value, uncertainty=error, low=low, high=high, unit=p.unit, identified=known
+        )
     text = diagnosis_text(found)
     run = _keep(points, source, unit, list(effects), text, archive)
     return {
@@ -108,7 +113,9 @@ def import_transfer(
         "error_percent": found.error_percent,
         "extended_percent": found.extended_percent,
         "left_out": list(found.left_out),
-        "where": [vars(one) for one in found.where],
+        "where": [
+            {"low_hz": one.low_hz, "high_hz": one.high_hz, "part": one.part, "share": one.share} for one in found.where
+        ],
         "classes": [{"effects": list(one.effects), "p_value": one.p_value} for one in found.classes],
         "recommended": list(found.recommended),
         "unexplained": found.unexplained,
@@ -121,7 +128,12 @@ def import_transfer(
 
 
 def _keep(
-    points: Points, source: files.SourceFile, unit: str, effects: list[str], text: Sequence[tuple[str, str]], archive: str | None
+    points: Points,
+    source: files.SourceFile,
+    unit: str,
+    effects: list[str],
+    text: Sequence[tuple[str, str]],
+    archive: str | None,
 ) -> Run:
     """The run that holds the import, with a manifest that names the source."""
     inputs, parameters = {"source": source.sha256}, {"procedure": "sweep", "effects": effects, "unit": unit}

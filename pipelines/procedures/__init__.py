@@ -130,7 +130,8 @@ def refuse_unusable(recipe: Recipe, station: StationConfig) -> None:
     kinds = [part.kind for part in parts_of(recipe)]
     if kinds and recipe.static_record_s > 0.0 and "static_record" not in kinds:
         raise RecipeInvalid(
-            f"recipe: static_record_s is {recipe.static_record_s:g} s and 'procedures' lists no static_record, both are needed for "
+            f"recipe: static_record_s is {recipe.static_record_s:g} s and 'procedures' lists no "
+            f"static_record, both are needed for "
             "the record; add the procedure, or set static_record_s = 0",
             key="procedures",
         )
@@ -139,7 +140,8 @@ def refuse_unusable(recipe: Recipe, station: StationConfig) -> None:
         for role in procedure.roles:
             if role not in station.fitted():
                 raise RecipeInvalid(
-                    f"recipe: procedures, number {number} ({part.kind}): station {station.name} has no {role}, one is needed; add "
+                    f"recipe: procedures, number {number} ({part.kind}): station {station.name} has "
+                    f"no {role}, one is needed; add "
                     f"[equipment.{role}] to the station's file, or measure on another station",
                     key="procedures",
                 )

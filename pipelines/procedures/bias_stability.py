@@ -127,7 +127,8 @@ class BiasStability(Procedure):
             ]
             for axis, one in by_axis.items():
                 text = (
-                    f"axis {axis}, µg: standard deviation of 1 s means {one.sd_1s:.4g}, of 100 s means {one.sd_100s:.4g}; range of "
+                    f"axis {axis}, µg: standard deviation of 1 s means {one.sd_1s:.4g}, of 100 s "
+                    f"means {one.sd_100s:.4g}; range of "
                     f"1 s means {one.range_1s:.4g}, of 100 s means {one.range_100s:.4g}; Allan deviation at 100 s "
                     f"{one.allan_100s:.4g}; drift {one.drift_h:.4g} ± {2.0 * one.drift_h_error:.2g} µg/h (k = 2)"
                 )

@@ -51,16 +51,9 @@ class CentrifugePart(NominalScale):
     """
 
     kind: Literal["centrifuge"]
-    forces_g: Annotated[list[Positive], Field(min_length=4, max_length=50)] = [
-        1.0,
-        3.0,
-        5.0,
-        10.0,
-        15.0,
-        20.0,
-        25.0,
-        30.0,
-    ]
+    forces_g: Annotated[list[Positive], Field(min_length=4, max_length=50)] = Field(
+        default_factory=lambda: [1.0, 3.0, 5.0, 10.0, 15.0, 20.0, 25.0, 30.0]
+    )
     down_again: bool = True
     reversed: bool = True
     radius_m: Positive = 0.5
@@ -159,7 +152,10 @@ class CentrifugeTest(Procedure):
             name = str(unit)
             note = ""
             if bool(rows["value"].isna().any()):
-                note = f"{int(rows['value'].isna().sum())} of {len(rows)} speeds clip the output; lower forces_g, or choose a wider range"
+                note = (
+                    f"{int(rows['value'].isna().sum())} of {len(rows)} speeds clip the output; lower "
+                    f"forces_g, or choose a wider range"
+                )
             elif bool((rows["spread"] <= 0.0).any()):
                 note = "the output is constant; check the unit"
             elif _responds(rows) < 0.5:
@@ -177,7 +173,7 @@ class CentrifugeTest(Procedure):
                 ]
                 continue
             figures[name] = _figures(part, fit)
-            findings += [Finding(name, subject, text) for subject, text in _texts(part, rows, fit)]
+            findings += [Finding(name, subject, text) for subject, text in _texts(part, fit)]
         return Outcome(figures, findings)
 
     def draw(self, drawing: Drawing, part: CentrifugePart, points: pd.DataFrame) -> None:
@@ -237,17 +233,23 @@ def _figures(part: CentrifugePart, fit: Polynomial) -> list[FigureValue]:
     ]
 
 
-def _texts(part: CentrifugePart, rows: pd.DataFrame, fit: Polynomial) -> list[tuple[str, str]]:
+def _texts(part: CentrifugePart, fit: Polynomial) -> list[tuple[str, str]]:
     p = float(chi2.sf(fit.chi_square, fit.dof)) if fit.dof > 0 else float("nan")
     verdict = "cannot be judged" if not np.isfinite(p) else "adequate" if p >= 0.005 else "not adequate"
     out = [
         (
             "model",
-            f"polynomial {' + '.join(fit.names)} is {verdict}: χ² {fit.chi_square:.1f} for {fit.dof} degrees of freedom, p = {p:.2g}",
+            (
+                f"polynomial {' + '.join(fit.names)} is {verdict}: χ² {fit.chi_square:.1f} for {fit.dof} "
+                f"degrees of freedom, p = {p:.2g}"
+            ),
         )
     ]
     if not part.reversed:
-        text = "arm stretch, Koq and the offset of the proof mass are not told from K2, K3 and bias; measure with the units reversed"
+        text = (
+            "arm stretch, Koq and the offset of the proof mass are not told from K2, K3 and bias; "
+            "measure with the units reversed"
+        )
         return [*out, ("not determined", text)]
     for name, text in (
         (

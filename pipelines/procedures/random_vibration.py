@@ -47,11 +47,13 @@ SEGMENT_S = 0.2
 
 
 class RandomVibrationPart(NominalScale):
-    """Random vibration at three levels or more, each with rest before and after in one recording; ``levels_g`` are overall g rms."""
+    """Three levels or more, each with rest before and after in one recording; ``levels_g`` are overall g rms."""
 
     kind: Literal["random_vibration"]
     profile: str = "flat_20_2000"
-    levels_g: Annotated[list[Positive], Field(min_length=3, max_length=20)] = [2.0, 4.0, 6.0]
+    levels_g: Annotated[list[Positive], Field(min_length=3, max_length=20)] = Field(
+        default_factory=lambda: [2.0, 4.0, 6.0]
+    )
     seconds: Annotated[Positive, Field(ge=2.0, le=60.0)] = 10.0
     axis: Literal["x", "y", "z"] = "z"
     window_s: Positive = 10.0
@@ -158,7 +160,10 @@ class RandomVibration(Procedure):
             clipped = int(rows["clipped"].sum())
             note = ""
             if clipped:
-                note = f"{clipped} samples are clipped, which shifts the mean as rectification does; lower the levels, or choose a wider range"
+                note = (
+                    f"{clipped} samples are clipped, which shifts the mean as rectification does; lower "
+                    f"the levels, or choose a wider range"
+                )
             elif bool(rows["value"].isna().any()):
                 note = "the output does not follow the vibration; check cable and mounting"
             if note:
@@ -231,7 +236,10 @@ def _density(driven: np.ndarray, rate_hz: float) -> list[dict[str, Any]]:
     inside = (f >= 1.0) & (f <= 2200.0)
     share = 1.0 / np.sqrt(count)
     return [
-        {"series": "density", "point": k, "setting": float(a), "value": float(b), "uncertainty": float(b * share), "averages": float(count)}
+        {
+            "series": "density", "point": k, "setting": float(a), "value": float(b), "uncertainty": float(b * share),
+            "averages": float(count),
+        }
         for k, (a, b) in enumerate(zip(f[inside], p[inside], strict=True))
     ]  # fmt: skip
 
@@ -259,7 +267,8 @@ def _tolerance(part: RandomVibrationPart, points: pd.DataFrame) -> list[Finding]
     low, high = density_confidence(float(density["averages"].iloc[0]))
     beyond = float(np.mean(np.abs(apart) > LINE_DB))
     text = (
-        f"overall level {100.0 * (ratio.min() - 1.0):+.1f} to {100.0 * (ratio.max() - 1.0):+.1f} % of the order (± {100.0 * OVERALL:.0f} % "
+        f"overall level {100.0 * (ratio.min() - 1.0):+.1f} to {100.0 * (ratio.max() - 1.0):+.1f} % of "
+        f"the order (± {100.0 * OVERALL:.0f} % "
         f"allowed); {100.0 * beyond:.1f} % of the lines beyond ± {LINE_DB:g} dB; 99 % of the lines of a right level lie within "
         f"{low:.1f} to {high:+.1f} dB"
     )

@@ -168,7 +168,8 @@ class ShockTest(Procedure):
                 peak, lasting = float(reference["value"].abs().mean()), float(reference["duration_s"].mean())
                 ideal = velocity_change(peak, lasting)
                 text = (
-                    f"reference {peak:.4g} g, {1e3 * lasting:.3g} ms, velocity change {float(reference['velocity_m_s'].mean()):.3g} m/s "
+                    f"reference {peak:.4g} g, {1e3 * lasting:.3g} ms, velocity change "
+                    f"{float(reference['velocity_m_s'].abs().mean()):.3g} m/s "
                     f"(half sine: {ideal:.3g} m/s; IEC 60068-2-27 allows ± 15 %)"
                 )
                 findings.append(Finding(name, "pulse", text))

@@ -27,7 +27,7 @@ from pipelines.procedures.base import (
     UnitRecord,
 )
 from pipelines.procedures.columns import points as point_table
-from pipelines.procedures.transfer_figures import diagnosis_text, figures_of_transfer
+from pipelines.procedures.transfer_figures import diagnosis_text, figures_of_transfer, sampling_text
 from pipelines.procedures.transfer_plots import draw_bode
 from schemas.bounds import NotNegative, Positive
 from schemas.errors import RecipeInvalid, did_you_mean
@@ -50,7 +50,7 @@ SILENT = 8.0  # standard uncertainties that a tone must stand out of the noise
 
 
 class SweepPart(Part):
-    """Frequencies in steps of a fraction of an octave, the level as far as stroke, velocity and acceleration of the exciter allow.
+    """Frequencies in steps of a fraction of an octave, the level as far as stroke and velocity of the exciter allow.
 
     Uncertainties are standard ones: ``reference_percent`` is common to all points, ``repeatability_percent`` and
     ``repeatability_deg`` are each point's own. ``transverse_percent`` is the largest transverse sensitivity of the device.
@@ -61,9 +61,9 @@ class SweepPart(Part):
     low_hz: Annotated[Positive, Field(ge=0.5)] = 5.0
     high_hz: Annotated[Positive, Field(le=10000.0)] = 1000.0
     per_octave: Annotated[int, Field(ge=1, le=24)] = 6
-    frequencies_hz: Annotated[list[Positive], Field(max_length=400)] = []
+    frequencies_hz: Annotated[list[Positive], Field(max_length=400)] = Field(default_factory=list[float])
     level_g: Annotated[Positive, Field(le=50.0)] = 0.5
-    other_levels_g: Annotated[list[Positive], Field(max_length=10)] = []
+    other_levels_g: Annotated[list[Positive], Field(max_length=10)] = Field(default_factory=list[float])
     level_frequency_hz: Positive = 160.0
     axis: Literal["x", "y", "z"] = "z"
     cycles: Annotated[int, Field(ge=3, le=1000)] = 20
@@ -78,7 +78,9 @@ class SweepPart(Part):
     flat_to_hz: Positive | None = None
     nominal_scale: Positive | None = None
     bandwidth_order: Annotated[int, Field(ge=1, le=8)] = 2
-    effects: Annotated[list[str], Field(min_length=1, max_length=6)] = ["second_order", "delay"]
+    effects: Annotated[list[str], Field(min_length=1, max_length=6)] = Field(
+        default_factory=lambda: ["second_order", "delay"]
+    )
 
     @model_validator(mode="after")
     def _usable(self) -> SweepPart:
@@ -89,7 +91,8 @@ class SweepPart(Part):
                 raise ValueError(f"effects: no effect '{name}'; {did_you_mean(name, EFFECTS)}")
         if len(self.plan()) < FEWEST_POINTS:
             raise ValueError(
-                f"per_octave: {len(self.plan())} points, at least {FEWEST_POINTS} are needed; raise per_octave, or widen the range"
+                f"per_octave: {len(self.plan())} points, at least {FEWEST_POINTS} are needed; raise "
+                f"per_octave, or widen the range"
             )
         return self
 
@@ -215,6 +218,10 @@ class Sweep(Procedure):
             figures[name] = figures_of_transfer(part, found, transfer_points(kept), device.scale.get(name))
             findings += [Finding(name, subject, text) for subject, text in diagnosis_text(found)]
             findings += _conditions(name, kept)
+            band = next(one for one in figures[name] if one.figure == "sweep_bandwidth_hz")
+            if band.identified:
+                text = sampling_text(float(kept["rate_hz"].iloc[0]), band.value, part.bandwidth_order)
+                findings.append(Finding(name, "sampling", text))
         return Outcome(figures, findings)
 
     def draw(self, drawing: Drawing, part: SweepPart, points: pd.DataFrame) -> None:
@@ -236,7 +243,8 @@ def transfer_points(rows: pd.DataFrame) -> Points:
         return rows[name].to_numpy(dtype=float)
 
     conditions = Conditions(column("setting"), column("level_g"), column("temperature_C"), column("record_s"))
-    value = column("value") * np.exp(1j * np.radians(column("phase_deg")))
+    turn = np.exp(1j * np.radians(column("phase_deg")))
+    value = np.asarray(column("value") * turn, dtype=np.complex128)
     share = column("uncertainty") / column("value")
     return Points(conditions, value, share, np.radians(column("phase_uncertainty_deg")))
 
@@ -323,7 +331,7 @@ def _conditions(unit: str, rows: pd.DataFrame) -> list[Finding]:
     if distortion > 5.0:
         found.append(Finding(unit, "distortion of the exciter", f"{distortion:.1f} %, at most 5 % is usually held"))
     if bool((across > limit).any()):
-        at = float(rows.loc[across.idxmax(), "setting"])
+        at = float(rows["setting"].to_numpy(dtype=float)[int(np.argmax(across.to_numpy(dtype=float)))])
         text = f"{across.max():.0f} % at {at:.4g} Hz, at most 10 % to 1 kHz and 30 % above is usually held"
         found.append(Finding(unit, "transverse motion of the exciter", text))
     return found

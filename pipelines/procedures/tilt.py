@@ -40,8 +40,8 @@ MICRO, MILLI = 1e6, 1e3
 class TiltPart(Part):
     """A whole turn about one axis of the fixture.
 
-    ``about`` is the axis of rotation: with ``x`` the outer axis turns (plane y–z), with ``y`` the inner axis is at 90° first (plane
-    x–z). ``angle_uncertainty_deg`` (k = 1) is that of the table: near 0 g it costs 175 µg per 0.01°.
+    ``about`` is the axis of rotation: with ``x`` the outer axis turns (plane y–z), with ``y`` the inner axis is at 90° first
+    (plane x–z). ``angle_uncertainty_deg`` (k = 1) is that of the table: near 0 g it costs 175 µg per 0.01°.
     """
 
     kind: Literal["tilt"]

@@ -58,7 +58,8 @@ def _parameter(figure: str, name: str, axis: str, fit: TransferFit, other: Trans
     if other is not None:
         ends = sorted((*fit.of(name)[2:], *other.of(name)[2:]))
         note = (
-            f"two solutions fit alike, {value:.4g} and {other.of(name)[0]:.4g}: sprung mass and two-pole low-pass can change places; "
+            f"two solutions fit alike, {value:.4g} and {other.of(name)[0]:.4g}: sprung mass and "
+            f"two-pole low-pass can change places; "
             "state the low-pass, or excite the mass alone"
         )
         return FigureValue(figure, axis, np.nan, np.nan, ends[0], ends[-1], identified=False, note=note)
@@ -83,7 +84,8 @@ def bandwidth_of(fit: TransferFit, values: Array, top: float) -> float:
     if below.size == 0 or below[0] == 0:
         return float("nan")
     k = int(below[0])
-    return float(brentq(lambda f: float(over(f)[0]), grid[k - 1], grid[k]))
+    found: Any = brentq(lambda f: float(np.ravel(over(f))[0]), grid[k - 1], grid[k])
+    return float(found)
 
 
 def _owners(fit: TransferFit) -> Array:
@@ -151,7 +153,10 @@ def diagnosis_text(found: Diagnosis) -> list[tuple[str, str]]:
     if found.adequate is None:
         return [("model", f"{model}: cannot be judged: {found.reason}")]
     verdict = "adequate" if found.adequate else "not adequate"
-    text = f"{model} is {verdict}: χ² {fit.chi_square:.1f} for {fit.dof} degrees of freedom, p = {fit.p_value:.2g}, rms residual {found.error_percent:.2g} %"
+    text = (
+        f"{model} is {verdict}: χ² {fit.chi_square:.1f} for {fit.dof} degrees of freedom, p = "
+        f"{fit.p_value:.2g}, rms residual {found.error_percent:.2g} %"
+    )
     out.append(("model", text))
     if found.where:
         places = [
@@ -165,7 +170,8 @@ def diagnosis_text(found: Diagnosis) -> list[tuple[str, str]]:
     if found.classes:
         before, after = found.left_out
         text = (
-            f"rms residual {found.error_percent:.2g} % → {found.extended_percent:.2g} % with {', '.join(found.recommended)}; of points "
+            f"rms residual {found.error_percent:.2g} % → {found.extended_percent:.2g} % with "
+            f"{', '.join(found.recommended)}; of points "
             f"left out, in standard uncertainties: {before:.2g} → {after:.2g}"
         )
         out.append(("after extension", text))
@@ -188,6 +194,7 @@ def sampling_text(rate_hz: float, bandwidth_hz: float, order: int) -> str:
     share = 100.0 * folded_share(rate_hz, bandwidth_hz, order)
     rule = "at least 5" if times >= 5.0 else "less than the 5 that the rule asks for"
     return (
-        f"{rate_hz:.5g} Hz is {times:.3g} times the bandwidth, {rule}; a filter of order {order} leaves {share:.2g} % folded onto the "
+        f"{rate_hz:.5g} Hz is {times:.3g} times the bandwidth, {rule}; a filter of order {order} "
+        f"leaves {share:.2g} % folded onto the "
         "band's edge"
     )

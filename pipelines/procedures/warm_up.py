@@ -135,7 +135,10 @@ def _figure(part: WarmUpPart, axis: str, rows: pd.DataFrame) -> FigureValue:
     time, value = rows["setting"].to_numpy(dtype=float), rows["value"].to_numpy(dtype=float)
     noise = float(rows["uncertainty"].iloc[0]) / np.sqrt(max(part.window_s, 1.0))
     if 3.0 * noise > part.band_ug:
-        note = f"noise of the smoothed output is {noise:.3g} µg, a third of the band of {part.band_ug:g} µg at most is needed; lengthen window_s"
+        note = (
+            f"noise of the smoothed output is {noise:.3g} µg, a third of the band of {part.band_ug:g} µg "
+            f"at most is needed; lengthen window_s"
+        )
         return FigureValue("warm_up_s", axis, np.nan, np.nan, identified=False, note=note)
     try:
         found, final = warm_up_time(time, value, band=part.band_ug, window_s=part.window_s)

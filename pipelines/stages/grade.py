@@ -100,7 +100,7 @@ def grade(evidence: Evidence, limits: Limits, zero_g: float = 0.0, *, tumbles: b
 
 
 def _of_procedures(table: pd.DataFrame | None, unit: str, limits: Limits) -> list[Figure]:
-    """The figures of a unit that procedures have determined: of several axes, or repeated procedures, the one nearest to a limit."""
+    """The figures of a unit that procedures have determined; of several axes, or repeated procedures, the largest."""
     found: dict[str, Figure] = {}
     if table is None or table.empty:
         return []

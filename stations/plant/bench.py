@@ -1,4 +1,4 @@
-"""Physics of the test equipment of a simulated station: what units and a reference sensor do on exciter, shock machine, centrifuge.
+"""Physics of the test equipment of a simulated station: units and reference on exciter, shock machine and centrifuge.
 
 It is written independently of the models that are fitted: a response is the product of a sprung mass, the low-pass of the output
 stage and a delay, with a nonlinear spring between, sampled by a clock of the device's own.
@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -177,7 +177,7 @@ class Bench:
         felt = base.copy()
         felt[:, axis] = along * (1.0 + share) + self.gravity
         spectrum = np.fft.rfft(felt, axis=0)
-        orders = frequency * np.arange(len(spectrum))
+        orders = frequency * np.arange(len(spectrum), dtype=np.float64)
         outputs = np.zeros((round(seconds * self.rate_hz), len(self.units), 3))
         for k, (unit, truth) in enumerate(zip(self.units, self.truths, strict=True)):
             moved = np.fft.irfft(spectrum * unit.mass(orders)[:, None], PERIOD_POINTS, axis=0)
@@ -208,8 +208,8 @@ class Bench:
         """
         rng = self._rng(tick, 2)
         n = len(force)
-        whole = int(next_fast_len(n + round(0.05 * fine_hz), real=True))
-        f = np.fft.rfftfreq(whole, 1.0 / fine_hz)
+        whole: int = cast("Any", next_fast_len)(n + round(0.05 * fine_hz), real=True)
+        f = np.asarray(np.fft.rfftfreq(whole, 1.0 / fine_hz), dtype=np.float64)
         padded = np.zeros((whole, 3))
         padded[:n, axis] = force
         rest = np.zeros(3)

@@ -57,10 +57,9 @@ def addresses(config: StationConfig, *, every: bool = False) -> dict[Part, str]:
         if every or address not in by_part.values():
             by_part[part] = address
     there = config.equipment.there()
-    for role in (one for one in ROLES if one in there):
-        address = address_of(there[role])
-        if every or address not in by_part.values():
-            by_part[role] = address
+    for role in ROLES:
+        if role in there and (every or address_of(there[role]) not in by_part.values()):
+            by_part[role] = address_of(there[role])
     return by_part
 
 

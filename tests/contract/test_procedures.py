@@ -81,7 +81,7 @@ def run(tmp_path_factory: pytest.TempPathFactory):
 @pytest.mark.parametrize("name", PROCEDURES)
 def test_a_procedure_is_documented(name: str) -> None:
     one = PROCEDURES[name]
-    assert one.states and one.source and one.title and type(one).__doc__ and one.part.__doc__
+    assert all((one.states, one.source, one.title, type(one).__doc__, one.part.__doc__))
     assert f"## {name}" in PAGE.read_text(encoding="utf-8")
     assert f"`{name}`" in HOW_TO.read_text(encoding="utf-8")
 

@@ -21,7 +21,8 @@ from schemas.station import load_station, with_faults
 from stations import open_station
 
 PARTS = {
-    "sweep": "frequencies_hz = [40.0, 80.0, 120.0, 160.0, 320.0, 640.0, 900.0, 1300.0]\nnominal_scale = 0.007\nlevel_g = 2.0\nrecord_s = 0.05\ncycles = 4",
+    "sweep": "frequencies_hz = [40.0, 80.0, 120.0, 160.0, 320.0, 640.0, 900.0, "
+    "1300.0]\nnominal_scale = 0.007\nlevel_g = 2.0\nrecord_s = 0.05\ncycles = 4",
     "shock": "shocks = 1\nboth_directions = false\nwindow_s = 10.0\nsettle_s = 0.0\nscale = 0.007",
     "centrifuge": "forces_g = [1.0, 5.0, 10.0, 20.0]\nrecord_s = 0.5\nreversed = false\ndown_again = false\nscale = 0.007",
 }  # fmt: skip

@@ -4,8 +4,19 @@ import numpy as np
 import pytest
 from scipy.signal import lsim
 
-from inertial.dynamics import centrifuge, exciter, pulses, random_vibration, second_order, settling, shock_spectrum
-from inertial.dynamics import sine_fit, spectra, stability, tilt
+from inertial.dynamics import (
+    centrifuge,
+    exciter,
+    pulses,
+    random_vibration,
+    second_order,
+    settling,
+    shock_spectrum,
+    sine_fit,
+    spectra,
+    stability,
+    tilt,
+)
 from inertial.errors import NotIdentified
 
 
@@ -222,7 +233,13 @@ def test_step_response_overshoot_and_settling() -> None:
     for zeta, over in ((0.6, 0.095), (0.65, 0.068), (0.7, 0.046), (0.75, 0.028), (0.8, 0.015)):
         assert settling.overshoot(zeta) == pytest.approx(over, abs=6e-4)
         assert settling.damping_from_overshoot(settling.overshoot(zeta)) == pytest.approx(zeta)
-    table = {0.6: (5.23, 5.94, 6.26, 10.17), 0.7: (2.90, 5.98, 6.58, 10.29), 0.75: (3.13, 5.74, 6.60, 8.00), 0.8: (3.39, 3.76, 6.35, 8.47), 1.0: (4.74, 5.83, 6.64, 9.23)}  # fmt: skip
+    table = {
+        0.6: (5.23, 5.94, 6.26, 10.17),
+        0.7: (2.90, 5.98, 6.58, 10.29),
+        0.75: (3.13, 5.74, 6.60, 8.00),
+        0.8: (3.39, 3.76, 6.35, 8.47),
+        1.0: (4.74, 5.83, 6.64, 9.23),
+    }
     for zeta, angles in table.items():
         assert [settling.settling_angle(zeta, band) for band in (0.05, 0.02, 0.01, 0.001)] == pytest.approx(
             angles, abs=0.012
@@ -296,7 +313,9 @@ def test_a_cubic_raises_the_scale_by_three_quarters() -> None:
 
 
 def test_definitions_of_bias_stability_differ(rng: np.random.Generator) -> None:
-    white = np.array([[getattr(stability.stability(10.0 * rng.normal(size=3600), 1.0), k) for k in ("range_1s", "sd_1s", "sd_100s", "range_100s", "allan_100s")] for _ in range(40)]).mean(axis=0)  # fmt: skip
+    names = ("range_1s", "sd_1s", "sd_100s", "range_100s", "allan_100s")
+    records = [stability.stability(10.0 * rng.normal(size=3600), 1.0) for _ in range(40)]
+    white = np.array([[getattr(one, name) for name in names] for one in records]).mean(axis=0)
     assert white == pytest.approx([72, 10, 1.0, 4.2, 1.0], rel=0.06)
     ramp = stability.stability(50.0 * np.arange(3600) / 3600.0, 1.0)
     assert (ramp.range_1s, ramp.sd_100s, ramp.range_100s) == pytest.approx((50, 14.6, 49), rel=0.02)
@@ -313,7 +332,10 @@ def test_warm_up_time_of_an_exponential() -> None:
 
 
 def test_factors_of_a_standard_deviation_from_few_cycles() -> None:
-    for n, low, high, upper in ((5, 0.60, 2.87, 2.37), (6, 0.62, 2.45, 2.09), (10, 0.69, 1.83, 1.65), (20, 0.76, 1.46, 1.37), (30, 0.80, 1.34, 1.28)):  # fmt: skip
+    for n, low, high, upper in (
+        *((5, 0.60, 2.87, 2.37), (6, 0.62, 2.45, 2.09), (10, 0.69, 1.83, 1.65)),
+        *((20, 0.76, 1.46, 1.37), (30, 0.80, 1.34, 1.28)),
+    ):
         assert stability.sigma_factors(n) == pytest.approx((low, high, upper), abs=6e-3)
 
 

@@ -26,7 +26,9 @@ def written(path: Path, *, low_pass_hz: float = 0.0, top: float = 5000.0, seed: 
     size = 0.3 * np.abs(h) * (1.0 + 0.002 * rng.normal(size=f.size))
     phase = np.degrees(np.angle(h)) + 0.15 * rng.normal(size=f.size)
     rows = "\n".join(f"{a:.9g},{b:.9g},{c:.9g},0.2,0.15" for a, b, c in zip(f, size, phase, strict=True))
-    path.write_text("frequency_hz,magnitude,phase_deg,magnitude_uncertainty_percent,phase_uncertainty_deg\n" + rows + "\n")
+    path.write_text(
+        "frequency_hz,magnitude,phase_deg,magnitude_uncertainty_percent,phase_uncertainty_deg\n" + rows + "\n"
+    )
     return path
 
 
@@ -59,9 +61,18 @@ def test_a_sweep_that_ends_too_soon_gives_an_interval(tmp_path: Path) -> None:
     ("text", "needed"),
     [
         ("f,h\n1,2\n", "column frequency_hz, magnitude"),
-        ("frequency_hz,magnitude,phase_deg,magnitude_uncertainty_percent,phase_uncertainty_deg\n1,2,0,0,1\n", "a value above 0"),
-        ("frequency_hz,magnitude,phase_deg,magnitude_uncertainty_percent,phase_uncertainty_deg\n1,2,x,1,1\n", "a finite number"),
-        ("frequency_hz,magnitude,phase_deg,magnitude_uncertainty_percent,phase_uncertainty_deg\n1,2,0,1,1\n", "1 points"),
+        (
+            "frequency_hz,magnitude,phase_deg,magnitude_uncertainty_percent,phase_uncertainty_deg\n1,2,0,0,1\n",
+            "a value above 0",
+        ),
+        (
+            "frequency_hz,magnitude,phase_deg,magnitude_uncertainty_percent,phase_uncertainty_deg\n1,2,x,1,1\n",
+            "a finite number",
+        ),
+        (
+            "frequency_hz,magnitude,phase_deg,magnitude_uncertainty_percent,phase_uncertainty_deg\n1,2,0,1,1\n",
+            "1 points",
+        ),
     ],
 )
 def test_a_file_without_units_or_values_is_refused(text: str, needed: str, tmp_path: Path) -> None:
@@ -73,6 +84,8 @@ def test_a_file_without_units_or_values_is_refused(text: str, needed: str, tmp_p
 
 def test_the_command_prints_a_document_and_says_by_its_status_what_came_of_it(tmp_path: Path) -> None:
     path, archive = written(tmp_path / "d.csv", low_pass_hz=6000.0), str(tmp_path / "archive")
-    result = CliRunner().invoke(app, ["import", str(path), "--procedure", "sweep", "--unit", "S1", "--archive", archive, "--json"])
+    result = CliRunner().invoke(
+        app, ["import", str(path), "--procedure", "sweep", "--unit", "S1", "--archive", archive, "--json"]
+    )
     assert result.exit_code == 1
     assert json.loads(result.stdout)["recommended"]

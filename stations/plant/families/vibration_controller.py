@@ -36,7 +36,7 @@ class Controller:
         self._aborted, self._troubles = "", frozenset[str]()
         self._files = ResultFiles()
 
-    def answer(self, line: str) -> tuple[str, bool]:
+    def answer(self, line: str) -> tuple[str, bool]:  # noqa: PLR0911 - one return an order
         """The answer to a line, and whether the line changed anything."""
         head, _, value = line.partition(" ")
         if line == "STAT?":
