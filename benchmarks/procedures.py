@@ -180,7 +180,7 @@ def lot_of_eight() -> None:
         limits.write_text('name = "lot"\n[figures]\nshock_bias_shift_ug = { max = 5000.0, unit = "µg" }\n')
         units = ", ".join(f'"L{k}"' for k in range(8))
         recipe.write_text(
-            f'name = "lot-of-eight"\ndevice = "SF1500"\nunits = [{units}]\nlocal_gravity_m_s2 = 9.80665\ntemperatures_C = [25.0]\n'
+            f'name = "eight"\ndevice = "SF1500"\nunits = [{units}]\nlocal_gravity_m_s2 = 9.80665\ntemperatures_C = [25.0]\n'
             'limits = "limits.toml"\n[[procedures]]\nkind = "sweep"\nhigh_hz = 3000.0\nlevel_g = 2.0\nnominal_scale = 0.007\n'
             '[[procedures]]\nkind = "shock"\nscale = 0.007\n[[procedures]]\nkind = "bias_stability"\nscale = 0.007\n'
         )

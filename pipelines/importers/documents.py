@@ -44,13 +44,13 @@ class TransferImport(TypedDict):
     p_value: float
     error_percent: Annotated[float, "rms of the relative complex residual"]
     extended_percent: Annotated[float, "the same with the recommended effects"]
-    left_out: Annotated[list[float], "rms residual of left-out points before and after, standard uncertainties"]
+    left_out: Annotated[list[float | None], "rms residual of left-out points before and after, standard uncertainties"]
     where: list[TransferFailure]
     classes: list[TransferClass]
     recommended: list[str]
     unexplained: bool
     sensitivity: Annotated[float, "output per g"]
-    bandwidth_hz: Annotated[float, "−3 dB frequency of the model"]
+    bandwidth_hz: Annotated[float | None, "−3 dB frequency of the model; null: it does not fall so far"]
     parameters: dict[str, TransferParameter]
     next_hz: list[float]
     text: list[str]

@@ -84,7 +84,12 @@ def bandwidth_of(fit: TransferFit, values: Array, top: float) -> float:
     if below.size == 0 or below[0] == 0:
         return float("nan")
     k = int(below[0])
-    found: Any = brentq(lambda f: float(np.ravel(over(f))[0]), grid[k - 1], grid[k])
+
+    def at_one(f: float) -> float:
+        value: Any = over(f)
+        return float(value[0])
+
+    found: Any = brentq(at_one, grid[k - 1], grid[k])
     return float(found)
 
 

@@ -29,6 +29,7 @@ DIGITAL_HZ = 8000.0
 ANALOGUE_HZ = 51200.0
 FINE_HZ = 102400.0
 PERIOD_POINTS = 64
+PER_CYCLE, SLOWEST_HZ = 40.0, 1600.0  # samples of a cycle, and the slowest rate, of the recorder in a sine test
 STANDARD_G = 9.80665
 
 
@@ -171,24 +172,28 @@ class Bench:
         base[:, axis] = along
         base[:, (axis + 1) % 3] = cross * math.cos(rig.transverse_angle)
         base[:, (axis + 2) % 3] = cross * math.sin(rig.transverse_angle)
-        n_ref = round(seconds * ANALOGUE_HZ)
-        reference = self._harmonics(np.fft.rfft(base, axis=0), frequency, np.arange(n_ref) / ANALOGUE_HZ)
+        recorder = ANALOGUE_HZ
+        while recorder / 2.0 >= max(PER_CYCLE * frequency, SLOWEST_HZ):
+            recorder /= 2.0
+        rate = min(self.rate_hz, recorder) if self.preset.output_unit == "V" else self.rate_hz
+        n_ref = round(seconds * recorder)
+        reference = self._harmonics(np.fft.rfft(base, axis=0), frequency, np.arange(n_ref) / recorder)
         reference = self._as_reference(reference, rng, troubles)
         felt = base.copy()
         felt[:, axis] = along * (1.0 + share) + self.gravity
         spectrum = np.fft.rfft(felt, axis=0)
         orders = frequency * np.arange(len(spectrum), dtype=np.float64)
-        outputs = np.zeros((round(seconds * self.rate_hz), len(self.units), 3))
+        outputs = np.zeros((round(seconds * rate), len(self.units), 3))
         for k, (unit, truth) in enumerate(zip(self.units, self.truths, strict=True)):
             moved = np.fft.irfft(spectrum * unit.mass(orders)[:, None], PERIOD_POINTS, axis=0)
             bent = self._bent(truth, unit, moved)
             late = np.exp(-2j * np.pi * orders * (unit.delay_s + skew / (2.0 * np.pi * max(frequency, 1.0))))
             after = np.fft.rfft(bent, axis=0) * (unit.behind(orders) * late)[:, None]
-            time = np.arange(len(outputs)) / (self.rate_hz * (1.0 + unit.clock))
+            time = np.arange(len(outputs)) / (rate * (1.0 + unit.clock))
             outputs[:, k] = self._harmonics(after, frequency, time)
             if self.preset.output_unit == "V":
                 outputs[:, k] += rig.hum_g * np.cos(2.0 * np.pi * 50.0 * time + 1.0)[:, None]
-        return Waveforms(self._converted(outputs, rng), self.rate_hz, reference, ANALOGUE_HZ)
+        return Waveforms(self._converted(outputs, rng, rate), rate, reference, recorder)
 
     def transient(
         self,
@@ -285,8 +290,10 @@ class Bench:
     def _harmonics(spectrum: Complex, frequency: float, time: Array) -> Array:
         """A periodic signal (n, channels) at any instants, from its spectrum over a period."""
         out = np.real(spectrum[0])[None, :] / PERIOD_POINTS + np.zeros((len(time), spectrum.shape[1]))
-        for k in range(1, 9):
-            spin = np.exp(2j * np.pi * k * frequency * time)
+        first = np.exp(2j * np.pi * frequency * time)
+        spin = np.ones_like(first)
+        for k in range(1, 6):
+            spin = spin * first
             out = out + 2.0 / PERIOD_POINTS * np.real(spin[:, None] * spectrum[k])
         return out
 

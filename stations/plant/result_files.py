@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 from scipy.io import savemat
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Callable, Sequence
 
     from stations.plant.bench import Waveforms
 
@@ -23,14 +23,15 @@ class ResultFiles:
         self._folder: Path | None = None
         self._last: Path | None = None
 
-    def write(self, number: int, made: Waveforms, slots: Sequence[int]) -> str:
-        """The path of the file of a recording."""
+    def write(self, number: int, recorded: Callable[[], Waveforms], slots: Sequence[int]) -> str:
+        """The path of the file of a recording, which is computed once."""
         if self._folder is None:
             self._folder = Path(tempfile.mkdtemp(prefix="tumbleline-results-"))
             weakref.finalize(self, shutil.rmtree, self._folder, ignore_errors=True)
         path = self._folder / f"test{number:06d}.mat"
         if path == self._last:
             return str(path)
+        made = recorded()
         content: dict[str, Any] = {
             "rate_hz": made.rate_hz,
             "reference": made.reference,

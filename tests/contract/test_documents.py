@@ -5,11 +5,13 @@ import shutil
 import tarfile
 from pathlib import Path
 
+import numpy as np
 import pytest
 from pydantic import TypeAdapter, ValidationError
 from typer.testing import CliRunner
 
 from docs.documents_page import PAGE, documents, head_of, page
+from inertial.dynamics.second_order import transfer
 from pipelines.cli import COMMANDS, app
 
 KEPT = Path(__file__).resolve().parents[1] / "archives" / "v1.tar.xz"
@@ -31,6 +33,7 @@ CASES = {
     "audit --json": ["audit"],
     "rerun --json": ["rerun", "latest", "--effects", "bias,scale,misalignment,bias_temperature"],
     "rerun --check --json": ["rerun", "latest", "--check"],
+    "import FILE --procedure sweep": ["import", "{folder}/sweep.csv", "--procedure", "sweep", "--unit", "S1"],
     "run --json": ["fit", "latest", "--limits", "consumer"],
 }
 WITHOUT_ARCHIVE = {"plan", "station"}
@@ -46,6 +49,11 @@ def kept(tmp_path_factory: pytest.TempPathFactory) -> Path:
     assert CliRunner().invoke(app, certify).exit_code == 0
     model = '[model]\nname = "m"\nversion = 1\neffects = ["bias", "scale", "misalignment"]\n'
     (folder / "model.toml").write_text(model, encoding="utf-8")
+    f = np.geomspace(5.0, 4000.0, 30)
+    h = -transfer(f, 2500.0, 0.7)
+    rows = [f"{a:.6g},{abs(b):.6g},{np.degrees(np.angle(b)):.6g},0.2,0.2" for a, b in zip(f, h, strict=True)]
+    head = "frequency_hz,magnitude,phase_deg,magnitude_uncertainty_percent,phase_uncertainty_deg"
+    (folder / "sweep.csv").write_text("\n".join([head, *rows]), encoding="utf-8")
     return folder
 
 

@@ -96,9 +96,7 @@ class Centrifuge:
         if line == ":rec:file?":
             over = self._world.now_us >= self._start_us + round(1e6 * self._seconds)
             return (
-                self._files.write(self._number, self._recorded(), self._world.slots)
-                if self._number and over
-                else "NONE"
+                self._files.write(self._number, self._recorded, self._world.slots) if self._number and over else "NONE"
             )
         return "rate" if line == ":mode? 1" else ("close" if self._closed else "open")
 

@@ -65,7 +65,7 @@ class Machine:
             return "RUN" if world.now_us < self._until_us else ("ARMED" if self._armed else "READY")
         if what == "FILE":
             done = self._recorded_one and world.now_us >= self._until_us
-            return self._files.write(self._number, self._waveforms(), world.slots) if done else "NONE"
+            return self._files.write(self._number, self._waveforms, world.slots) if done else "NONE"
         return f"{self._set[what]:.6g}" if what in self._set else UNKNOWN
 
     def _release(self) -> tuple[str, bool]:

@@ -96,7 +96,7 @@ class Controller:
     def _file(self) -> str:
         if not self._kind or self._number == 0 or self._world.now_us < self._until_us:
             return "NONE"
-        return self._files.write(self._number, self._recorded(), self._world.slots)
+        return self._files.write(self._number, self._recorded, self._world.slots)
 
     def _recorded(self) -> Waveforms:
         bench, axis, seconds = self._world.bench, int(self._set["AXIS"]), self._set["DUR"]
