@@ -46,6 +46,7 @@ if TYPE_CHECKING:
     Array = np.ndarray[Any, np.dtype[np.float64]]
 
 FEWEST_POINTS = 8
+MOST_KEPT = 64
 SILENT = 8.0  # standard uncertainties that a tone must stand out of the noise
 
 
@@ -231,9 +232,21 @@ class Sweep(Procedure):
             draw_bode(drawing, transfer_points(kept), judged(part, kept), kept["coherence"].to_numpy(dtype=float))
 
 
+_last_judged: dict[str, Diagnosis] = {}
+"""Diagnoses of the last sweeps: the report draws what the stage has judged in the same process."""
+
+
 def judged(part: SweepPart, rows: pd.DataFrame) -> Diagnosis:
     """The diagnosis of the part's model on the points of one unit."""
-    return diagnose_transfer(transfer_points(rows), part.effects, highest_hz=max(part.high_hz, 10000.0))
+    points = transfer_points(rows)
+    c = points.conditions
+    arrays = (c.frequency, c.level, c.temperature, c.record_s, points.value, points.magnitude_error, points.phase_error)
+    key = f"{part.model_dump_json()} {hash(b''.join(one.tobytes() for one in arrays))}"
+    if key not in _last_judged:
+        if len(_last_judged) >= MOST_KEPT:
+            _last_judged.clear()
+        _last_judged[key] = diagnose_transfer(points, part.effects, highest_hz=max(part.high_hz, 10000.0))
+    return _last_judged[key]
 
 
 def transfer_points(rows: pd.DataFrame) -> Points:
