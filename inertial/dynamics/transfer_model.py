@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 MOST_STARTS = 60
-SCREENED = 8  # of the starts that are searched from, those with the least residual
+SCREENED = 5  # of the starts that are searched from, those with the least residual
 POLISHED = 2  # of them that are carried to the end
 IDENTIFIED_SHARE = 0.2
 """Largest relative standard uncertainty at which a frequency or damping counts as identified."""

@@ -143,8 +143,7 @@ class BiasStability(Procedure):
             own = points[points["axis"] == axis]
             time, value = own["setting"].to_numpy() / 60.0, own["value"].to_numpy()
             value = value - value.mean()
-            step = max(1, len(time) // 600)
-            place.plot(time[::step], value[::step], ".", ms=1.2, c=colour, alpha=0.35, rasterized=True)
+            place.plot(block_means(time, 10), block_means(value, 10), "-", lw=0.5, c=colour, alpha=0.35)
             hundred = block_means(value, 100)
             place.plot(block_means(time, 100), hundred, "-", lw=1.6, c=colour, label=f"axis {axis}, 100 s means")
         place.set(xlabel="time / min", ylabel="output about its mean / µg")
