@@ -19,8 +19,12 @@ def points(f: np.ndarray, h: np.ndarray, share: float, phase: float, rng: np.ran
 
 @pytest.mark.parametrize(
     ("top", "known", "fitted"),
-    [(1000.0, (0.013, 0.010), (0.11, 0.011)), (2000.0, (0.0034, 0.003), (0.015, 0.004)), (5000.0, (0.0011, 0.0014), (0.0020, 0.0018))],
-)  # fmt: skip
+    [
+        (1000.0, (0.013, 0.010), (0.11, 0.011)),
+        (2000.0, (0.0034, 0.003), (0.015, 0.004)),
+        (5000.0, (0.0011, 0.0014), (0.0020, 0.0018)),
+    ],
+)
 def test_what_a_sweep_can_know(top: float, known: tuple, fitted: tuple) -> None:
     f = 5.0 * 2.0 ** (np.arange(200) / 6.0)
     f = f[f <= top]
@@ -60,7 +64,9 @@ def test_a_hidden_low_pass_is_named_and_the_error_falls(kind: str, rng: np.rando
 def test_nothing_is_named_where_nothing_is_missing(rng: np.random.Generator) -> None:
     f = np.geomspace(5.0, 4000.0, 40)
     for _ in range(5):
-        found = diagnose_transfer(points(f, -transfer(f, 2500.0, 0.7) * np.exp(-2j * np.pi * f * 3e-5), 2e-3, 2e-3, rng))
+        found = diagnose_transfer(
+            points(f, -transfer(f, 2500.0, 0.7) * np.exp(-2j * np.pi * f * 3e-5), 2e-3, 2e-3, rng)
+        )
         assert found.adequate is True
         assert found.classes == ()
 
