@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 from stations.devices.adapters import adapters
 from stations.devices.axis import TableAxis
+from stations.devices.equipment import Equipment
 from stations.profile_files import load_profile, profile_names
 
 if TYPE_CHECKING:
@@ -16,7 +17,16 @@ if TYPE_CHECKING:
     from schemas.profile import Command, Profile, Register
 
 PAGE = Path(__file__).resolve().parent.parent / "docs" / "reference" / "devices.md"
-KINDS = {"axis": "Drives of the table", "chamber": "Chambers", "reader": "Readers", "slot": "Slots of a reader"}
+KINDS = {
+    "axis": "Drives of the table",
+    "chamber": "Chambers",
+    "reader": "Readers",
+    "slot": "Slots of a reader",
+    "exciter": "Exciters",
+    "shock_machine": "Shock machines",
+    "centrifuge": "Centrifuges",
+    "power_supply": "Power supplies",
+}
 MOST_NAMES = 16
 SPACES = {"holding": "", "input": "input register", "coil": "coil", "discrete": "discrete input"}
 HEAD = """\
@@ -52,7 +62,7 @@ def _table(found: list[Profile]) -> str:
 def _families() -> str:
     """What a profile of each family must have."""
     rows = [
-        f"| `{name}` | {'axis' if issubclass(adapter, TableAxis) else 'chamber'} | {', '.join(f'`{n}`' for n in adapter.needs)} |"
+        f"| `{name}` | {_kind(name, adapter)} | {', '.join(f'`{n}`' for n in adapter.needs)} |"
         for name, adapter in sorted(adapters().items(), key=lambda item: (not issubclass(item[1], TableAxis), item[0]))
     ]
     head = [
@@ -62,6 +72,13 @@ def _families() -> str:
         "|---|---|---|",
     ]
     return "\n".join([*head, *rows, ""])
+
+
+def _kind(name: str, adapter: type) -> str:
+    """The kind of the devices of a family: that of its profiles for test equipment, whose adapters share one base."""
+    if not issubclass(adapter, Equipment):
+        return "axis" if issubclass(adapter, TableAxis) else "chamber"
+    return next(p.kind for p in map(load_profile, profile_names()) if p.adapter == name)
 
 
 def _disputes(found: list[Profile]) -> str:

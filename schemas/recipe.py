@@ -55,6 +55,7 @@ SHORTEST_SOAK_S = 900.0  # at least 15 min of soak per temperature: the field's 
 FEWEST_SAMPLES = 100  # per pose
 LEAST_SPAN_G = 1.4  # of the poses on every axis; twelve edges reach 1.41, and a scale from less is an extrapolation
 
+MOST_PROCEDURES = 50  # in one recipe
 MOST_SAMPLES = 10**9  # of one record, on one axis
 LONGEST_FILE = 4 * 2**20  # bytes of a file that somebody writes by hand
 LONGEST_REASON = 400  # characters of what a check says
@@ -134,6 +135,8 @@ class _Measurement(Strict):
     simulated station, to try what a recipe does then. ``verification_order``: at the end of each soak, or spread among the poses
     of the fit; it is part of the recipe because it moves the figure of verification. ``uncertainty`` states what the recipe's own
     fixture adds to the station's, ``stability`` what this kind of device does beyond a run, ``certificate`` what is certified.
+    simulated station, to try what a recipe does then. ``procedures`` lists the test procedures of the lot in order; without it
+    the lot goes through the multi-position test and the static record.
     """
 
     name: Annotated[Name, Field(pattern=r"^[a-z0-9][a-z0-9._-]*$")]
@@ -156,6 +159,7 @@ class _Measurement(Strict):
     units: Annotated[list[str], Field(max_length=MOST_UNITS)] = []
     seed: Seed = 0
     faults: list[FaultOrder] = []
+    procedures: Annotated[list[dict[str, Any]], Field(max_length=MOST_PROCEDURES)] = []
     verification_order: Literal["last", "interleaved"] = "last"
     uncertainty: Uncertainty | None = None
     stability: Stability | None = None
@@ -165,8 +169,19 @@ class _Measurement(Strict):
     def _as_before(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
         """Without what is not stated: runs and captures of earlier versions keep their names."""
         content = handler(self)
-        later = {"verification_order": "last", "uncertainty": None, "stability": None, "certificate": None}
+        later: dict[str, Any] = {
+            "verification_order": "last",
+            "uncertainty": None,
+            "stability": None,
+            "certificate": None,
+            "procedures": [],
+        }
         return {name: value for name, value in content.items() if name not in later or value != later[name]}
+
+    @property
+    def tumbles(self) -> bool:
+        """Whether the lot goes through the multi-position test: always, unless a list of procedures leaves it out."""
+        return not self.procedures or any(part.get("kind") == "multi_position" for part in self.procedures)
 
     @model_validator(mode="before")
     @classmethod
@@ -239,7 +254,7 @@ class RecipeFile(_Measurement):
     dwells tells what the calibration leaves, one dwell alone what the device has wandered besides.
     """
 
-    poses: str | Annotated[list[Angles], Field(min_length=1, max_length=MOST_POSES)]
+    poses: str | Annotated[list[Angles], Field(max_length=MOST_POSES)] = []
     verification: str | Annotated[list[Angles], Field(max_length=MOST_POSES)] = []
     verification_repeats: Annotated[int, Field(ge=1, le=20)] = 1
     static_pose: Angles = [0.0, 0.0]
@@ -247,6 +262,10 @@ class RecipeFile(_Measurement):
 
     @model_validator(mode="after")
     def _one_model(self) -> RecipeFile:
+        if not self.tumbles:
+            return self
+        if not self.poses:
+            raise ValueError("key 'poses' is missing; add it")
         if bool(self.model) == bool(self.effects):
             raise ValueError("effects, model: one of the two is needed; list the effects, or name a model file")
         return self
@@ -255,7 +274,7 @@ class RecipeFile(_Measurement):
 class Recipe(_Measurement):
     """A recipe with every name resolved: what capture and the stages work from."""
 
-    poses: Annotated[list[Pose], Field(min_length=1)]
+    poses: list[Pose]
     verification: list[Pose] = []
     static_pose: Pose
     model_name: str = ""
@@ -316,6 +335,12 @@ class Recipe(_Measurement):
     def verification_at(self, soak: int) -> list[Pose]:
         """The poses for verification that are measured at a soak, from 0, in order."""
         return _picked(self.verification, self.soaks[soak].verification if self.soaks else None)
+
+    @model_validator(mode="after")
+    def _tumbles_in_poses(self) -> Recipe:
+        if self.tumbles and not self.poses:
+            raise ValueError("poses: none, the multi-position test needs at least 1; add poses")
+        return self
 
     @property
     def wanted_records(self) -> int:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import cache
 from importlib.resources import files
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
@@ -30,6 +31,7 @@ if TYPE_CHECKING:
 Bounds = tuple[Number, Number]
 Angles = tuple[Degrees, Degrees]
 SIMULATED = "simulated.toml"
+SIMULATED_EQUIPMENT = "simulated_equipment.toml"
 MOST_SLOTS = 32  # the reader's registers name that many
 LAST_DEVICE_ID = 247  # Modbus over serial line 1.02, 2.2
 
@@ -65,6 +67,32 @@ class Devices(Strict):
     chamber: Device
     reader: Device
     slots: Slots
+
+
+class Equipment(Strict):
+    """Equipment for test procedures besides table, chamber and reader, by the role that it has; none where it is left out.
+
+    A simulated station has the built-in equipment besides, unless ``built_in`` is false.
+    """
+
+    built_in: bool = True
+    exciter: Device | None = None
+    shock_machine: Device | None = None
+    centrifuge: Device | None = None
+    power_supply: Device | None = None
+
+    def there(self) -> dict[str, Device]:
+        """The equipment that the station has, by role."""
+        found = {role: getattr(self, role) for role in type(self).model_fields if role != "built_in"}
+        return {role: device for role, device in found.items() if device is not None}
+
+
+@cache
+def built_in_equipment() -> Equipment:
+    """The test equipment of a simulated station whose file has none of its own."""
+    source = f"stations/{SIMULATED_EQUIPMENT}"
+    content = parse_toml(files("stations").joinpath(SIMULATED_EQUIPMENT).read_text("utf-8"), source)
+    return Equipment.model_validate(content["equipment"])
 
 
 class Limits(Strict):
@@ -178,6 +206,7 @@ class StationConfig(Strict):
     kind: Literal["simulated", "modbus"]
     description: Text = ""
     devices: Devices
+    equipment: Equipment = Equipment()
     limits: Limits = Limits()
     soak: Soak = Soak()
     pace: Pace = Pace()
@@ -189,17 +218,27 @@ class StationConfig(Strict):
     reference: list[Reference] = Field(default_factory=list[Reference])
     uncertainty: Uncertainty | None = None
 
-    @model_serializer(mode="wrap")
-    def _as_before(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
-        """Without what is not stated: captures of earlier versions keep their names."""
-        content = handler(self)
-        return {name: value for name, value in content.items() if name != "uncertainty" or value is not None}
-
     @model_validator(mode="after")
     def _budget_is_traced(self) -> StationConfig:
         if self.uncertainty is not None:
             refuse_untraced(self.uncertainty, self.reference, simulated=self.kind == "simulated")
         return self
+
+    @model_serializer(mode="wrap")
+    def _as_before(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
+        """Without equipment and uncertainty where there is none: captures of earlier versions keep their names."""
+        content = handler(self)
+        if content.get("uncertainty") is None:
+            content.pop("uncertainty", None)
+        if content.get("equipment") in ({}, Equipment().model_dump(), None):
+            content.pop("equipment", None)
+        return content
+
+    def fitted(self) -> dict[str, Device]:
+        """The equipment of the station by role; a simulated one has the built-in equipment where its file names none."""
+        found = self.equipment.there()
+        built_in = built_in_equipment().there() if self.kind == "simulated" and self.equipment.built_in else {}
+        return {**built_in, **found}
 
     @model_validator(mode="after")
     def _can_be_safe(self) -> StationConfig:
@@ -219,6 +258,9 @@ class StationConfig(Strict):
             for name in Devices.model_fields:
                 if missing := getattr(self.devices, name).missing():
                     raise ValueError(f"devices.{name}.{missing}: empty, a station of kind modbus needs one; add it")
+            for role, device in self.equipment.there().items():
+                if missing := device.missing():
+                    raise ValueError(f"equipment.{role}.{missing}: empty, a station of kind modbus needs one; add it")
         return self
 
 

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
 VERSION = version.VERSION
-KINDS = ("dwell", "verification", "allan")
+KINDS = ("dwell", "verification", "allan", "procedure")
 OUTPUT_UNITS = ("V", "LSB", "g", "m/s^2")
 OUTCOMES = ("pass", "fail", "refused")
 
@@ -274,6 +274,28 @@ TABLES: dict[str, Table] = {
             "unit_text": pa.Column(str),
         },
         key=("unit", "axis", "term"),
+    ),
+    "procedure_points": Table(
+        {
+            **{name: _text() for name in ("unit", "procedure", "axis", "series")},
+            **{name: _whole() for name in ("number", "point")},
+            **_gaps(("setting", "value", "uncertainty")),
+        },
+        key=("number", "unit", "axis", "series", "point"),
+    ),
+    "procedure_figures": Table(
+        {
+            **{name: _text() for name in ("unit", "procedure", "figure", "axis")},
+            "number": _whole(),
+            **_gaps(("value", "uncertainty", "low", "high")),
+            "identified": pa.Column(bool),
+            "unit_text": _text(),
+            "note": pa.Column(str),
+        },
+        key=("number", "unit", "figure", "axis"),
+    ),
+    "procedure_findings": Table(
+        {"unit": pa.Column(str), "procedure": _text(), "number": _whole(), "subject": _text(), "text": _text()}
     ),
     "figures": Table(
         {

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
     from contextlib import AbstractContextManager
 
     from schemas.recipe import Lot
@@ -13,9 +14,9 @@ if TYPE_CHECKING:
 
 
 def open_station(
-    config: StationConfig, lot: Lot, resume: bytes | None = None, *, run: str = "a run"
+    config: StationConfig, lot: Lot, resume: bytes | None = None, *, run: str = "a run", roles: Sequence[str] = ()
 ) -> AbstractContextManager[Station]:
     """A station ready to be driven, as a context; see :func:`stations.opening.open_station`."""
     from stations.opening import open_station as opened  # noqa: PLC0415 - light until a station is really opened
 
-    return opened(config, lot, resume, run=run)
+    return opened(config, lot, resume, run=run, roles=roles)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 from schemas.errors import RecipeInvalid, StationError
 from stations.clock import Clock, WallClock
-from stations.devices.adapters import axis_adapter, chamber_adapter
+from stations.devices.adapters import axis_adapter, chamber_adapter, equipment_adapter
 from stations.devices.commands import Commands
 from stations.devices.reader import Reader
 from stations.devices.registers import Registers
@@ -19,7 +19,7 @@ from stations.links.gate import Permit
 from stations.links.making import Links
 from stations.profile_files import profile_of
 from stations.safety.guarded import Protection, guarded
-from stations.safety.safe_state import safe_steps
+from stations.safety.safe_state import equipment_steps, safe_steps
 from stations.station import Station, nobody_else
 
 if TYPE_CHECKING:
@@ -42,6 +42,7 @@ def open_station(
     *,
     hidden: Sequence[HiddenEffect] = (),
     run: str = "a run",
+    roles: Sequence[str] = (),
 ) -> Generator[Station]:
     """A station ready to be driven; closed when the context ends.
 
@@ -54,14 +55,15 @@ def open_station(
     resume : ``Station.state()`` of an earlier session: a simulated station goes on exactly there; hardware is where it is
     hidden : physics beyond the station's file, for simulated stations
     run : what the leases are taken for, as others are told
+    roles : equipment that the run needs besides table, chamber and reader
     """
     if config.kind == "simulated":
         plant = make_plant(config, lot, resume, hidden)
-        with serve_plant(config, lot, plant) as station:
+        with serve_plant(config, lot, plant, roles) as station:
             yield station
         return
     slots = [unit.slot for unit in lot.units]
-    with guarded(config, run) as protection, open_devices(config, slots, resume, protection) as station:
+    with guarded(config, run) as protection, open_devices(config, slots, resume, protection, roles) as station:
         try:
             yield station
         except StationError:
@@ -77,13 +79,14 @@ def open_devices(
     slots: Sequence[int],
     resume: bytes | None = None,
     protection: Protection | None = None,
+    roles: Sequence[str] = (),
 ) -> Generator[Station]:
     """The devices of a station of hardware; without ``protection`` to look at them, or to make them safe."""
     permit = None if protection is None else Permit(protection, config.link.timeout_s)
     require = nobody_else if protection is None else protection.require
     links, clock = Links(config, permit=permit), WallClock(resume)
     try:
-        yield replace(_assemble(config, slots, links, clock), state=clock.state, exact=False, require=require)
+        yield replace(_assemble(config, slots, links, clock, roles), state=clock.state, exact=False, require=require)
     finally:
         links.close()
 
@@ -101,17 +104,17 @@ def make_plant(
 
 
 @contextmanager
-def serve_plant(config: StationConfig, lot: Lot, plant: Plant) -> Generator[Station]:
+def serve_plant(config: StationConfig, lot: Lot, plant: Plant, roles: Sequence[str] = ()) -> Generator[Station]:
     """A station whose devices are the plant's, on loopback; ``lot`` is what its client expects to find."""
     from stations.plant.clock import PlantClock  # noqa: PLC0415 - hardware needs no plant
 
-    with serve_devices(config, plant) as links:
-        station = _assemble(config, [unit.slot for unit in lot.units], links, PlantClock(plant))
+    with serve_devices(config, plant, roles) as links:
+        station = _assemble(config, [unit.slot for unit in lot.units], links, PlantClock(plant), roles)
         yield replace(station, state=lambda: plant.journal.state(plant.now_us))
 
 
 @contextmanager
-def serve_devices(config: StationConfig, plant: Plant) -> Generator[Links]:
+def serve_devices(config: StationConfig, plant: Plant, roles: Sequence[str] = ()) -> Generator[Links]:
     """The links to a plant's devices, served on loopback: registers over Modbus TCP, lines beside it."""
     from stations.plant.faults.wire import on_the_wire  # noqa: PLC0415 - hardware needs no plant
     from stations.plant.line_server import LineServer  # noqa: PLC0415
@@ -122,15 +125,20 @@ def serve_devices(config: StationConfig, plant: Plant) -> Generator[Links]:
         at: dict[Carrier, tuple[str, int]] = {
             "tcp": stack.enter_context(on_the_wire(plant, plant.faults, server.host, server.port))
         }
+        lines_at: dict[int, tuple[str, int]] = {}
+        wanted = {device.device_id for role, device in config.fitted().items() if role in roles}
         for device_id in plant.line_devices:
-            lines = stack.enter_context(LineServer(plant, device_id))
-            at["ascii"] = (lines.host, lines.port)
-        links = Links(config, at)
+            if device_id in wanted or device_id == config.devices.chamber.device_id:
+                lines = stack.enter_context(LineServer(plant, device_id))
+                lines_at[device_id] = at["ascii"] = (lines.host, lines.port)
+        links = Links(config, at, lines_at=lines_at)
         stack.callback(links.close)
         yield links
 
 
-def _assemble(config: StationConfig, slots: Sequence[int], links: Links, clock: Clock) -> Station:
+def _assemble(
+    config: StationConfig, slots: Sequence[int], links: Links, clock: Clock, roles: Sequence[str] = ()
+) -> Station:
     """The station's adapters on their links, each with the tighter of its profile's and the station's limits."""
     devices, limits = config.devices, config.limits
     axes = {
@@ -144,7 +152,15 @@ def _assemble(config: StationConfig, slots: Sequence[int], links: Links, clock: 
         _chamber(devices.chamber, links, limits),
         Reader(reader, {slot: Slot(_slot_registers(config, links, slot)) for slot in slots}, fastest),
     )
-    return Station(config, clock, *parts, safe_steps=safe_steps(config.safety, axes, *parts[1:]))
+    equipment = {
+        role: equipment_adapter(role, profile_of(device))(
+            Commands(role.replace("_", " "), links.lines(role), profile_of(device)), clock
+        )
+        for role, device in config.fitted().items()
+        if role in roles
+    }
+    steps = [*equipment_steps(equipment), *safe_steps(config.safety, axes, *parts[1:])]
+    return Station(config, clock, *parts, safe_steps=steps, equipment=equipment)
 
 
 def _registers(name: str, place: str, device: Device, links: Links) -> Registers:

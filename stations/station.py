@@ -6,13 +6,13 @@ import math
 from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from schemas.errors import NotReached
 from stations.safety.safe_state import Reached, SafeStep, reach_safe_state
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Mapping, Sequence
 
     from schemas.station import StationConfig
     from stations.clock import Clock
@@ -45,7 +45,7 @@ class Station:
 
     ``state()`` is what it is resumed from. ``exact`` says that a resumed station stands where it stood, to the bit; any
     other may have been anywhere since, so that its temperature is settled anew. ``require()`` refuses when another has
-    taken the station over. ``safe_steps`` lead to the safe state.
+    taken the station over. ``safe_steps`` lead to the safe state. ``equipment`` are the adapters of the roles that a run needs.
     """
 
     config: StationConfig
@@ -57,6 +57,7 @@ class Station:
     exact: bool = True
     require: Callable[[], None] = nobody_else
     safe_steps: list[SafeStep] = field(default_factory=list[SafeStep])
+    equipment: Mapping[str, Any] = field(default_factory=dict[str, Any])
 
     @property
     def name(self) -> str:

@@ -129,7 +129,10 @@ class Watch:
     def _free_lines(self) -> None:
         """Ends a run that does not respond on a serial line: only one process can open the line, and safety has priority."""
         devices = self.config.devices
-        if any(getattr(devices, part).link == "rtu" for part in self.leases.places) and os.getppid() == self.parent:
+        if (
+            any(getattr(devices, part, self.config.devices.reader).link == "rtu" for part in self.leases.places)
+            and os.getppid() == self.parent
+        ):
             os.kill(self.parent, signal.SIGKILL)
 
     def _take(self, part: Part) -> bool:
@@ -177,7 +180,9 @@ def main() -> None:
     holder = new_holder(config.name, order["run"], "watchdog", order["token"])
     leases = Leases(Path(order["folder"]), holder, order["wanted"], config.safety.lapse_s)
     os.set_blocking(1, False)
-    with open_devices(config, ()) as station:  # connects later, but all modules are loaded
+    with open_devices(
+        config, (), roles=tuple(config.fitted())
+    ) as station:  # connects later, but all modules are loaded
         watch = Watch(config, leases, os.getppid(), [_sturdy(step) for step in station.safe_steps])
         _send(READY)
         why = watch.until_gone()

@@ -233,6 +233,10 @@ there from the beginning.
 - **run refused**: the run ended with exit status 3 and this message; what was finished before is kept, and the same command goes
   on behind it.
 
+Faults of test equipment (exciter, shock machine, centrifuge) are not in the matrix: a spoilt recording is discarded and repeated,
+an abort, an open guard door or an overspeed ends the run for a person, and a unit whose cable is off has no figure
+(`test_equipment_faults`).
+
 """
 
 

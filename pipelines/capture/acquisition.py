@@ -12,9 +12,11 @@ from pipelines.capture.plausibility import Plausibility
 from pipelines.capture.power_cycling import Power
 from pipelines.capture.record import Record, TemperatureLog, readings_row
 from pipelines.capture.supervision import Supervisor, short_of_samples
+from pipelines.procedures import PROCEDURES
 from schemas.errors import LinkLost, OperatorNeeded, StationError, StationTimeout
 from schemas.event import NO_RECORD
-from stations.devices.slot import SamplesLost
+from stations.devices.recording import RecordingSpoilt
+from stations.devices.slot import Samples, SamplesLost
 from stations.safety.suspenders import Reason, Suspended
 
 if TYPE_CHECKING:
@@ -30,6 +32,7 @@ if TYPE_CHECKING:
 OBSERVATIONS = 5  # observations of encoders and instruments within a dwell
 HISTORY_S = 10.0
 OK = "ok"
+TUMBLED = ("dwell", "verification")
 LONG_ROWS = 1_000_000  # most samples of a record in memory; a longer record is stored in pieces
 PIECE_ROWS = 250_000
 FILL = 0.5  # part of the slots' memory that may fill before it is emptied
@@ -137,14 +140,16 @@ class Acquisition:
         Suspended : a condition failed before, during or after the record
         """
         station, recipe = self.station, self.recipe
+        if step.order is not None and step.order.role:
+            return self.measure_on_equipment(step)
         station.table.move(step.pose.outer_deg, step.pose.inner_deg)
         self.rest(recipe.settle_s if step.wait_s is None else step.wait_s)
         self.supervisor.check_before(self.slots)
         self.supervisor.require_steady_clocks(spoilt=False)
-        duration = recipe.static_record_s if step.kind == "allan" else recipe.dwell_s
+        duration, rate = step.lasts(recipe), step.rate_hz or recipe.rate_hz
         powered = station.reader.since_power()
-        station.reader.start(recipe.rate_hz)
-        record = Record(step.record, step.kind, step.pose, step.soak, station.clock.now(), duration, recipe.rate_hz)
+        station.reader.start(rate)
+        record = Record(step.record, step.kind, step.pose, step.soak, station.clock.now(), duration, rate)
         record.since_move = record.start + duration / 2.0 - station.table.still_since  # at its middle, as the means
         record.since_power = powered + duration / 2.0
         record.power_off = self.power.off_before(step) if self.power.ordered else None
@@ -155,7 +160,7 @@ class Acquisition:
         for _ in self._spans(record):
             self.observe(step, record)
             self.read_samples(record)
-            if duration * recipe.rate_hz * len(self.slots) > LONG_ROWS and record.rows() >= PIECE_ROWS:
+            if duration * rate * len(self.slots) > LONG_ROWS and record.rows() >= PIECE_ROWS:
                 self.plausibility.refuse_outliers(record, self.answering)
                 self.sink.part(step.record, record.pieces, record.piece(self.answering))
         station.reader.stop()
@@ -165,14 +170,52 @@ class Acquisition:
             self.give_up(unit.serial, fault_text(unit.slot, problem))
         counts = {u.slot: record.count(u.serial) for u in self.lot.units if u.serial not in self.lost}
         overflow = {u.slot for u in self.lot.units if u.serial not in self.lost and record.overflow(u.serial)}
-        reasons = short_of_samples(counts, overflow, duration, recipe.rate_hz)
+        reasons = short_of_samples(counts, overflow, duration, rate)
         if reasons:
             raise Suspended(reasons, spoilt=True)
         self.plausibility.refuse_outliers(record, self.answering)
         samples, readings = self.tables(record)
-        if step.kind != "allan" and step.settled:
+        if step.kind in TUMBLED and step.settled:
             self.plausibility.refuse_contradiction(record.soak, samples, readings)
         return record, samples, readings
+
+    def measure_on_equipment(self, step: Step) -> tuple[Record, pd.DataFrame, pd.DataFrame]:
+        """One record that other equipment of the station performs, with its samples, those of the reference, and readings.
+
+        Raises
+        ------
+        Suspended : the recording is of no use, and is repeated
+        """
+        if step.order is None:
+            raise LookupError(f"record {step.record} has no order for equipment")
+        station, order = self.station, step.order
+        self.supervisor.check_before(self.slots)
+        procedure = PROCEDURES[self.recipe.procedures[step.procedure or 0]["kind"]]
+        powered, start = station.reader.since_power(), station.clock.now()
+        try:
+            recording = procedure.measure(station.equipment[order.role], order, self.slots)
+        except RecordingSpoilt as problem:
+            raise Suspended([Reason("recording", str(problem))], spoilt=True) from None
+        self.supervisor.require_steady_clocks(spoilt=True)
+        duration = station.clock.now() - start
+        record = Record(step.record, step.kind, step.pose, step.soak, start, duration, recording.rate_hz)
+        record.since_power = powered + duration / 2.0
+        self.observe_instruments(record)
+        for unit in self.answering:
+            output = recording.outputs.get(unit.slot)
+            if output is None:
+                self.give_up(unit.serial, f"slot {unit.slot}: not recorded")
+            else:
+                record.keep(unit.serial, Samples(0, output, overflow=False))
+        samples, readings = self.tables(record)
+        return record, pd.concat([samples, recording.reference_frame(record.number, record.start)]), readings
+
+    def observe_instruments(self, record: Record) -> None:
+        """Adds an observation of angles, air and instruments to a record that is not taken on the table."""
+        station = self.station
+        angles, air, instruments = station.table.angles(), station.chamber.temperature(), station.reader.instruments()
+        self.log_temperatures(instruments)
+        record.observe(angles, air, instruments)
 
     def rest(self, seconds: float) -> None:
         """Waits ``seconds`` for the devices to come to rest after a move; logs temperatures during a long wait."""

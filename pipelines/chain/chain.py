@@ -11,9 +11,11 @@ from pipelines.stages.budget_terms import BudgetTables
 from pipelines.stages.fit import fit
 from pipelines.stages.grade import Evidence, grade
 from pipelines.stages.noise import noise
+from pipelines.stages.procedures import procedures
 from pipelines.stages.reduce import dwells_of
 from pipelines.stages.validate import verdicts
 from pipelines.stages.verify import verify
+from pipelines.tables.samples import PROCEDURE
 from pipelines.tables.summaries import summarised
 
 if TYPE_CHECKING:
@@ -26,6 +28,7 @@ if TYPE_CHECKING:
 
 Tables = dict[str, "pd.DataFrame"]
 RECORDS = "records"
+NOT_OF_PROCEDURES = ("limits", "effects", "model_name", "model_version", "formulas", "description", "units", "seed")
 
 
 @dataclass(frozen=True)
@@ -62,7 +65,10 @@ def _summaries(job: Job, run: Run) -> pd.DataFrame:
     key = (str(records.path), records.hash(), job.recipe.zero_output)
     found = _looked_at.get(key)
     if found is None:
-        found = summarised(records.samples(), run.table("readings"), job.recipe.zero_output)
+        readings = run.table("readings")
+        tumbled = set(readings.loc[readings["kind"] != PROCEDURE, "record"])
+        wanted = None if len(tumbled) == readings["record"].nunique() else tumbled
+        found = summarised(records.samples(wanted), readings, job.recipe.zero_output)
         _looked_at.clear()
         _looked_at[key] = found
     return found
@@ -106,14 +112,26 @@ def _budget(job: Job, run: Run) -> Tables:
 _EVIDENCE = (
     *("verdicts", "coefficients", "covariance", "residuals", "verification", "verification_poses", "noise"),
     *("uncertainties", "budget_covariance"),
+    "procedure_figures",
 )
 
 
 def _grade(job: Job, run: Run) -> Tables:
     readings = run.table("readings").drop_duplicates("unit")
     full_scale = dict(zip(readings["unit"].astype(str), readings["full_scale"].astype(float), strict=True))
-    evidence = Evidence(*(run.table(name) for name in _EVIDENCE), full_scale=full_scale)
-    return grade(evidence, job.limits, job.recipe.zero_output)
+    evidence = Evidence(**{name: run.table(name) for name in _EVIDENCE}, full_scale=full_scale)
+    return grade(evidence, job.limits, job.recipe.zero_output, tumbles=job.recipe.tumbles)
+
+
+def _procedures(job: Job, run: Run) -> Tables:
+    tables = (run.table(name) for name in ("readings", "verdicts", "coefficients", "covariance"))
+    return procedures(job.recipe, _records(run).samples, *tables)
+
+
+def _listed(job: Job) -> dict[str, Any]:
+    if not job.recipe.procedures:
+        return {}
+    return {"recipe": job.recipe.model_dump(mode="json", exclude=set(NOT_OF_PROCEDURES))}
 
 
 def _none(job: Job) -> dict[str, Any]:
@@ -176,12 +194,21 @@ STAGES: tuple[Stage, ...] = (
         modules=("pipelines.stages.budget", _TABLES),
     ),
     Stage(
+        name="procedures",
+        inputs=(RECORDS, "readings", "verdicts", "coefficients", "covariance"),
+        outputs=("procedure_points", "procedure_figures", "procedure_findings"),
+        parameters=_listed,
+        call=_procedures,
+        modules=("pipelines.stages.procedures", _TABLES),
+    ),
+    Stage(
         name="grade",
         inputs=(*_EVIDENCE, "readings"),
         outputs=("figures", "grades", "lot_risks"),
         parameters=lambda job: {
             "limits": job.limits.model_dump(mode="json"),
             "zero_output": job.recipe.zero_output,
+            **({} if job.recipe.tumbles else {"tumbles": False}),
         },
         call=_grade,
         modules=("pipelines.stages.grade", _TABLES),

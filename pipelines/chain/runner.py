@@ -45,10 +45,12 @@ Measure = Callable[["Job", "Records", "Progress"], None]
 def from_station(job: Job, records: Records, progress: Progress) -> None:
     """Measure a job's lot on its station, going on behind the last record that is stored."""
     from pipelines.capture.capture import capture  # a re-run of archived data opens no station
+    from pipelines.procedures import roles_of
     from stations import open_station
 
     run = f"{job.recipe.name} {job.capture_id}"
-    with open_station(job.station, job.lot, resume=records.last_state(), run=run) as station:
+    roles = roles_of(job.recipe)
+    with open_station(job.station, job.lot, resume=records.last_state(), run=run, roles=roles) as station:
         capture(station, job.recipe, job.lot, records, progress=progress, events=records.events)
 
 

@@ -34,6 +34,7 @@ VERDICTS = {
     False: ("NOT ADEQUATE: this fit does not describe these data", "bold red"),
     None: ("CANNOT BE JUDGED: see above", "bold yellow"),
 }
+VERDICTS_OF_TRANSFER = {**VERDICTS, False: ("NOT ADEQUATE: the model does not describe these points", "bold red")}
 
 
 def command(
@@ -101,6 +102,13 @@ def command(
         float | None, typer.Option("--local-g", metavar="M/S2", help="Gravity where it was measured, m/s².")
     ] = None,
     fit: Annotated[str, typer.Option("--fit", metavar="norm|faces|temperature", help="Fit and judge at once.")] = "",
+    procedure: Annotated[
+        str,
+        typer.Option("--procedure", metavar="sweep", help="A dynamic measurement: the transfer function of a sweep."),
+    ] = "",
+    effects: Annotated[
+        str, typer.Option("--effects", metavar="a,b,…", help="Model of the transfer function; second_order,delay.")
+    ] = "",
     archive: ArchiveOption = None,
     *,
     as_json: JsonOption = False,
@@ -110,6 +118,8 @@ def command(
     Columns are named, or numbered from 1. What a file does not state and its numbers do not show is not guessed but asked for.
     Exit status 1: the fit asked for is not adequate for these data, or they cannot tell.
     """
+    if procedure:
+        raise typer.Exit(_transfer(files, procedure, unit, effects, archive, as_json=as_json))
     from pipelines.importers import mapping as mapped
 
     given: dict[str, Any] = mapped.from_file(mapping) if mapping else {}
@@ -146,6 +156,31 @@ def command(
         for one in imports:
             _print(one, list_dwells=list_dwells)
     raise typer.Exit(DONE if adequate is True else PART_FAILED)
+
+
+def _transfer(files: list[Path], procedure: str, unit: str, effects: str, archive: str | None, *, as_json: bool) -> int:
+    """Judge and keep transfer functions; the exit status: part failed where one is not adequate, or cannot be judged."""
+    from pipelines.importers.transfer import import_transfer
+
+    if procedure != "sweep":
+        raise WrongUse(
+            f"--procedure: found '{shown(procedure)}', sweep is what can be imported; measure others with a recipe"
+        )
+    if not unit:
+        raise WrongUse("import: no serial number, a transfer function needs one; add --unit SN")
+    model = [part.strip() for part in effects.split(",")] if effects else ["second_order", "delay"]
+    found = [import_transfer(path, unit, model, archive) for path in files]
+    if as_json:
+        print_json(dict(found[0]) if len(found) == 1 else {"imports": found})
+    else:
+        out = console()
+        for one in found:
+            out.print(f"{one['unit']}: {one['points']} points, kept as run {one['run']}", markup=False)
+            for line in one["text"]:
+                out.print(f"  {line}", markup=False, soft_wrap=True)
+            verdict, style = VERDICTS_OF_TRANSFER[one["adequate"]]
+            out.print(f"  {verdict}", style=style)
+    return DONE if all(one["adequate"] is True for one in found) else PART_FAILED
 
 
 def _mapping(wanted: dict[str, Any], content: Content, where: str, name: str) -> Mapping:

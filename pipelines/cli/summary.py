@@ -81,13 +81,18 @@ def print_summary(document: dict[str, Any]) -> None:
     from rich.text import Text
 
     lines: list[list[str | Text]] = []
+    calibrated = any(name in unit["figures"] for unit in document["units"] for name, _ in SHOWN) or not _listed(
+        document
+    )
+    shown = [*(SHOWN if calibrated else ()), *_listed(document)]
     for unit in document["units"]:
-        values = [short(unit["figures"].get(name, {}).get("value")) for name, _ in SHOWN]
+        values = [short(unit["figures"].get(name, {}).get("value")) for name, _ in shown]
         outcome = Text(unit["outcome"], style=STYLES[unit["outcome"]])
         lines.append([str(unit["slot"]), unit["unit"], outcome, unit["grade"], *values])
-    print_table(["slot", "unit", "result", "grade", *(title for _, title in SHOWN)], lines)
+    print_table(["slot", "unit", "result", "grade", *(title for _, title in shown)], lines)
     out = console()
-    out.print(LEGEND, style="dim")
+    if calibrated:
+        out.print(LEGEND, style="dim")
     for unit in document["units"]:
         if unit["reasons"]:
             out.print(f"  {unit['unit']}: {unit['reasons']}", markup=False)
@@ -100,6 +105,19 @@ def print_summary(document: dict[str, Any]) -> None:
     out.print(f"{document['passed']} of {total} passed, {document['failed']} failed, {document['refused']} refused")
     out.print(f"run     {document['run']}", markup=False)
     out.print(f"report  {document['report']}", markup=False, soft_wrap=True)
+
+
+def _listed(document: dict[str, Any]) -> list[tuple[str, str]]:
+    """Figures of procedures that have a limit, with their heads."""
+    from pipelines.procedures import FIGURES
+
+    found: dict[str, str] = {}
+    for unit in document["units"]:
+        for name, figure in unit["figures"].items():
+            if name in FIGURES and figure["outcome"] != "no limit":
+                unit_text = "" if figure["unit_text"] == "1" else figure["unit_text"]
+                found[name] = f"{name.replace('_', ' ')}\n{unit_text}"
+    return list(found.items())
 
 
 def _interrupted(found: Interruptions | None) -> list[str]:

@@ -23,6 +23,7 @@ from pipelines.flows.knock import knock
 from pipelines.flows.server import ADDRESS, CLIENTS, START_LOCK, private_folder
 from pipelines.flows.settings import CLIENT_KEY, KEY_FILE, STARTUP_S, new_key, settings, use_key
 from pipelines.parallel import with_environment
+from pipelines.schedule.steps import steps
 from schemas.errors import ArchiveUnusable, StationTimeout
 
 if TYPE_CHECKING:
@@ -50,7 +51,7 @@ def run_locally(
 ) -> Run:
     """The run that the flow ``calibrate_lot`` made, on the server named by PREFECT_API_URL or on one of our own."""
     archive.prepare()
-    progress(0, job.recipe.wanted_records, "starting the orchestrator")
+    progress(0, len(steps(job.recipe)), "starting the orchestrator")
     with reached(archive):
         return _run(request, job, archive, progress, told, operator)
 

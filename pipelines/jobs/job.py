@@ -11,6 +11,7 @@ from pipelines.archive.keys import digest
 from pipelines.jobs.model_files import read_model, refuse_unknown_effects, use_formulas
 from pipelines.jobs.recipes import MAIN_JOB, load_limits, load_recipe, lot_of, units_of
 from pipelines.jobs.terms import refuse_contradictions, refuse_unreachable, with_stability
+from pipelines.procedures import refuse_unusable
 from pipelines.schedule.planned_state import refuse_unidentified
 from pipelines.stages.figures import UNITS
 from pipelines.stages.grade import refuse_limits_without_figures
@@ -77,6 +78,8 @@ class Job:
         if not measured["soaks"]:  # recipes without them keep the names that their captures had before there were any
             del measured["soaks"]
         unmoved = {"pace", "reference", "uncertainty", *GUARDS}  # plan time, state standards, guard: they drive nothing
+        if not self.recipe.procedures:
+            unmoved.add("equipment")
         station = self.station.model_dump(mode="json", exclude=unmoved)
         after = {"parents": list(self.parents)} if self.parents else {}
         content = {"recipe": measured, "lot": self.lot.model_dump(), "station": station, **after}
@@ -188,6 +191,9 @@ def job_of_run(run: Run, *, effects: Sequence[str] = (), model: Path | None = No
 def _refuse_inconsistent(job: Job, recorded: Sequence[str]) -> None:
     """Refuse a model that the plan cannot determine, or whose columns are not recorded, and limits that neither can serve."""
     refuse_limits_without_figures(job.limits, job.recipe)
+    refuse_unusable(job.recipe, job.station)
+    if not job.recipe.tumbles:
+        return
     try:
         refuse_unidentified(job.recipe, recorded)
     except InertialError as problem:

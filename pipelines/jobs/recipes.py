@@ -63,8 +63,9 @@ def resolved(file: RecipeFile, source: str, folder: Path | None = None, line: Li
     model = _model(file, folder or Path(), source, line)
     fit_poses = _resolve(file.poses, "p", "poses", source)
     verification = _resolve(file.verification, "v", "verification", source)
-    _refuse_flat_plan(fit_poses, file.span_min_g)
-    _refuse_coincidence(fit_poses, verification, source)
+    if file.tumbles:
+        _refuse_flat_plan(fit_poses, file.span_min_g)
+        _refuse_coincidence(fit_poses, verification, source)
     shared = file.model_dump(
         exclude={"poses", "verification", "verification_repeats", "static_pose", "model", "effects"}
     )

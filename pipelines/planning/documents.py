@@ -29,6 +29,7 @@ class StationMinutes(TypedDict):
     moves: float
     dwells: float
     static_record: float
+    procedures: NotRequired[float]
     total: float
     power_off: NotRequired[float]
 

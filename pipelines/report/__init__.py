@@ -18,8 +18,11 @@ INPUTS = (
     *("verdicts", "dwells", "coefficients", "residuals", "verification", "verification_poses"),
     *("allan", "noise", "figures", "grades"),
 )
-OPTIONAL = ("wander", "budget", "uncertainties", "lot_risks")
-MODULES = ("schemas.limits", "schemas.tables", "pipelines.report")
+OPTIONAL = (
+    *("wander", "budget", "uncertainties", "lot_risks"),
+    *("procedure_points", "procedure_figures", "procedure_findings"),
+)
+MODULES = ("schemas.limits", "schemas.tables", "pipelines.report", "pipelines.procedures")
 
 
 def make_report(run: Run) -> bool:

@@ -21,7 +21,10 @@ TABLES = (
     *("verdicts", "dwells", "coefficients", "residuals", "verification", "verification_poses"),
     *("allan", "noise", "figures", "grades"),
 )
-OPTIONAL = ("wander", "budget", "uncertainties", "lot_risks")  # runs of earlier versions have none
+OPTIONAL = (  # runs of earlier versions have none
+    *("wander", "budget", "uncertainties", "lot_risks"),
+    *("procedure_points", "procedure_figures", "procedure_findings"),
+)
 
 
 class ReportContext:

@@ -5,10 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Literal
 
+from pipelines.procedures import PROCEDURES, parts_of
+
 if TYPE_CHECKING:
+    from pipelines.procedures import ProcedureStep
     from schemas.recipe import Pose, Recipe
 
-Kind = Literal["dwell", "verification", "allan"]
+Kind = Literal["dwell", "verification", "allan", "procedure"]
 
 
 @dataclass(frozen=True)
@@ -18,6 +21,9 @@ class Step:
     wait_s : after the move; the recipe's where None
     off_s : without power before the move
     settled : whether the devices settle at the soak's temperature first, or are read while they follow the chamber
+    procedure : number in the recipe's list of procedures, from 0; None where the recipe has no list
+    lasting_s, rate_hz : of the record; the recipe's where None
+    order : the step of the procedure, for records that its equipment performs
     """
 
     record: int
@@ -28,6 +34,16 @@ class Step:
     wait_s: float | None = None
     settled: bool = True
     off_s: float = 0.0
+    procedure: int | None = None
+    lasting_s: float | None = None
+    rate_hz: float | None = None
+    order: ProcedureStep | None = None
+
+    def lasts(self, recipe: Recipe) -> float:
+        """Duration of the record, s."""
+        if self.lasting_s is not None:
+            return self.lasting_s
+        return recipe.static_record_s if self.kind == "allan" else recipe.dwell_s
 
 
 def steps(recipe: Recipe) -> list[Step]:
@@ -37,6 +53,8 @@ def steps(recipe: Recipe) -> list[Step]:
 
     The static record has a soak of its own, unless it is taken at the last temperature.
     """
+    if recipe.procedures:
+        return _listed(recipe)
     found: list[Step] = []
     for soak, temperature in enumerate(recipe.temperatures_C):
         first = len(found)
@@ -64,3 +82,30 @@ def _interleaved(soak: list[Step], first: int) -> list[Step]:
     order = sorted(range(len(soak)), key=lambda k: (places[k], k))
     every = [*others, *checks]
     return [replace(every[k], record=first + n) for n, k in enumerate(order)]
+
+
+def _listed(recipe: Recipe) -> list[Step]:
+    """Every record of a recipe's list of procedures; a procedure at the temperature of the one before shares its soak."""
+    found: list[Step] = []
+    for number, part in enumerate(parts_of(recipe)):
+        own = PROCEDURES[part.kind].steps(part, recipe)
+        same = bool(found and own) and found[-1].temperature == own[0].temperature_C and own[0].settled
+        first = (found[-1].soak + (0 if same else 1)) if found else 0
+        for one in own:
+            found.append(
+                Step(
+                    len(found),
+                    one.kind,
+                    first + one.soak - own[0].soak,
+                    one.temperature_C,
+                    one.pose,
+                    one.wait_s,
+                    one.settled,
+                    one.off_s,
+                    number,
+                    one.lasting_s,
+                    one.rate_hz,
+                    one,
+                )
+            )
+    return found

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from schemas.recipe import Pose, Recipe
     from schemas.station import StationConfig
 
-ActivityKind = Literal["soak", "move", "dwell", "verification", "allan"]
+ActivityKind = Literal["soak", "move", "dwell", "verification", "allan", "procedure"]
 
 _FIRST_SOAK = -1
 
@@ -28,15 +28,18 @@ class Minutes:
     soaks: float
     dwells: float
     static_record: float
+    procedures: float = 0.0
 
     @property
     def total(self) -> float:
         """All of it."""
-        return self.moves + self.soaks + self.dwells + self.static_record
+        return self.moves + self.soaks + self.dwells + self.static_record + self.procedures
 
     def document(self) -> dict[str, float]:
         """The parts and their sum, rounded, by name."""
         parts = {"soaks": self.soaks, "moves": self.moves, "dwells": self.dwells, "static_record": self.static_record}
+        if self.procedures > 0.0:
+            parts["procedures"] = self.procedures
         return {**{k: round(v, 2) for k, v in parts.items()}, "total": round(self.total, 2)}
 
 
@@ -81,7 +84,8 @@ def spent(stretches: Sequence[Activity]) -> Minutes:
     total = dict.fromkeys(get_args(ActivityKind), 0.0)
     for stretch in stretches:
         total[stretch.kind] += stretch.seconds / 60.0
-    return Minutes(total["move"], total["soak"], total["dwell"] + total["verification"], total["allan"])
+    dwells = total["dwell"] + total["verification"]
+    return Minutes(total["move"], total["soak"], dwells, total["allan"], total["procedure"])
 
 
 def schedule(
@@ -105,7 +109,7 @@ def schedule(
         there = replace(
             _later(now, step.temperature, going, station), outer=step.pose.outer_deg, inner=step.pose.inner_deg
         )
-        lasting = recipe.static_record_s if step.kind == "allan" else recipe.dwell_s
+        lasting = step.lasts(recipe)
         parts.append(("move", going, there))
         parts.append((step.kind, lasting, _later(there, step.temperature, lasting, station)))
         for what, seconds, end in parts:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pandas as pd
 
+from pipelines.procedures import PROCEDURES, figures_of_recipe
 from pipelines.stages.figures import FIGURES, Figure, LotCoefficients, UnitTables, figures_of
 from pipelines.stages.figures.base import BudgetRow
 from pipelines.stages.lot_risks import lot_risks
@@ -49,6 +50,7 @@ class Evidence:
     noise: pd.DataFrame
     uncertainties: pd.DataFrame | None = None
     budget_covariance: pd.DataFrame | None = None
+    procedure_figures: pd.DataFrame | None = None
     full_scale: Mapping[str, float] = field(default_factory=dict[str, float])
 
     @property
@@ -60,7 +62,13 @@ class Evidence:
 def refuse_limits_without_figures(limits: Limits, recipe: Recipe) -> None:
     """Refuse limits on figures that the recipe cannot yield, before anything is measured."""
     for name in limits.figures:
-        missing = FIGURES[name].missing(recipe)
+        if name in FIGURES:
+            missing = FIGURES[name].missing(recipe) if recipe.tumbles else "procedure multi_position"
+        elif name in figures_of_recipe(recipe):
+            missing = ""
+        else:
+            owner = next(one.name for one in PROCEDURES.values() if name in {figure.name for figure in one.figures})
+            missing = f"procedure {owner}"
         if missing:
             raise RecipeInvalid(
                 f"limits {limits.name}: {name} needs {missing}, the recipe has none; add it, or drop the limit",
@@ -68,7 +76,7 @@ def refuse_limits_without_figures(limits: Limits, recipe: Recipe) -> None:
             )
 
 
-def grade(evidence: Evidence, limits: Limits, zero_g: float = 0.0) -> dict[str, pd.DataFrame]:
+def grade(evidence: Evidence, limits: Limits, zero_g: float = 0.0, *, tumbles: bool = True) -> dict[str, pd.DataFrame]:
     """Tables ``figures`` (one row per unit and figure), ``grades`` (one row per unit) and ``lot_risks`` (one per limited figure).
 
     With an uncertainty budget the grade rests on the error expected over the period of validity, where that is known; without one
@@ -77,6 +85,7 @@ def grade(evidence: Evidence, limits: Limits, zero_g: float = 0.0) -> dict[str, 
     Parameters
     ----------
     zero_g : nominal output at 0 g, output unit.
+    tumbles : whether the recipe has the multi-position test; without it a unit has no coefficients, and is not refused for that
     """
     rule = describe_rule(limits)
     guard = limits.guard_factor
@@ -89,20 +98,23 @@ def grade(evidence: Evidence, limits: Limits, zero_g: float = 0.0) -> dict[str, 
     grade_rows: list[dict[str, object]] = []
     for verdict in evidence.verdicts.to_dict("records"):
         unit = str(verdict["unit"])
-        if verdict["refused"] or coefficients is None:
+        if verdict["refused"] or (coefficients is None and tumbles):
             grade_rows.append(_grade_row(verdict, "refused", NO_GRADE, str(verdict["reason"])))
             continue
-        own = UnitTables(
-            residuals.of(unit),
-            verification.of(unit),
-            verification_poses.of(unit),
-            noise.of(unit),
-            coefficients.of(places[unit]),
-            guard,
-            by_unit.get(unit, {}),
-            evidence.full_scale.get(unit, float("nan")),
-        )
-        figures = list(figures_of(own))
+        figures: list[Figure] = []
+        if coefficients is not None:
+            own = UnitTables(
+                residuals.of(unit),
+                verification.of(unit),
+                verification_poses.of(unit),
+                noise.of(unit),
+                coefficients.of(places[unit]),
+                guard,
+                by_unit.get(unit, {}),
+                evidence.full_scale.get(unit, float("nan")),
+            )
+            figures += figures_of(own)
+        figures += _of_procedures(evidence.procedure_figures, unit, limits)
         decisions = [
             decide(limits, f.name, f.value, f.uncertainty)
             for f in figures
@@ -140,6 +152,26 @@ def _stated(table: pd.DataFrame | None, units: int) -> NDArray[np.float64] | Non
     out[:, row, column] = values
     out[:, column, row] = values
     return out
+
+
+def _of_procedures(table: pd.DataFrame | None, unit: str, limits: Limits) -> list[Figure]:
+    """The figures of a unit that procedures have determined; of several axes, or repeated procedures, the largest."""
+    found: dict[str, Figure] = {}
+    if table is None or table.empty:
+        return []
+    guard = limits.coverage_factor if limits.rule == "guarded_acceptance" else 0.0
+    for row in table[table["unit"] == unit].to_dict("records"):
+        why = "" if row["identified"] else f"axis {row['axis']}: {row['note']}"
+        value = float(row["value"]) if row["identified"] else np.inf
+        name = str(row["figure"])
+        one = Figure(name, str(row["unit_text"]), value, float(row["uncertainty"]) if not why else 0.0, why)
+        before = found.get(name)
+        nearer = (
+            before is None or abs(one.value) + guard * one.uncertainty > abs(before.value) + guard * before.uncertainty
+        )
+        if nearer:
+            found[name] = one
+    return list(found.values())
 
 
 def _coefficients(evidence: Evidence, zero_g: float) -> tuple[LotCoefficients | None, dict[str, int]]:

@@ -9,6 +9,7 @@ import numpy as np
 from inertial.frames import force_from_angles
 from inertial.quantities import ANGLE_COLUMNS, BY_ATTRIBUTE
 from pipelines.tables.dwell_table import covariates
+from pipelines.tables.samples import PROCEDURE, STATIC
 from pipelines.tables.summaries import MEANS, SPREADS, summarised
 from schemas.units import AXES, STANDARD_GRAVITY_M_S2
 
@@ -54,7 +55,7 @@ def dwells_of(
     """
     accepted = set(verdicts.loc[~verdicts["refused"], "unit"])
     means = summaries.loc[summaries["unit"].isin(accepted), ["unit", "record", *MEANS, *SPREADS, "n"]]
-    static = readings[readings["unit"].isin(accepted) & (readings["kind"] != "allan")]
+    static = readings[readings["unit"].isin(accepted) & ~readings["kind"].isin([STATIC, PROCEDURE])]
     # a covariate that a sensor has failed to tell once is of no use to any model, and stays in the readings
     told = [column for column in covariates(readings) if static[column].notna().all()]
     kept = [*KEPT, *(c for c in WHERE_THERE if c in static.columns), *told]

@@ -15,7 +15,7 @@ from inertial.frames import force_from_angles
 from inertial.pointing import contradicts
 from pipelines.stages.frozen import frozen
 from pipelines.stages.pointing import pointing_of
-from pipelines.tables.samples import STATIC
+from pipelines.tables.samples import PROCEDURE, STATIC
 from pipelines.tables.summaries import HIGHS, LOWS, means, summarised
 from schemas.units import AXES
 
@@ -65,6 +65,7 @@ def verdicts(summaries: pd.DataFrame, readings: pd.DataFrame, units: Sequence[Un
     units : the lot, so that a unit which never answered has a verdict too.
     """
     faults = [*_silent(readings, units), *_reading_faults(readings)]
+    readings = readings[readings["kind"] != PROCEDURE]
     answered = readings[readings["status"] == "ok"]
     faults += _sample_faults(answered, summaries)
     faults += _stale_temperatures(answered)

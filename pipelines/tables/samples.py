@@ -11,6 +11,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
 STATIC = "allan"
+PROCEDURE = "procedure"
 
 
 def by_record(samples: Iterable[pd.DataFrame]) -> Iterator[tuple[int, Iterator[pd.DataFrame]]]:

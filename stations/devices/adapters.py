@@ -13,22 +13,25 @@ from schemas.profile import Profile
 from stations.devices import families
 from stations.devices.axis import TableAxis
 from stations.devices.chamber import ThermalChamber
+from stations.devices.equipment import Equipment
 
-Adapter = TypeVar("Adapter", bound="TableAxis | ThermalChamber")
+Adapter = TypeVar("Adapter", bound="TableAxis | ThermalChamber | Equipment")
 
 
 @cache
-def adapters() -> dict[str, type[TableAxis | ThermalChamber]]:
+def adapters() -> dict[str, type[TableAxis | ThermalChamber | Equipment]]:
     """Every adapter by the name of its family, sorted; a module of ``families`` without exactly one is a defect."""
-    by_family: dict[str, type[TableAxis | ThermalChamber]] = {}
+    by_family: dict[str, type[TableAxis | ThermalChamber | Equipment]] = {}
     for module in pkgutil.iter_modules(families.__path__):
         content = vars(import_module(f"{families.__name__}.{module.name}")).values()
-        own = [one for one in content if isinstance(one, type) and issubclass(one, (TableAxis, ThermalChamber))]
+        own = [
+            one for one in content if isinstance(one, type) and issubclass(one, (TableAxis, ThermalChamber, Equipment))
+        ]
         concrete = [one for one in own if not isabstract(one)]
         if len(concrete) != 1:
             raise LookupError(
                 f"stations/devices/families/{module.name}.py: {len(concrete)} adapters, 1 is needed; give it one complete "
-                "subclass of TableAxis or ThermalChamber"
+                "subclass of TableAxis, ThermalChamber or Equipment"
             )
         by_family[module.name] = concrete[0]
     return dict(sorted(by_family.items()))
@@ -42,6 +45,11 @@ def axis_adapter(profile: Profile) -> type[TableAxis]:
 def chamber_adapter(profile: Profile) -> type[ThermalChamber]:
     """The adapter that drives a chamber by this profile."""
     return _adapter(profile, "chamber", ThermalChamber)
+
+
+def equipment_adapter(role: str, profile: Profile) -> type[Equipment]:
+    """The adapter that drives test equipment in a role by this profile."""
+    return _adapter(profile, role, Equipment)
 
 
 def _adapter(profile: Profile, kind: str, base: type[Adapter]) -> type[Adapter]:

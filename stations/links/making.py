@@ -37,6 +37,7 @@ class Links:
     config: StationConfig
     simulated_at: Mapping[Carrier, Address] = field(default_factory=dict["Carrier", "Address"])
     permit: Permit | None = None
+    lines_at: Mapping[int, Address] = field(default_factory=dict[int, "Address"])
     made: dict[Key, GatedLink | GatedLines] = field(default_factory=dict["Key", "GatedLink | GatedLines"])
 
     def registers(self, place: str) -> GatedLink:
@@ -78,7 +79,7 @@ class Links:
 
     def _at(self, place: str) -> tuple[Carried, Profile]:
         """The device at a place and its profile, which must be carried as the file says."""
-        device: Carried = getattr(self.config.devices, place)
+        device = self._device(place)
         profile = load_profile(device.profile)
         if device.link not in profile.links:
             raise RecipeInvalid(
@@ -88,8 +89,16 @@ class Links:
             )
         return device, profile
 
+    def _device(self, place: str) -> Carried:
+        """The device at a place, or the equipment in a role."""
+        found = self.config.fitted().get(place)
+        return getattr(self.config.devices, place) if found is None else found
+
     def _key(self, device: Carried) -> Key:
         if self.config.kind == "simulated":
+            own = self.lines_at.get(getattr(device, "device_id", 0))
+            if device.link == "ascii" and own is not None:
+                return (device.link, *own)
             if device.link not in self.simulated_at:
                 carriers = " or ".join(self.simulated_at)
                 raise RecipeInvalid(

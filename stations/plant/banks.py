@@ -10,8 +10,10 @@ from stations.plant.simulations import axis_bank, chamber_bank, chamber_line_dev
 from stations.profile_files import profile_of
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+
     from schemas.profile import Profile
-    from schemas.station import Devices
+    from schemas.station import Device, Devices
     from stations.plant.line_device import LineDevice
     from stations.plant.world import World
 
@@ -32,10 +34,15 @@ def build_banks(world: World, devices: Devices) -> dict[int, Bank]:
     return banks
 
 
-def build_line_devices(world: World, devices: Devices) -> dict[int, LineDevice]:
+def build_line_devices(
+    world: World, devices: Devices, equipment: Mapping[str, Device] | None = None
+) -> dict[int, LineDevice]:
     """Devices with a text protocol, by device id."""
     profile = profile_of(devices.chamber)
-    return {devices.chamber.device_id: chamber_line_device(world, profile)} if profile.commands else {}
+    found = {devices.chamber.device_id: chamber_line_device(world, profile)} if profile.commands else {}
+    for device in (equipment or {}).values():
+        found[device.device_id] = chamber_line_device(world, profile_of(device))
+    return found
 
 
 def _reader(world: World, profile: Profile, slots: int) -> Bank:

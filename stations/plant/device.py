@@ -117,6 +117,16 @@ class Devices:
             drawn = np.stack([rng.standard_normal(3) for rng in self._turn_on])
             self._bias = self._first_bias + 1e-6 * self._preset.bias_stability_ug * drawn
 
+    def bias_of(self, serial: str, truths: Sequence[Truth]) -> Array:
+        """Bias of a unit since it was last switched on, (3,), g."""
+        return self._bias[[truth.serial for truth in truths].index(serial)]
+
+    def shift_bias(self, unit: int, step_g: float) -> None:
+        """Damage: the bias of a unit moves for good."""
+        self._first_bias, self._bias = self._first_bias.copy(), self._bias.copy()
+        self._first_bias[unit] += step_g
+        self._bias[unit] = self._bias[unit] + (step_g if self._bias is not self._first_bias else 0.0)
+
     def supply(self, part: Array) -> None:
         """Supplies at ``part`` (s,) of what they were: ratiometric outputs follow, the bias of others moves."""
         if self._preset.ratiometric:

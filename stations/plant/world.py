@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from schemas.errors import WrongUse
 from schemas.station import MOST_SLOTS, Simulation, StationConfig
+from stations.plant.bench import Bench
 from stations.plant.device import Devices, Truth, draw_truth, rotation, stream
 from stations.plant.dynamics import Dynamics
 from stations.plant.fixture import Fixture
@@ -88,6 +89,15 @@ class World:
             sim.local_gravity_m_s2 / STANDARD_G,
         )
         self.physics.orthogonality = 0.0 if self.station_errors is None else self.station_errors.orthogonality
+        self.bench = Bench(
+            self.preset,
+            self._truths,
+            self.physics.devices,
+            sim.local_gravity_m_s2 / STANDARD_G,
+            sim.seed,
+            lot.seed,
+            self._key,
+        )
         fifo = load_profile(config.devices.slots.profile).fifo
         registers = fifo.registers if fifo is not None else 0
         self.sampler = Sampler(self.physics, len(self.slots), self.preset.packing, registers)

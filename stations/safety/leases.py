@@ -35,7 +35,8 @@ if TYPE_CHECKING:
 
 __all__ = ["PARTS", "Holder", "Leases", "Part", "addresses", "holders", "new_holder"]
 
-Part = Literal["outer", "inner", "chamber", "reader"]
+Part = Literal["outer", "inner", "chamber", "reader", "exciter", "shock_machine", "centrifuge", "power_supply"]
+ROLES: tuple[Part, ...] = ("exciter", "shock_machine", "centrifuge", "power_supply")
 PARTS: tuple[Part, ...] = ("outer", "inner", "chamber", "reader")
 POLL_S = 0.2
 PASSING_S = 5.0  # a lock whose note names no live holder is being taken, released or tested
@@ -55,6 +56,10 @@ def addresses(config: StationConfig, *, every: bool = False) -> dict[Part, str]:
         address = address_of(getattr(config.devices, part))
         if every or address not in by_part.values():
             by_part[part] = address
+    there = config.equipment.there()
+    for role in ROLES:
+        if role in there and (every or address_of(there[role]) not in by_part.values()):
+            by_part[role] = address_of(there[role])
     return by_part
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from schemas.errors import StationError
 
@@ -61,6 +61,11 @@ def safe_steps(
     elif safety.chamber == "set_point":
         steps.append(SafeStep("chamber", f"chamber to {goal:g} °C", lambda: chamber.set_temperature(goal)))
     return steps
+
+
+def equipment_steps(equipment: Mapping[str, Any]) -> list[SafeStep]:
+    """The commands that stop test equipment: an exciter or centrifuge before anything else."""
+    return [SafeStep(role, f"{role.replace('_', ' ')} stopped", one.make_safe) for role, one in equipment.items()]
 
 
 def reach_safe_state(steps: list[SafeStep], *, patience_s: float = 0.0) -> Reached:

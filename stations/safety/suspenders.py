@@ -15,7 +15,9 @@ if TYPE_CHECKING:
     from schemas.station import Soak
     from stations.devices.reader import Guarded, Instruments
 
-Condition = Literal["door", "vibration", "supply", "chamber", "device", "table", "samples", "link", "clock"]
+Condition = Literal[
+    "door", "vibration", "supply", "chamber", "device", "table", "samples", "link", "clock", "recording"
+]
 
 
 @dataclass(frozen=True)

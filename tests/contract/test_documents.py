@@ -11,6 +11,7 @@ from pydantic import TypeAdapter, ValidationError
 from typer.testing import CliRunner
 
 from docs.documents_page import PAGE, documents, head_of, page
+from inertial.dynamics.second_order import transfer
 from pipelines.chain import certify as certifying
 from pipelines.cli import COMMANDS, app
 
@@ -39,6 +40,7 @@ CASES = {
     "whatif --json": ["whatif", "{folder}/model.toml"],
     "station check --json": ["station", "check", "--registers"],
     "station log --json": ["station", "log"],
+    "import FILE --procedure sweep": ["import", "{folder}/sweep.csv", "--procedure", "sweep", "--unit", "S1"],
     "run --json": ["fit", "latest", "--limits", "consumer"],
     "allan --json": ["allan", "{folder}/rest.csv", "--rate", "100"],
     "psd --json": ["psd", "{folder}/rest.csv", "--rate", "100"],
@@ -62,6 +64,11 @@ def kept(tmp_path_factory: pytest.TempPathFactory) -> Path:
     (folder / "record.csv").write_text("\n".join(["t,ax,ay,az", *rows, ""]), encoding="utf-8")
     rng = np.random.default_rng(1)
     np.savetxt(folder / "rest.csv", rng.normal(size=(2000, 3)), delimiter=",", header="x,y,z", comments="")
+    f = np.geomspace(5.0, 4000.0, 30)
+    h = -transfer(f, 2500.0, 0.7)
+    rows = [f"{a:.6g},{abs(b):.6g},{np.degrees(np.angle(b)):.6g},0.2,0.2" for a, b in zip(f, h, strict=True)]
+    head = "frequency_hz,magnitude,phase_deg,magnitude_uncertainty_percent,phase_uncertainty_deg"
+    (folder / "sweep.csv").write_text("\n".join([head, *rows]), encoding="utf-8")
     return folder
 
 

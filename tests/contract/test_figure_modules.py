@@ -69,14 +69,16 @@ def test_the_table_has_the_figures_in_their_order(kept, table) -> None:
 
 @pytest.mark.parametrize("name", FIGURES)
 def test_a_figure_says_what_a_recipe_lacks(name: str) -> None:
-    missing = FIGURES[name].missing(SimpleNamespace(static_record_s=0.0, verification=[], effects=[]))
+    missing = FIGURES[name].missing(SimpleNamespace(static_record_s=0.0, verification=[], effects=[], tumbles=True))
     effects = [missing.split()[1]] if missing else []
-    full = SimpleNamespace(static_record_s=3600.0, verification=["v1"], effects=effects, stability=object())
+    full = SimpleNamespace(
+        static_record_s=3600.0, verification=["v1"], effects=effects, stability=object(), tumbles=True
+    )
     assert FIGURES[name].missing(full) == ""
     limits = limits_of({"name": "one", "figures": {name: {"max": 1.0, "unit": UNITS[name]}}}, UNITS)
     refuse_limits_without_figures(limits, full)
     if missing:
-        bare = SimpleNamespace(static_record_s=0.0, verification=[], effects=[])
+        bare = SimpleNamespace(static_record_s=0.0, verification=[], effects=[], tumbles=True)
         with pytest.raises(RecipeInvalid, match=name):
             refuse_limits_without_figures(limits, bare)
 

@@ -22,6 +22,7 @@ FOUND = [*panels(PANELS), *panels(UNIT_PANELS)]
 NOT_OF_OLD_RUNS = {  # the kept archive has no such columns, and states no uncertainty
     "pipelines.report.unit_panels.bias",
     "pipelines.report.unit_panels.budget",
+    "pipelines.report.unit_panels.procedures",
 }
 
 

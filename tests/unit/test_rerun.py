@@ -79,6 +79,7 @@ def test_another_model_begins_at_the_fit_and_says_so(run: Run) -> None:
         "verify",
         "noise",
         "budget",
+        "procedures",
         "grade",
     }
     assert "third_order" in set(new.table("coefficients")["effect"])

@@ -35,7 +35,7 @@ repeatability of switching on is known for this device.</p>
 def render(unit: UnitContext) -> str | None:
     """One line per measurand; None for runs of earlier versions, and for models without a bias."""
     rows = unit.tables.get("wander")
-    if rows is None or "bias_record_u_ug" not in rows or not np.isfinite(rows["bias_record_u_ug"]).all():
+    if rows is None or rows.empty or "bias_record_u_ug" not in rows or not np.isfinite(rows["bias_record_u_ug"]).all():
         return None
     by_axis, coverage = {row["axis"]: row for row in rows_of(rows)}, unit.report.coverage
     lines = [

@@ -27,8 +27,10 @@ TEMPLATE = """\
 """
 
 
-def render(unit: UnitContext) -> str:
-    """One line per coefficient with its three axes side by side."""
+def render(unit: UnitContext) -> str | None:
+    """One line per coefficient with its three axes side by side; None without a fitted model."""
+    if unit.tables["coefficients"].empty:
+        return None
     lines: dict[tuple[str, int], dict[str, Any]] = {}
     counts: dict[tuple[str, str], int] = {}
     for row in rows_of(unit.tables["coefficients"]):

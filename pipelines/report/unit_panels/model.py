@@ -21,9 +21,11 @@ the curve; dotted: slopes −½ and +½.</p>
 """
 
 
-def render(unit: UnitContext) -> str:
-    """Two rows of plots."""
+def render(unit: UnitContext) -> str | None:
+    """Two rows of plots; None for a list of procedures without the multi-position test."""
     tables = unit.tables
+    if tables["residuals"].empty:
+        return None
     fitted = tables["dwells"][tables["dwells"]["kind"] == "dwell"]
     return fill(
         TEMPLATE,

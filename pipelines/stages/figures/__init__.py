@@ -10,6 +10,7 @@ from importlib import import_module
 from pkgutil import iter_modules
 from typing import TYPE_CHECKING, NamedTuple
 
+from pipelines.procedures import FIGURES as PROCEDURE_FIGURES
 from pipelines.stages.figures.base import FigureKind, LotCoefficients, UnitTables
 
 if TYPE_CHECKING:
@@ -72,8 +73,11 @@ def find_figures(package: str, path: Iterable[str]) -> dict[str, FigureKind]:
 
 
 FIGURES: Mapping[str, FigureKind] = find_figures(__name__, __path__)
-UNITS: Mapping[str, str] = {name: kind.unit for name, kind in FIGURES.items()}
-"""The unit of each figure, against which limits files are checked."""
+UNITS: Mapping[str, str] = {
+    **{name: kind.unit for name, kind in FIGURES.items()},
+    **{name: one.unit for name, one in PROCEDURE_FIGURES.items()},
+}
+"""The unit of each figure, of the calibration or of a procedure, against which limits files are checked."""
 
 
 def figures_of(tables: UnitTables) -> Iterator[Figure]:

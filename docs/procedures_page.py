@@ -1,0 +1,82 @@
+"""``python -m docs.procedures_page``: the reference of test procedures, from their modules; ``--check`` only compares."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from inertial.dynamics.transfer_effects import EFFECTS
+from pipelines.procedures import PROCEDURES
+
+if TYPE_CHECKING:
+    from pipelines.procedures import Procedure
+
+PAGE = Path(__file__).resolve().parent / "reference" / "procedures.md"
+HEAD = """\
+# Test procedures
+
+Written by `python -m docs.procedures_page` from `pipelines/procedures/` and `inertial/dynamics/transfer_effects/`; change those
+files, not this page. A recipe lists the procedures of a lot in order, as tables `[[procedures]]` with the key `kind`;
+[how to](../how-to/list-procedures.md).
+"""
+
+
+def page() -> str:
+    """The whole page as Markdown."""
+    parts = [HEAD, *(_section(one) for one in PROCEDURES.values()), _effects()]
+    return "\n".join(parts)
+
+
+def _section(one: Procedure) -> str:
+    roles = ", ".join(f"`{role}`" for role in one.roles) or "table, chamber and reader"
+    lines = [f"## {one.name}", "", f"{one.title}: {one.states}.", "", f"Source: {one.source}. Station: {roles}.", ""]
+    lines += [" ".join((one.part.__doc__ or "").split()), ""]
+    fields = {name: field for name, field in one.part.model_fields.items() if name != "kind"}
+    if fields:
+        lines += ["| key | default |", "|---|---|"]
+        lines += [
+            f"| `{name}` | {'required' if f.is_required() else f'`{_default(f)}`'} |" for name, f in fields.items()
+        ]
+        lines.append("")
+    if one.figures:
+        lines += ["| figure for limits | unit | meaning |", "|---|---|---|"]
+        lines += [f"| `{f.name}` | {f.unit} | {f.meaning} |" for f in one.figures]
+        lines.append("")
+    return "\n".join(lines)
+
+
+def _default(field: Any) -> Any:
+    """The default of a key, also of one that is made anew each time."""
+    return field.get_default(call_default_factory=True)
+
+
+def _effects() -> str:
+    lines = ["## Effects on a transfer function", ""]
+    lines += [
+        "The model of a sweep is a sensitivity times effects; the diagnosis names those that are missing, and those that"
+    ]
+    lines += ["the points do not tell apart.", ""]
+    lines += ["| effect | factor | meaning | measurement that tells it from others |", "|---|---|---|---|"]
+    lines += [
+        f"| `{one.id}` | {one.equation} | {(type(one).__doc__ or '').strip()} | {one.breaker} |"
+        for one in EFFECTS.values()
+    ]
+    return "\n".join([*lines, ""])
+
+
+def main(arguments: list[str]) -> int:
+    """Write the page, or check it; 1 where it is out of date."""
+    text = page()
+    if "--check" in arguments:
+        same = PAGE.is_file() and PAGE.read_text(encoding="utf-8") == text
+        sys.stdout.write(
+            "" if same else f"{PAGE.name} is out of date; write it again with 'python -m docs.procedures_page'\n"
+        )
+        return 0 if same else 1
+    PAGE.write_text(text, encoding="utf-8")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))

@@ -1,0 +1,1 @@
+"""Mathematics of dynamic and single-axis tests: transfer functions, pulses, spectra, centrifuge, tilt, stability."""

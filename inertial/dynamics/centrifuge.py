@@ -1,0 +1,195 @@
+"""Centrifuge: bias, scale and the polynomial over a = rω²/g, one way up or with the input reversed."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from inertial.errors import NotIdentified
+
+Array = NDArray[np.float64]
+STANDARD_GRAVITY = 9.80665
+EARTH_RATE = 7.292115e-5  # rad/s, IERS conventions
+
+
+@dataclass(frozen=True)
+class Centrifuge:
+    """Answer of a centrifuge test."""
+
+    bias: float
+    scale: float
+    """Output unit per g."""
+    bias_error: float
+    scale_error: float
+    linearity_percent: float
+    """Largest |V - V_fit| over the full-scale output span, %."""
+    residuals: Array
+    """(n,), output unit."""
+
+
+def centrifuge(
+    rate_rad_s: ArrayLike,
+    output: ArrayLike,
+    radius_m: float,
+    *,
+    full_scale_g: float,
+    standard_gravity: float = STANDARD_GRAVITY,
+) -> Centrifuge:
+    """Bias, scale and linearity error from a = r·ω².
+
+    Parameters
+    ----------
+    rate_rad_s : (n,), rad/s
+    output : (n,), output unit
+    radius_m : to the seismic mass, m; its error is the scale's, in full
+    full_scale_g : range, g, to which the linearity error is referred
+    standard_gravity : m/s² in one g
+    """
+    force = radius_m * np.asarray(rate_rad_s, dtype=np.float64) ** 2 / standard_gravity
+    v = np.asarray(output, dtype=np.float64)
+    if force.size < 3 or float(np.ptp(force)) <= 0.0:
+        msg = f"centrifuge: {force.size} speeds over {np.ptp(force):.3g} g, three different ones are needed; add speeds"
+        raise NotIdentified(msg)
+    rows = np.column_stack([np.ones_like(force), force])
+    c = np.asarray(np.linalg.lstsq(rows, v, rcond=None)[0], dtype=np.float64)
+    residuals = v - rows @ c
+    spread = np.linalg.inv(rows.T @ rows) * (residuals @ residuals) / (force.size - 2)
+    return Centrifuge(
+        bias=float(c[0]),
+        scale=float(c[1]),
+        bias_error=float(np.sqrt(spread[0, 0])),
+        scale_error=float(np.sqrt(spread[1, 1])),
+        linearity_percent=float(100.0 * np.max(np.abs(residuals)) / (abs(c[1]) * full_scale_g)),
+        residuals=residuals,
+    )
+
+
+TERMS = ("bias", "scale", "second_order", "third_order", "arm_stretch_or_odd_quadratic", "mass_offset_or_asymmetry")
+
+
+@dataclass(frozen=True)
+class Polynomial:
+    """Coefficients of a centrifuge test in g of indicated acceleration, with their covariance.
+
+    The indicated acceleration is the output over the sensitivity; terms are named in :data:`TERMS`. Arm stretch and Koq·a|a| are
+    one parameter of such a test, and so are the offset of the proof mass from the turning centre and a scale that differs by
+    sign.
+    """
+
+    names: tuple[str, ...]
+    value: Array
+    covariance: Array
+    residuals: Array
+    chi_square: float
+    dof: int
+
+    def of(self, name: str) -> tuple[float, float]:
+        """Value and standard uncertainty of a term."""
+        k = self.names.index(name)
+        return float(self.value[k]), float(np.sqrt(self.covariance[k, k]))
+
+
+def columns(acceleration: Array, names: tuple[str, ...]) -> Array:
+    """Design columns (n, terms) over the signed acceleration (n,), g."""
+    a = acceleration
+    known = {
+        "bias": np.ones_like(a),
+        "scale": a,
+        "second_order": a**2,
+        "third_order": a**3,
+        "arm_stretch_or_odd_quadratic": a * np.abs(a),
+        "mass_offset_or_asymmetry": np.abs(a),
+    }
+    return np.column_stack([known[name] for name in names])
+
+
+def fit_polynomial(acceleration: Array, output: Array, error: Array, names: tuple[str, ...]) -> Polynomial:
+    """Weighted least squares of the terms.
+
+    Parameters
+    ----------
+    acceleration : (n,), signed, g
+    output, error : (n,), indicated acceleration and its standard uncertainty, g
+
+    Raises
+    ------
+    NotIdentified
+        The speeds and mountings do not tell the terms apart.
+    """
+    design = columns(acceleration, names) / error[:, None]
+    size = np.linalg.norm(design, axis=0)
+    if len(output) < len(names) or np.linalg.matrix_rank(design / size, tol=1e-8) < len(names):
+        msg = (
+            f"centrifuge: {len(output)} points do not tell {', '.join(names)} apart; add speeds, or measure with the mounting "
+            "reversed too"
+        )
+        raise NotIdentified(msg)
+    c = np.linalg.lstsq(design / size, output / error, rcond=None)[0] / size
+    residuals = output - columns(acceleration, names) @ c
+    inverse = np.linalg.inv((design / size).T @ (design / size)) / np.outer(size, size)
+    return Polynomial(
+        names, c, inverse, residuals, float(np.sum((residuals / error) ** 2)), int(len(output) - len(names))
+    )
+
+
+def linearity_percent(polynomial: Polynomial, full_scale_g: float, line: str = "least_squares") -> float:
+    """Largest deviation from a straight line over 0 … full scale of both signs, % of the one-sided range.
+
+    Parameters
+    ----------
+    line : ``least_squares``, ``end_point`` or ``best`` (smallest largest deviation)
+    """
+    x = np.linspace(-full_scale_g, full_scale_g, 2001)
+    y = columns(x, polynomial.names) @ polynomial.value
+    gain = polynomial.of("scale")[0]
+    if line == "least_squares":
+        deviation = y - np.polyval(np.polyfit(x, y, 1), x)
+    elif line == "end_point":
+        slope = (y[-1] - y[0]) / (x[-1] - x[0])
+        deviation = y - (y[0] + slope * (x - x[0]))
+    else:
+        deviation = _minimax(x, y)
+    return float(100.0 * np.max(np.abs(deviation)) / (abs(gain) * full_scale_g))
+
+
+def _minimax(x: Array, y: Array) -> Array:
+    """Deviations from the straight line whose largest deviation is smallest: half the least vertical extent over slopes."""
+    start = (y[-1] - y[0]) / (x[-1] - x[0])
+    reach = 4.0 * float(np.ptp(y - start * x)) / float(np.ptp(x))
+    low, high = start - reach, start + reach
+    for _ in range(200):  # the extent is a convex function of the slope
+        one, two = low + (high - low) / 3.0, high - (high - low) / 3.0
+        if np.ptp(y - one * x) <= np.ptp(y - two * x):
+            high = two
+        else:
+            low = one
+    left = y - 0.5 * (low + high) * x
+    return np.asarray(left - 0.5 * (left.max() + left.min()))
+
+
+def scale_from_two_radii(
+    slopes: tuple[float, float], slope_errors: tuple[float, float], distance_m: float, distance_error_m: float
+) -> tuple[float, float]:
+    """Sensitivity in output per g and its standard uncertainty, from the slopes against ω² at two mounts a known distance apart.
+
+    S = Δ(slope)·g_n/Δr: at one radius, radius and sensitivity are one parameter.
+
+    Parameters
+    ----------
+    slopes, slope_errors : output per (rad/s)², the larger radius second
+    """
+    value = (slopes[1] - slopes[0]) * STANDARD_GRAVITY / distance_m
+    relative = np.hypot(np.hypot(*slope_errors) / (slopes[1] - slopes[0]), distance_error_m / distance_m)
+    return value, float(abs(value) * relative)
+
+
+def lever_arm(rate_deg_s: float, radius_m: float) -> float:
+    """Specific force in g of a point that turns at a radius: ω²r/g_n."""
+    return float(np.radians(rate_deg_s) ** 2 * radius_m / STANDARD_GRAVITY)
+
+
+def earth_rate_share(rate_rad_s: float, latitude_deg: float) -> float:
+    """Relative error of the acceleration where the rate is measured against the Earth: 2Ω sin φ/ω."""
+    return float(2.0 * EARTH_RATE * np.sin(np.radians(latitude_deg)) / rate_rad_s)

@@ -1,0 +1,181 @@
+"""Shock pulses: the half sine and a sensor's response, and peak, duration, baseline and velocity change of a recorded pulse."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.signal import StateSpace, lsim
+
+from inertial.dynamics.settling import settling_time
+from inertial.errors import NotIdentified
+
+Array = NDArray[np.float64]
+TEN_PERCENT = 1.0 - 2.0 * float(np.arcsin(0.1)) / np.pi
+"""0.936: part of a half sine's duration between its 10 % points."""
+TOP = 0.9  # of the largest sample: the part of the pulse through which the parabola is laid
+
+
+@dataclass(frozen=True)
+class Shock:
+    """Answer to a half sine."""
+
+    time: Array
+    """(n,) s"""
+    input: Array
+    """(n,) g"""
+    output: Array
+    """(n,) g, as an output that counts up with acceleration"""
+    overshoot: float
+    """(largest output - amplitude)/amplitude."""
+    undershoot: float
+    """Largest negative output after the pulse, over the amplitude."""
+    return_s: float
+    """Time after the pulse until the output stays within the band."""
+
+
+def half_sine(
+    amplitude: float, duration_s: float, natural_hz: float, damping: float, *, band: float = 0.02, points: int = 4000
+) -> Shock:
+    """Answer of a second-order accelerometer to A0·sin(πt/T).
+
+    Parameters
+    ----------
+    amplitude : A0, g
+    duration_s : T, s; 1 to 10 ms in tests
+    natural_hz, damping : of the accelerometer
+    band : share of the amplitude within which the output has come back
+    points : of the answer
+    """
+    rate, omega = damping * 2.0 * np.pi * natural_hz, 2.0 * np.pi * natural_hz
+    end = duration_s + 12.0 / max(rate, 1e-12)
+    time = np.linspace(0.0, min(end, duration_s + 400.0 / natural_hz), points)
+    pulse = np.where(time <= duration_s, amplitude * np.sin(np.pi * time / duration_s), 0.0)
+    system = StateSpace([[0.0, 1.0], [-(omega**2), -2.0 * damping * omega]], [[0.0], [omega**2]], [[1.0, 0.0]], [[0.0]])
+    output = np.asarray(lsim(system, pulse, time)[1], dtype=np.float64)
+    after = time > duration_s
+    return Shock(
+        time=time,
+        input=pulse,
+        output=output,
+        overshoot=float(output.max() / amplitude - 1.0),
+        undershoot=float(max(0.0, -output[after].min() / amplitude)),
+        return_s=settling_time(time[after] - duration_s, output[after], final=0.0, band=band * amplitude),
+    )
+
+
+def velocity_change(peak_g: float, duration_s: float, standard_gravity: float = 9.80665) -> float:
+    """Velocity change of a half sine in m/s: 2AD/π."""
+    return 2.0 * peak_g * standard_gravity * duration_s / np.pi
+
+
+@dataclass(frozen=True)
+class Pulse:
+    """What a recorded pulse is. ``peak`` carries the sign of the pulse; the other figures are magnitudes.
+
+    Attributes
+    ----------
+    peak, peak_error : above the baseline, and its standard uncertainty; unit of the record
+    duration_s : of the half sine with these 10 % points
+    velocity : integral over the pulse, unit of the record times s
+    baseline : mean before the pulse
+    noise : standard deviation of a sample before the pulse
+    undershoot : largest excursion against the pulse after it, as a share of the peak
+    start, stop : first and last sample of the pulse
+    """
+
+    peak: float
+    peak_error: float
+    duration_s: float
+    velocity: float
+    baseline: float
+    noise: float
+    undershoot: float
+    start: int
+    stop: int
+
+
+def measured_pulse(record: Array, rate_hz: float, *, before_s: float) -> Pulse:
+    """Peak, duration, velocity change and undershoot of a recorded half sine.
+
+    The baseline is the mean before the pulse: a sensor that measures gravity is not at zero there. The peak is the vertex of a
+    parabola through the top tenth, since the largest sample is biased by noise. Only the pulse is integrated.
+
+    Parameters
+    ----------
+    record : (n,), any unit
+    before_s : time at the beginning of the record that is free of the pulse, s
+
+    Raises
+    ------
+    NotIdentified
+        No pulse stands out of the noise, or its ends lie outside the record.
+    """
+    quiet = record[: int(before_s * rate_hz)]
+    if quiet.size < 8:
+        msg = f"shock: {quiet.size} samples before the pulse, 8 or more are needed for the baseline; trigger later"
+        raise NotIdentified(msg)
+    baseline, noise = float(quiet.mean()), float(quiet.std(ddof=1))
+    y = record - baseline
+    sign = 1.0 if y.max() >= -y.min() else -1.0
+    y = sign * y
+    top = int(np.argmax(y))
+    if not y[top] > 8.0 * noise:
+        msg = (
+            f"shock: the largest excursion is {y[top]:.3g}, {8.0 * noise:.3g} is needed above a noise of "
+            f"{noise:.3g}; check the trigger"
+        )
+        raise NotIdentified(msg)
+    low, high = _span(y, top, TOP * y[top])
+    places = np.arange(low, high + 1)
+    if places.size < 5:
+        msg = f"shock: {places.size} samples in the top tenth of the pulse, 5 or more are needed; sample faster"
+        raise NotIdentified(msg)
+    x = (places - places.mean()) / rate_hz
+    rows = np.column_stack([np.ones_like(x), x, x**2])
+    c = np.linalg.lstsq(rows, y[places], rcond=None)[0]
+    at = float(np.clip(-0.5 * c[1] / c[2], x[0], x[-1])) if c[2] < 0.0 else 0.0
+    value = float(c[0] + c[1] * at + c[2] * at**2)
+    covariance = np.linalg.inv(rows.T @ rows) * noise**2
+    vertex = np.array([1.0, at, at**2])
+    start, stop = _crossings(y, top, 0.1 * value)
+    if start < 1 or stop > y.size - 2:
+        msg = "shock: the pulse is cut off at an end of the record; move the trigger, or record longer"
+        raise NotIdentified(msg)
+    duration = (stop - start) / rate_hz / TEN_PERCENT
+    pad = 0.5 * (1.0 - TEN_PERCENT) * duration * rate_hz
+    first, last = max(0, round(start - pad)), min(y.size - 1, round(stop + pad))
+    after = y[last:]
+    return Pulse(
+        peak=sign * value,
+        peak_error=float(np.sqrt(vertex @ covariance @ vertex)),
+        duration_s=duration,
+        velocity=float(np.trapezoid(y[first : last + 1]) / rate_hz),
+        baseline=baseline,
+        noise=noise,
+        undershoot=max(0.0, float(-after.min()) / value) if after.size else 0.0,
+        start=first,
+        stop=last,
+    )
+
+
+def _span(y: Array, top: int, level: float) -> tuple[int, int]:
+    """First and last sample of the run around ``top`` that stays above a level."""
+    low = high = top
+    while low > 0 and y[low - 1] >= level:
+        low -= 1
+    while high < y.size - 1 and y[high + 1] >= level:
+        high += 1
+    return low, high
+
+
+def _crossings(y: Array, top: int, level: float) -> tuple[float, float]:
+    """Interpolated places where the pulse crosses a level before and after ``top``, in samples."""
+    low, high = _span(y, top, level)
+    start, stop = float(low), float(high)
+    if low > 0 and y[low] > y[low - 1]:
+        start = low - (y[low] - level) / (y[low] - y[low - 1])
+    if high < y.size - 1 and y[high] > y[high + 1]:
+        stop = high + (y[high] - level) / (y[high] - y[high + 1])
+    return start, stop

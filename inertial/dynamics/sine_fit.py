@@ -1,0 +1,127 @@
+"""Sine fits of one tone: three parameters with drift, the fourth (frequency), harmonics; standard uncertainties.
+
+ISO 16063-11 method 3, IEEE 1057: least squares on [cos ωt, sin ωt, 1]; a linear term is added, since a drift d over n whole
+periods errs by up to d/(πn).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from inertial.errors import NotIdentified
+
+Array = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+ROUNDS = 12
+HARMONICS = 5
+
+
+@dataclass(frozen=True)
+class Tone:
+    """A tone in several channels.
+
+    Attributes
+    ----------
+    value : (channels,), complex amplitude: the real part belongs to cos ωt, minus the imaginary part to sin ωt
+    sigma : (channels,), residual standard deviation of a sample
+    amplitude_error : (channels,), σ√(2/N); the phase's in rad is this over the amplitude
+    frequency, frequency_error : Hz on the channel's own time base; the error is 0 where the frequency was given
+    """
+
+    value: Complex
+    sigma: Array
+    amplitude_error: Array
+    frequency: float
+    frequency_error: float = 0.0
+
+
+def fit_tone(record: Array, rate_hz: float, frequency: float, *, first_s: float = 0.0) -> Tone:
+    """The tone of a known frequency in every channel, by least squares with constant and drift.
+
+    Parameters
+    ----------
+    record : (n, channels), any unit
+    rate_hz, frequency : Hz
+    first_s : time of the first sample, s
+    """
+    n = len(record)
+    if n < 8:
+        msg = f"sine fit: {n} samples, 8 or more are needed; record longer"
+        raise NotIdentified(msg)
+    time = first_s + np.arange(n) / rate_hz
+    design = _columns(time, frequency)
+    c = np.linalg.lstsq(design, record, rcond=None)[0]
+    left = record - design @ c
+    sigma = np.sqrt(np.sum(left**2, axis=0) / (n - design.shape[1]))
+    return Tone(c[0] - 1j * c[1], sigma, sigma * np.sqrt(2.0 / n), frequency)
+
+
+def fit_tone_and_frequency(record: Array, rate_hz: float, frequency: float, *, first_s: float = 0.0) -> Tone:
+    """The tone and its frequency, common to all channels: Gauss–Newton on the fourth parameter.
+
+    A device with a clock of its own sees another frequency; 1000 ppm at 1 kHz over 1 s would null a fit at the given one. The
+    search begins at the largest value of a fine periodogram within ± 2 % of the given frequency.
+    The phase refers to time 0, so ``first_s`` decides how strongly phase and frequency depend on each other.
+    """
+    n, channels = record.shape
+    time = first_s + np.arange(n) / rate_hz
+    span = n / rate_hz
+    f = _coarse(record, time, frequency, span)
+    value = np.zeros(channels, dtype=np.complex128)
+    sigma, error = np.zeros(channels), np.inf
+    for _ in range(ROUNDS):
+        tone = fit_tone(record, rate_hz, f, first_s=first_s)
+        value, sigma = tone.value, tone.sigma
+        spin = np.exp(2j * np.pi * f * time)
+        slope = np.real(1j * 2.0 * np.pi * time[:, None] * spin[:, None] * value)  # derivative by the frequency
+        design = _columns(time, f)
+        q = np.linalg.qr(design)[0]
+        slope = slope - q @ (q.T @ slope)
+        left = record - q @ (q.T @ record)
+        weight = 1.0 / np.maximum(sigma, 1e-300) ** 2
+        information = float(np.sum(weight * np.sum(slope**2, axis=0)))
+        step = float(np.sum(weight * np.sum(slope * left, axis=0))) / information
+        error = information**-0.5
+        f += float(np.clip(step, -0.25 / span, 0.25 / span))
+        if abs(step) < 1e-3 * error:
+            break
+    tone = fit_tone(record, rate_hz, f, first_s=first_s)
+    return Tone(tone.value, tone.sigma, tone.amplitude_error, f, error)
+
+
+def harmonic_distortion(record: Array, rate_hz: float, frequency: float) -> Array:
+    """Total harmonic distortion of every channel, a share: harmonics 2 to 5 below half the rate over the fundamental."""
+    time = np.arange(len(record)) / rate_hz
+    orders = [k for k in range(2, HARMONICS + 1) if k * frequency < 0.49 * rate_hz]
+    parts = [_columns(time, frequency)]
+    parts += [
+        np.column_stack([np.cos(w * time), np.sin(w * time)]) for w in (2.0 * np.pi * k * frequency for k in orders)
+    ]
+    c = np.linalg.lstsq(np.hstack(parts), record, rcond=None)[0]
+    fundamental = np.hypot(c[0], c[1])
+    return np.sqrt(np.sum(c[4:] ** 2, axis=0)) / np.where(fundamental > 0.0, fundamental, np.inf)
+
+
+def frequency_error_of(sigma: float, amplitude: float, span_s: float, count: int) -> float:
+    """Standard uncertainty in Hz of a fitted frequency: √6/π·(σ/A)/(T√N)."""
+    return float(np.sqrt(6.0) / np.pi * sigma / amplitude / (span_s * np.sqrt(count)))
+
+
+def _columns(time: Array, frequency: float) -> Array:
+    turn = 2.0 * np.pi * frequency * time
+    drift = (time - time.mean()) / max(float(np.ptp(time)), 1e-300)
+    return np.column_stack([np.cos(turn), np.sin(turn), np.ones_like(time), drift])
+
+
+def _coarse(record: Array, time: Array, frequency: float, span: float) -> float:
+    """The frequency within ± 2 % of the given one at which the channels hold most power."""
+    y = record - record.mean(axis=0)
+    y = y / np.maximum(np.sqrt(np.mean(y**2, axis=0)), 1e-300)
+    reach = max(0.02 * frequency, 0.5 / span)
+    grid = np.linspace(frequency - reach, frequency + reach, 2 * int(np.ceil(4.0 * reach * span)) + 1)
+    grid = grid[grid > 0.0]
+    power = np.array([np.sum(np.abs(np.exp(-2j * np.pi * f * time) @ y) ** 2) for f in grid])
+    return float(grid[int(np.argmax(power))])

@@ -1,0 +1,185 @@
+"""Bias stability by its several definitions, warm-up time, and repeatability from turn-on to turn-on."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.stats import chi2
+
+from inertial.errors import NotIdentified
+from inertial.noise.allan import overlapping
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Stability:
+    """Stability of a bias record, in the record's unit; the definitions differ by up to thirty times for one unit.
+
+    Attributes
+    ----------
+    sd_100s, sd_100s_error : standard deviation of 100 s means, and its standard uncertainty from effective degrees of freedom
+    sd_1s, range_1s, range_100s : standard deviation and range of 1 s means, range of 100 s means
+    allan_100s, allan_100s_error : Allan deviation at 100 s
+    drift_h, drift_h_error : slope per hour and its standard uncertainty from the scatter of the 100 s means
+    """
+
+    sd_100s: float
+    sd_100s_error: float
+    sd_1s: float
+    range_1s: float
+    range_100s: float
+    allan_100s: float
+    allan_100s_error: float
+    drift_h: float
+    drift_h_error: float
+
+
+def block_means(record: Array, size: int) -> Array:
+    """Means (m,) of ``size`` samples each."""
+    count = len(record) // size
+    return record[: count * size].reshape(count, size).mean(axis=1)
+
+
+def stability(record: Array, rate_hz: float) -> Stability:
+    """The figures of a bias record (n,).
+
+    Raises
+    ------
+    NotIdentified
+        The record is shorter than ten means of 100 s.
+    """
+    hundred = block_means(record, round(100.0 * rate_hz))
+    if hundred.size < 10:
+        msg = f"stability: {hundred.size} means of 100 s, 10 or more are needed; record at least 1000 s"
+        raise NotIdentified(msg)
+    second = block_means(record, max(1, round(rate_hz)))
+    time = 100.0 * np.arange(hundred.size) / 3600.0
+    rows = np.column_stack([np.ones_like(time), time - time.mean()])
+    c = np.linalg.lstsq(rows, hundred, rcond=None)[0]
+    left = hundred - rows @ c
+    drift_error = float(np.sqrt(left @ left / (hundred.size - 2) / np.sum(rows[:, 1] ** 2)) * _correlated(left))
+    rate = rate_hz / max(1, round(rate_hz))
+    curve = overlapping(second, rate, np.array([1, 3, 10, 30, round(100.0 * rate)]))
+    allan = float(curve.deviation[-1])
+    sd = float(hundred.std(ddof=1))
+    return Stability(
+        sd_100s=sd,
+        sd_100s_error=sd / np.sqrt(2.0 * (hundred.size - 1)) * _correlated(hundred - hundred.mean()),
+        sd_1s=float(second.std(ddof=1)),
+        range_1s=float(np.ptp(second)),
+        range_100s=float(np.ptp(hundred)),
+        allan_100s=allan,
+        allan_100s_error=0.5 * float(curve.high[-1] - curve.low[-1]),
+        drift_h=float(c[1]),
+        drift_h_error=drift_error,
+    )
+
+
+def _correlated(values: Array) -> float:
+    """Factor √((1 + ρ)/(1 − ρ)) on a standard uncertainty for neighbours that are correlated by ρ > 0."""
+    y = values - values.mean()
+    power = float(y @ y)
+    rho = float(np.clip(y[1:] @ y[:-1] / power, 0.0, 0.9)) if power > 0.0 else 0.0
+    return float(np.sqrt((1.0 + rho) / (1.0 - rho)))
+
+
+def white_and_flicker(record: Array, rate_hz: float) -> tuple[float, float]:
+    """White noise N² (per s) and flicker F² of a short record, from Allan variances N²/τ + F² at a thirtieth and a sixth of it.
+
+    Of one record both are rough; means over channels and records are of use.
+    """
+    span = len(record) / rate_hz
+    values: list[float] = []
+    taus = (span / 30.0, span / 6.0)
+    for tau in taus:
+        means = block_means(record, max(1, round(tau * rate_hz)))
+        values.append(float(np.mean(np.diff(means) ** 2) / 2.0))
+    white = (values[0] - values[1]) / (1.0 / taus[0] - 1.0 / taus[1])
+    return white, values[1] - white / taus[1]
+
+
+def difference_error(white: float, flicker: float, window_s: float) -> float:
+    """Standard uncertainty of the difference of the means of two windows: 2N²/T + 2·1.2·F².
+
+    For adjacent windows of flicker B the difference scatters by 0.99·B, with F = 0.664·B; a fifth is added for the gap.
+    """
+    return float(np.sqrt(2.0 * max(white, 0.0) / window_s + 2.4 * max(flicker, 0.0)))
+
+
+def warm_up_time(time: Array, record: Array, *, band: float, window_s: float) -> tuple[float, float]:
+    """Time in s from power-on until the smoothed output stays within ± band of its final value; and that final value.
+
+    The final value is the mean over the last fifth of the record. IEEE 528: within specification, and staying there.
+
+    Parameters
+    ----------
+    time : (n,), s since power-on, evenly spaced
+    record : (n,), any unit
+    band : unit of the record
+    window_s : of the moving mean, s
+
+    Raises
+    ------
+    NotIdentified
+        The output leaves the band in the last fifth of the record.
+    """
+    step = float(time[1] - time[0])
+    size = max(1, round(window_s / step))
+    sums = np.concatenate([[0.0], np.cumsum(record)])
+    smooth = (sums[size:] - sums[:-size]) / size
+    middle = time[: smooth.size] + 0.5 * (size - 1) * step
+    final = float(record[int(0.8 * record.size) :].mean())
+    outside = np.flatnonzero(np.abs(smooth - final) > band)
+    if outside.size == 0:
+        return float(time[0]), final
+    last = float(middle[outside[-1]])
+    if last > time[0] + 0.8 * float(np.ptp(time)):
+        msg = f"warm-up: the output leaves ± {band:.3g} at {last:.0f} s, in the last fifth of the record; record longer"
+        raise NotIdentified(msg)
+    return last + step, final
+
+
+@dataclass(frozen=True)
+class Repeatability:
+    """Scatter of the bias from turn-on to turn-on, the cycles' own error removed.
+
+    Attributes
+    ----------
+    value : standard deviation between cycles; 0 where their own error explains all
+    low, high : 95 % interval
+    upper : one-sided 95 % upper limit
+    """
+
+    value: float
+    low: float
+    high: float
+    upper: float
+    cycles: int
+
+
+def repeatability(means: Array, own_error: float) -> Repeatability:
+    """Repeatability from the mean of every cycle (n,) and the standard uncertainty of one such mean within its cycle.
+
+    s_b² = s² − s_w²; the interval is that of s by χ² with n − 1 degrees of freedom, reduced in the same way.
+    """
+    n = means.size
+    if n < 3:
+        msg = f"turn-on: {n} cycles, 3 or more are needed; add cycles"
+        raise NotIdentified(msg)
+    s2, dof = float(np.var(means, ddof=1)), n - 1
+
+    def reduced(value: float) -> float:
+        return float(np.sqrt(max(0.0, value - own_error**2)))
+
+    low, high = (reduced(float(s2 * dof / chi2.ppf(p, dof))) for p in (0.975, 0.025))
+    return Repeatability(reduced(s2), low, high, reduced(float(s2 * dof / chi2.ppf(0.05, dof))), n)
+
+
+def sigma_factors(n: int) -> tuple[float, float, float]:
+    """95 % factors of an estimated standard deviation from n values: two-sided low and high, one-sided upper."""
+    dof = n - 1
+    low, high, upper = (float(np.sqrt(dof / chi2.ppf(p, dof))) for p in (0.975, 0.025, 0.05))
+    return low, high, upper

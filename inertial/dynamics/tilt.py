@@ -1,0 +1,94 @@
+"""Single-axis tilt in one plane: bias, scale, angle and, from enough poses, K2 and K3 of the axes that lie in the plane."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from inertial.errors import NotIdentified
+
+Array = NDArray[np.float64]
+TERMS = ("bias", "sine", "cosine", "second_order", "third_order")
+
+
+@dataclass(frozen=True)
+class TiltFit:
+    """Fit of one axis: output = bias + scale·sin(θ + φ), with K2 and K3 of the indicated force where asked for.
+
+    Attributes
+    ----------
+    value, covariance : (terms,), (terms, terms), terms as in ``names``; output unit
+    residuals : (n,), output unit
+    """
+
+    names: tuple[str, ...]
+    value: Array
+    covariance: Array
+    residuals: Array
+    angle: Array
+
+    @property
+    def scale(self) -> tuple[float, float]:
+        """Scale K1 and its standard uncertainty, output per g."""
+        s, c = self.value[1:3]
+        size = float(np.hypot(s, c))
+        slope = np.array([s, c]) / size
+        return size, float(np.sqrt(slope @ self.covariance[1:3, 1:3] @ slope))
+
+    @property
+    def phase(self) -> tuple[float, float]:
+        """Angle φ of the input axis against the table's zero and its standard uncertainty, rad."""
+        s, c = self.value[1:3]
+        size = float(np.hypot(s, c))
+        slope = np.array([-c, s]) / size**2
+        return float(np.arctan2(c, s)), float(np.sqrt(slope @ self.covariance[1:3, 1:3] @ slope))
+
+    def of(self, name: str) -> tuple[float, float]:
+        """Value and standard uncertainty of a term."""
+        k = self.names.index(name)
+        return float(self.value[k]), float(np.sqrt(self.covariance[k, k]))
+
+
+def fit_tilt(angle: Array, output: Array, error: Array, *, orders: int = 1) -> TiltFit:
+    """Weighted least squares of one axis over angles in its plane.
+
+    Parameters
+    ----------
+    angle : (n,), rad; the force along the axis is sin(angle + φ) g
+    output, error : (n,), output unit; the error must hold noise and the share of the angle's uncertainty (scale·cos θ·u_θ)
+    orders : 1 for bias and scale, 3 with K2 and K3; φ must be small then (below 0.1 rad), since the powers are of sin θ
+
+    Raises
+    ------
+    NotIdentified
+        The angles do not tell the terms apart.
+    """
+    names = TERMS[:3] if orders == 1 else TERMS
+    rows = np.column_stack([np.ones_like(angle), np.sin(angle), np.cos(angle)])
+    if orders > 1:
+        plain = np.linalg.lstsq(rows / error[:, None], output / error, rcond=None)[0]
+        size = float(np.hypot(plain[1], plain[2]))
+        force = (rows[:, 1] * plain[1] + rows[:, 2] * plain[2]) / size
+        rows = np.column_stack([rows, force**2, force**3])
+    weighted = rows / error[:, None]
+    if len(angle) < len(names) + 1 or np.linalg.matrix_rank(weighted, tol=1e-8 * np.linalg.norm(weighted, 2)) < len(
+        names
+    ):
+        msg = f"tilt: {len(angle)} angles do not tell {', '.join(names)} apart; add angles over the whole turn"
+        raise NotIdentified(msg)
+    c = np.linalg.lstsq(weighted, output / error, rcond=None)[0]
+    covariance = np.asarray(np.linalg.inv(weighted.T @ weighted), dtype=np.float64)
+    return TiltFit(names, np.asarray(c, dtype=np.float64), covariance, output - rows @ c, angle)
+
+
+def left_open(*, in_plane: bool) -> tuple[str, ...]:
+    """What one plane leaves open for an axis that lies in it, or that is the axis of rotation."""
+    if in_plane:
+        return (
+            "misalignment out of the plane",
+            "cross-axis terms with the axis of rotation",
+            "Kpp apart from K2 and bias",
+        )
+    return ("scale", "K2", "K3", "bias apart from scale times the tilt of the axis of rotation")

@@ -1,0 +1,69 @@
+"""What an effect on a transfer function is, and the conditions of the points of a sweep."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from dataclasses import dataclass
+from typing import ClassVar, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+
+
+class Parameter(NamedTuple):
+    """A parameter of an effect: name, unit, bounds, and the values from which a fit starts.
+
+    ``log`` parameters are positive and are fitted by their logarithm.
+    """
+
+    name: str
+    unit: str
+    low: float
+    high: float
+    starts: tuple[float, ...]
+    log: bool = False
+
+
+@dataclass(frozen=True)
+class Conditions:
+    """The points of a sweep, all (n,).
+
+    frequency : Hz · level : peak g · temperature : °C · record_s : duration of the record of a point, s
+    """
+
+    frequency: Array
+    level: Array
+    temperature: Array
+    record_s: Array
+
+    def picked(self, rows: NDArray[np.bool_]) -> Conditions:
+        """Some of the points."""
+        return Conditions(self.frequency[rows], self.level[rows], self.temperature[rows], self.record_s[rows])
+
+
+class TransferEffect(ABC):
+    """A factor of the transfer function, 1 where it does not act. Every module of this package defines one class.
+
+    id : of the module · equation, source : for people · breaker : the measurement that tells it from others
+    """
+
+    id: ClassVar[str]
+    equation: ClassVar[str]
+    source: ClassVar[str]
+    breaker: ClassVar[str]
+
+    @abstractmethod
+    def parameters(self, points: Conditions) -> tuple[Parameter, ...]:
+        """The parameters, with bounds and starts that suit the points."""
+
+    @abstractmethod
+    def factor(self, points: Conditions, values: Array) -> Complex:
+        """The factor (n,) at the points, for parameter values (p,)."""
+
+    def seen(self, points: Conditions) -> bool:
+        """Whether the points can show the effect at all."""
+        del points
+        return True

@@ -1,0 +1,42 @@
+"""A resonance of the mounting between the reference and the device."""
+
+from __future__ import annotations
+
+from typing import ClassVar
+
+import numpy as np
+
+from inertial.dynamics.transfer_effects.base import Array, Complex, Conditions, Parameter, TransferEffect
+
+
+class MountingResonance(TransferEffect):
+    """A resonance of the mounting between the reference and the device."""
+
+    id: ClassVar[str] = "mounting_resonance"
+    equation: ClassVar[str] = "(1 + 2jζr)/(1 − r² + 2jζr), r = f/f_m"
+    source: ClassVar[str] = "transmissibility of a base-excited mass; ISO 5348"
+    breaker: ClassVar[str] = "another torque, adhesive or fixture"
+
+    def parameters(self, points: Conditions) -> tuple[Parameter, ...]:
+        """The parameters."""
+        return (
+            Parameter("mount_hz", "Hz", *_reach(points), _starts(points), log=True),
+            Parameter("mount_damping", "1", 2e-3, 0.5, (0.03,), log=True),
+        )
+
+    def factor(self, points: Conditions, values: Array) -> Complex:
+        """The factor (n,) at the points."""
+        ratio = points.frequency / values[0]
+        return np.asarray(
+            (1.0 + 2j * values[1] * ratio) / (1.0 - ratio**2 + 2j * values[1] * ratio), dtype=np.complex128
+        )
+
+
+def _reach(points: Conditions) -> tuple[float, float]:
+    top = float(points.frequency.max())
+    return 0.05 * top, 20.0 * top
+
+
+def _starts(points: Conditions) -> tuple[float, ...]:
+    top = float(points.frequency.max())
+    return tuple(float(top * share) for share in (*np.geomspace(0.15, 1.0, 12), 2.0, 5.0))

@@ -1,0 +1,28 @@
+"""A moving average of length T, as of a decimating filter: linear phase."""
+
+from __future__ import annotations
+
+from typing import ClassVar
+
+import numpy as np
+
+from inertial.dynamics.transfer_effects.base import Array, Complex, Conditions, Parameter, TransferEffect
+
+
+class MovingAverage(TransferEffect):
+    """A moving average of length T, as of a decimating filter: linear phase."""
+
+    id: ClassVar[str] = "moving_average"
+    equation: ClassVar[str] = "sinc(fT)·exp(−jπfT)"
+    source: ClassVar[str] = "boxcar filter; −3 dB at 0.443/T, delay T/2"
+    breaker: ClassVar[str] = "points up to the first null at 1/T"
+
+    def parameters(self, points: Conditions) -> tuple[Parameter, ...]:
+        """The parameters."""
+        top = float(points.frequency.max())
+        return (Parameter("average_s", "s", 1e-3 / top, 0.98 / top, (0.1 / top, 0.4 / top, 0.8 / top), log=True),)
+
+    def factor(self, points: Conditions, values: Array) -> Complex:
+        """The factor (n,) at the points."""
+        turn = points.frequency * values[0]
+        return np.asarray(np.sinc(turn) * np.exp(-1j * np.pi * turn), dtype=np.complex128)

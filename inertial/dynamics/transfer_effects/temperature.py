@@ -1,0 +1,31 @@
+"""A sensitivity that follows the temperature during the sweep."""
+
+from __future__ import annotations
+
+from typing import ClassVar
+
+import numpy as np
+
+from inertial.dynamics.transfer_effects.base import Array, Complex, Conditions, Parameter, TransferEffect
+
+
+class Temperature(TransferEffect):
+    """A sensitivity that follows the temperature during the sweep."""
+
+    id: ClassVar[str] = "temperature"
+    equation: ClassVar[str] = "1 + kT·(T − mean T)"
+    source: ClassVar[str] = "thermal coefficient of sensitivity"
+    breaker: ClassVar[str] = "the same frequencies at another temperature"
+
+    def parameters(self, points: Conditions) -> tuple[Parameter, ...]:
+        """The parameters."""
+        span = float(np.ptp(points.temperature))
+        return (Parameter("tempco_per_K", "1/K", -0.2 / span, 0.2 / span, (0.0,)),)
+
+    def factor(self, points: Conditions, values: Array) -> Complex:
+        """The factor (n,) at the points."""
+        return np.asarray(1.0 + values[0] * (points.temperature - points.temperature.mean()), dtype=np.complex128)
+
+    def seen(self, points: Conditions) -> bool:
+        """Whether the temperature moved by 0.5 K or more."""
+        return bool(np.all(np.isfinite(points.temperature))) and bool(np.ptp(points.temperature) >= 0.5)

@@ -1,0 +1,221 @@
+"""Fit of a transfer function: sensitivity times effects, each point weighted by its own uncertainty in magnitude and phase."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from itertools import product
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import least_squares
+from scipy.stats import chi2
+
+from inertial.dynamics.transfer_effects import EFFECTS, Conditions, Parameter
+from inertial.errors import NotIdentified
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+Array = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+MOST_STARTS = 60
+SCREENED = 5  # of the starts that are searched from, those with the least residual
+POLISHED = 2  # of them that are carried to the end
+IDENTIFIED_SHARE = 0.2
+"""Largest relative standard uncertainty at which a frequency or damping counts as identified."""
+
+
+@dataclass(frozen=True)
+class Points:
+    """A measured transfer function.
+
+    Attributes
+    ----------
+    conditions : frequency, level, temperature and duration of the points
+    value : (n,), complex, output per g
+    magnitude_error : (n,), standard uncertainty of the magnitude as a share of it, without what all points share
+    phase_error : (n,), standard uncertainty of the phase, rad
+    """
+
+    conditions: Conditions
+    value: Complex
+    magnitude_error: Array
+    phase_error: Array
+
+    def picked(self, rows: NDArray[np.bool_]) -> Points:
+        """Some of the points."""
+        return Points(
+            self.conditions.picked(rows), self.value[rows], self.magnitude_error[rows], self.phase_error[rows]
+        )
+
+
+@dataclass(frozen=True)
+class TransferFit:
+    """A fitted model.
+
+    Attributes
+    ----------
+    effects : ids of the effects besides the sensitivity
+    sensitivity : output per g at low frequency, with the sign of the polarity; sensitivity_error : as a share
+    parameters : of all effects in order; values, errors : (p,), errors of a log parameter are shares of the value
+    chi_square, dof : of the weighted residuals
+    residual : (2n,), weighted: log magnitude, then phase
+    """
+
+    effects: tuple[str, ...]
+    sensitivity: float
+    sensitivity_error: float
+    parameters: tuple[Parameter, ...]
+    values: Array
+    errors: Array
+    chi_square: float
+    dof: int
+    residual: Array
+    covariance: Array = field(repr=False)
+
+    @property
+    def p_value(self) -> float:
+        """Probability of a larger χ² where the model is right."""
+        return float(chi2.sf(self.chi_square, self.dof)) if self.dof > 0 else float("nan")
+
+    def of(self, name: str) -> tuple[float, float, float, float]:
+        """Value, standard uncertainty, and the ends of the 95 % interval of a parameter, in its unit."""
+        k = [p.name for p in self.parameters].index(name)
+        value, error = float(self.values[k]), float(self.errors[k])
+        if not self.parameters[k].log:
+            return value, error, value - 1.96 * error, value + 1.96 * error
+        return (
+            value,
+            value * error,
+            value * float(np.exp(-1.96 * min(error, 20.0))),
+            value * float(np.exp(1.96 * min(error, 20.0))),
+        )
+
+    def identified(self, name: str) -> bool:
+        """Whether a log parameter is known to a fifth, or another differs from 0 by three standard uncertainties."""
+        k = [p.name for p in self.parameters].index(name)
+        if self.parameters[k].log:
+            return bool(self.errors[k] < IDENTIFIED_SHARE)
+        return bool(abs(self.values[k]) > 3.0 * self.errors[k])
+
+    def response(self, conditions: Conditions) -> Complex:
+        """The model at some points, output per g."""
+        return self.sensitivity * factor(self.effects, conditions, self.values)
+
+    def has(self, name: str) -> bool:
+        """Whether the model has a parameter of this name."""
+        return any(p.name == name for p in self.parameters)
+
+
+def factor(effects: Sequence[str], conditions: Conditions, values: Array) -> Complex:
+    """Product of the effects' factors (n,) for parameter values (p,) in order."""
+    out, at = np.ones(len(conditions.frequency), dtype=np.complex128), 0
+    for name in effects:
+        count = len(EFFECTS[name].parameters(conditions))
+        out = out * EFFECTS[name].factor(conditions, values[at : at + count])
+        at += count
+    return out
+
+
+def fit_transfer(points: Points, effects: Sequence[str], near: Mapping[str, float] | None = None) -> TransferFit:
+    """The best fit of a model over several starts.
+
+    Parameters
+    ----------
+    effects : ids of the effects; the sensitivity is always fitted
+    near : values of parameters at which the search starts, by name, as those of a smaller model
+
+    Raises
+    ------
+    NotIdentified
+        The points are fewer than the parameters need.
+    """
+    conditions = points.conditions
+    parameters = tuple(p for name in effects for p in EFFECTS[name].parameters(conditions))
+    if 2 * len(points.value) < len(parameters) + 2:
+        msg = f"transfer function: {len(points.value)} points for {len(parameters) + 1} parameters; sweep more frequencies"
+        raise NotIdentified(msg)
+    low_end = np.argsort(conditions.frequency)[: max(3, len(points.value) // 5)]
+    sign = -1.0 if np.median(np.abs(np.angle(points.value[low_end]))) > 0.5 * np.pi else 1.0
+    log = np.array([p.log for p in parameters], dtype=bool)
+    bounds = _bounds(parameters)
+
+    def residual(x: Array) -> Array:
+        values = np.where(log, np.exp(np.where(log, x[1:], 0.0)), x[1:]) if len(parameters) else x[1:]
+        with np.errstate(all="ignore"):
+            ratio = points.value / (sign * np.exp(x[0]) * factor(effects, conditions, values))
+            out = np.concatenate([np.log(np.abs(ratio)) / points.magnitude_error, np.angle(ratio) / points.phase_error])
+        return np.nan_to_num(np.clip(out, -1e6, 1e6), nan=1e6)
+
+    level = float(np.log(np.median(np.abs(points.value[low_end]))))
+    starts = [np.concatenate([[level], start]) for start in _starts(parameters, near or {}, log)]
+    screened = sorted(starts, key=lambda x: float(np.sum(np.minimum(residual(x) ** 2, 1e4))))[:SCREENED]
+    tried = sorted(
+        (least_squares(residual, x, bounds=bounds, max_nfev=12, x_scale="jac") for x in screened),
+        key=lambda one: one.cost,
+    )
+    done = [
+        least_squares(residual, one.x, bounds=bounds, max_nfev=150, x_scale="jac", xtol=1e-8, ftol=1e-8)
+        for one in tried[:POLISHED]
+    ]
+    best = min(done, key=lambda one: one.cost)
+    values = np.where(log, np.exp(np.where(log, best.x[1:], 0.0)), best.x[1:])
+    covariance = np.asarray(np.linalg.pinv(best.jac.T @ best.jac, rcond=1e-15))
+    errors = np.sqrt(np.maximum(np.diag(covariance), 0.0))
+    left = residual(best.x)
+    return TransferFit(
+        tuple(effects),
+        float(sign * np.exp(best.x[0])),
+        float(errors[0]),
+        parameters,
+        values,
+        errors[1:],
+        float(left @ left),
+        len(left) - len(best.x),
+        left,
+        covariance,
+    )
+
+
+def exchanged(points: Points, fit: TransferFit) -> TransferFit | None:
+    """The solution in which sprung mass and two-pole low-pass change places; None where the model has not both.
+
+    At ζ near 0.7071 both are alike, and a sweep hardly tells which of them is the mass.
+    """
+    if not (fit.has("natural_hz") and fit.has("two_pole_hz")):
+        return None
+    near = {p.name: float(v) for p, v in zip(fit.parameters, fit.values, strict=True)}
+    near |= {"natural_hz": near["two_pole_hz"], "two_pole_hz": near["natural_hz"], "damping": float(np.sqrt(0.5))}
+    return fit_transfer(points, fit.effects, near)
+
+
+def best_of_exchange(points: Points, fit: TransferFit) -> tuple[TransferFit, TransferFit | None]:
+    """The better of both solutions, and the other one where the points do not exclude it (χ² less than 9 larger)."""
+    other = exchanged(points, fit)
+    if other is None or abs(np.log(other.of("natural_hz")[0] / fit.of("natural_hz")[0])) < 0.02:
+        return fit, None
+    first, second = sorted((fit, other), key=lambda one: one.chi_square)
+    return first, second if second.chi_square - first.chi_square < 9.0 else None
+
+
+def _bounds(parameters: Sequence[Parameter]) -> tuple[Array, Array]:
+    low = [-np.inf, *(np.log(p.low) if p.log else p.low for p in parameters)]
+    high = [np.inf, *(np.log(p.high) if p.log else p.high for p in parameters)]
+    return np.array(low), np.array(high)
+
+
+def _starts(parameters: Sequence[Parameter], near: Mapping[str, float], log: NDArray[np.bool_]) -> list[Array]:
+    """Combinations of the parameters' starts, thinned; parameters with a known value start there alone."""
+    choices = [(near[p.name],) if p.name in near else p.starts for p in parameters]
+    whole = list(product(*choices))
+    step = max(1, -(-len(whole) // MOST_STARTS))
+    found: list[Array] = []
+    for one in whole[::step]:
+        clipped = [
+            min(max(value, p.low * (1.0 + 1e-9) if p.log else p.low), p.high)
+            for value, p in zip(one, parameters, strict=True)
+        ]
+        x = np.array(clipped, dtype=np.float64)
+        found.append(np.where(log, np.log(np.where(log, x, 1.0)), x) if len(x) else x)
+    return found

@@ -1,0 +1,162 @@
+"""A transfer function that was measured elsewhere: points from a CSV, judged as those of a sweep are."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pandas as pd
+
+from inertial.dynamics.transfer_diagnosis import diagnose_transfer
+from inertial.dynamics.transfer_effects import EFFECTS, Conditions
+from inertial.dynamics.transfer_model import Points
+from inertial.errors import InertialError
+from pipelines.archive import Archive, code_hash, stage_key
+from pipelines.importers import files
+from pipelines.importers.documents import TransferImport, TransferParameter
+from pipelines.procedures.columns import finding_table, gathered_points
+from pipelines.procedures.transfer_figures import bandwidth_of, diagnosis_text
+from schemas.errors import DataRejected, WrongUse, did_you_mean
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+    from pathlib import Path
+
+    from pipelines.archive import Run
+
+NEEDED = ("frequency_hz", "magnitude", "phase_deg", "magnitude_uncertainty_percent", "phase_uncertainty_deg")
+OPTIONAL = {"level_g": 1.0, "temperature_C": np.nan, "record_s": np.nan}
+FEWEST = 8
+
+
+def transfer_points(table: pd.DataFrame, name: str) -> Points:
+    """The points of a table with the columns of :data:`NEEDED`, each with its unit in its name.
+
+    Parameters
+    ----------
+    name : of the file, for messages
+
+    Raises
+    ------
+    DataRejected
+        A column is missing, a value is not a finite number, or there are fewer than eight points.
+    """
+    missing = [one for one in NEEDED if one not in table.columns]
+    if missing:
+        found = ", ".join(map(str, table.columns)) or "none"
+        raise DataRejected(
+            f"{name}: column {', '.join(missing)} is missing, found {found}; a transfer function needs its units in the "
+            "names of its columns; rename them"
+        )
+    columns: dict[str, Any] = {}
+    for one in (*NEEDED, *OPTIONAL):
+        there = one in table.columns
+        values = pd.to_numeric(table[one], errors="coerce") if there else pd.Series(OPTIONAL[one], index=table.index)
+        columns[one] = values.to_numpy(dtype=float)
+        bad = np.flatnonzero(~np.isfinite(columns[one])) if there else np.zeros(0)
+        if bad.size:
+            raise DataRejected(
+                f"{name}: row {int(bad[0]) + 1}, column {one}: a finite number is needed; correct the row"
+            )
+    for one in ("frequency_hz", "magnitude", "magnitude_uncertainty_percent", "phase_uncertainty_deg"):
+        if not np.all(columns[one] > 0.0):
+            row = int(np.flatnonzero(columns[one] <= 0.0)[0]) + 1
+            raise DataRejected(f"{name}: row {row}, column {one}: a value above 0 is needed; correct the row")
+    if len(table) < FEWEST:
+        raise DataRejected(f"{name}: {len(table)} points, at least {FEWEST} are needed; measure more frequencies")
+    conditions = Conditions(columns["frequency_hz"], columns["level_g"], columns["temperature_C"], columns["record_s"])
+    value = columns["magnitude"] * np.exp(1j * np.radians(columns["phase_deg"]))
+    error = 1e-2 * columns["magnitude_uncertainty_percent"], np.radians(columns["phase_uncertainty_deg"])
+    return Points(conditions, value, *error)
+
+
+def import_transfer(
+    path: Path, unit: str, effects: Sequence[str] = ("second_order", "delay"), archive: str | None = None
+) -> TransferImport:
+    """The diagnosis of a transfer function in a file; points, findings and source are kept as a run of the archive.
+
+    Raises
+    ------
+    WrongUse
+        An effect is not known.
+    DataRejected
+        The file, or its points, cannot be judged.
+    """
+    for name in effects:
+        if name not in EFFECTS:
+            raise WrongUse(f"import: no effect '{name}' of transfer functions; {did_you_mean(name, EFFECTS)}")
+    table, source = files.read(path)
+    points = transfer_points(table, path.name)
+    try:
+        found = diagnose_transfer(points, effects)
+    except InertialError as problem:
+        raise DataRejected(f"{path.name}: {problem}") from None
+    fit = found.extended
+    bandwidth = bandwidth_of(fit, fit.values, float(points.conditions.frequency.max()))
+    parameters: dict[str, TransferParameter] = {}
+    for p in fit.parameters:
+        value, error, low, high = fit.of(p.name)
+        known = fit.identified(p.name)
+        parameters[p.name] = TransferParameter(
+            value=value, uncertainty=error, low=low, high=high, unit=p.unit, identified=known
+        )
+    text = diagnosis_text(found)
+    run = _keep(points, source, unit, list(effects), text, archive)
+    return {
+        "run": run.id,
+        "unit": unit,
+        "points": len(points.value),
+        "adequate": found.adequate,
+        "reason": found.reason,
+        "model": list(found.fit.effects),
+        "p_value": found.fit.p_value,
+        "error_percent": found.error_percent,
+        "extended_percent": found.extended_percent,
+        "left_out": list(found.left_out),
+        "where": [
+            {"low_hz": one.low_hz, "high_hz": one.high_hz, "part": one.part, "share": one.share} for one in found.where
+        ],
+        "classes": [{"effects": list(one.effects), "p_value": one.p_value} for one in found.classes],
+        "recommended": list(found.recommended),
+        "unexplained": found.unexplained,
+        "sensitivity": fit.sensitivity,
+        "bandwidth_hz": bandwidth,
+        "parameters": parameters,
+        "next_hz": list(found.next_hz),
+        "text": [f"{subject}: {one}" for subject, one in text],
+    }
+
+
+def _keep(
+    points: Points,
+    source: files.SourceFile,
+    unit: str,
+    effects: list[str],
+    text: Sequence[tuple[str, str]],
+    archive: str | None,
+) -> Run:
+    """The run that holds the import, with a manifest that names the source."""
+    inputs, parameters = {"source": source.sha256}, {"procedure": "sweep", "effects": effects, "unit": unit}
+    code = code_hash(("pipelines.importers.transfer", "inertial.dynamics.transfer_diagnosis"))
+    key = stage_key("import", inputs, parameters, code)
+    about = {
+        "name": f"transfer function of {unit}",
+        "source": source.as_dict(),
+        "lot": {"device": "imported", "units": [{"serial": unit, "slot": 0}]},
+    }
+    run = Archive(archive).open_run("import", about, {"key": key})
+    size, c = np.abs(points.value), points.conditions
+    rows = pd.DataFrame(
+        {
+            "unit": unit, "axis": "z", "series": "response", "point": np.arange(len(size)), "setting": c.frequency, "value": size,
+            "uncertainty": size * points.magnitude_error, "phase_deg": np.degrees(np.angle(points.value)),
+            "phase_uncertainty_deg": np.degrees(points.phase_error), "level_g": c.level, "temperature_C": c.temperature,
+            "record_s": c.record_s,
+        }
+    )  # fmt: skip
+    findings = [{"unit": unit, "procedure": "sweep", "number": 0, "subject": a, "text": b} for a, b in text]
+    tables = {"procedure_points": gathered_points([(0, "sweep", rows)]), "procedure_findings": finding_table(findings)}
+    if not run.has(tuple(tables), key):
+        run.save("import", key, tables, {"inputs": inputs, "parameters": parameters, "code": code})
+    run.seal()
+    return run

@@ -1,0 +1,148 @@
+"""Test procedures: each module of this package is one procedure and is found here.
+
+A recipe lists the procedures of a lot in order, as tables ``[[procedures]]`` with the key ``kind``. Nothing else names a
+procedure: recipes, capture, the stage ``procedures``, limits, the report and the reference read :data:`PROCEDURES`.
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from pkgutil import iter_modules
+from typing import TYPE_CHECKING, Any
+
+from pydantic import ValidationError
+
+from pipelines.procedures.base import FigureSpec, Part, Procedure, ProcedureStep
+from schemas.errors import RecipeInvalid, close_matches, did_you_mean
+from schemas.recipe import explain
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from schemas.recipe import Recipe
+    from schemas.station import StationConfig
+
+__all__ = [
+    "FIGURES",
+    "PROCEDURES",
+    "FigureSpec",
+    "IncompleteProcedure",
+    "Part",
+    "Procedure",
+    "ProcedureStep",
+    "figures_of_recipe",
+    "parts_of",
+    "refuse_unusable",
+    "roles_of",
+    "steps_of",
+]
+
+MULTI_POSITION = "multi_position"
+SHARED = ("base", "columns", "recorded", "transfer_figures", "transfer_plots")
+
+
+class IncompleteProcedure(Exception):
+    """A module that defines no procedure, or one whose name or figure another has: its author repairs the module."""
+
+
+def find_procedures(package: str, path: Any) -> dict[str, Procedure]:
+    """The procedures that the modules of a package define, by name in the order of the reference.
+
+    Raises
+    ------
+    IncompleteProcedure
+        A module has no PROCEDURE, or two have one name, or one figure.
+    """
+    found: list[Procedure] = []
+    for info in iter_modules(path):
+        if info.name in SHARED or info.ispkg:
+            continue
+        one = getattr(import_module(f"{package}.{info.name}"), "PROCEDURE", None)
+        if not isinstance(one, Procedure) or one.name != info.name:
+            raise IncompleteProcedure(
+                f"{package}.{info.name}: no PROCEDURE of this name, one is needed; define PROCEDURE = … with name = '{info.name}'"
+            )
+        found.append(one)
+    figures = [figure.name for one in found for figure in one.figures]
+    twice = sorted({name for name in figures if figures.count(name) > 1})
+    if twice:
+        raise IncompleteProcedure(f"{package}: figure {', '.join(twice)} is declared twice; rename one")
+    return {one.name: one for one in sorted(found, key=lambda one: (one.order, one.name))}
+
+
+PROCEDURES: Mapping[str, Procedure] = find_procedures(__name__, __path__)
+FIGURES: Mapping[str, FigureSpec] = {f.name: f for one in PROCEDURES.values() for f in one.figures}
+"""Every figure that limits may name because a procedure determines it."""
+
+
+def parts_of(recipe: Recipe) -> list[Part]:
+    """The parts of a recipe's list of procedures, checked.
+
+    Raises
+    ------
+    RecipeInvalid
+        A procedure is not known, or a key of its part is not usable.
+    """
+    parts: list[Part] = []
+    for number, content in enumerate(recipe.procedures, start=1):
+        where = f"recipe: procedures, number {number}"
+        kind = str(content.get("kind", ""))
+        if kind not in PROCEDURES:
+            raise RecipeInvalid(
+                f"{where}: kind '{kind}'; {did_you_mean(kind, PROCEDURES)}",
+                key="kind",
+                close=close_matches(kind, PROCEDURES),
+            )
+        try:
+            parts.append(PROCEDURES[kind].part.model_validate(content))
+        except ValidationError as problem:
+            raise explain(problem, f"{where} ({kind})", PROCEDURES[kind].part) from None
+    return parts
+
+
+def steps_of(recipe: Recipe) -> list[tuple[int, ProcedureStep]]:
+    """Every step of a recipe's procedures in order, each with the number of its procedure in the list, from 0."""
+    return [
+        (number, step)
+        for number, part in enumerate(parts_of(recipe))
+        for step in PROCEDURES[part.kind].steps(part, recipe)
+    ]
+
+
+def roles_of(recipe: Recipe) -> tuple[str, ...]:
+    """The roles that a recipe's procedures need of a station, besides table, chamber and reader."""
+    return tuple(dict.fromkeys(role for part in parts_of(recipe) for role in PROCEDURES[part.kind].roles))
+
+
+def figures_of_recipe(recipe: Recipe) -> dict[str, FigureSpec]:
+    """The figures that a recipe's procedures determine."""
+    return {f.name: f for part in parts_of(recipe) for f in PROCEDURES[part.kind].figures}
+
+
+def refuse_unusable(recipe: Recipe, station: StationConfig) -> None:
+    """Refuse procedures that the station cannot perform, before anything moves.
+
+    Raises
+    ------
+    RecipeInvalid
+        The station lacks a role, a level is beyond it, or the list contradicts the recipe's other keys.
+    """
+    kinds = [part.kind for part in parts_of(recipe)]
+    if kinds and recipe.static_record_s > 0.0 and "static_record" not in kinds:
+        raise RecipeInvalid(
+            f"recipe: static_record_s is {recipe.static_record_s:g} s and 'procedures' lists no "
+            f"static_record, both are needed for "
+            "the record; add the procedure, or set static_record_s = 0",
+            key="procedures",
+        )
+    for number, part in enumerate(parts_of(recipe), start=1):
+        procedure = PROCEDURES[part.kind]
+        for role in procedure.roles:
+            if role not in station.fitted():
+                raise RecipeInvalid(
+                    f"recipe: procedures, number {number} ({part.kind}): station {station.name} has "
+                    f"no {role}, one is needed; add "
+                    f"[equipment.{role}] to the station's file, or measure on another station",
+                    key="procedures",
+                )
+        procedure.check(part, recipe, station)

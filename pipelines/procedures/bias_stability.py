@@ -1,0 +1,153 @@
+"""Bias stability over an hour in one pose, by its several definitions."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
+
+import numpy as np
+from pydantic import Field
+
+from inertial.dynamics.stability import block_means, stability
+from pipelines.procedures.base import (
+    Device,
+    FigureSpec,
+    FigureValue,
+    Finding,
+    NominalScale,
+    Outcome,
+    Part,
+    Procedure,
+    ProcedureRecord,
+    ProcedureStep,
+    scale_of,
+    worst,
+)
+from pipelines.procedures.columns import points
+from schemas.bounds import Positive
+from schemas.recipe import Pose
+from schemas.units import AXES
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    import pandas as pd
+    from matplotlib.figure import Figure as Drawing
+
+    from schemas.recipe import Recipe
+    from schemas.station import StationConfig
+
+MICRO = 1e6
+
+
+class BiasStabilityPart(NominalScale):
+    """One record in one pose; ``settle_s`` after the soak is not recorded."""
+
+    kind: Literal["bias_stability"]
+    lasting_s: Annotated[Positive, Field(ge=1000.0, le=86400.0)] = 3600.0
+    rate_hz: Annotated[Positive, Field(ge=1.0, le=1000.0)] = 10.0
+    temperature_C: Annotated[float, Field(ge=-100.0, le=200.0)] = 25.0
+    pose_deg: tuple[float, float] = (0.0, 0.0)
+
+
+class BiasStability(Procedure):
+    """A bias record of an hour."""
+
+    name: ClassVar[str] = "bias_stability"
+    title: ClassVar[str] = "Bias stability"
+    order: ClassVar[int] = 40
+    states: ClassVar[str] = (
+        "standard deviation of 100 s means, drift per hour, Allan deviation at 100 s, and the other definitions"
+    )
+    source: ClassVar[str] = (
+        "IEEE Std 528 for the terms; definitions differ by up to thirty times for one unit, so each is named"
+    )
+    part: ClassVar[type[Part]] = BiasStabilityPart
+    figures: ClassVar[tuple[FigureSpec, ...]] = (
+        FigureSpec("bias_stability_ug", "µg", "standard deviation of 100 s means over the record, worst axis"),
+        FigureSpec("bias_drift_ug_h", "µg/h", "slope of the record, worst axis"),
+        FigureSpec("bias_allan_100s_ug", "µg", "Allan deviation at 100 s, worst axis; it hides a ramp"),
+    )
+
+    def steps(self, part: BiasStabilityPart, recipe: Recipe) -> list[ProcedureStep]:
+        """One record."""
+        del recipe
+        pose = Pose(name="stability", outer_deg=part.pose_deg[0], inner_deg=part.pose_deg[1])
+        return [ProcedureStep(pose.name, pose, part.temperature_C, lasting_s=part.lasting_s, rate_hz=part.rate_hz)]
+
+    def check(self, part: BiasStabilityPart, recipe: Recipe, station: StationConfig) -> None:
+        """Refuse a list without a scale."""
+        del station
+        part.require_scale(recipe)
+
+    def reduce(self, part: BiasStabilityPart, records: Sequence[ProcedureRecord], device: Device) -> pd.DataFrame:
+        """Means of 1 s in µg from the start of the record; the points keep those of 10 s besides."""
+        rows: list[dict[str, Any]] = []
+        for record in records:
+            for unit in record.readings["unit"]:
+                own = record.samples.get(str(unit))
+                if own is None:
+                    continue
+                scale = scale_of(part, device, str(unit))
+                for i, axis in enumerate(AXES):
+                    second = block_means(own.output[:, i], round(part.rate_hz)) / scale[i] * MICRO
+                    time = own.time[0] + np.arange(second.size) * round(part.rate_hz) / part.rate_hz
+                    white = second.std(ddof=1) if second.size > 1 else np.nan
+                    rows += [
+                        {
+                            "unit": unit, "axis": axis, "series": "mean_1s", "point": k, "setting": t - time[0],
+                            "value": value, "uncertainty": white,
+                        }
+                        for k, (t, value) in enumerate(zip(time, second, strict=True))
+                    ]  # fmt: skip
+        return points(rows)
+
+    def evaluate(self, part: BiasStabilityPart, points: pd.DataFrame, device: Device) -> Outcome:
+        """Figures of the worst axis; every definition as a finding, so that numbers of others can be compared."""
+        del device
+        figures: dict[str, list[FigureValue]] = {}
+        findings: list[Finding] = []
+        for unit, rows in points.groupby("unit", sort=False):
+            seconds = round(part.rate_hz) / part.rate_hz
+            by_axis = {
+                str(axis): stability(own["value"].to_numpy(dtype=float), 1.0 / seconds)
+                for axis, own in rows.groupby("axis", sort=False)
+            }
+            figures[str(unit)] = [
+                worst(
+                    [
+                        FigureValue(name, axis, getattr(one, key), getattr(one, f"{key}_error"))
+                        for axis, one in by_axis.items()
+                    ]
+                )
+                for name, key in (
+                    ("bias_stability_ug", "sd_100s"),
+                    ("bias_drift_ug_h", "drift_h"),
+                    ("bias_allan_100s_ug", "allan_100s"),
+                )
+            ]
+            for axis, one in by_axis.items():
+                text = (
+                    f"axis {axis}, µg: standard deviation of 1 s means {one.sd_1s:.4g}, of 100 s "
+                    f"means {one.sd_100s:.4g}; range of "
+                    f"1 s means {one.range_1s:.4g}, of 100 s means {one.range_100s:.4g}; Allan deviation at 100 s "
+                    f"{one.allan_100s:.4g}; drift {one.drift_h:.4g} ± {2.0 * one.drift_h_error:.2g} µg/h (k = 2)"
+                )
+                findings.append(Finding(str(unit), "definitions of bias stability", text))
+        return Outcome(figures, findings)
+
+    def draw(self, drawing: Drawing, part: BiasStabilityPart, points: pd.DataFrame) -> None:
+        """Means of 1 s and of 100 s of every axis over time, each about its mean."""
+        del part
+        place = drawing.subplots()
+        for axis, colour in zip(AXES, ("#0072b2", "#d55e00", "#009e73"), strict=True):
+            own = points[points["axis"] == axis]
+            time, value = own["setting"].to_numpy() / 60.0, own["value"].to_numpy()
+            value = value - value.mean()
+            place.plot(block_means(time, 10), block_means(value, 10), "-", lw=0.5, c=colour, alpha=0.35)
+            hundred = block_means(value, 100)
+            place.plot(block_means(time, 100), hundred, "-", lw=1.6, c=colour, label=f"axis {axis}, 100 s means")
+        place.set(xlabel="time / min", ylabel="output about its mean / µg")
+        place.legend(frameon=False, loc="upper right", ncols=3)
+
+
+PROCEDURE = BiasStability()

@@ -1,0 +1,51 @@
+"""Tables that procedures write: points, figures and findings, made from rows."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import pandas as pd
+
+from pipelines.tables.frames import empty_table
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Mapping, Sequence
+
+POINT_TEXTS, POINT_NUMBERS, POINT_WHOLE = "unit procedure axis series", "setting value uncertainty", "number point"
+FIGURE_TEXTS, FIGURE_NUMBERS = "unit procedure figure axis unit_text note", "value uncertainty low high"
+
+
+def points(rows: Iterable[Mapping[str, Any]]) -> pd.DataFrame:
+    """Points from rows with unit, axis, series, point, setting, value, uncertainty and further numbers."""
+    found = list(rows)
+    if not found:
+        return pd.DataFrame(
+            {
+                **{name: pd.Series([], dtype="str") for name in ("unit", "axis", "series")},
+                "point": pd.Series([], dtype="int64"),
+            }
+            | {name: pd.Series([], dtype="float64") for name in POINT_NUMBERS.split()}
+        )
+    return pd.DataFrame(found)
+
+
+def gathered_points(parts: Sequence[tuple[int, str, pd.DataFrame]]) -> pd.DataFrame:
+    """The table ``procedure_points`` of all procedures of a recipe."""
+    frames = [frame.assign(number=number, procedure=name) for number, name, frame in parts if len(frame)]
+    if not frames:
+        return empty_table(texts=POINT_TEXTS, numbers=POINT_NUMBERS, whole=POINT_WHOLE)
+    return pd.concat(frames, ignore_index=True)
+
+
+def figure_table(rows: Sequence[Mapping[str, Any]]) -> pd.DataFrame:
+    """The table ``procedure_figures``."""
+    if not rows:
+        return empty_table(texts=FIGURE_TEXTS, numbers=FIGURE_NUMBERS, whole="number", flags="identified")
+    return pd.DataFrame(list(rows))
+
+
+def finding_table(rows: Sequence[Mapping[str, Any]]) -> pd.DataFrame:
+    """The table ``procedure_findings``."""
+    if not rows:
+        return empty_table(texts="unit procedure subject text", whole="number")
+    return pd.DataFrame(list(rows))

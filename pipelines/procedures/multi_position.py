@@ -1,0 +1,65 @@
+"""The multi-position test: static dwells over poses and temperatures, reduced and fitted by the stages of the chain."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, ClassVar, Literal
+
+import pandas as pd
+
+from pipelines.procedures.base import Device, Outcome, Part, Procedure, ProcedureRecord, ProcedureStep
+from pipelines.procedures.columns import points
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from schemas.recipe import Recipe
+
+
+class MultiPositionPart(Part):
+    """Poses, temperatures, dwells and the model are keys of the recipe itself."""
+
+    kind: Literal["multi_position"]
+
+
+class MultiPosition(Procedure):
+    """Static dwells over poses and temperatures."""
+
+    name: ClassVar[str] = "multi_position"
+    title: ClassVar[str] = "Multi-position test"
+    order: ClassVar[int] = 10
+    states: ClassVar[str] = (
+        "bias, scale, misalignment, nonlinearity and their temperature coefficients, by the recipe's model"
+    )
+    source: ClassVar[str] = "IEEE Std 1293, multi-position tumble test; ISO 16063-16 for the reference"
+    part: ClassVar[type[Part]] = MultiPositionPart
+
+    def steps(self, part: Any, recipe: Recipe) -> list[ProcedureStep]:
+        """Per temperature the poses of the fit, then those for verification."""
+        del part
+        found: list[ProcedureStep] = []
+        for soak, temperature in enumerate(recipe.temperatures_C):
+            poses, waits, settled = recipe.poses_at(soak), recipe.waits_at(soak), recipe.settles_at(soak)
+            for pose, wait, off in zip(poses, waits, recipe.off_at(soak), strict=True):
+                found.append(
+                    ProcedureStep(
+                        pose.name, pose, temperature, "dwell", wait_s=wait, off_s=off, soak=soak, settled=settled
+                    )
+                )
+            found += [
+                ProcedureStep(pose.name, pose, temperature, "verification", soak=soak, settled=settled)
+                for pose in recipe.verification_at(soak)
+            ]
+        return found
+
+    def reduce(self, part: Any, records: Sequence[ProcedureRecord], device: Device) -> pd.DataFrame:
+        """Nothing: the stages ``reduce``, ``fit`` and ``verify`` do it."""
+        del part, records, device
+        return points([])
+
+    def evaluate(self, part: Any, points: pd.DataFrame, device: Device) -> Outcome:
+        """Nothing: the stage ``grade`` computes the figures of the calibration."""
+        del part, points, device
+        return Outcome({})
+
+
+PROCEDURE = MultiPosition()

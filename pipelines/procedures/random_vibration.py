@@ -1,0 +1,278 @@
+"""Random vibration by a profile: density of the reference against its tolerance, and the vibration rectification of the units."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
+
+import numpy as np
+from pydantic import Field, field_validator
+from scipy.signal import welch
+
+from inertial.dynamics.random_vibration import interpolated, overall_level, rectification
+from inertial.dynamics.spectra import HANN_HALF, density_confidence, hann_mean
+from pipelines.procedures.base import (
+    REFERENCE,
+    Device,
+    FigureSpec,
+    FigureValue,
+    Finding,
+    NominalScale,
+    Outcome,
+    Part,
+    Procedure,
+    ProcedureRecord,
+    ProcedureStep,
+    scale_of,
+)
+from pipelines.procedures.columns import points as point_table
+from schemas.bounds import Positive
+from schemas.recipe import Pose
+from schemas.units import AXES
+from schemas.vibration_profile import load_vibration_profile, vibration_profiles
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    import pandas as pd
+    from matplotlib.figure import Figure as Drawing
+
+    from schemas.recipe import Recipe
+    from schemas.station import StationConfig
+
+MICRO = 1e6
+REST_S = 0.8  # used of the second of rest before and after
+GUARD_S = 0.2  # left out at the ends of the vibration
+LINE_DB, OVERALL = 3.0, 0.10  # tolerances of IEC 60068-2-64
+SEGMENT_S = 0.2
+
+
+class RandomVibrationPart(NominalScale):
+    """Three levels or more, each with rest before and after in one recording; ``levels_g`` are overall g rms."""
+
+    kind: Literal["random_vibration"]
+    profile: str = "flat_20_2000"
+    levels_g: Annotated[list[Positive], Field(min_length=3, max_length=20)] = Field(
+        default_factory=lambda: [2.0, 4.0, 6.0]
+    )
+    seconds: Annotated[Positive, Field(ge=2.0, le=60.0)] = 10.0
+    axis: Literal["x", "y", "z"] = "z"
+    window_s: Positive = 10.0
+    temperature_C: Annotated[float, Field(ge=-100.0, le=200.0)] = 25.0
+
+    @field_validator("profile")
+    @classmethod
+    def _known(cls, name: str) -> str:
+        if name not in vibration_profiles():
+            raise ValueError(f"no vibration profile '{name}', {', '.join(vibration_profiles())} are there; choose one")
+        return name
+
+
+class RandomVibration(Procedure):
+    """Gaussian vibration by a profile."""
+
+    name: ClassVar[str] = "random_vibration"
+    title: ClassVar[str] = "Random vibration"
+    order: ClassVar[int] = 115
+    states: ClassVar[str] = (
+        "vibration rectification over g rms² at three levels or more; density of the reference against tolerance"
+    )
+    source: ClassVar[str] = (
+        "IEC 60068-2-64 (tolerances), IEEE Std 1293 (rectification); profiles as files in schemas/vibration"
+    )
+    roles: ClassVar[tuple[str, ...]] = ("exciter",)
+    part: ClassVar[type[Part]] = RandomVibrationPart
+    figures: ClassVar[tuple[FigureSpec, ...]] = (
+        FigureSpec(
+            "vibration_rectification_ug_g2",
+            "µg/g²",
+            "shift of the mean by vibration over g rms², line through the origin",
+        ),
+    )
+
+    def steps(self, part: RandomVibrationPart, recipe: Recipe) -> list[ProcedureStep]:
+        """One recording at each level."""
+        del recipe
+        pose = Pose(name="exciter", outer_deg=0.0, inner_deg=0.0)
+        return [
+            ProcedureStep(
+                f"{part.profile}, {level:g} g rms",
+                pose,
+                part.temperature_C,
+                lasting_s=part.seconds,
+                role="exciter",
+                setting={
+                    "level_g": level,
+                    "axis": float(AXES.index(part.axis)),
+                    "profile": float(vibration_profiles().index(part.profile)),
+                },
+            )
+            for level in part.levels_g
+        ]
+
+    def check(self, part: RandomVibrationPart, recipe: Recipe, station: StationConfig) -> None:
+        """Refuse a list without a scale."""
+        del station
+        part.require_scale(recipe)
+
+    def measure(self, equipment: Any, step: ProcedureStep, slots: Sequence[int]) -> Any:
+        """One level of the controller's profile."""
+        one = step.setting
+        profile = vibration_profiles()[int(one["profile"])]
+        return equipment.random(profile, one["level_g"], int(one["axis"]), step.lasting_s or 0.0, slots)
+
+    def reduce(self, part: RandomVibrationPart, records: Sequence[ProcedureRecord], device: Device) -> pd.DataFrame:
+        """Shift of the mean of every unit at every level, and the density of the reference at the largest level."""
+        axis = AXES.index(part.axis)
+        rows: list[dict[str, Any]] = []
+        for k, record in enumerate(records):
+            reference = record.samples[REFERENCE]
+            rate = reference.rate_hz
+            driven = reference.output[
+                round((1.0 + GUARD_S) * rate) : round((1.0 + part.seconds - GUARD_S) * rate), axis
+            ]
+            level = float(np.sqrt(np.mean((driven - driven.mean()) ** 2)))
+            for unit in record.readings["unit"]:
+                own = record.samples.get(str(unit))
+                if own is None:
+                    continue
+                scale = scale_of(part, device, str(unit))[axis]
+                shift, error = _shift(own.output[:, axis] / scale, own.rate_hz, part.seconds)
+                clipped = int(np.count_nonzero(np.abs(own.output[:, axis]) >= device.full_scale))
+                silent = float(np.std(own.output[:, axis])) < 0.2 * level * scale
+                rows.append(
+                    {
+                        "unit": unit, "axis": part.axis, "series": "shift", "point": k, "setting": level,
+                        "value": np.nan if silent else MICRO * shift, "uncertainty": MICRO * error, "clipped": float(clipped),
+                        "ordered_g": record.step.setting["level_g"],
+                    }
+                )  # fmt: skip
+                if k == len(records) - 1:
+                    rows += [one | {"unit": unit, "axis": part.axis} for one in _density(driven, rate)]
+        return point_table(rows)
+
+    def evaluate(self, part: RandomVibrationPart, points: pd.DataFrame, device: Device) -> Outcome:
+        """Slope over g rms², its straightness tested; none where samples are clipped, which imitates it."""
+        del device
+        figures: dict[str, list[FigureValue]] = {}
+        findings: list[Finding] = []
+        name = "vibration_rectification_ug_g2"
+        for unit, rows in points[points["series"] == "shift"].groupby("unit", sort=False):
+            clipped = int(rows["clipped"].sum())
+            note = ""
+            if clipped:
+                note = (
+                    f"{clipped} samples are clipped, which shifts the mean as rectification does; lower "
+                    f"the levels, or choose a wider range"
+                )
+            elif bool(rows["value"].isna().any()):
+                note = "the output does not follow the vibration; check cable and mounting"
+            if note:
+                figures[str(unit)] = [FigureValue(name, part.axis, np.nan, np.nan, identified=False, note=note)]
+                continue
+            level, shift, error = (rows[one].to_numpy(dtype=float) for one in ("setting", "value", "uncertainty"))
+            value, spread, chi_square = rectification(level, shift, error)
+            figures[str(unit)] = [FigureValue(name, part.axis, value, spread)]
+            text = (
+                f"χ² {chi_square:.2g} for {len(rows) - 1} degrees of freedom of the line through the origin over g rms²"
+            )
+            findings.append(Finding(str(unit), "straightness", text))
+        findings += _tolerance(part, points)
+        return Outcome(figures, findings)
+
+    def draw(self, drawing: Drawing, part: RandomVibrationPart, points: pd.DataFrame) -> None:
+        """Density of the reference with the tolerance band, and the shift of the mean over g rms²."""
+        left, right = drawing.subplots(1, 2)
+        density = points[points["series"] == "density"]
+        f = density["setting"].to_numpy(dtype=float)
+        target = _target(part, points, f)
+        left.fill_between(
+            f, target * 10.0 ** (-LINE_DB / 10.0), target * 10.0 ** (LINE_DB / 10.0), color="#dddddd", label="± 3 dB"
+        )
+        left.plot(f, density["value"], lw=0.9, c="#0072b2", label="reference")
+        left.set(xscale="log", yscale="log", xlabel="frequency / Hz", ylabel="density / (g²/Hz)")
+        for axis in (left.xaxis, left.yaxis):
+            axis.set_major_formatter("{x:g}")
+        left.minorticks_off()
+        left.legend(frameon=False, loc="lower left")
+        shift = points[points["series"] == "shift"]
+        x = shift["setting"].to_numpy(dtype=float) ** 2
+        right.errorbar(
+            x,
+            shift["value"],
+            2.0 * shift["uncertainty"],
+            fmt="o",
+            ms=4,
+            lw=0.9,
+            c="#0072b2",
+            label="measured, U (k = 2)",
+        )
+        if bool(shift["value"].notna().all()):
+            level, value, error = (shift[one].to_numpy(dtype=float) for one in ("setting", "value", "uncertainty"))
+            slope = rectification(level, value, error)[0]
+            right.plot([0.0, x.max()], [0.0, slope * x.max()], c="#d55e00", lw=1.1, label="line through the origin")
+        right.set(xlabel="level² / g²", ylabel="shift of the mean / µg")
+        right.legend(frameon=False)
+
+
+def _shift(output: np.ndarray, rate_hz: float, seconds: float) -> tuple[float, float]:
+    """Hann-weighted mean in vibration minus the mean at rest, g; standard uncertainty from the noise at rest."""
+    n = round(REST_S * rate_hz)
+    begin, end = round((1.0 + GUARD_S) * rate_hz), round((1.0 + seconds - GUARD_S) * rate_hz)
+    before, after = output[:n], output[-n // 2 :]
+    rest = 0.5 * (before.mean() + after.mean())
+    noise = float(np.hypot(before.std(ddof=1) / np.sqrt(before.size), after.std(ddof=1) / np.sqrt(after.size)) / 2.0)
+    during = float(hann_mean(output[begin:end][:, None])[0])
+    white = float(before.std(ddof=1)) * np.sqrt(
+        1.5 / (end - begin)
+    )  # a Hann weight has 1.5 times the variance of a plain mean
+    return during - rest, float(np.hypot(noise, white))
+
+
+def _density(driven: np.ndarray, rate_hz: float) -> list[dict[str, Any]]:
+    """Density of the reference up to 2.2 kHz, thinned to lines of the segments."""
+    segment = round(SEGMENT_S * rate_hz)
+    f, p = welch(driven, rate_hz, nperseg=segment, noverlap=segment // 2)
+    count = HANN_HALF * ((driven.size - segment // 2) // (segment - segment // 2))
+    inside = (f >= 1.0) & (f <= 2200.0)
+    share = 1.0 / np.sqrt(count)
+    return [
+        {
+            "series": "density", "point": k, "setting": float(a), "value": float(b), "uncertainty": float(b * share),
+            "averages": float(count),
+        }
+        for k, (a, b) in enumerate(zip(f[inside], p[inside], strict=True))
+    ]  # fmt: skip
+
+
+def _target(part: RandomVibrationPart, points: pd.DataFrame, f: np.ndarray) -> np.ndarray:
+    """The ordered density at the largest level."""
+    profile = np.array(load_vibration_profile(part.profile).breakpoints)
+    whole = overall_level(profile[:, 0], profile[:, 1])
+    level = float(points.loc[points["series"] == "shift", "ordered_g"].iloc[-1])
+    return interpolated(f, profile[:, 0], profile[:, 1]) * (level / whole) ** 2
+
+
+def _tolerance(part: RandomVibrationPart, points: pd.DataFrame) -> list[Finding]:
+    """Overall level and lines against their tolerances, with the confidence of a line."""
+    shift = points[points["series"] == "shift"]
+    if shift.empty:
+        return []
+    first = shift[shift["unit"] == shift["unit"].iloc[0]]
+    ratio = first["setting"].to_numpy(dtype=float) / first["ordered_g"].to_numpy(dtype=float)
+    density = points[(points["series"] == "density") & (points["unit"] == shift["unit"].iloc[0])]
+    f = density["setting"].to_numpy(dtype=float)
+    target = _target(part, points, f)
+    inside = target > 0.0
+    apart = 10.0 * np.log10(density["value"].to_numpy(dtype=float)[inside] / target[inside])
+    low, high = density_confidence(float(density["averages"].iloc[0]))
+    beyond = float(np.mean(np.abs(apart) > LINE_DB))
+    text = (
+        f"overall level {100.0 * (ratio.min() - 1.0):+.1f} to {100.0 * (ratio.max() - 1.0):+.1f} % of "
+        f"the order (± {100.0 * OVERALL:.0f} % "
+        f"allowed); {100.0 * beyond:.1f} % of the lines beyond ± {LINE_DB:g} dB; 99 % of the lines of a right level lie within "
+        f"{low:.1f} to {high:+.1f} dB"
+    )
+    return [Finding("", "level of the reference", text)]
+
+
+PROCEDURE = RandomVibration()

@@ -1,0 +1,61 @@
+"""The static record: hours in one pose, whose noise the stage of the chain analyses."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, ClassVar, Literal
+
+import pandas as pd
+
+from pipelines.procedures.base import Device, Outcome, Part, Procedure, ProcedureRecord, ProcedureStep
+from pipelines.procedures.columns import points
+from schemas.errors import RecipeInvalid
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from schemas.recipe import Recipe
+    from schemas.station import StationConfig
+
+
+class StaticRecordPart(Part):
+    """Duration, pose and temperature are the recipe's keys ``static_record_s``, ``static_pose``, ``static_temperature_C``."""
+
+    kind: Literal["static_record"]
+
+
+class StaticRecord(Procedure):
+    """One long record in one pose."""
+
+    name: ClassVar[str] = "static_record"
+    title: ClassVar[str] = "Static record"
+    order: ClassVar[int] = 20
+    states: ClassVar[str] = "noise terms by the Allan deviation: Q, N, B, K, R"
+    source: ClassVar[str] = "IEEE Std 952, IEEE Std 1293"
+    part: ClassVar[type[Part]] = StaticRecordPart
+
+    def steps(self, part: Any, recipe: Recipe) -> list[ProcedureStep]:
+        """One record."""
+        del part
+        return [ProcedureStep("static", recipe.static_pose, recipe.static_temperature_C, "allan")]
+
+    def check(self, part: Any, recipe: Recipe, station: StationConfig) -> None:
+        """Refuse a record without a duration."""
+        del part, station
+        if recipe.static_record_s <= 0.0:
+            raise RecipeInvalid(
+                "recipe: procedures lists static_record and static_record_s is 0 s, a duration is needed; set static_record_s",
+                key="static_record_s",
+            )
+
+    def reduce(self, part: Any, records: Sequence[ProcedureRecord], device: Device) -> pd.DataFrame:
+        """Nothing: the stage ``noise`` does it."""
+        del part, records, device
+        return points([])
+
+    def evaluate(self, part: Any, points: pd.DataFrame, device: Device) -> Outcome:
+        """Nothing: the stage ``grade`` computes the figures of noise."""
+        del part, points, device
+        return Outcome({})
+
+
+PROCEDURE = StaticRecord()

@@ -1,0 +1,213 @@
+"""Single-axis tilt: the output over the angle in one plane, every 15° to 30°."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
+
+import numpy as np
+from pydantic import Field, model_validator
+
+from inertial.dynamics.tilt import TiltFit, fit_tilt, left_open
+from pipelines.procedures.base import (
+    Device,
+    FigureSpec,
+    FigureValue,
+    Finding,
+    Outcome,
+    Part,
+    Procedure,
+    ProcedureRecord,
+    ProcedureStep,
+    worst,
+)
+from pipelines.procedures.columns import points
+from schemas.bounds import NotNegative, Positive
+from schemas.recipe import Pose
+from schemas.units import AXES
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    import pandas as pd
+    from matplotlib.figure import Figure as Drawing
+
+    from schemas.recipe import Recipe
+
+FEWEST_ANGLES = 6
+MICRO, MILLI = 1e6, 1e3
+
+
+class TiltPart(Part):
+    """A whole turn about one axis of the fixture.
+
+    ``about`` is the axis of rotation: with ``x`` the outer axis turns (plane y–z), with ``y`` the inner axis is at 90° first
+    (plane x–z). ``angle_uncertainty_deg`` (k = 1) is that of the table: near 0 g it costs 175 µg per 0.01°.
+    """
+
+    kind: Literal["tilt"]
+    about: Literal["x", "y"] = "x"
+    step_deg: Annotated[Positive, Field(le=60.0)] = 15.0
+    dwell_s: Annotated[Positive, Field(le=3600.0)] = 10.0
+    temperature_C: Annotated[float, Field(ge=-100.0, le=200.0)] = 25.0
+    orders: Literal[1, 3] = 3
+    angle_uncertainty_deg: NotNegative = 0.002
+
+    @model_validator(mode="after")
+    def _whole_turn(self) -> TiltPart:
+        count = 360.0 / self.step_deg
+        if abs(count - round(count)) > 1e-9 or round(count) < FEWEST_ANGLES:
+            raise ValueError(
+                f"step_deg: {self.step_deg:g}° gives {count:g} angles in a turn, a whole number of at least {FEWEST_ANGLES} is "
+                "needed; use 15, 20, 24, 30, 36, 45 or 60"
+            )
+        return self
+
+
+class Tilt(Procedure):
+    """The output of the axes that lie in one plane, over a whole turn."""
+
+    name: ClassVar[str] = "tilt"
+    title: ClassVar[str] = "Single-axis tilt"
+    order: ClassVar[int] = 30
+    states: ClassVar[str] = (
+        "bias, scale, angle of the input axis, K2 and K3 within 1 g, of the axes that lie in the plane"
+    )
+    source: ClassVar[str] = "IEEE Std 1293, tilt about one axis; reference by gravity, ISO 16063-16"
+    part: ClassVar[type[Part]] = TiltPart
+    figures: ClassVar[tuple[FigureSpec, ...]] = (
+        FigureSpec(
+            "tilt_linearity_ug", "µg", "largest residual from bias and scale over the plane, worst axis in it; 1 g only"
+        ),
+        FigureSpec("tilt_orthogonality_mrad", "mrad", "departure from 90° of the two axes in the plane"),
+        FigureSpec("tilt_second_order_ug_g2", "µg/g²", "K2 of the worst axis in the plane"),
+    )
+
+    def steps(self, part: TiltPart, recipe: Recipe) -> list[ProcedureStep]:
+        """One dwell at each angle, in order of angle."""
+        del recipe
+        inner = 0.0 if part.about == "x" else 90.0
+        found: list[ProcedureStep] = []
+        for k in range(round(360.0 / part.step_deg)):
+            angle = k * part.step_deg if k * part.step_deg <= 180.0 else k * part.step_deg - 360.0
+            pose = Pose(name=f"t{angle:+07.2f}", outer_deg=angle, inner_deg=inner)
+            found.append(
+                ProcedureStep(pose.name, pose, part.temperature_C, lasting_s=part.dwell_s, setting={"angle_deg": angle})
+            )
+        return found
+
+    def reduce(self, part: TiltPart, records: Sequence[ProcedureRecord], device: Device) -> pd.DataFrame:
+        """Mean output of every axis at every angle; the angle is the encoder's."""
+        rows: list[dict[str, Any]] = []
+        for k, record in enumerate(records):
+            for reading in record.readings.to_dict("records"):
+                own = record.samples.get(str(reading["unit"]))
+                if own is None:
+                    continue
+                mean, sd = own.output.mean(axis=0), own.output.std(axis=0, ddof=1) / np.sqrt(len(own.output))
+                rows += [
+                    {
+                        "unit": reading["unit"],
+                        "axis": axis,
+                        "series": "output",
+                        "point": k,
+                        "setting": float(reading["outer_deg"]),
+                        "value": mean[i],
+                        "uncertainty": sd[i],
+                    }
+                    for i, axis in enumerate(AXES)
+                ]
+        del device, part
+        return points(rows)
+
+    def evaluate(self, part: TiltPart, points: pd.DataFrame, device: Device) -> Outcome:
+        """Figures of the axes in the plane, and what the plane leaves open."""
+        del device
+        figures: dict[str, list[FigureValue]] = {}
+        for unit, rows in points.groupby("unit", sort=False):
+            fits = {axis: _fit(part, rows[rows["axis"] == axis]) for axis in _plane(part)}
+            linear = {axis: _fit(part, rows[rows["axis"] == axis], orders=1) for axis in _plane(part)}
+            found = [worst([_linearity(axis, one) for axis, one in linear.items()]), _orthogonality(part, linear)]
+            if part.orders == 3:
+                found.append(worst([_second_order(axis, one) for axis, one in fits.items()]))
+            else:
+                found.append(
+                    FigureValue(
+                        "tilt_second_order_ug_g2",
+                        "*",
+                        np.nan,
+                        np.nan,
+                        identified=False,
+                        note="orders = 1; set orders = 3",
+                    )
+                )
+            figures[str(unit)] = found
+        inside, turned = " and ".join(_plane(part)), part.about
+        open_in, open_out = "; ".join(left_open(in_plane=True)), "; ".join(left_open(in_plane=False))
+        findings = [
+            Finding("", "not determined by this plane", f"axes {inside}: {open_in}"),
+            Finding("", "not determined by this plane", f"axis {turned}, about which the unit turns: {open_out}"),
+        ]
+        return Outcome(figures, findings)
+
+    def draw(self, drawing: Drawing, part: TiltPart, points: pd.DataFrame) -> None:
+        """Residual from bias and scale over the angle."""
+        place = drawing.subplots()
+        for axis, colour in zip(_plane(part), ("#0072b2", "#d55e00"), strict=True):
+            one = _fit(part, points[points["axis"] == axis], orders=1)
+            order = np.argsort(one.angle)
+            residual = MICRO * one.residuals / one.scale[0]
+            error = MICRO * points.loc[points["axis"] == axis, "uncertainty"].to_numpy() / one.scale[0]
+            place.errorbar(
+                np.degrees(one.angle)[order],
+                residual[order],
+                error[order],
+                fmt="o-",
+                ms=3,
+                lw=0.8,
+                c=colour,
+                label=f"axis {axis}",
+            )
+        place.axhline(0.0, c="#999999", lw=0.8)
+        place.set(xlabel="angle / °", ylabel="residual from bias and scale / µg")
+        place.legend(frameon=False, loc="upper right")
+
+
+def _plane(part: TiltPart) -> tuple[str, str]:
+    """The axes of the fixture in the plane: f = (Rx(outer)·Rz(inner))ᵀ·(0, 0, 1)."""
+    return ("y", "z") if part.about == "x" else ("x", "z")
+
+
+def _fit(part: TiltPart, rows: pd.DataFrame, orders: int | None = None) -> TiltFit:
+    """Fit of one axis; the weight holds the share of the table's angle, which is largest near 0 g."""
+    angle = np.radians(rows["setting"].to_numpy(dtype=float))
+    output, white = rows["value"].to_numpy(dtype=float), rows["uncertainty"].to_numpy(dtype=float)
+    plain = fit_tilt(angle, output, np.ones_like(output))
+    slope = plain.scale[0] * np.abs(np.cos(angle + plain.phase[0]))
+    error = np.hypot(white, slope * np.radians(part.angle_uncertainty_deg))
+    return fit_tilt(angle, output, error, orders=part.orders if orders is None else orders)
+
+
+def _linearity(axis: str, one: TiltFit) -> FigureValue:
+    residual = MICRO * one.residuals / one.scale[0]
+    k = int(np.argmax(np.abs(residual)))
+    spread = float(np.sqrt(np.mean(residual**2)))
+    return FigureValue("tilt_linearity_ug", axis, float(abs(residual[k])), spread)
+
+
+def _orthogonality(part: TiltPart, fits: dict[str, TiltFit]) -> FigureValue:
+    first, second = _plane(part)
+    a, b = fits[first].phase, fits[second].phase
+    apart = (a[0] - b[0] + np.pi) % (2.0 * np.pi) - np.pi
+    departure = MILLI * (abs(apart) - 0.5 * np.pi)
+    return FigureValue(
+        "tilt_orthogonality_mrad", f"{first}{second}", float(departure), float(MILLI * np.hypot(a[1], b[1]))
+    )
+
+
+def _second_order(axis: str, one: TiltFit) -> FigureValue:
+    value, error = one.of("second_order")
+    scale = one.scale[0]
+    return FigureValue("tilt_second_order_ug_g2", axis, MICRO * value / scale, MICRO * error / scale)
+
+
+PROCEDURE = Tilt()

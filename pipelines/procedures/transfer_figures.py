@@ -1,0 +1,205 @@
+"""Figures and findings that follow from the diagnosis of a transfer function."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from scipy.optimize import brentq
+
+from inertial.dynamics.spectra import folded_share
+from inertial.dynamics.transfer_effects import Conditions
+from inertial.dynamics.transfer_model import IDENTIFIED_SHARE, TransferFit, best_of_exchange, factor
+from pipelines.procedures.base import FigureValue
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from inertial.dynamics.transfer_diagnosis import Diagnosis
+    from inertial.dynamics.transfer_model import Points
+
+    Array = NDArray[np.float64]
+
+WORD = {"delay_s": "delay", "natural_hz": "natural frequency", "damping": "damping ratio"}
+
+
+def figures_of_transfer(part: Any, found: Diagnosis, points: Points, static: Array | None) -> list[FigureValue]:
+    """Figures of one unit.
+
+    Parameters
+    ----------
+    part : of the recipe: axis, flat_to_hz, nominal_scale, reference_percent
+    static : (3,), scale of the multi-position test, output per g; None without one
+    """
+    fit, axis = found.extended, part.axis
+    if found.adequate is None or found.unexplained:
+        why = found.reason or "the model, also with the effects found, does not describe the points"
+        lost = [
+            FigureValue(name, axis, np.nan, np.nan, identified=False, note=why)
+            for name in ("sweep_bandwidth_hz", "sweep_natural_hz", "sweep_damping")
+        ]
+        return [*lost, _flatness(part, points), _sensitivity(part, fit, static)]
+    fit, other = best_of_exchange(points, fit)
+    return [
+        _bandwidth(axis, fit, points),
+        _parameter("sweep_natural_hz", "natural_hz", axis, fit, other),
+        _parameter("sweep_damping", "damping", axis, fit, other),
+        _flatness(part, points),
+        _sensitivity(part, fit, static),
+    ]
+
+
+def _parameter(figure: str, name: str, axis: str, fit: TransferFit, other: TransferFit | None = None) -> FigureValue:
+    if not fit.has(name):
+        return FigureValue(
+            figure, axis, np.nan, np.nan, identified=False, note=f"the model has no {WORD.get(name, name)}"
+        )
+    value, error, low, high = fit.of(name)
+    if other is not None:
+        ends = sorted((*fit.of(name)[2:], *other.of(name)[2:]))
+        note = (
+            f"two solutions fit alike, {value:.4g} and {other.of(name)[0]:.4g}: sprung mass and "
+            f"two-pole low-pass can change places; "
+            "state the low-pass, or excite the mass alone"
+        )
+        return FigureValue(figure, axis, np.nan, np.nan, ends[0], ends[-1], identified=False, note=note)
+    if not fit.identified(name):
+        note = f"not identified by this sweep: 95 % interval {low:.4g} … {high:.4g}; sweep to higher frequencies"
+        return FigureValue(figure, axis, np.nan, np.nan, low, high, identified=False, note=note)
+    return FigureValue(figure, axis, value, error, low, high)
+
+
+def bandwidth_of(fit: TransferFit, values: Array, top: float) -> float:
+    """Frequency in Hz of the first crossing of 1/√2, up to twenty times ``top``; NaN where there is none."""
+    grid = np.geomspace(1e-3 * top, 20.0 * top, 2000)
+
+    def over(f: Any) -> Any:
+        at = np.atleast_1d(np.asarray(f, dtype=np.float64))
+        plain = Conditions(at, np.full(at.size, 1e-9), np.zeros(at.size), np.full(at.size, np.nan))
+        names = [name for name in fit.effects if name not in {"temperature", "hum", "own_clock", "amplitude"}]
+        keep = np.isin(_owners(fit), names)
+        return np.abs(factor(names, plain, values[keep])) - np.sqrt(0.5)
+
+    below = np.flatnonzero(over(grid) < 0.0)
+    if below.size == 0 or below[0] == 0:
+        return float("nan")
+    k = int(below[0])
+
+    def at_one(f: float) -> float:
+        value: Any = over(f)
+        return float(value[0])
+
+    found: Any = brentq(at_one, grid[k - 1], grid[k])
+    return float(found)
+
+
+def _owners(fit: TransferFit) -> Array:
+    """The effect of each parameter of a fit."""
+    from inertial.dynamics.transfer_effects import EFFECTS
+
+    one = np.ones(2)
+    plain = Conditions(one, one, np.array([0.0, 1.0]), one)
+    return np.array([name for name in fit.effects for _ in EFFECTS[name].parameters(plain)])
+
+
+def _bandwidth(axis: str, fit: TransferFit, points: Points) -> FigureValue:
+    """The −3 dB frequency of the model, its uncertainty by the covariance of the parameters."""
+    top = float(points.conditions.frequency.max())
+    value = bandwidth_of(fit, fit.values, top)
+    if not np.isfinite(value):
+        note = "the model does not fall by 3 dB; sweep to higher frequencies"
+        return FigureValue("sweep_bandwidth_hz", axis, np.nan, np.nan, identified=False, note=note)
+    gradient = np.zeros(len(fit.values))
+    for k, parameter in enumerate(fit.parameters):
+        step = 1e-4 if parameter.log else 1e-4 * max(abs(fit.values[k]), float(fit.errors[k]), 1e-12)
+        moved = fit.values.copy()
+        moved[k] = moved[k] * np.exp(step) if parameter.log else moved[k] + step
+        gradient[k] = (bandwidth_of(fit, moved, top) - value) / step
+    error = float(np.sqrt(max(0.0, np.nan_to_num(gradient) @ fit.covariance[1:, 1:] @ np.nan_to_num(gradient))))
+    low, high = value * np.exp(-1.96 * error / value), value * np.exp(1.96 * min(error / value, 10.0))
+    if error > IDENTIFIED_SHARE * value or value > 2.5 * top:
+        note = f"not identified by this sweep to {top:.4g} Hz: 95 % interval {low:.4g} … {high:.4g}; sweep to higher frequencies"
+        return FigureValue(
+            "sweep_bandwidth_hz", axis, np.nan, np.nan, float(low), float(high), identified=False, note=note
+        )
+    return FigureValue("sweep_bandwidth_hz", axis, value, error, float(low), float(high))
+
+
+def _flatness(part: Any, points: Points) -> FigureValue:
+    """Largest departure of the measured magnitude from that of the lowest fifth of the points."""
+    f, size = points.conditions.frequency, np.abs(points.value)
+    low = np.argsort(f)[: max(3, len(f) // 5)]
+    rest = float(np.median(size[low]))
+    inside = f <= (part.flat_to_hz or f.max())
+    departure = 100.0 * (size[inside] / rest - 1.0)
+    k = int(np.argmax(np.abs(departure)))
+    error = 100.0 * float(
+        np.hypot(points.magnitude_error[inside][k], np.median(points.magnitude_error[low]) / np.sqrt(len(low)))
+    )
+    return FigureValue("sweep_flatness_percent", part.axis, float(departure[k]), error)
+
+
+def _sensitivity(part: Any, fit: TransferFit, static: Array | None) -> FigureValue:
+    """Departure of the fitted sensitivity from the static scale, with the reference's uncertainty."""
+    nominal = part.nominal_scale if static is None else float(static["xyz".index(part.axis)])
+    if nominal is None:
+        note = "no static scale and no nominal_scale to compare with"
+        return FigureValue("sweep_sensitivity_percent", part.axis, np.nan, np.nan, identified=False, note=note)
+    value = 100.0 * (abs(fit.sensitivity) / nominal - 1.0)
+    error = float(np.hypot(100.0 * fit.sensitivity_error, part.reference_percent))
+    return FigureValue("sweep_sensitivity_percent", part.axis, value, error)
+
+
+def diagnosis_text(found: Diagnosis) -> list[tuple[str, str]]:
+    """Subject and text of what the diagnosis says of one unit."""
+    fit = found.fit
+    model = " + ".join(("sensitivity", *fit.effects))
+    out: list[tuple[str, str]] = []
+    if found.adequate is None:
+        return [("model", f"{model}: cannot be judged: {found.reason}")]
+    verdict = "adequate" if found.adequate else "not adequate"
+    text = (
+        f"{model} is {verdict}: χ² {fit.chi_square:.1f} for {fit.dof} degrees of freedom, p = "
+        f"{fit.p_value:.2g}, rms residual {found.error_percent:.2g} %"
+    )
+    out.append(("model", text))
+    if found.where:
+        places = [
+            f"{w.part} from {w.low_hz:.4g} to {w.high_hz:.4g} Hz ({100.0 * w.share:.0f} % of χ²)"
+            for w in found.where[:3]
+        ]
+        out.append(("where the model fails", ", ".join(places)))
+    for one in found.classes:
+        alike = f"; not told apart from {', '.join(one.effects[1:])}" if len(one.effects) > 1 else ""
+        out.append(("missing effect", f"{one.effects[0]} (p = {one.p_value:.1g}){alike}"))
+    if found.classes:
+        before, after = found.left_out
+        text = (
+            f"rms residual {found.error_percent:.2g} % → {found.extended_percent:.2g} % with "
+            f"{', '.join(found.recommended)}; of points "
+            f"left out, in standard uncertainties: {before:.2g} → {after:.2g}"
+        )
+        out.append(("after extension", text))
+    if found.unexplained:
+        out.append(("unexplained", "a real departure remains that no effect of the catalogue describes"))
+    for p in found.extended.parameters:
+        value, _, low, high = found.extended.of(p.name)
+        if p.log and not found.extended.identified(p.name):
+            out.append(("not identified", f"{p.name}: 95 % interval {low:.4g} … {high:.4g} {p.unit}"))
+        elif p.name == "delay_s":
+            out.append(("delay", f"{1e6 * value:.2f} µs, 95 % interval {1e6 * low:.2f} … {1e6 * high:.2f} µs"))
+    if found.next_hz:
+        out.append(("next frequencies to measure", ", ".join(f"{f:.4g} Hz" for f in found.next_hz)))
+    return out
+
+
+def sampling_text(rate_hz: float, bandwidth_hz: float, order: int) -> str:
+    """Whether the rate is five times the bandwidth, and what the filter of this order leaves folded onto the band's edge."""
+    times = rate_hz / bandwidth_hz
+    share = 100.0 * folded_share(rate_hz, bandwidth_hz, order)
+    rule = "at least 5" if times >= 5.0 else "less than the 5 that the rule asks for"
+    return (
+        f"{rate_hz:.5g} Hz is {times:.3g} times the bandwidth, {rule}; a filter of order {order} "
+        f"leaves {share:.2g} % folded onto the "
+        "band's edge"
+    )

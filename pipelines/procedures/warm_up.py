@@ -1,0 +1,155 @@
+"""Warm-up time: from power-on until the output is within its band, and stays there."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
+
+import numpy as np
+from pydantic import Field
+
+from inertial.dynamics.stability import block_means, warm_up_time
+from inertial.errors import NotIdentified
+from pipelines.procedures.base import (
+    Device,
+    FigureSpec,
+    FigureValue,
+    NominalScale,
+    Outcome,
+    Part,
+    Procedure,
+    ProcedureRecord,
+    ProcedureStep,
+    scale_of,
+    worst,
+)
+from pipelines.procedures.columns import points
+from schemas.bounds import Positive
+from schemas.recipe import Pose
+from schemas.units import AXES
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    import pandas as pd
+    from matplotlib.figure import Figure as Drawing
+
+    from schemas.recipe import Recipe
+    from schemas.station import StationConfig
+
+MICRO = 1e6
+
+
+class WarmUpPart(NominalScale):
+    """Power off for ``off_s``, then a record from power-on. ``band_ug`` is the specification about the final value."""
+
+    kind: Literal["warm_up"]
+    band_ug: Positive
+    off_s: Annotated[Positive, Field(le=86400.0)] = 1800.0
+    lasting_s: Annotated[Positive, Field(ge=60.0, le=86400.0)] = 1800.0
+    rate_hz: Annotated[Positive, Field(ge=1.0, le=1000.0)] = 10.0
+    window_s: Annotated[Positive, Field(le=600.0)] = 10.0
+    temperature_C: Annotated[float, Field(ge=-100.0, le=200.0)] = 25.0
+
+
+class WarmUp(Procedure):
+    """A record from power-on."""
+
+    name: ClassVar[str] = "warm_up"
+    title: ClassVar[str] = "Warm-up time"
+    order: ClassVar[int] = 50
+    states: ClassVar[str] = "time from power-on until the smoothed output stays within its band"
+    source: ClassVar[str] = "IEEE Std 528, warm-up time; not the time to the first usable output"
+    part: ClassVar[type[Part]] = WarmUpPart
+    figures: ClassVar[tuple[FigureSpec, ...]] = (
+        FigureSpec("warm_up_s", "s", "time from power-on until the smoothed output stays within its band, worst axis"),
+    )
+
+    def steps(self, part: WarmUpPart, recipe: Recipe) -> list[ProcedureStep]:
+        """One record directly after power-on."""
+        del recipe
+        pose = Pose(name="warm-up", outer_deg=0.0, inner_deg=0.0)
+        step = ProcedureStep(
+            pose.name,
+            pose,
+            part.temperature_C,
+            lasting_s=part.lasting_s,
+            rate_hz=part.rate_hz,
+            wait_s=0.0,
+            off_s=part.off_s,
+        )
+        return [step]
+
+    def check(self, part: WarmUpPart, recipe: Recipe, station: StationConfig) -> None:
+        """Refuse a list without a scale."""
+        del station
+        part.require_scale(recipe)
+
+    def reduce(self, part: WarmUpPart, records: Sequence[ProcedureRecord], device: Device) -> pd.DataFrame:
+        """Means of 1 s in µg over the time since power-on."""
+        rows: list[dict[str, Any]] = []
+        for record in records:
+            for reading in record.readings.to_dict("records"):
+                own = record.samples.get(str(reading["unit"]))
+                if own is None:
+                    continue
+                scale = scale_of(part, device, str(reading["unit"]))
+                begun = float(reading["since_power_s"]) - 0.5 * float(reading["duration_s"])
+                size = round(part.rate_hz)
+                for i, axis in enumerate(AXES):
+                    second = block_means(own.output[:, i], size) / scale[i] * MICRO
+                    noise = float(np.std(np.diff(second), ddof=1) / np.sqrt(2.0)) if second.size > 2 else np.nan
+                    rows += [
+                        {
+                            "unit": reading["unit"], "axis": axis, "series": "mean_1s", "point": k,
+                            "setting": begun + (k + 0.5) * size / part.rate_hz, "value": value, "uncertainty": noise,
+                        }
+                        for k, value in enumerate(second)
+                    ]  # fmt: skip
+        return points(rows)
+
+    def evaluate(self, part: WarmUpPart, points: pd.DataFrame, device: Device) -> Outcome:
+        """The time of the slowest axis; not determined where the record ends too soon, or noise alone leaves the band."""
+        del device
+        figures: dict[str, list[FigureValue]] = {}
+        for unit, rows in points.groupby("unit", sort=False):
+            figures[str(unit)] = [
+                worst([_figure(part, str(axis), own) for axis, own in rows.groupby("axis", sort=False)])
+            ]
+        return Outcome(figures)
+
+    def draw(self, drawing: Drawing, part: WarmUpPart, points: pd.DataFrame) -> None:
+        """Output about its final value over the time since power-on, with the band."""
+        place = drawing.subplots()
+        for axis, colour in zip(AXES, ("#0072b2", "#d55e00", "#009e73"), strict=True):
+            own = points[points["axis"] == axis]
+            value = own["value"].to_numpy()
+            final = value[int(0.8 * value.size) :].mean()
+            place.plot(own["setting"], value - final, lw=0.8, c=colour, label=f"axis {axis}")
+        place.axhspan(-part.band_ug, part.band_ug, color="#dddddd", zorder=0)
+        place.set(xlabel="time since power-on / s", ylabel="output minus final value / µg")
+        place.legend(frameon=False, loc="upper right", ncols=3)
+
+
+def _figure(part: WarmUpPart, axis: str, rows: pd.DataFrame) -> FigureValue:
+    """Warm-up time of one axis; its uncertainty is that of the smoothed output over its slope, at least the window's half."""
+    time, value = rows["setting"].to_numpy(dtype=float), rows["value"].to_numpy(dtype=float)
+    noise = float(rows["uncertainty"].iloc[0]) / np.sqrt(max(part.window_s, 1.0))
+    if 3.0 * noise > part.band_ug:
+        note = (
+            f"noise of the smoothed output is {noise:.3g} µg, a third of the band of {part.band_ug:g} µg "
+            f"at most is needed; lengthen window_s"
+        )
+        return FigureValue("warm_up_s", axis, np.nan, np.nan, identified=False, note=note)
+    try:
+        found, final = warm_up_time(time, value, band=part.band_ug, window_s=part.window_s)
+    except NotIdentified as problem:
+        return FigureValue("warm_up_s", axis, np.nan, np.nan, identified=False, note=str(problem))
+    near = np.abs(time - found) <= 5.0 * part.window_s
+    slope = abs(float(np.polyfit(time[near], value[near] - final, 1)[0])) if np.count_nonzero(near) > 3 else 0.0
+    spread = noise / slope if slope > 0.0 else 0.0
+    return FigureValue(
+        "warm_up_s", axis, found, float(np.hypot(0.5 * part.window_s / np.sqrt(3.0), min(spread, found)))
+    )
+
+
+PROCEDURE = WarmUp()

@@ -1,0 +1,93 @@
+"""Figures, findings and pictures of a unit's test procedures."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import matplotlib as mpl
+import numpy as np
+from matplotlib.figure import Figure
+
+from pipelines.procedures import PROCEDURES
+from pipelines.report.numbers import plain
+from pipelines.report.plots import STYLE, WIDTH_IN, svg
+from pipelines.report.templates import fill
+from pipelines.tables.frames import rows_of
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+    from pipelines.report.context import UnitContext
+
+ORDER = 45
+TITLE = "Test procedures"
+HEIGHT_IN = 3.4
+TEMPLATE = """\
+{% for one in procedures %}
+<h4>{{ one.title }}</h4>
+<table>
+<tr><th>figure</th><th>axis</th><th class="n">value</th><th class="n">U</th><th class="n">95 % interval</th><th>unit</th><th class="n">limit</th><th>outcome</th></tr>
+{% for line in one.lines %}
+<tr><td>{{ line.meaning }}</td><td>{{ line.axis }}</td><td class="n">{{ line.value }}</td><td class="n">{{ line.spread }}</td><td class="n">{{ line.interval }}</td><td>{{ line.unit }}</td><td class="n">{{ line.limit }}</td><td>{{ line.outcome }}</td></tr>
+{% if line.note %}<tr><td></td><td colspan="7">{{ line.note }}</td></tr>{% endif %}
+{% endfor %}
+</table>
+{% if one.findings %}<ul>{% for text in one.findings %}<li>{{ text }}</li>{% endfor %}</ul>{% endif %}
+{{ one.picture | safe }}
+{% endfor %}
+<p class="note">U with k = {{ coverage }}. Not determined: the records do not identify the figure; it passes no limit.</p>
+"""
+
+
+def render(unit: UnitContext) -> str | None:
+    """Every procedure of the recipe's list that has figures of its own; None for recipes without a list."""
+    parts = unit.report.recipe.get("procedures") or []
+    tables = unit.tables
+    if not parts or "procedure_figures" not in tables:
+        return None
+    shown = [one for number in range(len(parts)) if (one := _procedure(unit, number, parts[number])) is not None]
+    return fill(TEMPLATE, procedures=shown, coverage=f"{unit.report.coverage:g}") if shown else None
+
+
+def _procedure(unit: UnitContext, number: int, content: dict[str, Any]) -> dict[str, Any] | None:
+    figures, points = (unit.tables[name] for name in ("procedure_figures", "procedure_points"))
+    figures, points = figures[figures["number"] == number], points[points["number"] == number]
+    procedure = PROCEDURES.get(str(content.get("kind")))
+    if procedure is None or figures.empty:
+        return None
+    whole = unit.report.tables["procedure_findings"]
+    findings = whole[(whole["number"] == number) & whole["unit"].isin([unit.unit, ""])]
+    return {
+        "title": procedure.title,
+        "lines": [_line(unit, row, {f.name: f.meaning for f in procedure.figures}) for row in rows_of(figures)],
+        "findings": [f"{row['subject']}: {row['text']}" for row in rows_of(findings)],
+        "picture": picture(procedure.name, content, points) if len(points) else "",
+    }
+
+
+def picture(name: str, content: dict[str, Any], points: pd.DataFrame) -> str:
+    """The procedure's picture of one unit as SVG."""
+    procedure = PROCEDURES[name]
+    with mpl.rc_context(STYLE):
+        drawing = Figure(figsize=(WIDTH_IN, HEIGHT_IN * procedure.rows), layout="constrained")
+        procedure.draw(drawing, procedure.part.model_validate(content), points)
+        return svg(drawing)
+
+
+def _line(unit: UnitContext, row: dict[str, Any], meanings: dict[str, str]) -> dict[str, Any]:
+    known = bool(row["identified"])
+    limit = unit.report.limit(row["figure"])
+    decided = unit.tables["figures"]
+    outcome = decided.loc[decided["figure"] == row["figure"], "outcome"].tolist()
+    interval = f"{row['low']:.5g} … {row['high']:.5g}" if np.isfinite([row["low"], row["high"]]).all() else ""
+    return {
+        "meaning": meanings.get(row["figure"], row["figure"]),
+        "axis": row["axis"],
+        "value": f"{row['value']:.5g}" if known else "not determined",
+        "spread": plain(unit.report.coverage * row["uncertainty"]) if known else "",
+        "interval": interval,
+        "unit": row["unit_text"],
+        "limit": plain(limit) if np.isfinite(limit) else "",
+        "outcome": "" if not np.isfinite(limit) else (outcome[0] if outcome else "fail"),
+        "note": row["note"],
+    }

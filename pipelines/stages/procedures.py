@@ -1,0 +1,143 @@
+"""The procedures of a recipe: points of every unit, the figures that limits may name, and the findings."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from inertial.errors import InertialError
+from pipelines.procedures import PROCEDURES, parts_of, steps_of
+from pipelines.procedures.base import FigureValue, Outcome
+from pipelines.procedures.columns import figure_table, finding_table, gathered_points
+from pipelines.procedures.recorded import nominal_device, procedure_record
+from pipelines.tables.calibration import read_calibration
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator
+
+    import pandas as pd
+
+    from pipelines.procedures.base import Device, Part, Procedure, ProcedureRecord
+    from schemas.recipe import Recipe
+
+
+def procedures(
+    recipe: Recipe,
+    samples: Callable[[set[int]], Iterator[pd.DataFrame]],
+    readings: pd.DataFrame,
+    verdicts: pd.DataFrame,
+    coefficients: pd.DataFrame,
+    covariance: pd.DataFrame,
+) -> dict[str, pd.DataFrame]:
+    """Tables ``procedure_points``, ``procedure_figures`` and ``procedure_findings``; without rows where the recipe has no list.
+
+    Parameters
+    ----------
+    samples : gives the samples of some records, by their numbers
+    """
+    if not recipe.procedures:
+        return {
+            "procedure_points": gathered_points([]),
+            "procedure_figures": figure_table([]),
+            "procedure_findings": finding_table([]),
+        }
+    device = _device(readings, coefficients, covariance)
+    accepted = verdicts.loc[~verdicts["refused"], "unit"].tolist()
+    points: list[tuple[int, str, pd.DataFrame]] = []
+    figures: list[dict[str, Any]] = []
+    findings: list[dict[str, Any]] = []
+    steps = steps_of(recipe)
+    for number, part in enumerate(parts_of(recipe)):
+        procedure = PROCEDURES[part.kind]
+        own = [(record, step) for record, (of, step) in enumerate(steps) if of == number and step.kind == "procedure"]
+        if not own:
+            continue
+        records = (
+            procedure_record(record, step, samples({record}), _answered(readings, record, accepted))
+            for record, step in own
+        )
+        table, outcome = analysed(procedure, part, records, device, accepted)
+        points.append((number, part.kind, table))
+        units = {spec.name: spec.unit for spec in procedure.figures}
+        for unit, values in outcome.figures.items():
+            figures += [_figure_row(number, part.kind, unit, one, units[one.figure]) for one in values]
+        findings += [
+            {"unit": one.unit, "procedure": part.kind, "number": number, "subject": one.subject, "text": one.text}
+            for one in outcome.findings
+        ]
+    return {
+        "procedure_points": gathered_points(points),
+        "procedure_figures": figure_table(figures),
+        "procedure_findings": finding_table(findings),
+    }
+
+
+def analysed(
+    procedure: Procedure, part: Part, records: Any, device: Device, units: list[str]
+) -> tuple[pd.DataFrame, Outcome]:
+    """Points, figures and findings; a unit for which a declared figure is missing gets it as not determined, with the reason.
+
+    Parameters
+    ----------
+    records : of the procedure, in order; each is read once
+    """
+    try:
+        kept: list[ProcedureRecord] = list(records)
+        table = procedure.reduce(part, kept, device)
+        outcome = procedure.evaluate(part, table, device)
+        why = "its records give no value"
+    except InertialError as problem:
+        from pipelines.procedures.columns import points
+
+        table, outcome, why = points([]), Outcome({}), str(problem)
+    whole: dict[str, list[FigureValue]] = {}
+    for unit in units:
+        found = list(outcome.figures.get(unit, []))
+        there = {one.figure for one in found}
+        missing = [spec for spec in procedure.figures if spec.name not in there]
+        found += [FigureValue(spec.name, "*", np.nan, np.nan, identified=False, note=why) for spec in missing]
+        whole[unit] = [one if np.isfinite(one.value) else replace(one, identified=False) for one in found]
+    return table, Outcome(whole, outcome.findings)
+
+
+def _answered(readings: pd.DataFrame, record: int, accepted: list[str]) -> pd.DataFrame:
+    """Readings of a record of the accepted units that answered."""
+    own = readings[(readings["record"] == record) & (readings["status"] == "ok")]
+    return own[own["unit"].isin(accepted)]
+
+
+def _device(readings: pd.DataFrame, coefficients: pd.DataFrame, covariance: pd.DataFrame) -> Device:
+    """The units with the scale of their calibration, where the recipe has one."""
+    device = nominal_device(readings)
+    if coefficients.empty:
+        return device
+    calibration = read_calibration(coefficients, covariance)
+    scale = np.abs(np.diagonal(calibration.response, axis1=-2, axis2=-1))
+    errors = calibration.standard_error("scale") if "scale" in calibration.effects else None
+    return replace(
+        device,
+        scale=dict(zip(calibration.units, scale, strict=True)),
+        scale_error={
+            unit: (errors[k, :, 0] / scale[k] if errors is not None else np.zeros(3))
+            for k, unit in enumerate(calibration.units)
+        },
+    )
+
+
+def _figure_row(number: int, procedure: str, unit: str, one: FigureValue, unit_text: str) -> dict[str, Any]:
+    return {
+        "unit": unit,
+        "procedure": procedure,
+        "number": number,
+        "figure": one.figure,
+        "axis": one.axis,
+        "value": one.value,
+        "uncertainty": one.uncertainty,
+        "low": one.low,
+        "high": one.high,
+        "identified": one.identified,
+        "unit_text": unit_text,
+        "note": one.note,
+    }

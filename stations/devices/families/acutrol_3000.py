@@ -1,0 +1,94 @@
+"""Centrifuges and rate tables that speak as the ACUTROL 3000, with a recorder that leaves a result file."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from pathlib import Path
+from typing import ClassVar
+
+from schemas.errors import OperatorNeeded, StationTimeout
+from stations.devices.equipment import Equipment
+from stations.devices.recording import Recording, RecordingSpoilt
+from stations.devices.result_files import read_recording
+
+POLL_S = 0.5
+PATIENCE_S = 600.0
+REACHED = 2e-5  # of the rate, or deg/s below one
+STANDING_DEG_S = 0.01
+
+
+class Acutrol(Equipment):
+    """Absolute rates, each read back; standing means below 0.01 °/s, then the interlock opens."""
+
+    needs: ClassVar[tuple[str, ...]] = (
+        "rate",
+        "interlock",
+        "mode",
+        "rate_read",
+        "fault",
+        "record",
+        "direction",
+        "file",
+    )
+
+    def spin(self, rate_deg_s: float, direction: int, seconds: float, slots: Sequence[int]) -> Recording:
+        """A record at a constant rate in °/s; ``direction`` says which way the units are mounted (1 or −1).
+
+        Raises
+        ------
+        OperatorNeeded
+            The interlock has opened: guard door or overspeed.
+        RecordingSpoilt
+            The recorder has missed its trigger, or the rate has left its band.
+        """
+        self._require_no_fault()
+        self.values.write("direction", float(direction))
+        self.values.write("interlock", "close 1")
+        self.values.write("mode", "rate 1")
+        self.values.write("rate", rate_deg_s)
+        self._wait(rate_deg_s, REACHED * max(rate_deg_s, 1.0))
+        before = self.values.text("file")
+        self.values.write("record", seconds)
+        self.clock.sleep(seconds)
+        self._require_no_fault()
+        found = self.values.number("rate_read")
+        if not abs(found - rate_deg_s) <= 10.0 * REACHED * max(rate_deg_s, 1.0):
+            raise RecordingSpoilt(
+                f"{self.name}: {found:g} °/s after the record, {rate_deg_s:g} °/s is needed; check the drive"
+            )
+        path = self.values.text("file")
+        if path in {before, "NONE"}:
+            raise RecordingSpoilt(f"{self.name}: no recording, the trigger was missed; check the recorder")
+        return read_recording(Path(path), list(slots), self.name)
+
+    def stop(self) -> None:
+        """Rate 0, waits until it stands, opens the interlock."""
+        self.values.write("rate", 0.0)
+        self._wait(0.0, STANDING_DEG_S)
+        self.values.write("interlock", "open 1")
+
+    def make_safe(self) -> None:
+        """Orders rate 0; the interlock opens at standstill by the machine's own logic."""
+        self.values.write("rate", 0.0)
+
+    def _wait(self, wanted: float, band: float) -> None:
+        end = self.clock.now() + PATIENCE_S
+        while not abs(self.values.number("rate_read") - wanted) <= band:
+            self._require_no_fault()
+            if self.clock.now() > end:
+                self.make_safe()
+                raise StationTimeout(f"{self.name}: not at {wanted:g} °/s after {PATIENCE_S:g} s; check the drive")
+            self.clock.sleep(POLL_S)
+
+    def _require_no_fault(self) -> None:
+        state = self.values.text("fault")
+        if state.startswith("Fault"):
+            raise OperatorNeeded(
+                f"{self.name}: interlock {state}; remove the cause, reset the interlock and give the command again"
+            )
+
+
+def rate_of(force_g: float, radius_m: float) -> float:
+    """Rate in °/s for a centripetal acceleration in g at a radius."""
+    return math.degrees(math.sqrt(force_g * 9.80665 / radius_m))

@@ -1,0 +1,109 @@
+"""Vibration controllers that a host selects, starts and reads over lines of text, with the recording in a result file."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import ClassVar
+
+import numpy as np
+
+from schemas.errors import OperatorNeeded, StationTimeout
+from stations.devices.equipment import Equipment
+from stations.devices.recording import Recording, RecordingSpoilt
+from stations.devices.result_files import read_recording
+
+POLL_S = 0.5
+GRACE_S = 30.0
+LEVEL_SHARE = 0.3  # by which the level that was reached may depart from the order
+FLAT_TOP = (
+    0.02  # share of the samples within a thousandth of the extremes: a sine has a tenth of it, a clipped one more
+)
+
+
+class VibrationController(Equipment):
+    """Runs its own closed loop; the host orders finite tests, so that an exciter that is left alone stops by itself."""
+
+    needs: ClassVar[tuple[str, ...]] = (
+        "frequency",
+        "level",
+        "duration",
+        "axis",
+        "start",
+        "stop",
+        "state",
+        "reason",
+        "file",
+    )
+
+    def sine(self, frequency: float, level: float, axis: int, seconds: float, slots: Sequence[int]) -> Recording:
+        """A dwell at one frequency in Hz with a peak level in g, along an axis (0 to 2) of the units.
+
+        Raises
+        ------
+        RecordingSpoilt
+            Missed trigger, clipped reference, or a level that was not reached.
+        OperatorNeeded
+            The controller has aborted: its interlock or a limit must be looked after first.
+        """
+        for name, value in (("frequency", frequency), ("level", level), ("duration", seconds), ("axis", float(axis))):
+            self.values.write(name, value)
+        recording = self._run("SINE", seconds, slots)
+        driven = recording.reference[:, axis] - recording.reference[:, axis].mean()
+        _refuse_clipped(driven, self.name)
+        reached = float(np.sqrt(2.0 * np.mean(driven**2)))
+        if not abs(reached / level - 1.0) <= LEVEL_SHARE:
+            raise RecordingSpoilt(
+                f"{self.name}: {reached:.4g} g at {frequency:g} Hz, {level:g} g was ordered; check amplifier and fixture"
+            )
+        return recording
+
+    def random(self, profile: str, level: float, axis: int, seconds: float, slots: Sequence[int]) -> Recording:
+        """Random vibration by a profile that the controller has, ``level`` in g rms."""
+        self.values.write("profile", profile)
+        for name, value in (("level", level), ("duration", seconds), ("axis", float(axis))):
+            self.values.write(name, value)
+        recording = self._run("RANDOM", seconds, slots)
+        driven = recording.reference[:, axis]
+        n = len(driven)
+        reached = float(np.std(driven[n // 4 : 3 * n // 4]))
+        if not abs(reached / level - 1.0) <= LEVEL_SHARE:
+            raise RecordingSpoilt(
+                f"{self.name}: {reached:.4g} g rms, {level:g} g rms was ordered; check amplifier and fixture"
+            )
+        return recording
+
+    def make_safe(self) -> None:
+        """Stops the exciter."""
+        self.values.write("stop", "NOW")
+
+    def _run(self, kind: str, seconds: float, slots: Sequence[int]) -> Recording:
+        before = self.values.text("file")
+        self.values.write("start", kind)
+        end = self.clock.now() + seconds + GRACE_S
+        while (state := self.values.text("state")) == "RUN":
+            if self.clock.now() > end:
+                self.make_safe()
+                raise StationTimeout(
+                    f"{self.name}: still runs {GRACE_S:g} s after the end of the test; check the controller"
+                )
+            self.clock.sleep(min(POLL_S, max(0.02, seconds)))
+        if state == "ABORT":
+            raise OperatorNeeded(
+                f"{self.name}: aborted the test ({self.values.text('reason')}); remove the cause, reset the controller, and give "
+                "the command again"
+            )
+        path = self.values.text("file")
+        if path in {before, "NONE"}:
+            raise RecordingSpoilt(f"{self.name}: no recording of the test, the trigger was missed; check the recorder")
+        return read_recording(Path(path), list(slots), self.name)
+
+
+def _refuse_clipped(driven: np.ndarray, name: str) -> None:
+    """Refuse a reference whose extremes are flat."""
+    top = float(np.max(np.abs(driven)))
+    share = float(np.mean(np.abs(driven) > 0.999 * top))
+    if share > 0.1:
+        raise RecordingSpoilt(
+            f"{name}: the reference is clipped at {top:.4g} g; choose a larger range of its conditioner"
+        )

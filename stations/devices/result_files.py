@@ -1,0 +1,46 @@
+"""Result files of test equipment: MATLAB files with a rate, a unit and a channel for every slot."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from scipy.io import loadmat
+
+from schemas.errors import StationRefused
+from stations.devices.recording import Recording
+
+NEEDED = ("rate_hz", "reference", "reference_rate_hz", "reference_unit")
+STANDARD_GRAVITY = {"g": 1.0, "m/s^2": 9.80665}
+
+
+def read_recording(path: Path, slots: list[int], name: str) -> Recording:
+    """The recording in a result file; a file without rate or unit is refused.
+
+    Parameters
+    ----------
+    slots : whose channels are wanted; one that is not there is left out
+    name : of the equipment, for messages
+    """
+    try:
+        content: dict[str, Any] = loadmat(path, simplify_cells=True)
+    except (OSError, ValueError, NotImplementedError) as problem:
+        raise StationRefused(f"{name}: result file {path.name} cannot be read ({problem}); check the share") from None
+    missing = [key for key in NEEDED if key not in content]
+    if missing:
+        raise StationRefused(
+            f"{name}: result file {path.name} lacks {', '.join(missing)}; set up the export of the recorder"
+        )
+    unit = str(content["reference_unit"])
+    if unit not in STANDARD_GRAVITY:
+        raise StationRefused(
+            f"{name}: reference in '{unit}', {' or '.join(STANDARD_GRAVITY)} is needed; correct the set-up"
+        )
+    outputs = {
+        slot: np.atleast_2d(np.asarray(content[f"slot_{slot}"], dtype=np.float64))
+        for slot in slots
+        if f"slot_{slot}" in content
+    }
+    reference = np.asarray(content["reference"], dtype=np.float64) / STANDARD_GRAVITY[unit]
+    return Recording(outputs, float(content["rate_hz"]), reference, float(content["reference_rate_hz"]))

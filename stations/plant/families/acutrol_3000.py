@@ -1,0 +1,115 @@
+"""The simulated centrifuge behind an ACUTROL 3000, with arm stretch, an offset of each proof mass, and a recorder."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from stations.plant.bench import STANDARD_G, Waveforms
+from stations.plant.result_files import ResultFiles
+
+if TYPE_CHECKING:
+    from schemas.profile import Profile
+    from stations.plant.world import World
+
+UNKNOWN, WRONG = "NA:CMD ERR", "NA:PARA ERR"
+RADIUS_M = 0.5
+ACCELERATION_DEG_S2 = 100.0
+RECORD_HZ = 200.0
+IDLE_S = 900.0  # without a line for so long the machine stops by itself
+
+
+def simulated(world: World, profile: Profile) -> Centrifuge:
+    """A centrifuge in front of the world's bench; its input axis is z, radial."""
+    del profile
+    return Centrifuge(world)
+
+
+class Centrifuge:
+    """Follows the demanded rate at constant acceleration; an open interlock or a long silence brings it to rest."""
+
+    def __init__(self, world: World) -> None:
+        self._world = world
+        self._from, self._to, self._since_us = 0.0, 0.0, 0
+        self._closed, self._direction = False, 1.0
+        self._heard_us, self._tripped = 0, ""
+        self._number, self._seconds, self._start_us = 0, 0.0, 0
+        self._files = ResultFiles()
+
+    def answer(self, line: str) -> tuple[str, bool]:
+        """The answer to a line, and whether the line changed anything."""
+        self._watch()
+        head, _, value = line.partition(",")
+        if line in {":read:rate? 1", ":interlock? 1", ":rec:file?", ":mode? 1", ":int? 1"}:
+            return self._report(line), False
+        self._heard_us = self._world.now_us
+        if line in {":int:close 1", ":int:open 1"}:
+            self._closed = line.endswith("close 1")
+            if not self._closed:
+                self._go(0.0)
+            return "OK", True
+        if line in {":mode:off 1", ":mode:rate 1"}:
+            return "OK", True
+        try:
+            number = float(value)
+        except ValueError:
+            return UNKNOWN, False
+        if head == ":dem:rate 1":
+            self._go(number if self._closed and not self._tripped else 0.0)
+        elif head == ":mount 1":
+            self._direction = 1.0 if number > 0.0 else -1.0
+        elif head == ":rec 1":
+            if "missed_trigger" not in self._world.bench.troubles:
+                self._number += 1
+                self._seconds, self._start_us = number, self._world.now_us
+        else:
+            return UNKNOWN, False
+        return "OK", True
+
+    def rate(self) -> float:
+        """Rate now, °/s."""
+        way = ACCELERATION_DEG_S2 * 1e-6 * (self._world.now_us - self._since_us)
+        return self._from + math.copysign(min(way, abs(self._to - self._from)), self._to - self._from)
+
+    def _go(self, wanted: float) -> None:
+        self._from, self._to, self._since_us = self.rate(), wanted, self._world.now_us
+
+    def _watch(self) -> None:
+        """Trips by door and overspeed, and the stop after a silence; all follow from the plant's time."""
+        troubles = self._world.bench.troubles
+        found = "guard door" if "guard_door" in troubles else "overspeed" if "overspeed" in troubles else ""
+        if found and not self._tripped:
+            self._tripped = found
+            self._go(0.0)
+        elif not found:
+            self._tripped = ""
+        if self._to > 0.0 and self._world.now_us - self._heard_us > round(1e6 * IDLE_S):
+            self._go(0.0)
+
+    def _report(self, line: str) -> str:
+        if line == ":read:rate? 1":
+            return f"{self.rate():.6f}"
+        if line == ":interlock? 1":
+            return f"Fault {self._tripped}" if self._tripped else ("Closed" if self._closed else "Open")
+        if line == ":rec:file?":
+            over = self._world.now_us >= self._start_us + round(1e6 * self._seconds)
+            return (
+                self._files.write(self._number, self._recorded, self._world.slots) if self._number and over else "NONE"
+            )
+        return "rate" if line == ":mode? 1" else ("close" if self._closed else "open")
+
+    def _recorded(self) -> Waveforms:
+        bench = self._world.bench
+        rig, omega = bench.rig, math.radians(self._to)
+        arm = (RADIUS_M + rig.arm_radius_error_m) * (1.0 + rig.arm_stretch * omega**2)
+        offsets = np.array([unit.mass_offset_m for unit in bench.units])
+        force = self._direction * (arm + self._direction * offsets) * omega**2 / STANDARD_G
+        wobble = np.random.Generator(np.random.Philox(key=self._start_us + 10)).standard_normal()
+        force = force * (1.0 + 2e-6 * float(wobble))
+        outputs = bench.steady(force, 2, self._seconds, RECORD_HZ, self._start_us)
+        rng = np.random.Generator(np.random.Philox(key=self._start_us + 9))
+        reference = np.zeros((round(self._seconds * 10.0), 3))
+        reference[:, 0] = self._to * (1.0 + 1e-6 * rng.standard_normal(len(reference)))
+        return Waveforms(outputs, RECORD_HZ, reference, 10.0)

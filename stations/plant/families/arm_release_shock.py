@@ -1,0 +1,99 @@
+"""The simulated shock machine with recorder and reference sensor."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from stations.plant.bench import FINE_HZ
+from stations.plant.result_files import ResultFiles
+
+if TYPE_CHECKING:
+    from schemas.profile import Profile
+    from stations.plant.bench import Waveforms
+    from stations.plant.world import World
+
+UNKNOWN, WRONG, REFUSED = "NA:CMD ERR", "NA:PARA ERR", "NA:NOT ARMED"
+FALL_S = 2.0
+BEFORE_S, AFTER_S = 0.06, 0.12
+JITTER = 0.03
+
+
+def simulated(world: World, profile: Profile) -> Machine:
+    """A machine in front of the world's bench."""
+    del profile
+    return Machine(world)
+
+
+class Machine:
+    """One shock a release; it disarms itself."""
+
+    def __init__(self, world: World) -> None:
+        self._world = world
+        self._set = {"PEAK": 50.0, "DUR": 11.0, "AXIS": 2.0, "DIR": 1.0}
+        self._armed, self._number, self._start_us, self._until_us = False, 0, 0, 0
+        self._recorded_one, self._refused = False, False
+        self._shape, self._troubles = (0.0, 0.0), frozenset[str]()
+        self._files = ResultFiles()
+
+    def answer(self, line: str) -> tuple[str, bool]:
+        """The answer to a line, and whether the line changed anything."""
+        head, _, value = line.partition(" ")
+        if line.endswith("?"):
+            return self._report(line[:-1]), False
+        if head in self._set:
+            try:
+                self._set[head] = float(value)
+            except ValueError:
+                return WRONG, False
+            return "OK", True
+        if head == "ARM":
+            self._armed = value == "ON"
+            return "OK", True
+        if line == "REL NOW":
+            return self._release()
+        return UNKNOWN, False
+
+    def _report(self, what: str) -> str:
+        world = self._world
+        if what == "DOOR":
+            return "OPEN" if "guard_door" in world.bench.troubles else "CLOSED"
+        if what == "STAT":
+            if self._refused:
+                return "DOOR"
+            return "RUN" if world.now_us < self._until_us else ("ARMED" if self._armed else "READY")
+        if what == "FILE":
+            done = self._recorded_one and world.now_us >= self._until_us
+            return self._files.write(self._number, self._waveforms, world.slots) if done else "NONE"
+        return f"{self._set[what]:.6g}" if what in self._set else UNKNOWN
+
+    def _release(self) -> tuple[str, bool]:
+        world = self._world
+        if not self._armed:
+            return REFUSED, False
+        self._armed, self._recorded_one = False, False
+        self._refused = "guard_door" in world.bench.troubles
+        if self._refused:
+            return "OK", True
+        rng = np.random.Generator(np.random.Philox(key=world.now_us + 5))
+        share = 0.33 if "level_not_reached" in world.bench.troubles else 1.0
+        self._shape = (
+            share * self._set["PEAK"] * (1.0 + JITTER * float(rng.standard_normal())),
+            1e-3 * self._set["DUR"] * (1.0 + JITTER * float(rng.standard_normal())),
+        )
+        self._start_us, self._troubles = world.now_us, frozenset(world.bench.troubles)
+        self._until_us = world.now_us + round(1e6 * FALL_S)
+        world.bench.hit(self._shape[0])
+        if "missed_trigger" not in world.bench.troubles:
+            self._number += 1
+            self._recorded_one = True
+        return "OK", True
+
+    def _waveforms(self) -> Waveforms:
+        peak, duration = self._shape
+        t = np.arange(round((BEFORE_S + duration + AFTER_S) * FINE_HZ)) / FINE_HZ - BEFORE_S
+        pulse = np.where((t >= 0.0) & (t <= duration), peak * np.sin(np.pi * t / duration), 0.0)
+        return self._world.bench.transient(
+            self._set["DIR"] * pulse, int(self._set["AXIS"]), self._start_us, troubles=self._troubles
+        )

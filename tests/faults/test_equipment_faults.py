@@ -1,0 +1,150 @@
+"""Trouble at test equipment ends repeated, refused, or as not determined, and never as a figure."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from pipelines.archive import Archive
+from pipelines.capture.capture import capture
+from pipelines.chain.runner import Runner
+from pipelines.jobs.job import Job
+from pipelines.jobs.recipes import load_recipe
+from pipelines.procedures import roles_of
+from pipelines.stages.figures import UNITS
+from schemas.errors import OperatorNeeded
+from schemas.fault import FaultOrder
+from schemas.limits import limits_of
+from schemas.progress import silent
+from schemas.recipe import Lot, Unit
+from schemas.station import load_station, with_faults
+from stations import open_station
+
+PARTS = {
+    "sweep": "frequencies_hz = [40.0, 80.0, 120.0, 160.0, 320.0, 640.0, 900.0, "
+    "1300.0]\nnominal_scale = 0.007\nlevel_g = 2.0\nrecord_s = 0.05\ncycles = 4",
+    "shock": "shocks = 1\nboth_directions = false\nwindow_s = 10.0\nsettle_s = 0.0\nscale = 0.007",
+    "centrifuge": "forces_g = [1.0, 5.0, 10.0, 20.0]\nrecord_s = 0.5\nreversed = false\ndown_again = false\nscale = 0.007",
+}  # fmt: skip
+
+
+def recipe_of(folder: Path, name: str):
+    path = folder / "recipe.toml"
+    path.write_text(
+        'name = "trouble"\ndevice = "SF1500"\nlocal_gravity_m_s2 = 9.80665\ntemperatures_C = [25.0]\n'
+        f'soak_min_s = 1.0\nallow_short_soak = true\n[[procedures]]\nkind = "{name}"\n{PARTS[name]}\n'
+    )
+    return load_recipe(str(path))
+
+
+def lot() -> Lot:
+    return Lot(units=[Unit(serial="F1", slot=0), Unit(serial="F2", slot=1)], device="SF1500", seed=5)
+
+
+def take(folder: Path, name: str, faults: list[FaultOrder], archive: str):
+    records = Archive(folder / archive).capture("one")
+    recipe = recipe_of(folder, name)
+    with open_station(with_faults(load_station(), faults), lot(), roles=roles_of(recipe)) as station:
+        capture(station, recipe, lot(), records, progress=silent, events=records.events)
+        after = station.equipment
+    assert after
+    return records
+
+
+@pytest.mark.parametrize(
+    ("name", "kind"),
+    [
+        ("sweep", "missed_trigger"),
+        ("sweep", "clipped_reference"),
+        ("sweep", "level_not_reached"),
+        ("shock", "missed_trigger"),
+    ],
+)
+def test_a_spoilt_recording_is_discarded_and_repeated(name: str, kind: str, tmp_path: Path) -> None:
+    good = take(tmp_path, name, [], "good")
+    readings = good.gathered("readings")
+    first = float(readings[readings["pose"] != "bias"]["start_s"].min())
+    fault = FaultOrder(kind=kind, at_s=max(0.0, first - 0.2), for_s=0.6)
+    again = take(tmp_path, name, [fault], "again")
+    events = [event for event in again.events.noted() if event.kind == "spoilt"]
+    assert events
+    assert again.finished() == good.finished()
+    assert ("exciter" if name == "sweep" else "shock") in events[0].reason
+
+
+@pytest.mark.parametrize(
+    ("name", "kind", "text"),
+    [
+        ("sweep", "missed_trigger", "trigger was missed"),
+        ("sweep", "controller_abort", "interlock open"),
+        ("shock", "guard_door", "guard door is open"),
+        ("shock", "level_not_reached", "was ordered"),
+        ("centrifuge", "guard_door", "guard door"),
+        ("centrifuge", "overspeed", "overspeed"),
+        ("centrifuge", "missed_trigger", "trigger was missed"),
+    ],
+)
+def test_trouble_that_stays_ends_the_run_for_a_person(name: str, kind: str, text: str, tmp_path: Path) -> None:
+    with pytest.raises(OperatorNeeded, match=text):
+        take(tmp_path, name, [FaultOrder(kind=kind)], "bad")
+
+
+@pytest.mark.parametrize("name", ["sweep", "shock", "centrifuge"])
+def test_a_unit_whose_cable_is_off_has_no_figure(name: str, tmp_path: Path) -> None:
+    recipe = recipe_of(tmp_path, name)
+    figure = {
+        "sweep": "sweep_bandwidth_hz",
+        "shock": "shock_sensitivity_percent",
+        "centrifuge": "centrifuge_linearity_percent",
+    }
+    limits = limits_of({"name": "one", "figures": {figure[name]: {"max": 1e9, "unit": UNITS[figure[name]]}}}, UNITS)
+    station = with_faults(load_station(), [FaultOrder(kind="cable_off", serial="F2")])
+    runner = Runner(Job(recipe, limits, lot(), station), Archive(tmp_path / "archive"))
+    for stage in ("capture", "validate", "reduce", "fit", "verify", "noise", "procedures", "grade"):
+        runner.stage(stage)
+    figures = runner.run.table("procedure_figures")
+    own = figures[figures["figure"] == figure[name]].set_index("unit")
+    assert bool(own.loc["F1", "identified"]) or name == "sweep"
+    assert not own.loc["F2", "identified"]
+    assert np.isnan(own.loc["F2", "value"])
+    assert runner.run.table("grades").set_index("unit").loc["F2", "outcome"] == "fail"
+
+
+def test_a_shock_beyond_the_sheets_limit_changes_the_unit_for_good(tmp_path: Path) -> None:
+    PARTS["hard"] = PARTS["shock"] + "\npeak_g = 14000.0\nduration_ms = 0.5"
+    path = tmp_path / "recipe.toml"
+    path.write_text(
+        'name = "trouble"\ndevice = "SF1500"\nlocal_gravity_m_s2 = 9.80665\ntemperatures_C = [25.0]\n'
+        f'soak_min_s = 1.0\nallow_short_soak = true\n[[procedures]]\nkind = "shock"\n{PARTS.pop("hard")}\n'
+    )
+    recipe = load_recipe(str(path))
+    limits = limits_of({"name": "one", "figures": {"shock_bias_shift_ug": {"max": 5000.0, "unit": "µg"}}}, UNITS)
+    runner = Runner(Job(recipe, limits, lot(), load_station()), Archive(tmp_path / "archive"))
+    for stage in ("capture", "validate", "reduce", "fit", "verify", "noise", "procedures", "grade"):
+        runner.stage(stage)
+    figures = runner.run.table("procedure_figures").set_index(["unit", "figure"])
+    assert abs(figures.loc[("F1", "shock_bias_shift_ug"), "value"]) == pytest.approx(250_000.0, rel=0.05)
+    assert not figures.loc[("F1", "shock_sensitivity_percent"), "identified"]  # the pulse is beyond the range: it clips
+    assert set(runner.run.table("grades")["outcome"]) == {"fail"}
+
+
+def test_a_centrifuge_that_is_left_alone_stops(tmp_path: Path) -> None:
+    recipe = recipe_of(tmp_path, "centrifuge")
+    with open_station(load_station(), lot(), roles=roles_of(recipe)) as station:
+        machine = station.equipment["centrifuge"]
+        machine.spin(200.0, 1, 0.5, [0, 1])
+        assert machine.values.number("rate_read") == pytest.approx(200.0)
+        station.clock.sleep(2000.0)
+        machine.values.text("fault")
+        station.clock.sleep(30.0)
+        assert machine.values.number("rate_read") == 0.0
+
+
+def test_the_safe_state_stops_the_equipment(tmp_path: Path) -> None:
+    recipe = recipe_of(tmp_path, "centrifuge")
+    with open_station(load_station(), lot(), roles=roles_of(recipe)) as station:
+        station.equipment["centrifuge"].spin(200.0, 1, 0.5, [0, 1])
+        reached = station.make_safe()
+        assert "centrifuge stopped" in reached.done
+        station.clock.sleep(30.0)
+        assert station.equipment["centrifuge"].values.number("rate_read") == 0.0

@@ -1,0 +1,367 @@
+"""Reference values of dynamic tests: published, or computed once by another route (exact integrals, simulation)."""
+
+import numpy as np
+import pytest
+from scipy.signal import lsim
+
+from inertial.dynamics import (
+    centrifuge,
+    exciter,
+    pulses,
+    random_vibration,
+    second_order,
+    settling,
+    shock_spectrum,
+    sine_fit,
+    spectra,
+    stability,
+    tilt,
+)
+from inertial.errors import NotIdentified
+
+
+@pytest.mark.parametrize(
+    ("zeta", "three_db", "five_percent"),
+    [
+        *((0.5, 1.272, 0.322), (0.6, 1.148, 0.844), (0.65, 1.080, 0.720), (0.7, 1.010, 0.591)),
+        *((0.7071, 1.000, 0.573), (0.75, 0.940, 0.476), (0.8, 0.871, 0.390), (1.0, 0.644, 0.229)),
+    ],
+)
+def test_band_edges_of_a_second_order_sensor(zeta: float, three_db: float, five_percent: float) -> None:
+    assert second_order.bandwidth(1.0, zeta) == pytest.approx(three_db, abs=6e-4)
+    assert second_order.flat_band(1.0, zeta) == pytest.approx(five_percent, abs=6e-4)
+
+
+@pytest.mark.parametrize("zeta", [0.01, 0.05, 0.1, 0.2, 0.3, 0.38])
+def test_half_power_width_gives_the_damping_exactly(zeta: float) -> None:
+    from scipy.optimize import brentq
+
+    height, place = second_order.peak(zeta)
+
+    def over(r: float) -> float:
+        return abs(complex(second_order.transfer(r, 1.0, zeta))) - height / np.sqrt(2.0)
+
+    low, high = brentq(over, 1e-9, place, xtol=1e-14), brentq(over, place, 3.0, xtol=1e-14)
+    assert second_order.damping_from_half_power(low, high) == pytest.approx(zeta, rel=1e-9)
+
+
+def test_the_usual_estimates_from_the_width_err_as_known() -> None:
+    for zeta, by_peak, by_natural in ((0.05, 0.005, 0.0025), (0.2, 0.091, 0.047), (0.38, 0.71, 0.45)):
+        phi = np.arcsin(zeta)
+        low, high = np.sqrt(np.cos(2 * phi) - np.sin(2 * phi)), np.sqrt(np.cos(2 * phi) + np.sin(2 * phi))
+        assert (high - low) / (2 * second_order.peak(zeta)[1]) / zeta - 1 == pytest.approx(by_peak, rel=0.06)
+        assert (high - low) / 2 / zeta - 1 == pytest.approx(by_natural, rel=0.06)
+
+
+def test_group_delay_at_rest() -> None:
+    assert second_order.group_delay(0.0, 2500.0, 0.7) == pytest.approx(89.1e-6, rel=2e-3)
+
+
+SEVERITIES = {
+    (5, 30): 0.94, (15, 11): 1.03, (30, 18): 3.37, (50, 11): 3.43, (50, 3): 0.94, (100, 6): 3.75, (100, 11): 6.87,
+    (500, 1): 3.12, (1000, 1): 6.24, (1500, 0.5): 4.68, (3000, 0.2): 3.75,
+}  # fmt: skip
+
+
+@pytest.mark.parametrize(("severity", "velocity"), SEVERITIES.items())
+def test_velocity_change_of_the_severities_of_iec_60068_2_27(severity: tuple[float, float], velocity: float) -> None:
+    assert pulses.velocity_change(severity[0], 1e-3 * severity[1]) == pytest.approx(velocity, abs=6e-3)
+
+
+@pytest.mark.parametrize(
+    ("zeta", "peaks", "under"),
+    [
+        (0.7, (-0.051, 0.0, 0.0, 0.0, 0.0), (0.038, 0.024, 0.016, 0.010, 0.005)),
+        (0.6, (0.005, 0.019, 0.007, 0.003, 0.001), (0.081, 0.046, 0.031, 0.019, 0.009)),
+        (0.05, (0.62, 0.21, 0.10, 0.043, 0.011), None),
+    ],
+)
+def test_a_sensors_own_error_on_a_half_sine(zeta: float, peaks: tuple[float, ...], under: tuple | None) -> None:
+    for k, product in enumerate((1.0, 2.0, 3.0, 5.0, 10.0)):
+        shock = pulses.half_sine(1.0, product / 1000.0, 1000.0, zeta, band=0.02, points=20_000)
+        inside = shock.output[shock.time <= product / 1000.0 * 1.6].max() - 1.0
+        assert inside == pytest.approx(peaks[k], abs=0.006)
+        if under:
+            assert shock.undershoot == pytest.approx(under[k], abs=7e-4)
+
+
+def test_the_peak_of_a_noisy_pulse_is_not_its_largest_sample(rng: np.random.Generator) -> None:
+    rate, duration = 20_000.0, 0.011
+    t = np.arange(2000) / rate
+    clean = np.where((t > 0.03) & (t < 0.041), 50.0 * np.sin(np.pi * (t - 0.03) / duration), 0.0)
+    largest, parabola = [], []
+    for _ in range(200):
+        record = clean + 0.5 * rng.normal(size=t.size)
+        largest.append(record.max() - 50.0)
+        parabola.append(pulses.measured_pulse(record, rate, before_s=0.025))
+    errors = np.array([p.peak - 50.0 for p in parabola])
+    assert np.mean(largest) == pytest.approx(0.82, abs=0.12)
+    assert abs(np.mean(errors)) < 0.06
+    assert np.std(errors) / np.mean([p.peak_error for p in parabola]) == pytest.approx(1.0, abs=0.2)
+    assert np.mean([p.duration_s for p in parabola]) == pytest.approx(duration, rel=0.01)
+
+
+SRS = {
+    np.inf: (0.3963, 0.7705, 1.5708, 1.7683, 1.7320, 1.5000, 1.2681, 1.1699, 1.0998, 1.0497),
+    10.0: (0.3691, 0.7176, 1.4626, 1.6510, 1.6238, 1.4213, 1.2124, 1.1016, 1.0430, 1.0112),
+}
+
+
+@pytest.mark.parametrize("q", SRS)
+def test_shock_response_spectrum_of_the_half_sine(q: float) -> None:
+    products = np.array([0.1, 0.2, 0.5, 0.8, 1.0, 1.5, 2.0, 3.0, 5.0, 10.0])
+    duration, rate = 1.0, 4000.0
+    t = np.arange(int(duration * rate) + 1) / rate
+    found = shock_spectrum.shock_spectrum(np.sin(np.pi * t / duration), rate, products / duration, q)
+    assert found == pytest.approx(SRS[q], abs=6e-4)
+
+
+def test_the_recursion_is_exact_for_straight_segments() -> None:
+    rate, f, q = 500.0, 40.0, 10.0
+    x = np.random.default_rng(4).normal(size=200)
+    x[0] = 0.0
+    wn, zeta = 2.0 * np.pi * f, 0.5 / q
+    system = ([2.0 * zeta * wn, wn**2], [1.0, 2.0 * zeta * wn, wn**2])
+    assert shock_spectrum.responses(x, rate, f, q) == pytest.approx(lsim(system, x, np.arange(200) / rate)[1], abs=1e-9)
+
+
+def test_the_largest_response_and_the_undamped_residual() -> None:
+    x = np.linspace(0.79, 0.85, 61)
+    t = np.arange(0, 1.0 + 1e-9, 1 / 2000.0)
+    for q, largest, place in (
+        (np.inf, 1.7685, 0.810),
+        (25.0, 1.7184, 0.816),
+        (10.0, 1.6516, 0.823),
+        (5.0, 1.5584, 0.834),
+    ):
+        found = shock_spectrum.shock_spectrum(np.sin(np.pi * t), 2000.0, x, q)
+        assert found.max() == pytest.approx(largest, abs=3e-4)
+        assert x[int(np.argmax(found))] == pytest.approx(place, abs=0.004)
+    assert shock_spectrum.undamped_residual(0.5) == pytest.approx(np.pi / 2.0)
+    assert shock_spectrum.undamped_residual(0.1) == pytest.approx(0.3963, abs=1e-4)
+    with pytest.raises(NotIdentified, match="sample faster"):
+        shock_spectrum.shock_spectrum(np.ones(10), 100.0, np.array([20.0]))
+
+
+def test_sine_fit_variances(rng: np.random.Generator) -> None:
+    n, rate, f = 400, 1000.0, 37.3
+    t = np.arange(n) / rate
+    tones = [
+        sine_fit.fit_tone((np.cos(2 * np.pi * f * t + 0.4) + 0.1 * rng.normal(size=n))[:, None], rate, f)
+        for _ in range(1000)
+    ]
+    amplitude = np.array([abs(tone.value[0]) for tone in tones])
+    phase = np.array([np.angle(tone.value[0]) for tone in tones])
+    assert np.std(amplitude) / (0.1 * np.sqrt(2 / n)) == pytest.approx(0.996, abs=0.05)
+    assert np.std(phase) / (0.1 * np.sqrt(2 / n)) == pytest.approx(1.007, abs=0.05)
+    assert np.mean(phase) == pytest.approx(0.4, abs=1e-3)
+
+
+def test_a_wrong_frequency_lowers_the_amplitude_and_the_fourth_parameter_repairs_it(rng: np.random.Generator) -> None:
+    rate, f = 10_000.0, 1000.0
+    t = np.arange(10_000) / rate
+    for share, low in ((0.05, -0.0041), (0.1, -0.016), (0.2, -0.065)):
+        record = np.cos(2 * np.pi * (f + share) * t)[:, None]
+        assert abs(sine_fit.fit_tone(record, rate, f).value[0]) - 1.0 == pytest.approx(low, rel=0.06)
+    ppm = 1000.0
+    record = (np.cos(2 * np.pi * f * (1 + 1e-6 * ppm) * t) + 0.01 * rng.normal(size=t.size))[:, None]
+    assert abs(sine_fit.fit_tone(record, rate, f).value[0]) < 0.01
+    errors = []
+    for _ in range(40):
+        noisy = np.cos(2 * np.pi * f * (1 + 1e-6 * ppm) * t)[:, None] + 0.1 * rng.normal(size=(t.size, 1))
+        tone = sine_fit.fit_tone_and_frequency(noisy, rate, f)
+        errors.append((tone.frequency - f * (1 + 1e-6 * ppm)) / tone.frequency_error)
+        assert abs(tone.value[0]) == pytest.approx(1.0, abs=0.01)
+    assert 0.7 < np.std(errors) < 1.35
+    assert tone.frequency_error == pytest.approx(sine_fit.frequency_error_of(0.1, 1.0, 1.0, t.size), rel=0.05)
+
+
+def test_the_linear_term_takes_a_drift_out() -> None:
+    t = np.arange(3000) / 1000.0
+    record = (np.sin(2 * np.pi * t) + 0.5 * t / 3.0)[:, None]
+    assert abs(sine_fit.fit_tone(record, 1000.0, 1.0).value[0]) == pytest.approx(1.0, abs=1e-9)
+
+
+def test_response_by_h1_and_h2_and_its_random_error(rng: np.random.Generator) -> None:
+    x = rng.normal(size=200_000)
+    noisy = x + 0.3 * rng.normal(size=x.size)
+    on_input, on_output = spectra.response(noisy, x, 1.0, segment=256), spectra.response(x, noisy, 1.0, segment=256)
+    assert np.mean(np.abs(on_input.h1)) == pytest.approx(0.917, abs=0.005)
+    assert np.mean(np.abs(on_input.h2)) == pytest.approx(1.0, abs=0.005)
+    assert np.mean(np.abs(on_output.h1)) == pytest.approx(1.0, abs=0.005)
+    none = spectra.response(rng.normal(size=2688), rng.normal(size=2688), 1.0, segment=256)
+    assert np.mean(none.coherence) == pytest.approx(1.0 / none.averages, rel=0.3)
+    with pytest.raises(NotIdentified, match="record longer"):
+        spectra.response(x[:256], x[:256], 1.0, segment=256)
+    scatter = []
+    for _ in range(40):
+        a = rng.normal(size=6528)
+        found = spectra.response(a, a + 0.436 * rng.normal(size=a.size), 1.0, segment=256)
+        scatter.append((np.abs(found.h1[5:-5]) - 1.0) / found.error[5:-5])
+    assert np.std(scatter) == pytest.approx(1.0, abs=0.08)
+
+
+def test_a_delay_between_the_channels_biases_the_magnitude() -> None:
+    assert [spectra.delay_bias(s, 1.0) for s in (1 / 32, 1 / 8, 1 / 4)] == pytest.approx([0.994, 0.90, 0.66], abs=0.006)
+    assert spectra.delay_bias(0.25, 1.0, "none") == pytest.approx(0.75, abs=1e-3)
+
+
+def test_confidence_of_a_density_and_butterworth_figures() -> None:
+    for n, low, high in ((60, -2.3, 1.9), (120, -1.6, 1.3), (240, -1.1, 1.0)):
+        assert spectra.density_confidence(n / 2.0) == pytest.approx((low, high), abs=0.13)
+    for order, noise, delay, over in ((1, 1.571, 1.0, 0.0), (2, 1.111, 1.414, 0.043), (4, 1.026, 2.613, 0.108)):
+        assert spectra.butterworth(order) == pytest.approx((noise, delay, over), abs=1e-3)
+
+
+def test_what_five_times_the_bandwidth_leaves_folded() -> None:
+    for times, second, one in ((5, -24, -12), (10, -38, -19), (20, -51, -26)):
+        found = [20 * np.log10(spectra.folded_share(times, 1.0, order)) for order in (2, 1)]
+        assert found == pytest.approx([second, one], abs=0.6)
+
+
+def test_rectification_by_clipping_and_the_hann_mean(rng: np.random.Generator) -> None:
+    for reach, shift in ((2.0, -0.436), (2.048, -0.425), (4.0, -0.119), (8.0, -0.002)):
+        assert random_vibration.gaussian_clipping(2.5, 1.0, reach) == pytest.approx(shift, abs=2e-3)
+    flat = np.array([20.0, 2000.0]), np.array([0.03, 0.03])
+    made = np.array([random_vibration.made_signal(*flat, 8000.0, 16_000, rng)[4000:12_000] for _ in range(60)])
+    assert np.std(made) == pytest.approx(random_vibration.overall_level(*flat), rel=0.01)
+    assert np.std([spectra.hann_mean(one[:, None])[0] for one in made]) < 3e-5
+    assert np.std(made.mean(axis=1)) > 3e-3
+
+
+def test_step_response_overshoot_and_settling() -> None:
+    for zeta, over in ((0.6, 0.095), (0.65, 0.068), (0.7, 0.046), (0.75, 0.028), (0.8, 0.015)):
+        assert settling.overshoot(zeta) == pytest.approx(over, abs=6e-4)
+        assert settling.damping_from_overshoot(settling.overshoot(zeta)) == pytest.approx(zeta)
+    table = {
+        0.6: (5.23, 5.94, 6.26, 10.17),
+        0.7: (2.90, 5.98, 6.58, 10.29),
+        0.75: (3.13, 5.74, 6.60, 8.00),
+        0.8: (3.39, 3.76, 6.35, 8.47),
+        1.0: (4.74, 5.83, 6.64, 9.23),
+    }
+    for zeta, angles in table.items():
+        assert [settling.settling_angle(zeta, band) for band in (0.05, 0.02, 0.01, 0.001)] == pytest.approx(
+            angles, abs=0.012
+        )
+    assert settling.damping_from_decrement(1.0, np.exp(-2 * np.pi * 0.1 / np.sqrt(1 - 0.01) * 3), 3) == pytest.approx(
+        0.1
+    )
+
+
+def test_budget_of_a_shaker_by_the_gum() -> None:
+    r3 = np.sqrt(3.0)
+    parts = [0.25, 0.2 / r3, 0.1 / r3, 100 * 0.03 * 0.10 / r3, 0.2 / r3, 0.04 / r3, 0.1 / r3, 0.05, 0.1 / np.sqrt(5.0)]
+    assert exciter.combined(parts) == pytest.approx(0.362, abs=1e-3)
+    assert 2.0 * exciter.combined(parts) == pytest.approx(0.72, abs=5e-3)
+    rng = np.random.default_rng(1)
+    s, a, beta = rng.uniform(0, 1, (3, 400_000)) * np.array([1.0, 1.0, 2 * np.pi])[:, None]
+    assert np.std(s * a * np.cos(beta)) == pytest.approx(exciter.transverse_error(1.0, 1.0), rel=5e-3)
+
+
+def test_limits_of_the_exciter_decide_the_level() -> None:
+    assert exciter.stroke(5.0, 5.0) == pytest.approx((0.0497, 1.56), rel=2e-3)
+    for stroke, start in ((0.005, 15.8), (0.0127, 9.9), (0.0254, 7.0)):
+        found = exciter.largest_level(start, displacement_m=stroke, velocity_m_s=10.0, acceleration_g=50.0)
+        assert found == pytest.approx(5.0, rel=0.01)
+
+
+def test_centrifuge_relations() -> None:
+    assert [1e6 * centrifuge.earth_rate_share(w, 45.0) for w in (5.0, 20.0, 60.0)] == pytest.approx(
+        [21, 5, 1.7], abs=0.4
+    )
+    assert [1e3 * centrifuge.lever_arm(w, 1e-3) for w in (100, 300, 360, 1000)] == pytest.approx(
+        [0.31, 2.8, 4.0, 31], rel=0.02
+    )
+    slope = 0.5 / centrifuge.STANDARD_GRAVITY
+    for distance, ppm in ((0.02, 440), (0.05, 179), (0.1, 92), (0.2, 50)):
+        far = slope * (0.5 + distance) / 0.5
+        found, error = centrifuge.scale_from_two_radii((slope, far), (1e-5 * slope, 1e-5 * far), distance, 5e-6)
+        assert found == pytest.approx(1.0)
+        assert 1e6 * error == pytest.approx(ppm, rel=0.04)
+    x = np.linspace(0.1, 1.0, 10)
+    for largest, k2, k3 in ((1.0, 69, 127), (10.0, 0.69, 0.13), (100.0, 0.0069, 0.00013)):
+        a = np.sqrt(x) * largest if False else np.concatenate([x, -x]) * largest
+        found = centrifuge.fit_polynomial(a, a, np.full(20, 1e-4), centrifuge.TERMS[:4])
+        assert 1e6 * found.of("second_order")[1] == pytest.approx(k2, rel=0.35)
+        assert 1e6 * found.of("third_order")[1] == pytest.approx(k3, rel=0.35)
+
+
+def test_linearity_says_which_line() -> None:
+    for name, quadratic, cubic in (("least_squares", 66.7, 38.5), ("end_point", 100.0, 38.5), ("best", 50.0, 25.0)):
+        for terms, value in (((0.0, 1.0, 1.0, 0.0), quadratic), ((0.0, 1.0, 0.0, 1.0), cubic)):
+            p = centrifuge.Polynomial(centrifuge.TERMS[:4], np.array(terms), np.eye(4), np.zeros(1), 0.0, 1)
+            assert centrifuge.linearity_percent(p, 1.0, name) == pytest.approx(value, rel=0.05)
+
+
+def test_one_plane_of_tilt_gives_the_known_uncertainties() -> None:
+    for n, first, more in ((12, (0.29, 0.41), (0.50, 1.29, 0.82, 1.63)), (24, (0.20, 0.29), (0.35, 0.91, 0.58, 1.15))):
+        angle = 2 * np.pi * np.arange(n) / n
+        plain = tilt.fit_tilt(angle, np.sin(angle), np.ones(n))
+        assert (plain.of("bias")[1], plain.scale[1]) == pytest.approx(first, abs=6e-3)
+        assert plain.phase[1] == pytest.approx(first[1], abs=6e-3)
+        whole = tilt.fit_tilt(angle, np.sin(angle), np.ones(n), orders=3)
+        found = (whole.of("bias")[1], whole.scale[1], whole.of("second_order")[1], whole.of("third_order")[1])
+        assert found == pytest.approx(more, abs=0.01)
+
+
+def test_a_cubic_raises_the_scale_by_three_quarters() -> None:
+    angle = 2 * np.pi * np.arange(24) / 24
+    found = tilt.fit_tilt(angle, np.sin(angle) + 1e-3 * np.sin(angle) ** 3, np.ones(24))
+    assert found.scale[0] - 1.0 == pytest.approx(0.75e-3, rel=1e-6)
+    assert found.residuals == pytest.approx(-0.25e-3 * np.sin(3 * angle), abs=1e-12)
+
+
+def test_definitions_of_bias_stability_differ(rng: np.random.Generator) -> None:
+    names = ("range_1s", "sd_1s", "sd_100s", "range_100s", "allan_100s")
+    records = [stability.stability(10.0 * rng.normal(size=3600), 1.0) for _ in range(40)]
+    white = np.array([[getattr(one, name) for name in names] for one in records]).mean(axis=0)
+    assert white == pytest.approx([72, 10, 1.0, 4.2, 1.0], rel=0.06)
+    ramp = stability.stability(50.0 * np.arange(3600) / 3600.0, 1.0)
+    assert (ramp.range_1s, ramp.sd_100s, ramp.range_100s) == pytest.approx((50, 14.6, 49), rel=0.02)
+    assert ramp.drift_h == pytest.approx(50.0, rel=1e-3)
+    assert ramp.allan_100s == pytest.approx(1.0, rel=0.03)
+
+
+def test_warm_up_time_of_an_exponential() -> None:
+    t = np.arange(0.0, 6000.0)
+    time, _ = stability.warm_up_time(t, 1000.0 * np.exp(-t / 300.0), band=50.0, window_s=1.0)
+    assert time == pytest.approx(899.0, abs=2.0)
+    with pytest.raises(NotIdentified, match="record longer"):
+        stability.warm_up_time(t[:800], 1000.0 * np.exp(-t[:800] / 300.0), band=5.0, window_s=1.0)
+
+
+def test_factors_of_a_standard_deviation_from_few_cycles() -> None:
+    for n, low, high, upper in (
+        *((5, 0.60, 2.87, 2.37), (6, 0.62, 2.45, 2.09), (10, 0.69, 1.83, 1.65)),
+        *((20, 0.76, 1.46, 1.37), (30, 0.80, 1.34, 1.28)),
+    ):
+        assert stability.sigma_factors(n) == pytest.approx((low, high, upper), abs=6e-3)
+
+
+def test_own_error_of_the_cycles_is_removed(rng: np.random.Generator) -> None:
+    found = [
+        stability.repeatability(20.0 * rng.normal(size=10) + 15.0 * rng.normal(size=10), 15.0) for _ in range(2000)
+    ]
+    assert np.mean([one.value == 0.0 for one in found]) == pytest.approx(0.05, abs=0.03)
+    assert np.sqrt(np.mean([one.value**2 for one in found])) == pytest.approx(20.0, rel=0.06)
+    assert np.mean([one.low <= 20.0 <= one.high for one in found]) == pytest.approx(0.95, abs=0.03)
+
+
+OVERALL = {
+    "flat_20_2000": 8.90, "mil_std_810_truck_vertical": 1.043, "mil_std_810_truck_transverse": 0.2035,
+    "mil_std_810_truck_longitudinal": 0.7402, "navmat_p9492": 6.06, "gevs_qualification": 14.14, "gevs_acceptance": 10.00,
+    "do160_curve_c": 4.13, "do160_curve_d1": 7.95, "rideshare_2022": 5.57, "astm_d4169_truck_2": 0.517,
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", OVERALL)
+def test_overall_level_of_the_profiles(name: str) -> None:
+    from schemas.vibration_profile import load_vibration_profile, vibration_profiles
+
+    assert set(OVERALL) == set(vibration_profiles())
+    points = np.array(load_vibration_profile(name).breakpoints)
+    assert random_vibration.overall_level(points[:, 0], points[:, 1]) == pytest.approx(OVERALL[name], rel=2e-3)
+    fine = np.geomspace(points[0, 0], points[-1, 0], 200_001)
+    by_sum = np.trapezoid(random_vibration.interpolated(fine, points[:, 0], points[:, 1]), fine)
+    assert np.sqrt(by_sum) == pytest.approx(OVERALL[name], rel=2e-3)

@@ -1,0 +1,78 @@
+"""Diagnosis of a transfer function: what a sweep can know, and effects that are hidden by other means than they are fitted."""
+
+import numpy as np
+import pytest
+from scipy import signal
+
+from inertial.dynamics.second_order import transfer
+from inertial.dynamics.transfer_diagnosis import diagnose_transfer
+from inertial.dynamics.transfer_effects import Conditions
+from inertial.dynamics.transfer_model import Points, fit_transfer
+
+
+def points(f: np.ndarray, h: np.ndarray, share: float, phase: float, rng: np.random.Generator | None = None) -> Points:
+    n = f.size
+    noise = 0.0 if rng is None else share * rng.normal(size=n) + 1j * phase * rng.normal(size=n)
+    c = Conditions(f, np.ones(n), np.full(n, 25.0), np.ones(n))
+    return Points(c, h * np.exp(noise), np.full(n, share), np.full(n, phase))
+
+
+@pytest.mark.parametrize(
+    ("top", "known", "fitted"),
+    [
+        (1000.0, (0.013, 0.010), (0.11, 0.011)),
+        (2000.0, (0.0034, 0.003), (0.015, 0.004)),
+        (5000.0, (0.0011, 0.0014), (0.0020, 0.0018)),
+    ],
+)
+def test_what_a_sweep_can_know(top: float, known: tuple, fitted: tuple) -> None:
+    f = 5.0 * 2.0 ** (np.arange(200) / 6.0)
+    f = f[f <= top]
+    one = points(f, -transfer(f, 2500.0, 0.7), 0.005, np.radians(0.3))
+    for effects, expected in ((("second_order",), known), (("second_order", "delay"), fitted)):
+        fit = fit_transfer(one, effects)
+        assert fit.errors[0] == pytest.approx(expected[0], rel=0.06)
+        assert fit.of("damping")[1] == pytest.approx(expected[1], rel=0.2, abs=2e-4)
+
+
+def test_a_sweep_from_gain_alone_to_1_khz_does_not_identify_2500_hz() -> None:
+    f = 5.0 * 2.0 ** (np.arange(46) / 6.0)
+    one = points(f, -transfer(f, 2500.0, 0.7), 0.005, 1e3)
+    fit = fit_transfer(one, ("second_order",))
+    assert fit.errors[0] == pytest.approx(0.37, rel=0.1)
+    assert not fit.identified("natural_hz")
+    assert fit.of("natural_hz")[2] < 2500.0 < fit.of("natural_hz")[3]
+
+
+@pytest.mark.parametrize("kind", ["two_pole", "moving_average", "one_pole"])
+def test_a_hidden_low_pass_is_named_and_the_error_falls(kind: str, rng: np.random.Generator) -> None:
+    f = np.geomspace(5.0, 5000.0, 45)
+    h = -transfer(f, 2300.0, 0.62) * np.exp(-2j * np.pi * f * 2e-5)
+    if kind == "moving_average":
+        h = h * signal.freqz(np.ones(160) / 160, worN=f, fs=1e6)[1]
+    else:
+        b, a = signal.butter(2 if kind == "two_pole" else 1, 2.0 * np.pi * 5000.0, analog=True)
+        h = h * signal.freqs(b, a, 2.0 * np.pi * f)[1]
+    found = diagnose_transfer(points(f, h, 2e-3, 2e-3, rng))
+    assert found.adequate is False
+    assert kind in found.classes[0].effects
+    assert found.extended_percent < 0.5 * found.error_percent
+    assert found.left_out[1] == pytest.approx(1.0, abs=0.3)
+    assert found.where[0].high_hz == pytest.approx(5000.0)
+
+
+def test_nothing_is_named_where_nothing_is_missing(rng: np.random.Generator) -> None:
+    f = np.geomspace(5.0, 4000.0, 40)
+    for _ in range(5):
+        found = diagnose_transfer(
+            points(f, -transfer(f, 2500.0, 0.7) * np.exp(-2j * np.pi * f * 3e-5), 2e-3, 2e-3, rng)
+        )
+        assert found.adequate is True
+        assert found.classes == ()
+
+
+def test_few_points_cannot_be_judged() -> None:
+    f = np.geomspace(5.0, 4000.0, 4)
+    found = diagnose_transfer(points(f, -transfer(f, 2500.0, 0.7), 2e-3, 2e-3))
+    assert found.adequate is None
+    assert "sweep more frequencies" in found.reason
