@@ -67,6 +67,17 @@ EffectFileOption = Annotated[
     list[Path] | None,
     typer.Option("--effect-file", metavar="FILE.py", help="A Python file with effects of your own; may be repeated."),
 ]
+FormulaOption = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--formula",
+        metavar="ID=EXPRESSION",
+        help="An effect as a formula over recorded quantities, to be named in --effects; may be repeated.",
+    ),
+]
+LeaveOutOption = Annotated[
+    str, typer.Option("--leave-out", metavar="UNIT:DWELL,…", help="Dwells that are not used, by unit and number.")
+]
 SelectionArgument = Annotated[
     list[str],
     typer.Argument(
