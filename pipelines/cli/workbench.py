@@ -47,7 +47,7 @@ def command(
 ) -> None:
     """Serve pages on this machine: units, what is missing, upload, operator, plan, station and audit.
 
-    Open the address that is printed: its token lets this browser start work. Without the token a browser on this machine may look.
+    Open the address that is printed: its token lets this browser start work; without it a browser on this machine may look.
     Nothing is loaded from elsewhere, and nothing is sent.
     """
     import os
@@ -70,7 +70,8 @@ def command(
     given = os.environ.get("TUMBLELINE_WORKBENCH_TOKEN", "")
     settings = Settings(
         archive=Archive(archive or None).address, folder=folder, host=host, port=listening, names=tuple(name or ()),
-        tls=certificate is not None, proxied=behind_proxy, station=station, workers=workers, **({"token": given} if given else {}),
+        tls=certificate is not None, proxied=behind_proxy, station=station, workers=workers,
+        **({"token": given} if given else {}),
     )  # fmt: skip
     app = create_app(settings)
     console().print(f"{settings.address}/?token={settings.token}", soft_wrap=True)

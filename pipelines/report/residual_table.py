@@ -93,10 +93,12 @@ def _tabled(found: Measured, model: Model, units: tuple[str, ...]) -> ResidualTa
     state = problem.lot.state
     drivers: dict[str, tuple[str, Array]] = {}
     for driver in drivers_of(problem):
-        if driver.values is not None:
-            values = state.force_step if driver.name == "approach" else driver.values
+        recorded = driver.values  # noqa: PD011 - no table of pandas
+        if recorded is not None:
+            values = state.force_step if driver.name == "approach" else recorded
             drivers[driver.name] = (LABELS.get(driver.name, driver.name), values * shown_factor(driver.name))
     shape = (len(units), problem.n)
+    drivers["force"] = ("specific force along the axis / g", np.asarray(state.force, dtype=float))
     drivers.setdefault("time_s", (LABELS["time_s"], state.time * shown_factor("time_s")))
     drivers["dwell"] = ("number of the dwell", np.broadcast_to(found.dwells.astype(float), shape).copy())
     if state.slot is not None:

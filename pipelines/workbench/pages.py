@@ -8,9 +8,9 @@ import secrets
 from dataclasses import dataclass, field
 from functools import cache, lru_cache
 from importlib.resources import files
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 
-from fastapi import Request
+from fastapi import Body, Request
 from jinja2 import Environment, FunctionLoader, StrictUndefined
 from starlette.responses import HTMLResponse, JSONResponse, Response
 
@@ -31,6 +31,8 @@ if TYPE_CHECKING:
     from pipelines.workbench.state import PageState
 
 State = TypeVar("State", bound="PageState")
+Wanted = Annotated[dict[str, Any], Body()]
+"""What a change asks for, as JSON."""
 PARAMETER = {"json": "application/json", "csv": "text/csv; charset=utf-8", "png": "image/png"}
 
 

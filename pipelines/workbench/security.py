@@ -7,6 +7,7 @@ another machine it also needs the token. A change needs, besides, the same origi
 from __future__ import annotations
 
 import secrets
+from contextlib import suppress
 from http.cookies import CookieError, SimpleCookie
 from typing import TYPE_CHECKING, Any
 from urllib.parse import parse_qsl, urlencode
@@ -65,28 +66,40 @@ class Guard:
 def _refused(scope: Scope, settings: Settings) -> str | None:
     """Why a request is refused; None where it is not."""
     headers = Headers(scope=scope)
-    host = headers.get("host", "").rpartition("]")
-    name = (host[0] + host[1] or headers.get("host", "").partition(":")[0]).lower()
+    name = _host(headers)
     if name not in settings.hosts:
         return f"workbench: host '{name[:80]}' is not one of this service; open {settings.address}"
     if scope["type"] != "http":
         return "workbench: no sockets here"
-    method = scope["method"]
-    if method not in READING | CHANGING:
-        return f"workbench: method {method[:20]} is not known here"
-    given = _token_given(scope, settings)
-    if method in READING:
-        if headers.get("sec-fetch-site") == "cross-site" and headers.get("sec-fetch-mode") not in {None, "navigate"}:
-            return "workbench: parts of other sites are not served"
-        if not settings.local and not given and not _asks_to_enter(scope):
-            return "workbench: from another machine the token is needed; open the address that the command printed"
-        return None
+    if scope["method"] in READING:
+        return _refused_to_read(scope, headers, settings)
+    if scope["method"] in CHANGING:
+        return _refused_to_change(scope, headers, settings)
+    return f"workbench: method {scope['method'][:20]} is not known here"
+
+
+def _host(headers: Headers) -> str:
+    """The name by which the service was called, without its port; an IPv6 address keeps its brackets."""
+    text = headers.get("host", "").lower()
+    before, bracket, _ = text.rpartition("]")
+    return before + bracket if bracket else text.partition(":")[0]
+
+
+def _refused_to_read(scope: Scope, headers: Headers, settings: Settings) -> str | None:
+    if headers.get("sec-fetch-site") == "cross-site" and headers.get("sec-fetch-mode") not in {None, "navigate"}:
+        return "workbench: parts of other sites are not served"
+    if not settings.local and not _token_given(scope, settings) and not _asks_to_enter(scope):
+        return "workbench: from another machine the token is needed; open the address that the command printed"
+    return None
+
+
+def _refused_to_change(scope: Scope, headers: Headers, settings: Settings) -> str | None:
     origin = headers.get("origin")
     if origin is None and not _bearer(headers):
         return "workbench: a change without an origin is refused; send the token as 'Authorization: Bearer …'"
     if origin is not None and origin not in _origins(headers, settings):
         return f"workbench: origin '{origin[:80]}' may not change anything here"
-    if not given:
+    if not _token_given(scope, settings):
         return "workbench: this browser may look, not change; open the address with the token that the command printed"
     return None
 
@@ -106,10 +119,8 @@ def _bearer(headers: Headers) -> str:
 def _token_given(scope: Scope, settings: Settings) -> bool:
     headers = Headers(scope=scope)
     cookie: Any = None
-    try:
+    with suppress(CookieError):
         cookie = SimpleCookie(headers.get("cookie", "")).get(settings.cookie)
-    except CookieError:
-        pass
     offered = [_bearer(headers), "" if cookie is None else cookie.value]
     return any(secrets.compare_digest(one.encode(), settings.token.encode()) for one in offered)
 

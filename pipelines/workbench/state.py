@@ -96,7 +96,7 @@ class UnitsPage(PageState):
 
     def words(self) -> list[str]:
         """A question in SQL."""
-        from pipelines.workbench.services.questions import units_question
+        from pipelines.workbench.questions import units_question
 
         return ["query", units_question(self)]
 
@@ -146,7 +146,7 @@ class MissingPage(PageState):
     without: Texts = ()
     formula: Texts = ()
     unit: Text = ""
-    against: Text = "unit_C"
+    against: Text = ""
     colour: Literal["axis", "direction", "slot"] = "axis"
     dwell: Text = ""
 

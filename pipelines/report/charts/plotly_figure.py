@@ -20,7 +20,9 @@ if TYPE_CHECKING:
 MANY = 4000
 """Points from which WebGL draws faster than SVG."""
 DAY_MS = 86_400_000.0
-GAP_X, GAP_PX = 0.085, 74.0
+GAP_X, GAP_PX = 0.06, 74.0
+SPHERE_GAP_X, SPHERE_GAP_PX = 0.012, 26.0
+NARROW_D = 20.0  # dates nearer together are shown with room around them
 LONGEST = 28
 CONFIG = {
     "displaylogo": False,
@@ -56,6 +58,9 @@ def plotly_figure(chart: Chart) -> dict[str, Any]:
     if chart.scale is not None:
         layout["coloraxis"] = _colour_axis(chart)
         layout["margin"]["r"] = 78
+    if all(plot.sphere for plot in chart.plots):
+        layout["margin"] |= {"l": 8, "b": 8, "t": 34}
+        layout["height"] = chart.height * chart.rows + 20
     return {"data": data, "layout": layout, "config": CONFIG}
 
 
@@ -67,22 +72,25 @@ def _axis_names(number: int) -> tuple[str, str]:
 def _place(layout: dict[str, Any], plot: Plot, number: int, chart: Chart) -> None:
     """The axes of a plot at its place in the grid, with its title above."""
     row, column = divmod(number, chart.columns)
-    width = (1.0 - GAP_X * (chart.columns - 1)) / chart.columns
-    gap = GAP_PX / (chart.height * chart.rows)
+    beside, below = (SPHERE_GAP_X, SPHERE_GAP_PX) if plot.sphere else (GAP_X, GAP_PX)
+    width = (1.0 - beside * (chart.columns - 1)) / chart.columns
+    gap = below / (chart.height * chart.rows)
     height = (1.0 - gap * (chart.rows - 1)) / chart.rows
-    left, top = column * (width + GAP_X), 1.0 - row * (height + gap)
+    left, top = column * (width + beside), 1.0 - row * (height + gap)
     across, along = _axis_names(number)
     for axis, name, domain, other in (
         (plot.x, across, (left, left + width), along),
         (plot.y, along, (top - height, top), across),
     ):
         layout[name.replace("x", "xaxis").replace("y", "yaxis")] = {
-            **_axis(axis, hidden=plot.sphere),
+            **_axis(axis, plot),
             "domain": [max(domain[0], 0.0), min(domain[1], 1.0)],
             "anchor": other,
         }
     if plot.sphere:
         layout[along.replace("y", "yaxis")] |= {"scaleanchor": across, "scaleratio": 1.0}
+    elif column and chart.plots[number - 1].y.label == plot.y.label:
+        del layout[along.replace("y", "yaxis")]["title"]  # said at the left already
     if plot.title:
         layout["annotations"].append({
             "text": f"<b>{_safe(plot.title)}</b>", "x": left, "y": top, "xref": "paper", "yref": "paper",
@@ -90,14 +98,18 @@ def _place(layout: dict[str, Any], plot: Plot, number: int, chart: Chart) -> Non
         })  # fmt: skip
 
 
-def _axis(axis: PlotAxis, *, hidden: bool) -> dict[str, Any]:
-    out: dict[str, Any] = {"title": {"text": _safe(axis.label), "standoff": 8}, "automargin": True, "zeroline": False}
-    if hidden:
+def _axis(axis: PlotAxis, plot: Plot) -> dict[str, Any]:
+    title = {"text": _safe(axis.label), "standoff": 8, "font": {"size": 13}}
+    out: dict[str, Any] = {"title": title, "automargin": True, "zeroline": False}
+    if plot.sphere:
         return {"visible": False, "range": [axis.low, axis.high], "fixedrange": True}
     if axis.log:
-        out |= {"type": "log", "exponentformat": "power", "dtick": 1}
+        out |= {"type": "log", "exponentformat": "power"}
     if axis.dates:
         out["type"] = "date"
+        days = np.concatenate([trace.x for trace in plot.traces]) if plot.traces else np.zeros(0)
+        if days.size and np.ptp(days) < NARROW_D:
+            out["range"] = [DAY_MS * (float(days.min()) - NARROW_D), DAY_MS * (float(days.max()) + NARROW_D)]
     if axis.names:
         out |= {"tickvals": list(range(len(axis.names))), "ticktext": [_cut(name) for name in axis.names]}
     if axis.low is not None and axis.high is not None:

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
-from fastapi import APIRouter, Body, Request
+from fastapi import APIRouter, Request
 from starlette.responses import JSONResponse, Response
 
 from pipelines.diagnosis.inputs import use_written_formulas
 from pipelines.report.diagnosis import chance
-from pipelines.workbench.pages import figure, page, state_of, table_csv, workbench_of
+from pipelines.workbench.pages import Wanted, figure, page, state_of, table_csv, workbench_of
 from pipelines.workbench.services import models, requests, sources
 from pipelines.workbench.services.samples import samples_of
 from pipelines.workbench.state import MissingPage
@@ -19,7 +19,7 @@ from schemas.errors import TumblelineError, WrongUse
 if TYPE_CHECKING:
     from pipelines.report.charts import Chart
     from pipelines.workbench.pages import Workbench
-    from pipelines.workbench.services.work import Diagnosed
+    from pipelines.workbench.results import Diagnosed
 
 router = APIRouter()
 HEADING, ORDER, ADDRESS = "What is missing", 20, "/missing"
@@ -34,7 +34,7 @@ def missing(request: Request) -> Response:
     chosen, found, rows, work = sources.sources(bench.settings), None, None, {}
     if state.source:
         try:
-            state = state.model_copy(update={"source": sources.resolve(bench.settings, state.source, "source")})
+            state = requests.settled(bench.settings, state)
             work = {kind: requests.KINDS[kind][1](bench.settings, state) for kind in ("diagnose", "ladder")}
             found = bench.jobs.result("diagnose", work["diagnose"][1])
             rows = bench.jobs.result("ladder", work["ladder"][1])
@@ -44,8 +44,9 @@ def missing(request: Request) -> Response:
         request, "missing.html", state, problems, sources=chosen, found=found, rows=rows, chance=chance,
         jobs={kind: bench.jobs.known(kind, content) for kind, (_, content) in work.items()},
         twin=sources.twin(bench.settings, state.source) if state.source and not state.fresh else "",
-        models=models.models(bench.settings), ladder_command=state.ladder_command(bench.settings.archive),
-        unit=_unit(found, state), candidates=CANDIDATES, influence=INFLUENCE, drivers=_drivers(found),
+        models=models.models(bench.settings),
+        ladder_command=state.ladder_command(bench.settings.archive),
+        unit=_unit(found, state), against="" if found is None else missing_charts.chosen_driver(found, state), candidates=CANDIDATES, influence=INFLUENCE, drivers=_drivers(found),
         is_file=any(one.is_file and one.name == state.source for one in chosen),
     )  # fmt: skip
 
@@ -68,7 +69,7 @@ def candidates(request: Request) -> Response:
 
 
 @router.post("/missing/save")
-def save(request: Request, wanted: dict[str, Any] = Body(...)) -> JSONResponse:  # noqa: B008 - the form of FastAPI
+def save(request: Request, wanted: Wanted) -> JSONResponse:
     """Save the model of a page's address as the next version of a model file."""
     bench = workbench_of(request)
     state, _ = MissingPage.parse(_pairs(str(wanted.get("address", ""))))
@@ -83,7 +84,7 @@ def save(request: Request, wanted: dict[str, Any] = Body(...)) -> JSONResponse: 
 
 
 @router.post("/missing/formula")
-def formula(wanted: dict[str, Any] = Body(...)) -> JSONResponse:  # noqa: B008 - the form of FastAPI
+def formula(wanted: Wanted) -> JSONResponse:
     """The address of the page with a formula tried beside the model; refused where it is no formula."""
     from inertial import effects
 

@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-from typing import Any
-
-from fastapi import APIRouter, Body, Request
+from fastapi import APIRouter, Request
 from starlette.responses import JSONResponse, Response
 
-from pipelines.workbench.pages import page, state_of, workbench_of
+from pipelines.workbench.pages import Wanted, page, state_of, workbench_of
 from pipelines.workbench.services import lots, requests
 from pipelines.workbench.state import OperatorPage
 from schemas.errors import WrongUse, did_you_mean
@@ -40,7 +38,7 @@ def operator(request: Request) -> Response:
 
 
 @router.post("/operator/start")
-def start(request: Request, wanted: dict[str, Any] = Body(...)) -> JSONResponse:  # noqa: B008 - the form of FastAPI
+def start(request: Request, wanted: Wanted) -> JSONResponse:
     """Begin a lot from the serials that were scanned, slot by slot."""
     bench = workbench_of(request)
     known = requests.recipes(bench.settings)
@@ -62,7 +60,7 @@ def start(request: Request, wanted: dict[str, Any] = Body(...)) -> JSONResponse:
 
 
 @router.post("/operator/{name}/answer")
-def answer(request: Request, name: str, wanted: dict[str, Any] = Body(...)) -> JSONResponse:  # noqa: B008
+def answer(request: Request, name: str, wanted: Wanted) -> JSONResponse:
     """The answer to the question that the page showed; refused where something else is asked by now."""
     number = str(wanted.get("number", ""))
     if not number.isdecimal():

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 from urllib.parse import parse_qsl, urlsplit
 
-from fastapi import APIRouter, Body, Request
+from fastapi import APIRouter, Request
 from starlette.responses import JSONResponse, Response, StreamingResponse
 
-from pipelines.workbench.pages import workbench_of
+from pipelines.workbench.pages import Wanted, workbench_of
 from pipelines.workbench.services import lots, requests
 from pipelines.workbench.services.events import stream
 from schemas.errors import WrongUse
@@ -20,7 +20,7 @@ router = APIRouter()
 
 
 @router.post("/jobs")
-def start(request: Request, wanted: dict[str, Any] = Body(...)) -> JSONResponse:  # noqa: B008 - the form of FastAPI
+def start(request: Request, wanted: Wanted) -> JSONResponse:
     """Begin the work that a page needs: ``kind`` and the page's ``address``; the job that does it."""
     bench = workbench_of(request)
     kind, address = str(wanted.get("kind", "")), urlsplit(str(wanted.get("address", "")))

@@ -10,9 +10,10 @@ from starlette.responses import Response
 from pipelines.audit.calibrations import day_of
 from pipelines.audit.sql import ask
 from pipelines.certificates import Ledger
+from pipelines.stages.figures import FIGURES
 from pipelines.tables.frames import rows_of
 from pipelines.workbench.pages import figure, page, run_table, state_of, workbench_of
-from pipelines.workbench.services.questions import history_question
+from pipelines.workbench.questions import history_question
 from pipelines.workbench.services.samples import samples_of
 from pipelines.workbench.state import UnitPage
 from pipelines.workbench.views import unit_charts
@@ -53,7 +54,7 @@ def unit(request: Request) -> Response:
     return page(
         request, "unit.html", state, problems, run=run, grade=grade, own=own, tables=tables, units=units,
         before=units[place - 1] if place else "", after=units[place + 1] if place + 1 < len(units) else "",
-        coefficients=_by_axis(own.get("coefficients", [])), parameters=parameters,
+        coefficients=_by_axis(own.get("coefficients", [])), parameters=parameters, labels={name: kind.label for name, kind in FIGURES.items()},
         certificates=Ledger(bench.archive).calibrations(state.unit)[-CERTIFICATES:][::-1],
     )  # fmt: skip
 

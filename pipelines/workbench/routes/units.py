@@ -7,7 +7,7 @@ from starlette.responses import Response
 
 from pipelines.audit.sql import ask
 from pipelines.workbench.pages import page, state_of, table_csv, workbench_of
-from pipelines.workbench.services.questions import ROWS, units_question, yield_question
+from pipelines.workbench.questions import ROWS, units_question, yield_question
 from pipelines.workbench.state import UnitsPage
 
 router = APIRouter()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -29,23 +30,48 @@ def of_address(settings: Settings, kind: str, path: str, query: Iterable[tuple[s
 
 def diagnosis(settings: Settings, page: MissingPage) -> Request:
     """A diagnosis."""
-    return f"diagnosis of {page.source}", _judging(settings, page, "diagnose")
+    return f"diagnosis of {page.source}", _judging(settings, page)
 
 
 def ladder(settings: Settings, page: MissingPage) -> Request:
     """The errors of every version."""
-    content = _judging(settings, page, "compare")
+    content = _judging(settings, page)
     fresh = sources.resolve(settings, page.fresh, "compare") if page.fresh else ""
     content |= {"fresh": fresh, "fresh_stamp": sources.stamp(settings, fresh) if fresh else ""}
     return f"errors on {page.source}", content
 
 
-def _judging(settings: Settings, page: MissingPage, where: str) -> dict[str, Any]:
-    name = sources.resolve(settings, page.source, where)
+def _judging(settings: Settings, page: MissingPage) -> dict[str, Any]:
+    page = settled(settings, page)
+    name = page.source
     return {
         "archive": settings.archive, "source": name, "stamp": sources.stamp(settings, name), "effects": list(page.effects),
         "added": list(page.added), "without": list(page.without), "formula": list(page.formula),
     }  # fmt: skip
+
+
+def settled(settings: Settings, page: MissingPage) -> MissingPage:
+    """The page with the source's own name, and with the model that it begins with where none is named."""
+    name = sources.resolve(settings, page.source, "source")
+    if page.effects:
+        return page.model_copy(update={"source": name})
+    return page.model_copy(
+        update={"source": name, "effects": _starting_model(settings.archive, name, sources.stamp(settings, name))}
+    )
+
+
+@lru_cache(maxsize=64)
+def _starting_model(archive: str, name: str, stamp: str) -> tuple[str, ...]:
+    """The model that a diagnosis of these dwells judges where none is named."""
+    from inertial import effects
+    from pipelines.diagnosis.diagnose import default_model
+    from pipelines.diagnosis.inputs import judged_effects
+    from pipelines.importers.exchange import read_dwells
+
+    del stamp  # another content is another answer
+    with effects.additions_forgotten():
+        judged = judged_effects(name, archive, "", None, "diagnose")
+    return tuple(judged or default_model(read_dwells(name, archive=archive)))
 
 
 def plan(settings: Settings, page: PlanPage) -> Request:

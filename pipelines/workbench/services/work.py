@@ -3,35 +3,15 @@
 from __future__ import annotations
 
 import traceback
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
+from pipelines.workbench.results import Diagnosed
 from schemas.errors import TumblelineError
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
 
-    from numpy.typing import NDArray
-
-    from pipelines.report.residual_table import ResidualTable
-
     Tell = Callable[[int, int, str], None]
-    Array = NDArray[Any]
-
-
-@dataclass(frozen=True)
-class Diagnosed:
-    """A diagnosis for its page.
-
-    before : residuals of the model before the last step, µg, as in ``table``; None where there was none
-    names : what formulas may speak of, with what it is
-    """
-
-    document: dict[str, Any]
-    table: ResidualTable | None
-    ladder: list[dict[str, Any]]
-    before: Array | None
-    names: dict[str, str]
 
 
 def done_in_process(kind: str, request: Mapping[str, Any], tell: Tell) -> tuple[str, Any]:
@@ -89,7 +69,7 @@ def diagnose(request: Mapping[str, Any], tell: Tell) -> Diagnosed:
         table, ladder = residual_table(made.found, made.diagnosis, units), ladder_of(made.diagnosis)
         if added:
             tell(3, steps, "fitting the model before")
-            before = residuals_of_model(condense(dwells), history, model[: len(model) - 1], units)
+            before = residuals_of_model(condense(dwells), history, model[:-1], units)
     names = {name: meaning for name, (_, _, meaning) in formula_names().items() if meaning != "the same"}
     names |= dict.fromkeys(covariates(dwells), "recorded column")
     return Diagnosed(made.document, table, ladder, before, names)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -19,6 +20,7 @@ if TYPE_CHECKING:
 
 MOST_CHARTS = 6
 MONTHS = 24
+NAMES = ("since", "until", "device", "station")
 YEAR_D = 365.25
 
 
@@ -28,9 +30,10 @@ def audited(request: Mapping[str, Any], tell: Callable[[int, int, str], None]) -
     from pipelines.audit.audit import audit
     from pipelines.audit.document import document, furthest
     from pipelines.audit.findings import findings
+    from pipelines.audit.period import scope_of
     from pipelines.audit.rules import load_rules
 
-    found = audit(Archive(request["archive"]), load_rules(None), scope_of(request))
+    found = audit(Archive(request["archive"]), load_rules(None), scope_of(*(str(request[name]) for name in NAMES)))
     tell(1, 2, "what its findings rest on")
     if not len(found.all) and not found.problems:
         raise WrongUse(
@@ -50,22 +53,6 @@ def audited(request: Mapping[str, Any], tell: Callable[[int, int, str], None]) -
     for number, one in enumerate(furthest(found, MOST_CHARTS)):
         charts[f"drift-{number}"] = drift_chart(found, one)
     return {"document": document(found, findings(found), request["archive"]), "charts": charts}
-
-
-def scope_of(request: Mapping[str, Any]) -> Any:
-    """What is looked at, as the command's options say it."""
-    from pipelines.audit.audit import Scope
-    from pipelines.audit.calibrations import day_of
-    from pipelines.certificates.days import FIRST, today
-    from pipelines.certificates.days import day_of as checked
-
-    first = day_of(checked(request["since"] or FIRST, "since"))
-    last = day_of(checked(request["until"] or today(), "until")) + 1.0
-    if first >= last:
-        raise WrongUse(
-            f"audit: since {request['since']} is after until {request['until'] or today()}; exchange the two"
-        )
-    return Scope(first, last, request["device"], request["station"], day_of(today()) + 1.0)
 
 
 def yield_chart(months: list[Any]) -> Chart:
@@ -147,7 +134,7 @@ def series_chart(one: StationSeries) -> Chart:
     """A quantity of a station over time, its level between changes, and the days of these."""
     edges = [0, *(change.first for change in one.changes), one.day.size]
     traces = [Trace("runs", one.day, one.value, role="muted", texts=tuple(str(run) for run in one.run))]
-    for k, (start, stop) in enumerate(zip(edges[:-1], edges[1:], strict=True)):
+    for k, (start, stop) in enumerate(pairwise(edges)):
         level = np.full(2, one.value[start:stop].mean())
         traces.append(
             Trace("level", np.array([one.day[start], one.day[stop - 1]]), level, "line", "accent", legend=k == 0)

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
     from pipelines.report.charts.chart import Role
     from pipelines.report.residual_table import ResidualTable
-    from pipelines.workbench.services.work import Diagnosed
+    from pipelines.workbench.results import Diagnosed
     from pipelines.workbench.state import MissingPage
 
     Array = NDArray[np.float64]
@@ -44,6 +44,13 @@ def chosen_unit(table: ResidualTable, page: MissingPage) -> int:
     if page.unit in table.units:
         return table.units.index(page.unit)
     return int(np.nanargmax(np.nanmean(table.residual**2, axis=(1, 2))))
+
+
+def chosen_driver(found: Diagnosed, page: MissingPage) -> str:
+    """The quantity of the address, else the one along which the model fails most, else force."""
+    known = {} if found.table is None else found.table.drivers
+    told = [str(place["driver"]) for place in found.document["where"]]
+    return next((name for name in (page.against, *told) if name in known), "force")
 
 
 def sphere_chart(found: Diagnosed, page: MissingPage) -> Chart | None:
@@ -86,7 +93,7 @@ def sphere_chart(found: Diagnosed, page: MissingPage) -> Chart | None:
             plots.append(sphere(f"{head}{title}", (points,)))
     scale = symmetric(np.concatenate(everything), "mean residual / µg")
     return Chart(
-        f"Mean residual at every pose, unit {table.units[unit]}", tuple(plots), len(table.axes), scale, height=220
+        f"Mean residual at every pose, unit {table.units[unit]}", tuple(plots), len(table.axes), scale, height=190
     )
 
 
@@ -95,7 +102,7 @@ def driver_chart(found: Diagnosed, page: MissingPage) -> Chart | None:
     table = found.table
     if table is None:
         return None
-    name = page.against if page.against in table.drivers else next(iter(table.drivers))
+    name = chosen_driver(found, page)
     label, values = table.drivers[name]
     unit = chosen_unit(table, page)
     sides = [(table.residual, "the model judged")]

@@ -29,37 +29,31 @@ def planned(request: Mapping[str, Any]) -> dict[str, Any]:
     from pathlib import Path
 
     from pipelines.archive import Archive
-    from pipelines.jobs.model_files import chosen_effects
+    from pipelines.jobs.model_files import chosen_effects, use_formulas
     from pipelines.jobs.recipes import load_recipe
     from pipelines.jobs.releases import line_model
     from pipelines.planning.plan import plan, plan_context
+    from pipelines.planning.preset_noise import noise_of
     from schemas.station import load_station
 
     config = load_station(Path(request["station"]) if request["station"] else None)
     chosen = chosen_effects(",".join(request["effects"]), None, "plan")
-    recipe = load_recipe(
-        request["recipe"],
-        lambda device: {"effects": chosen} if chosen else line_model(Archive(request["archive"]), device, config.name),
-    )
+
+    def line(device: str) -> dict[str, Any]:
+        if chosen:
+            return {"effects": chosen}
+        keys = line_model(Archive(request["archive"]), device, config.name)
+        use_formulas(keys["formulas"], "the line's model")
+        return keys
+
+    recipe = load_recipe(request["recipe"], line)
     recipe = recipe.model_copy(update={"effects": list(chosen)}) if chosen else recipe
-    context = plan_context(recipe, config, noise_of_preset(recipe.device))
+    context = plan_context(recipe, config, noise_of(recipe, recipe.device, None, None))
     return {
         "document": plan(context),
         "charts": {"sphere": sphere_chart(context), "temperature": temperature_chart(context)},
         "poses": [[pose.name, pose.outer_deg, pose.inner_deg] for pose in recipe.poses],
     }
-
-
-def noise_of_preset(device: str) -> Any:
-    """Noise of the dwells of a device by its preset."""
-    from inertial.noise.dwells import DwellNoise
-    from schemas.units import MICRO
-    from stations.plant.preset import load_preset
-
-    preset = load_preset(device)
-    return DwellNoise(
-        preset.noise_density_ug * MICRO, preset.bias_instability_ug * MICRO, preset.rate_random_walk_ug * MICRO
-    )
 
 
 def sphere_chart(context: PlanContext) -> Chart:

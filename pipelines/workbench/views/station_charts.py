@@ -47,8 +47,9 @@ def station_chart(history: pd.DataFrame, readings: pd.DataFrame, events: pd.Data
         Trace("outer", start, own["outer_deg"].to_numpy(float), role="x", size=4),
         Trace("inner", start, own["inner_deg"].to_numpy(float), role="y", symbol="square", size=4),
     )
+    span = PlotAxis("station time / h", low=0.0, high=float(max(hours[-1], start[-1])))
     plots = (
-        Plot("temperature", PlotAxis("station time / h"), PlotAxis("temperature / °C"), tuple(traces)),
-        Plot("table", PlotAxis("station time / h"), PlotAxis("angle / °"), angles),
+        Plot("temperature", span, PlotAxis("temperature / °C"), tuple(traces)),
+        Plot("table", span, PlotAxis("angle / °"), angles),
     )
     return Chart("Temperatures and angles over the station's time", plots, 1, height=280)
