@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from pathlib import Path
 from typing import Annotated
 
@@ -75,6 +76,7 @@ def command(
     )  # fmt: skip
     app = create_app(settings)
     console().print(f"{settings.address}/?token={settings.token}", soft_wrap=True)
+    sys.stdout.flush()  # a program that started it waits for the address
     error_console().print("Open the address above; Ctrl-C ends the workbench.")
     config = uvicorn.Config(
         app, host=host, port=listening, log_level="warning", access_log=False, server_header=False, ws="none",
