@@ -44,10 +44,10 @@ class Served:
             "TUMBLELINE_WORKBENCH_TOKEN": TOKEN,
             "PYTHONPATH": str(ROOT),
         }
-        log = (self.folder.parent / "workbench.log").open("ab")
-        self.process = subprocess.Popen(
-            command, stdout=subprocess.PIPE, stderr=log, text=True, cwd=ROOT, env=os.environ | own
-        )
+        with (self.folder.parent / "workbench.log").open("ab") as log:
+            self.process = subprocess.Popen(
+                command, stdout=subprocess.PIPE, stderr=log, text=True, cwd=ROOT, env=os.environ | own
+            )
         line = self.process.stdout.readline()
         assert line.startswith("http://127.0.0.1:"), (self.folder.parent / "workbench.log").read_text()
         self.port = int(line.split(":")[2].split("/")[0])
@@ -135,10 +135,17 @@ class Tab:
             return [r.left + x._offset + x.l2p(d.x[point]), r.top + y._offset + y.l2p(d.y[point])]; }""",
             [figure, trace, point],
         )
-        self.page.mouse.move(place[0] - 3, place[1])
-        self.page.mouse.move(*place)
-        time.sleep(0.25)
-        self.page.mouse.click(*place)
+        pointed = self.page.locator(f'[data-name="{figure}"] .hoverlayer .hovertext')
+
+        def found() -> bool:
+            self.page.mouse.move(place[0] - 3, place[1])
+            self.page.mouse.move(*place)
+            time.sleep(0.25)
+            return pointed.count() > 0
+
+        until(found, f"point {point} of {figure} is pointed at")
+        self.page.mouse.down()
+        self.page.mouse.up()
 
     def findings(self) -> list[str]:
         """What axe-core finds serious or critical."""

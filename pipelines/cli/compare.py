@@ -55,9 +55,9 @@ def command(
     add_effect_files(effect_file)
     add_formulas(formula, "compare")
     chosen = judged_effects(dwells, archive, effects, model, "compare")
-    first, *others = both_runs(dwells, history, fresh, fresh_history, archive)
+    first, temperatures, again, again_temperatures = both_runs(dwells, history, fresh, fresh_history, archive)
     table = without_dwells(first, leave_out, "compare")
-    document = compared(chosen or default_model(table), table, *others)
+    document = compared(chosen or default_model(table), table, temperatures, again, again_temperatures)
     if as_json:
         print_json(document)
     else:

@@ -20,7 +20,7 @@ from pipelines.workbench.state import PageState
 from schemas.errors import TumblelineError
 
 if TYPE_CHECKING:
-    from collections.abc import AsyncIterator
+    from collections.abc import AsyncGenerator
 
     from starlette.types import ASGIApp
 
@@ -35,7 +35,7 @@ def create_app(settings: Settings) -> ASGIApp:
     bench = Workbench(settings, Jobs(settings.folder / "jobs.json", settings.workers))
 
     @asynccontextmanager
-    async def life(app: FastAPI) -> AsyncIterator[None]:
+    async def life(app: FastAPI) -> AsyncGenerator[None]:
         del app
         yield
         bench.jobs.close()

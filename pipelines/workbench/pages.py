@@ -8,6 +8,7 @@ import secrets
 from dataclasses import dataclass, field
 from functools import cache, lru_cache
 from importlib.resources import files
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 
 from fastapi import Body, Request
@@ -22,7 +23,7 @@ from schemas.errors import WrongUse
 from schemas.units import MICRO
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Mapping, Sequence
 
     import pandas as pd
 
@@ -102,7 +103,7 @@ def saved_as(name: str) -> dict[str, str]:
     return {"content-disposition": f'attachment; filename="{safe}"'}
 
 
-def table_csv(rows: list[Mapping[str, Any]], name: str) -> Response:
+def table_csv(rows: Sequence[Mapping[str, Any]], name: str) -> Response:
     """Rows as comma-separated values."""
     import csv
     import io
@@ -124,7 +125,7 @@ def run_table(bench: Workbench, run: str, name: str) -> pd.DataFrame:
     """A table of a run, kept while its manifest is the same."""
     found = bench.archive.run(run)
     place = found.path / f"{name}.json"
-    when = place.stat().st_mtime_ns if place.is_file() and hasattr(place, "stat") else 0
+    when = place.stat().st_mtime_ns if isinstance(place, Path) and place.is_file() else 0
     return _table(bench.settings.archive, found.id, name, when)
 
 
@@ -153,7 +154,7 @@ def _environment() -> Environment:
         loader=loader, autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
     )
     environment.filters["short"] = short
-    environment.filters["tuple_of"] = tuple
+    environment.filters["tuple_of"] = lambda values: tuple(values)  # noqa: PLW0108 - a class is no filter to the type checker
     return environment
 
 

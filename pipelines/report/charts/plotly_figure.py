@@ -131,7 +131,7 @@ def _trace(trace: Trace, names: tuple[str, str], chart: Chart, shown: set[str]) 
         counts = np.asarray(trace.counts, dtype=float)
         return out | {
             "type": "heatmap", "x": packed(x), "y": packed(trace.y), "showscale": False, "hoverinfo": "skip",
-            "z": np.where(counts > 0.0, np.log10(np.maximum(counts, 1.0)) + 0.3, None).tolist(),
+            "z": [[float(np.log10(n)) + 0.3 if n > 0.0 else None for n in row] for row in counts],
             "colorscale": [[0, "role:faint"], [1, "role:muted"]], "zmin": 0,
         }  # fmt: skip
     if trace.style == "band":

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import matplotlib as mpl
 import numpy as np
+from matplotlib.cm import ScalarMappable
 from matplotlib.colors import LinearSegmentedColormap, Normalize
 from matplotlib.figure import Figure
 
@@ -49,7 +50,7 @@ def _drawn(chart: Chart) -> Figure:
         else:
             place.set_axis_off()
     if chart.scale is not None:
-        shade = mpl.cm.ScalarMappable(Normalize(chart.scale.low, chart.scale.high), _colours(chart.scale))
+        shade = ScalarMappable(Normalize(chart.scale.low, chart.scale.high), _colours(chart.scale))
         bar = figure.colorbar(shade, ax=places, shrink=0.75, aspect=26, pad=0.015)
         bar.set_label(chart.scale.label)
     return figure
@@ -123,7 +124,7 @@ def _line(place: Axes, trace: Trace, scale: ColourScale | None) -> None:
 def _band(place: Axes, trace: Trace, scale: ColourScale | None) -> None:
     del scale
     place.fill_between(
-        trace.x, trace.y, trace.high, color=ROLES[trace.role], alpha=0.18, linewidth=0, label=_label(trace)
+        trace.x, trace.y, np.asarray(trace.high), color=ROLES[trace.role], alpha=0.18, linewidth=0, label=_label(trace)
     )
 
 

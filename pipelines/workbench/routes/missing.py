@@ -46,7 +46,8 @@ def missing(request: Request) -> Response:
         twin=sources.twin(bench.settings, state.source) if state.source and not state.fresh else "",
         models=models.models(bench.settings),
         ladder_command=state.ladder_command(bench.settings.archive),
-        unit=_unit(found, state), against="" if found is None else missing_charts.chosen_driver(found, state), candidates=CANDIDATES, influence=INFLUENCE, drivers=_drivers(found),
+        unit=_unit(found, state), against="" if found is None else missing_charts.chosen_driver(found, state),
+        candidates=CANDIDATES, influence=INFLUENCE, drivers=_drivers(found),
         is_file=any(one.is_file and one.name == state.source for one in chosen),
     )  # fmt: skip
 

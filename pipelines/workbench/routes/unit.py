@@ -54,7 +54,8 @@ def unit(request: Request) -> Response:
     return page(
         request, "unit.html", state, problems, run=run, grade=grade, own=own, tables=tables, units=units,
         before=units[place - 1] if place else "", after=units[place + 1] if place + 1 < len(units) else "",
-        coefficients=_by_axis(own.get("coefficients", [])), parameters=parameters, labels={name: kind.label for name, kind in FIGURES.items()},
+        coefficients=_by_axis(own.get("coefficients", [])), parameters=parameters,
+        labels={name: kind.label for name, kind in FIGURES.items()},
         certificates=Ledger(bench.archive).calibrations(state.unit)[-CERTIFICATES:][::-1],
     )  # fmt: skip
 

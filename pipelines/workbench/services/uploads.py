@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -111,7 +111,7 @@ def reading(settings: Settings, page: UploadPage) -> Reading:
     try:
         return _read_as(plain, table, page)
     except TumblelineError as problem:
-        return Reading(**{**vars(plain), "problem": str(problem)})
+        return replace(plain, problem=str(problem))
 
 
 def _read_as(plain: Reading, table: pd.DataFrame, page: UploadPage) -> Reading:
@@ -122,10 +122,10 @@ def _read_as(plain: Reading, table: pd.DataFrame, page: UploadPage) -> Reading:
     if data.samples is not None and len(data.samples) > 1:
         rate = record_rate(data.samples)
     dwells = [] if data.dwells is None else rows_of(data.dwells)
-    return Reading(**{
-        **vars(plain), "units": tuple(data.units), "out_unit": data.out_unit, "remarks": data.remarks, "rate_hz": rate,
-        "samples": 0 if data.samples is None else len(data.samples), "dwells": tuple(dwells),
-    })  # fmt: skip
+    return replace(
+        plain, units=tuple(data.units), out_unit=data.out_unit, remarks=data.remarks, rate_hz=rate,
+        samples=0 if data.samples is None else len(data.samples), dwells=tuple(dwells),
+    )  # fmt: skip
 
 
 def record_rate(samples: pd.DataFrame) -> float:

@@ -41,7 +41,10 @@ export async function go(address, { push = true, part = "", focus = false } = {}
 
 function arrived() {
   drawAll(document);
-  for (const place of document.querySelectorAll("[data-job-kind]")) begin(place);
+  for (const place of document.querySelectorAll("[data-job-kind]")) {
+    begin(place);
+    if (["waiting", "running"].includes(place.dataset.jobState)) look(place.dataset.job);  // it may have ended while the page came
+  }
   document.querySelector("[data-scan-field]")?.focus();
   document.body.dataset.ready = location.pathname + location.search;
 }

@@ -81,7 +81,7 @@ def due_chart(audit: Audit) -> Chart:
     months = (audit.due.day - audit.scope.until) / (YEAR_D / 12.0)
     ahead = np.bincount(np.floor(months[(months >= 0.0) & (months < MONTHS)]).astype(int), minlength=MONTHS)
     late = int(np.count_nonzero(months < 0.0))
-    bars = Trace("units due", np.arange(MONTHS) + 0.5, ahead.astype(float), "bars")
+    bars = Trace("units due", np.arange(MONTHS, dtype=np.float64) + 0.5, ahead.astype(float), "bars")
     axis = PlotAxis(f"months ahead ({late} units are overdue and are not among them)")
     return Chart("Re-calibrations due", (Plot("", axis, PlotAxis("units"), (bars,)),), height=260)
 

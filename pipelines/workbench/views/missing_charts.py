@@ -134,7 +134,7 @@ def _driven(table: ResidualTable, residual: Array, values: Array, unit: int, pag
         for title, role, symbol, chosen in groups(axis, name):
             there = chosen & np.isfinite(y) & np.isfinite(x)
             if there.any():
-                picks = tuple(table.pick(unit, k) for k in np.flatnonzero(there))
+                picks = tuple(table.pick(unit, int(k)) for k in np.flatnonzero(there))
                 texts = tuple(
                     f"{name}, dwell {int(table.dwells[k])}: {y[k]:.4g} µg at {x[k]:.5g}" for k in np.flatnonzero(there)
                 )

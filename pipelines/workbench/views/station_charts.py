@@ -17,7 +17,7 @@ MOST = 3000
 def station_chart(history: pd.DataFrame, readings: pd.DataFrame, events: pd.DataFrame) -> Chart:
     """Chamber, coldest and warmest unit; angles of the table; pauses and ends as marks."""
     by_time = history.groupby("time_s")
-    time = np.array(sorted(by_time.groups), dtype=float)
+    time = np.unique(history["time_s"].to_numpy(float))
     chamber = by_time["chamber_C"].first().to_numpy(float)
     cold, warm = by_time["unit_C"].min().to_numpy(float), by_time["unit_C"].max().to_numpy(float)
     step = 1 + time.size // MOST
