@@ -70,7 +70,9 @@ def diagnose(request: Mapping[str, Any], tell: Tell) -> Diagnosed:
         if added:
             tell(3, steps, "fitting the model before")
             before = residuals_of_model(condense(dwells), history, model[:-1], units)
-    names = {name: meaning for name, (_, _, meaning) in formula_names().items() if meaning != "the same"}
+    state = made.found.state
+    known = {name: one for name, one in formula_names().items() if getattr(state, one[0]) is not None}
+    names = {name: meaning for name, (_, _, meaning) in known.items() if not meaning.startswith("the same")}
     names |= dict.fromkeys(covariates(dwells), "recorded column")
     return Diagnosed(made.document, table, ladder, before, names)
 
