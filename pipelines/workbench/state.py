@@ -187,6 +187,8 @@ class UploadPage(PageState):
     temperature: Text = "degC"
     serial: Text = ""
     rate: Annotated[float, Field(ge=0.0, le=1e6, allow_inf_nan=False)] = 0.0
+    gravity: Annotated[float, Field(ge=0.0, le=20.0, allow_inf_nan=False)] = 0.0
+    poses: Text = ""
     fit: Literal["", "norm", "faces", "temperature"] = "norm"
     run: Text = ""
 
@@ -201,7 +203,9 @@ class UploadPage(PageState):
         words += ["--units", ",".join(units)] if units else []
         words += ["--unit", self.serial] if self.serial else []
         words += ["--rows", self.rows] if self.rows != "samples" else []
-        words += ["--rate", f"{self.rate:g}"] if self.rate else []
+        words += ["--rate", repr(self.rate)] if self.rate else []
+        words += ["--local-g", repr(self.gravity)] if self.gravity else []
+        words += ["--poses", self.poses] if self.poses else []
         return words + (["--fit", self.fit] if self.fit else [])
 
 

@@ -147,9 +147,9 @@ def test_a_click_on_a_residual_shows_the_samples_of_its_dwell(bench: Served, bro
     with tab(browser, bench.address) as one:
         one.open("/unit?run=latest&unit=A1&against=force")
         one.click_point("residuals", 0, 3)
-        until(lambda: "dwell=A1" in one.page.url, "the dwell is in the address")
+        until(lambda: "dwell=A1" in one.page.evaluate("() => location.href"), "the dwell is in the address")
         one.sees("[data-name='samples'][data-drawn]")
-        drawn = one.page.evaluate("() => document.querySelector('[data-name=samples]').data[0].x.length")
+        drawn = one.page.evaluate("() => document.querySelector('[data-name=samples]')._fullData[0].x.length")
         assert drawn >= 100  # a dwell of 1 s at 100 Hz
         one.page.reload()
         one.ready()
@@ -194,6 +194,7 @@ def test_an_upload_in_a_wrong_unit_says_so_and_is_corrected(bench: Served, brows
         one.sees("[data-mapping]")
         one.page.select_option("select[name=output]", "g")
         one.page.fill("input[name=serial]", "HAND-1")
+        one.page.fill("input[name=gravity]", "9.80665")
         one.press("text=Read it so")
         one.sees("[data-reading-problem]")
         assert "m/s^2" in one.page.inner_text("[data-reading-problem]")

@@ -147,6 +147,8 @@ def mapping_of(request: Mapped[str, Any]) -> Any:
     }
     wanted |= {"unit": request["serial"]} if request["serial"] else {}
     wanted |= {"rate_hz": request["rate"]} if request["rate"] else {}
+    wanted |= {"local_gravity_m_s2": request["gravity"]} if request["gravity"] else {}
+    wanted |= {"poses": mapping.pairs(request["poses"], "poses")} if request["poses"] else {}
     return mapping.build(wanted, "upload")
 
 
