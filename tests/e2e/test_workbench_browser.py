@@ -178,12 +178,13 @@ def test_a_server_that_is_killed_is_said_and_the_page_goes_on(bench: Served, bro
 
 def test_an_upload_in_a_wrong_unit_says_so_and_is_corrected(bench: Served, browser: Any, tmp_path: Path) -> None:
     rng = np.random.default_rng(3)
-    still = np.repeat(
-        np.concatenate([np.eye(3), -np.eye(3), [[0.6, 0.8, 0.0], [0.0, 0.6, -0.8], [0.8, 0.0, 0.6]]]), 200, axis=0
+    general = np.array(
+        [[0.6, 0.8, 0.0], [0.0, 0.6, -0.8], [0.8, 0.0, 0.6], [-0.6, 0.0, 0.8], [0.0, -0.8, -0.6], [-0.8, -0.6, 0.0]]
     )
-    moving = 0.2 * rng.normal(size=(9, 40, 3))
-    parts = [np.concatenate([still[200 * k : 200 * (k + 1)], still[200 * k] + moving[k]]) for k in range(9)]
-    output = 9.80665 * (np.concatenate(parts) + 1e-4 * rng.normal(size=(9 * 240, 3)))
+    faces = np.concatenate([np.eye(3), -np.eye(3), general])
+    moving = 0.2 * rng.normal(size=(len(faces), 40, 3))
+    parts = [np.concatenate([np.tile(face, (200, 1)), face + moved]) for face, moved in zip(faces, moving, strict=True)]
+    output = 9.80665 * (np.concatenate(parts) + 1e-4 * rng.normal(size=(len(faces) * 240, 3)))
     frame = pd.DataFrame(
         {"t": np.arange(len(output)) / 50.0, **dict(zip(("ax", "ay", "az"), output.T, strict=True)), SCRIPT: 1}
     )
@@ -201,7 +202,7 @@ def test_an_upload_in_a_wrong_unit_says_so_and_is_corrected(bench: Served, brows
         one.page.select_option("select[name=output]", "m/s^2")
         one.press("text=Read it so")
         one.sees("[data-dwells]")
-        assert 7 <= int(one.page.inner_text("[data-dwells]")) <= 11
+        assert 12 <= int(one.page.inner_text("[data-dwells]")) <= 14
         one.press("text=Import it")
         one.sees("text=Diagnose it")
         assert one.page.evaluate("() => window.ran") is None
