@@ -91,6 +91,11 @@ def served(archive: Path, folder: Path, station: Path | None = None) -> Iterator
         one.end()
 
 
+def clip(width: int, height: int) -> dict[str, float]:
+    """The upper part of a page."""
+    return {"x": 0, "y": 0, "width": width, "height": height}
+
+
 @dataclass
 class Tab:
     """A page of the browser, what it asked for outside, and what went wrong in it."""
@@ -113,8 +118,10 @@ class Tab:
     def sees(self, selector: str) -> None:
         until(lambda: self.page.locator(selector).count() > 0, f"{selector} on {self.page.url}")
 
-    def shot(self, folder: Path | None, name: str, *, width: int = 1280, height: int = 720) -> None:
-        """A picture of the whole page, where pictures are wanted."""
+    def shot(
+        self, folder: Path | None, name: str, *, width: int = 1280, height: int = 720, tall: int | None = None
+    ) -> None:
+        """A picture of the whole page, or of its upper part, where pictures are wanted."""
         if folder is None:
             return
         self.page.set_viewport_size({"width": width, "height": height})
@@ -122,7 +129,10 @@ class Tab:
         self.page.set_viewport_size({"width": width, "height": max(whole, height)})
         self.ready()
         time.sleep(0.4)
-        self.page.screenshot(path=str(folder / f"{name}.png"))
+        self.page.add_style_tag(
+            content=".command, .place, #errors code { visibility: hidden }"
+        )  # they name this machine
+        self.page.screenshot(path=str(folder / f"{name}.png"), clip=None if tall is None else clip(width, tall))
         self.page.set_viewport_size({"width": 1280, "height": 720})
 
     def click_point(self, figure: str, trace: int, point: int) -> None:

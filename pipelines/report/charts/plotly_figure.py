@@ -182,9 +182,11 @@ def _colour_axis(chart: Chart) -> dict[str, Any]:
     scale = chart.scale
     if scale is None:
         return {}
-    colours = DIVERGING if scale.diverging else SEQUENTIAL
+    colours = [list(one) for one in (DIVERGING if scale.diverging else SEQUENTIAL)]
+    if scale.diverging:
+        colours[len(colours) // 2][1] = "role:middle"  # zero is as quiet on a dark page as on a light one
     return {
-        "cmin": scale.low, "cmax": scale.high, "colorscale": [list(one) for one in colours],
+        "cmin": scale.low, "cmax": scale.high, "colorscale": colours,
         "colorbar": {"title": {"text": _safe(scale.label), "side": "right"}, "thickness": 12, "outlinewidth": 0},
     }  # fmt: skip
 
