@@ -154,8 +154,12 @@ def _environment() -> Environment:
         loader=loader, autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
     )
     environment.filters["short"] = short
-    environment.filters["tuple_of"] = lambda values: tuple(values)  # noqa: PLW0108 - a class is no filter to the type checker
+    environment.filters["tuple_of"] = _tuple_of
     return environment
+
+
+def _tuple_of(values: Any) -> tuple[Any, ...]:
+    return tuple(values)
 
 
 def short(text: object, most: int = 28) -> str:

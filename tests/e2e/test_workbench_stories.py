@@ -8,9 +8,9 @@ from typing import Any
 
 import pytest
 from browser import ROOT, chromium, served, tab, until
-from capture_double import recipe_file
+from capture_double import recipe_file, small_run
 
-pytestmark = pytest.mark.slow
+pytestmark = [pytest.mark.slow, pytest.mark.timeout(900)]
 
 
 @pytest.fixture(scope="module")
@@ -38,6 +38,24 @@ def test_the_demonstration_from_its_measurement_to_the_error_falling(tmp_path: P
         assert fresh[1] < 0.6 * fresh[0]
         assert "confirmed" in one.page.inner_text("#errors")
         assert one.outside == [] == one.errors
+
+
+@pytest.mark.parametrize("dark", [False, True], ids=["light", "dark"])
+@pytest.mark.parametrize("size", [(1280, 720), (820, 1180)], ids=["screen", "tablet"])
+def test_every_page_can_be_read_in_both_themes_and_on_a_tablet(
+    tmp_path: Path, browser: Any, dark: bool, size: tuple[int, int]
+) -> None:
+    small_run(tmp_path)
+    pages = ("/units", "/run", "/unit", "/missing?source=latest", "/upload", "/operator", "/plan", "/station", "/audit")
+    with served(tmp_path / "archive", tmp_path / "bench") as server:
+        with tab(browser, server.address, dark=dark, size=size) as one:
+            for number, path in enumerate(pages):
+                one.open(path)
+                assert one.findings() == [], path
+                wide = one.page.evaluate("() => document.documentElement.scrollWidth - innerWidth")
+                assert wide <= 0, f"{path} is {wide} px wider than the screen"
+                one.shot(tmp_path, f"page-{number}", width=size[0], height=size[1])
+            assert one.outside == [] == one.errors
 
 
 def test_a_lot_with_an_open_door_is_measured_from_two_browsers(tmp_path: Path, browser: Any) -> None:

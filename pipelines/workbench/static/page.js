@@ -5,9 +5,10 @@ import { listen, start } from "./events.js";
 const main = () => document.getElementById("main");
 let boot = document.body.dataset.boot, going = null;
 
-export async function go(address, { push = true, part = "", focus = false } = {}) {
+export async function go(address, { push = true, part = "", focus = false, renews = false } = {}) {
+  if (renews && going && !going.renews) return;  // a page that somebody has asked for is on its way
   going?.abort();
-  const now = (going = new AbortController());
+  const now = (going = Object.assign(new AbortController(), { renews }));
   let answer, text;
   try {
     answer = await fetch(address, { headers: { accept: "text/html" }, signal: now.signal });
@@ -15,6 +16,8 @@ export async function go(address, { push = true, part = "", focus = false } = {}
   } catch (problem) {
     if (problem.name !== "AbortError") lost(true);
     return;
+  } finally {
+    if (going === now) going = null;
   }
   const page = new DOMParser().parseFromString(text, "text/html");
   if (push) history.pushState(null, "", answer.redirected ? answer.url : address);
@@ -85,7 +88,7 @@ async function begin(place, pressed = false) {
 function told(job) {
   for (const place of document.querySelectorAll(`[data-job="${CSS.escape(job.id)}"]`)) {
     place.dataset.jobState = job.state;
-    if (["done", "failed", "stopped"].includes(job.state)) { go(location.href, { push: false }); return; }
+    if (["done", "failed", "stopped"].includes(job.state)) { go(location.href, { push: false, renews: true }); return; }
     const bar = place.querySelector("progress"), note = place.querySelector("[data-job-note]");
     if (bar) { bar.max = job.total || 4; bar.value = job.done; }
     if (note) note.textContent = `${job.note}${job.seconds > 1 ? `, ${Math.round(job.seconds)} s` : ""}`;
@@ -99,20 +102,20 @@ listen((message) => {
   if (message.kind === "lost") lost(true);
   if (message.kind === "boot") {
     lost(false);
-    if (message.boot !== boot) { boot = message.boot; go(location.href, { push: false }); } else {
+    if (message.boot !== boot) { boot = message.boot; go(location.href, { push: false, renews: true }); } else {
       for (const place of document.querySelectorAll("[data-job]")) if (["waiting", "running"].includes(place.dataset.jobState)) look(place.dataset.job);
     }
   }
   if (message.kind === "job") told(message.job);
   if (message.kind === "changed" && document.querySelector(`[data-live="${CSS.escape(message.what)}"]`)) {
     const had = Boolean(document.querySelector("[data-phase]"));
-    if (had || !document.activeElement?.matches("input")) go(location.href, { push: false, part: had ? message.what : "" });
+    if (had || !document.activeElement?.matches("input")) go(location.href, { push: false, part: had ? message.what : "", renews: true });
   }
 });
 
 async function look(id) {
   const answer = await fetch(`/jobs/${encodeURIComponent(id)}`);
-  if (answer.ok) told(await answer.json()); else go(location.href, { push: false });
+  if (answer.ok) told(await answer.json()); else go(location.href, { push: false, renews: true });
 }
 
 // --- what is pressed ---------------------------------------------------------------------------------------------------
