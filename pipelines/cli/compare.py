@@ -56,7 +56,7 @@ def command(
     add_formulas(formula, "compare")
     chosen = judged_effects(dwells, archive, effects, model, "compare")
     first, temperatures, again, again_temperatures = both_runs(dwells, history, fresh, fresh_history, archive)
-    table = without_dwells(first, leave_out, "compare")
+    table, _ = without_dwells(first, leave_out, "compare")
     document = compared(chosen or default_model(table), table, temperatures, again, again_temperatures)
     if as_json:
         print_json(document)

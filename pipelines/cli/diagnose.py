@@ -23,6 +23,8 @@ from pipelines.cli.options import (
 from schemas.errors import DONE, PART_FAILED
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     import pandas as pd
 
 PART = "Is the model good enough, and what is missing?"
@@ -66,9 +68,9 @@ def command(
     add_formulas(formula, "diagnose")
     judged = judged_effects(dwells, archive, effects, model, "diagnose")
     table, temperatures = dwells_and_history(dwells, history, archive)
-    table = without_dwells(table, leave_out, "diagnose")
+    table, left_out = without_dwells(table, leave_out, "diagnose")
     beside = history or (history_beside(dwells) if is_file(dwells) else "")
-    document, report_text = diagnosed(table, temperatures, judged, dwells, wanted=report is not None)
+    document, report_text = diagnosed(table, temperatures, judged, dwells, wanted=report is not None, left_out=left_out)
     document["history"] = beside or None
     if report is not None:
         write_report(report, report_text)
@@ -82,7 +84,13 @@ def command(
 
 
 def diagnosed(
-    table: pd.DataFrame, history: pd.DataFrame | None, judged: list[str] | None, source: str, *, wanted: bool
+    table: pd.DataFrame,
+    history: pd.DataFrame | None,
+    judged: list[str] | None,
+    source: str,
+    *,
+    wanted: bool,
+    left_out: Sequence[str] = (),
 ) -> tuple[dict[str, Any], str]:
     """The document of a diagnosis, and its report where one is wanted."""
     from threadpoolctl import threadpool_limits
@@ -90,7 +98,7 @@ def diagnosed(
     with threadpool_limits(1), error_console().status("looking for missing effects"):
         from pipelines.diagnosis.examination import examination  # loads scipy.stats: after the first line
 
-        made = examination(table, history, judged)
+        made = examination(table, history, judged, left_out)
     if not wanted:
         return made.document, ""
     with error_console().status("drawing the report"):

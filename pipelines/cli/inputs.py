@@ -40,11 +40,12 @@ def judged_effects(source: str, archive: str | None, listed: str, model: Path | 
     return inputs.judged_effects(source, archive, listed, model, where)
 
 
-def without_dwells(dwells: pd.DataFrame, listed: str, where: str) -> pd.DataFrame:
-    """The dwells without those that an option lists as UNIT:DWELL, divided by commas."""
+def without_dwells(dwells: pd.DataFrame, listed: str, where: str) -> tuple[pd.DataFrame, list[str]]:
+    """The dwells without those that an option lists as UNIT:DWELL, divided by commas; and these, one by one."""
     from pipelines.diagnosis import inputs
 
-    return inputs.without_dwells(dwells, [part.strip() for part in listed.split(",") if part.strip()], where)
+    left_out = [part.strip() for part in listed.split(",") if part.strip()]
+    return inputs.without_dwells(dwells, left_out, where), left_out
 
 
 def add_formulas(written: Sequence[str] | None, where: str) -> None:

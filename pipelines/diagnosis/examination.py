@@ -11,7 +11,7 @@ from pipelines.diagnosis.diagnose import default_model, document, examined
 from pipelines.diagnosis.suggested_formula import as_toml, offer
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Collection, Sequence
 
     import pandas as pd
 
@@ -32,10 +32,21 @@ class Examination:
     diagnosis: Diagnosis | None
 
 
-def examination(table: pd.DataFrame, history: pd.DataFrame | None, judged: Sequence[str] | None) -> Examination:
-    """The diagnosis of dwells against a model; against the default one where ``judged`` is None."""
+def examination(
+    table: pd.DataFrame,
+    history: pd.DataFrame | None,
+    judged: Sequence[str] | None,
+    left_out: Collection[str] = (),
+) -> Examination:
+    """The diagnosis of dwells against a model.
+
+    Parameters
+    ----------
+    judged : the model; the default one where None
+    left_out : ``UNIT:DWELL``, which were taken out of ``table`` on purpose
+    """
     effects = list(judged) if judged else default_model(table)
-    found, faults, diagnosis = examined(table, history, effects)
+    found, faults, diagnosis = examined(table, history, effects, left_out)
     told = {**document(found, faults, diagnosis), **_extras(found.units, effects, diagnosis)}
     return Examination(told, found, diagnosis)
 

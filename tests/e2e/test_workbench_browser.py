@@ -114,7 +114,7 @@ def test_a_hidden_effect_is_found_added_confirmed_and_taken_out_again(
         assert "Missing: third_order" in one.page.inner_text(".verdict")
         one.press("text=as the fresh measurement")
         one.sees("[data-version='1']")
-        one.shot(pictures, "workbench-before", tall=1180)
+        one.shot(pictures, "story-before")
         one.press("[data-add='third_order']")
         one.sees("[data-version='2']")
         one.ready()
@@ -125,7 +125,7 @@ def test_a_hidden_effect_is_found_added_confirmed_and_taken_out_again(
         assert 8.0 < errors[0] < 16.0  # the cubic of 60 µg, as a plain fit leaves it
         assert errors[1] < 5.5
         assert "confirmed" in one.page.inner_text("#errors")
-        one.shot(pictures, "workbench-after", tall=1440)
+        one.shot(pictures, "story-after")
         assert one.findings() == []
         one.page.fill("input[name=name]", "line-1")
         one.page.fill("input[name=why]", "the fresh run confirms it")

@@ -1,5 +1,6 @@
 """Long stories in a real browser: the demonstration's hidden effect, and an operator's lot with a fault, from two stations."""
 
+import os
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -19,7 +20,17 @@ def browser() -> Iterator[Any]:
         yield found
 
 
-def test_the_demonstration_from_its_measurement_to_the_error_falling(tmp_path: Path, browser: Any) -> None:
+@pytest.fixture
+def pictures(tmp_path: Path) -> Path:
+    """Where the pictures of docs/how-to/workbench.md are made: TUMBLELINE_PICTURES, else the test's own folder."""
+    folder = Path(os.environ.get("TUMBLELINE_PICTURES") or tmp_path / "pictures")
+    folder.mkdir(parents=True, exist_ok=True)
+    return folder
+
+
+def test_the_demonstration_from_its_measurement_to_the_error_falling(
+    tmp_path: Path, browser: Any, pictures: Path
+) -> None:
     folder = tmp_path / "bench"
     command = [sys.executable, "-m", "pipelines.cli", "demo", "--effect", "cubic_transfer", "--seed", "1", "--by-hand"]
     subprocess.run([*command, "--folder", str(folder)], cwd=ROOT, check=True, capture_output=True, timeout=280)
@@ -30,32 +41,36 @@ def test_the_demonstration_from_its_measurement_to_the_error_falling(tmp_path: P
         assert "Missing: third_order" in one.page.inner_text(".verdict")
         one.press("text=as the fresh measurement")
         one.sees("[data-version='1']")
+        one.shot(pictures, "workbench-before", tall=1180)
         one.press("[data-add='third_order']")
         one.sees("[data-version='2']")
         one.ready()
         assert "Adequate" in one.page.inner_text(".verdict")
+        one.shot(pictures, "workbench-after", tall=1440)
         fresh = [float(one.page.get_attribute(f"[data-version='{k}']", "data-fresh") or "nan") for k in (1, 2)]
         assert fresh[1] < 0.6 * fresh[0]
         assert "confirmed" in one.page.inner_text("#errors")
         assert one.outside == [] == one.errors
 
 
-@pytest.mark.parametrize("dark", [False, True], ids=["light", "dark"])
+@pytest.mark.parametrize("theme", ["light", "dark"])
 @pytest.mark.parametrize("size", [(1280, 720), (820, 1180)], ids=["screen", "tablet"])
 def test_every_page_can_be_read_in_both_themes_and_on_a_tablet(
-    tmp_path: Path, browser: Any, dark: bool, size: tuple[int, int]
+    tmp_path: Path, browser: Any, theme: str, size: tuple[int, int]
 ) -> None:
     small_run(tmp_path)
     pages = ("/units", "/run", "/unit", "/missing?source=latest", "/upload", "/operator", "/plan", "/station", "/audit")
-    with served(tmp_path / "archive", tmp_path / "bench") as server:
-        with tab(browser, server.address, dark=dark, size=size) as one:
-            for number, path in enumerate(pages):
-                one.open(path)
-                assert one.findings() == [], path
-                wide = one.page.evaluate("() => document.documentElement.scrollWidth - innerWidth")
-                assert wide <= 0, f"{path} is {wide} px wider than the screen"
-                one.shot(tmp_path, f"page-{number}", width=size[0], height=size[1])
-            assert one.outside == [] == one.errors
+    with (
+        served(tmp_path / "archive", tmp_path / "bench") as server,
+        tab(browser, server.address, dark=theme == "dark", size=size) as one,
+    ):
+        for number, path in enumerate(pages):
+            one.open(path)
+            assert one.findings() == [], path
+            wide = one.page.evaluate("() => document.documentElement.scrollWidth - innerWidth")
+            assert wide <= 0, f"{path} is {wide} px wider than the screen"
+            one.shot(tmp_path, f"page-{number}", width=size[0], height=size[1])
+        assert one.outside == [] == one.errors
 
 
 def test_a_lot_with_an_open_door_is_measured_from_two_browsers(tmp_path: Path, browser: Any) -> None:

@@ -185,9 +185,10 @@ def _colour_axis(chart: Chart) -> dict[str, Any]:
     colours = [list(one) for one in (DIVERGING if scale.diverging else SEQUENTIAL)]
     if scale.diverging:
         colours[len(colours) // 2][1] = "role:middle"  # zero is as quiet on a dark page as on a light one
+    title = {"text": _safe(scale.label), "side": "right", "font": {"size": 13}}
     return {
         "cmin": scale.low, "cmax": scale.high, "colorscale": colours,
-        "colorbar": {"title": {"text": _safe(scale.label), "side": "right"}, "thickness": 12, "outlinewidth": 0},
+        "colorbar": {"title": title, "thickness": 12, "outlinewidth": 0},
     }  # fmt: skip
 
 

@@ -60,7 +60,7 @@ def diagnose(request: Mapping[str, Any], tell: Tell) -> Diagnosed:
     added = list(request["added"])
     model = [*(judged or default_model(dwells)), *added]
     tell(1, steps, "searching for missing effects")
-    made = examination(dwells, history, model)
+    made = examination(dwells, history, model, request["without"])
     faulty = {unit for fault in made.document["blocked_by"] for unit in fault["units"]}
     units = tuple(unit for unit in made.found.units if unit not in faulty)
     table, ladder, before = None, [], None
