@@ -32,14 +32,13 @@ EFFECTS = ["bias", "scale", "misalignment", "bias_temperature", "scale_temperatu
 CLICKS = 8
 WATCH = """() => {
   window.began = 0;
+  window.took = 0;
   document.addEventListener("pointerdown", () => { window.began = performance.now(); }, { once: true, capture: true });
-  window.until = new Promise((end) => {
-    const look = () => {
-      const shown = document.querySelector("[data-name=samples][data-drawn]");
-      if (window.began && shown) end(performance.now() - window.began); else requestAnimationFrame(look);
-    };
-    look();
-  });
+  const look = () => {
+    const shown = document.querySelector("[data-name=samples][data-drawn]");
+    if (window.began && shown) window.took = performance.now() - window.began; else requestAnimationFrame(look);
+  };
+  look();
 }"""
 
 
@@ -134,7 +133,8 @@ def measure(server: Served, units: list[str], run: str, known: str) -> None:
         for number in range(CLICKS):
             one.page.evaluate(WATCH)
             one.click_point("residuals", 0, 20 + 7 * number)
-            clicks.append(one.page.evaluate("() => window.until"))
+            until(lambda: one.page.evaluate("() => window.took"), "the samples are drawn")
+            clicks.append(one.page.evaluate("() => window.took"))
             one.page.goto(one.page.url.split("&dwell")[0])
             one.ready()
         search = timed(lambda number: one.open(f"/units?search={known[:-1]}{number}"), 6)

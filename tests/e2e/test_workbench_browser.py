@@ -151,6 +151,9 @@ def test_a_click_on_a_residual_shows_the_samples_of_its_dwell(bench: Served, bro
         one.sees("[data-name='samples'][data-drawn]")
         drawn = one.page.evaluate("() => document.querySelector('[data-name=samples]')._fullData[0].x.length")
         assert drawn >= 100  # a dwell of 1 s at 100 Hz
+        for word in ("hare", "loud", "Send"):  # "Share chart…" would send the data to the maker of the library
+            assert one.page.locator(f".modebar-btn[data-title*='{word}']").count() == 0
+        assert one.page.locator(".modebar-btn").count() > 0
         one.page.reload()
         one.ready()
         one.sees("[data-name='samples'][data-drawn]")
