@@ -77,7 +77,7 @@ def tables(units: list[str], dwells: int, seed: int) -> dict[str, pd.DataFrame]:
     time = np.arange(1000) / 100.0
     samples = [
         pd.DataFrame({"unit": units[0], "slot": 0, "record": k, "kind": "dwell", "time_s": 30.0 * k + time})
-        for k in range(min(dwells, 80))
+        for k in range(dwells)
     ]
     raw = pd.concat(samples, ignore_index=True).assign(**{axis: rng.normal(size=1000 * len(samples)) for axis in "xyz"})
     return {
@@ -129,6 +129,7 @@ def measure(server: Served, units: list[str], run: str, known: str) -> None:
             one.open(f"/unit?run={run}&unit={units[number + 1]}")
 
         page = timed(opened, 6)
+        one.open(f"/unit?run={run}&unit={units[0]}")
         clicks = []
         for number in range(CLICKS):
             one.page.evaluate(WATCH)
