@@ -4,12 +4,13 @@ import shlex
 from urllib.parse import parse_qsl, urlsplit
 
 import pytest
-from hypothesis import given
+from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from pydantic import TypeAdapter
 
 from pipelines.workbench.state import PAGES, MissingPage, PageState, UnitsPage
 
+CALM = settings(deadline=None, suppress_health_check=[HealthCheck.too_slow])  # the first texts load a table
 TEXT = st.text(st.characters(exclude_categories=["Cs"]), max_size=40)
 VALUES = {
     "texts": st.lists(TEXT.filter(bool), max_size=4).map(tuple),
@@ -35,6 +36,7 @@ def states(kind: type[PageState]) -> st.SearchStrategy[PageState]:
 
 
 @pytest.mark.parametrize("kind", PAGES, ids=lambda kind: kind.__name__)
+@CALM
 @given(data=st.data())
 def test_parse_after_address_is_the_identity(kind: type[PageState], data: st.DataObject) -> None:
     state = data.draw(states(kind))
@@ -46,6 +48,7 @@ def test_parse_after_address_is_the_identity(kind: type[PageState], data: st.Dat
 
 
 @pytest.mark.parametrize("kind", PAGES, ids=lambda kind: kind.__name__)
+@CALM
 @given(data=st.data())
 def test_every_state_has_a_command_line_that_a_shell_reads_back(kind: type[PageState], data: st.DataObject) -> None:
     state = data.draw(states(kind))
@@ -53,6 +56,7 @@ def test_every_state_has_a_command_line_that_a_shell_reads_back(kind: type[PageS
         assert shlex.split(state.command("an archive"))[1:-2] == state.words()
 
 
+@CALM
 @given(st.lists(st.tuples(TEXT, TEXT), max_size=12))
 def test_no_address_breaks_a_page(pairs: list[tuple[str, str]]) -> None:
     for kind in PAGES:
