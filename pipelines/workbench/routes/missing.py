@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import TYPE_CHECKING
 
 from fastapi import APIRouter, Request
@@ -9,7 +10,7 @@ from starlette.responses import JSONResponse, Response
 
 from pipelines.diagnosis.inputs import use_written_formulas
 from pipelines.report.diagnosis import chance
-from pipelines.workbench.pages import Wanted, figure, page, state_of, table_csv, workbench_of
+from pipelines.workbench.pages import Wanted, figure, page, run_table, state_of, table_csv, workbench_of
 from pipelines.workbench.services import models, requests, sources
 from pipelines.workbench.services.samples import samples_of
 from pipelines.workbench.state import MissingPage
@@ -112,7 +113,9 @@ def _diagnosed(bench: Workbench, state: MissingPage) -> Diagnosed | None:
 
 def _chart(bench: Workbench, state: MissingPage, name: str) -> Chart | None:
     if name == "samples":
-        samples, out_unit, title = samples_of(bench.archive, state.source, state.dwell)
+        samples, out_unit, title = samples_of(
+            bench.archive, state.source, state.dwell, partial(run_table, bench, state.source)
+        )
         return unit_charts.samples_chart(samples, title, out_unit)
     if name == "ladder":
         _, content = requests.ladder(bench.settings, state)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from fastapi import APIRouter, Request
@@ -70,7 +71,9 @@ def drawn(request: Request, name: str, ending: str) -> Response:
 
 def _chart(bench: Workbench, state: UnitPage, name: str) -> Chart:
     if name == "samples":
-        samples, out_unit, title = samples_of(bench.archive, state.run, state.dwell)
+        samples, out_unit, title = samples_of(
+            bench.archive, state.run, state.dwell, partial(run_table, bench, state.run)
+        )
         return unit_charts.samples_chart(samples, title, out_unit)
     if name == "history":
         rows = [row for row in _history(bench, state.unit) if unit_charts.parameter_of(row) == state.parameter]

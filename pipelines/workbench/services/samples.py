@@ -7,13 +7,21 @@ from typing import TYPE_CHECKING
 from schemas.errors import WrongUse
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     import pandas as pd
 
     from pipelines.archive import Archive
 
 
-def samples_of(archive: Archive, run: str, dwell: str) -> tuple[pd.DataFrame, str, str]:
+def samples_of(
+    archive: Archive, run: str, dwell: str, read: Callable[[str], pd.DataFrame]
+) -> tuple[pd.DataFrame, str, str]:
     """Samples of a dwell ``UNIT:DWELL``, the unit of their values, and what they are called.
+
+    Parameters
+    ----------
+    read : gives a table of the run by its name
 
     Raises
     ------
@@ -22,7 +30,7 @@ def samples_of(archive: Archive, run: str, dwell: str) -> tuple[pd.DataFrame, st
     """
     found = archive.run(run)
     unit, _, number = dwell.rpartition(":")
-    table = found.table("dwells")
+    table = read("dwells")
     rows = table[(table["unit"] == unit) & (table["dwell"].astype(str) == number)]
     if rows.empty:
         raise WrongUse(f"run {found.id} has no dwell '{dwell[:80]}'; click a residual")
@@ -31,7 +39,7 @@ def samples_of(archive: Archive, run: str, dwell: str) -> tuple[pd.DataFrame, st
     if found.records is not None:
         tables = list(found.records.samples({record}))
     elif "samples" in found.tables():
-        samples = found.table("samples")
+        samples = read("samples")
         tables = [samples[samples["record"] == record]]
     else:
         raise WrongUse(f"run {found.id} was imported as dwells: its samples were not recorded")
