@@ -11,7 +11,7 @@ from pipelines.cli.options import ArchiveOption, JsonOption, console, error_cons
 from schemas.errors import DONE, PART_FAILED, WrongUse
 
 if TYPE_CHECKING:
-    from pipelines.audit.audit import Audit, Scope
+    from pipelines.audit.audit import Audit
     from pipelines.audit.finding import AuditFinding
 
 PART = "Certificates, trace, audit"
@@ -54,6 +54,7 @@ def command(
     from pipelines.audit.audit import audit
     from pipelines.audit.document import document
     from pipelines.audit.findings import findings
+    from pipelines.audit.period import scope_of
     from pipelines.audit.rules import load_rules
     from pipelines.flows.spread import on_dask
     from pipelines.parallel import processors
@@ -70,22 +71,6 @@ def command(
     else:
         _show(found, told, page)
     raise typer.Exit(PART_FAILED if told else DONE)
-
-
-def scope_of(since: str, until: str, device: str, station: str) -> Scope:
-    """What is looked at, from dates as texts; ``until`` holds its whole day."""
-    from pipelines.audit.audit import Scope
-    from pipelines.audit.calibrations import day_of
-    from pipelines.certificates.days import FIRST, today
-    from pipelines.certificates.days import day_of as checked
-
-    first = day_of(checked(since or FIRST, "--since"))
-    last = day_of(checked(until or today(), "--until")) + 1.0
-    if first >= last:
-        raise WrongUse(
-            f"audit: --since {since} is after --until {until or today()}, a period is needed; exchange the two"
-        )
-    return Scope(first, last, device, station, day_of(today()) + 1.0)
 
 
 def _refuse_nothing(found: Audit, root: str) -> None:

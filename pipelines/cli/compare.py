@@ -9,10 +9,12 @@ from pipelines.cli.options import (
     DwellsArgument,
     EffectFileOption,
     EffectsOption,
+    FormulaOption,
     FreshHistoryOption,
     FreshOption,
     HistoryOption,
     JsonOption,
+    LeaveOutOption,
     ModelOption,
     console,
     error_console,
@@ -40,18 +42,22 @@ def command(
     history: HistoryOption = "",
     fresh_history: FreshHistoryOption = "",
     effect_file: EffectFileOption = None,
+    formula: FormulaOption = None,
+    leave_out: LeaveOutOption = "",
     archive: ArchiveOption = None,
     *,
     as_json: JsonOption = False,
 ) -> None:
     """Fit a model to dwells; state its error there, on dwells left out, and on a fresh run with the coefficients unchanged."""
-    from pipelines.cli.inputs import add_effect_files, both_runs, judged_effects
+    from pipelines.cli.inputs import add_effect_files, add_formulas, both_runs, judged_effects, without_dwells
     from pipelines.diagnosis.diagnose import default_model
 
     add_effect_files(effect_file)
+    add_formulas(formula, "compare")
     chosen = judged_effects(dwells, archive, effects, model, "compare")
-    tables = both_runs(dwells, history, fresh, fresh_history, archive)
-    document = compared(chosen or default_model(tables[0]), *tables)
+    first, temperatures, again, again_temperatures = both_runs(dwells, history, fresh, fresh_history, archive)
+    table, _ = without_dwells(first, leave_out)
+    document = compared(chosen or default_model(table), table, temperatures, again, again_temperatures)
     if as_json:
         print_json(document)
     else:

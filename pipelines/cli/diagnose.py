@@ -12,6 +12,7 @@ from pipelines.cli.options import (
     DwellsArgument,
     EffectFileOption,
     EffectsOption,
+    FormulaOption,
     HistoryOption,
     JsonOption,
     LeaveOutOption,
@@ -22,9 +23,9 @@ from pipelines.cli.options import (
 from schemas.errors import DONE, PART_FAILED
 
 if TYPE_CHECKING:
-    import pandas as pd
+    from collections.abc import Sequence
 
-    from inertial.criticism.diagnosis import Diagnosis
+    import pandas as pd
 
 PART = "Is the model good enough, and what is missing?"
 ORDER = 220
@@ -37,6 +38,7 @@ def command(
     model: ModelOption = None,
     history: HistoryOption = "",
     effect_file: EffectFileOption = None,
+    formula: FormulaOption = None,
     leave_out: LeaveOutOption = "",
     report: Annotated[
         Path | None,
@@ -53,17 +55,23 @@ def command(
     Exit status 0: the model is adequate. 1: it is not, it cannot be judged, or every unit has a data fault. 2: the input cannot
     be used.
     """
-    from pipelines.cli.inputs import add_effect_files, dwells_and_history, history_beside, judged_effects
+    from pipelines.cli.inputs import (
+        add_effect_files,
+        add_formulas,
+        dwells_and_history,
+        judged_effects,
+        without_dwells,
+    )
+    from pipelines.diagnosis.inputs import history_beside
     from pipelines.importers.exchange import is_file
-    from pipelines.tables.leave_out import leave_out as without_dwells
-    from pipelines.tables.leave_out import named_dwells
 
     add_effect_files(effect_file)
+    add_formulas(formula, "diagnose")
     judged = judged_effects(dwells, archive, effects, model, "diagnose")
     table, temperatures = dwells_and_history(dwells, history, archive)
-    table = without_dwells(table, named_dwells(leave_out))
+    table, left_out = without_dwells(table, leave_out)
     beside = history or (history_beside(dwells) if is_file(dwells) else "")
-    document, report_text = diagnosed(table, temperatures, judged, dwells, wanted=report is not None)
+    document, report_text = diagnosed(table, temperatures, judged, dwells, wanted=report is not None, left_out=left_out)
     document["history"] = beside or None
     if report is not None:
         write_report(report, report_text)
@@ -84,44 +92,21 @@ def diagnosed(
     *,
     wanted: bool,
     coefficients: list[dict[str, Any]] | None = None,
+    left_out: Sequence[str] = (),
 ) -> tuple[dict[str, Any], str]:
     """The document of a diagnosis, and its report where one is wanted, with a fit's coefficients where they are given."""
     from threadpoolctl import threadpool_limits
 
     with threadpool_limits(1), error_console().status("looking for missing effects"):
-        from pipelines.diagnosis.diagnose import (
-            default_model,
-            document,
-            examined,
-        )  # loads scipy.stats: after the first line
+        from pipelines.diagnosis.examination import examination  # loads scipy.stats: after the first line
 
-        effects = judged or default_model(table)
-        found, faults, diagnosis = examined(table, history, effects)
-    told = {**document(found, faults, diagnosis), **_extras(found.units, effects, diagnosis)}
+        made = examination(table, history, judged, left_out)
     if not wanted:
-        return told, ""
+        return made.document, ""
     with error_console().status("drawing the report"):
         from pipelines.report.diagnosis import render_diagnosis
 
-        return told, render_diagnosis(told, found, diagnosis, source, coefficients)
-
-
-def _extras(units: tuple[str, ...], effects: list[str], diagnosis: Diagnosis | None) -> dict[str, Any]:
-    """What the document says beyond its fixed keys: the model judged, breakers of what was unseen, the formula on offer."""
-    from inertial import effects as catalogue
-    from inertial.planning.reasons import reason
-    from pipelines.diagnosis.suggested_formula import as_toml, offer
-
-    extras: dict[str, Any] = {"effects": effects, "units": list(units), "breakers": {}, "offer": None}
-    if diagnosis is None:
-        return extras
-    extras["breakers"] = {name: catalogue.get(name).breaker for name in diagnosis.unseen}
-    state = diagnosis.problem.lot.state
-    extras["reasons"] = {name: reason(state, name, effects) for name in diagnosis.unseen}
-    if diagnosis.unexplained is not None:
-        formula = offer(diagnosis.unexplained, diagnosis.problem.lot.state)
-        extras["offer"] = None if formula is None else {**formula, "toml": as_toml(formula)}
-    return extras
+        return made.document, render_diagnosis(made.document, made.found, made.diagnosis, source, coefficients)
 
 
 def write_report(path: Path, text: str) -> None:

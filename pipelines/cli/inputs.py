@@ -19,31 +19,12 @@ def dwells_and_history(source: str, history: str, archive: str | None) -> tuple[
     history : a file; empty for the run's own, or for the one that stands beside a file of dwells
     """
     from pipelines.cli.options import error_console
-    from pipelines.importers.exchange import is_file, read_dwells, read_history
+    from pipelines.diagnosis import inputs
 
-    dwells = read_dwells(source, archive=archive)
-    if is_file(source) and not history:
-        history = history_beside(source)
-        if history:
-            error_console().print(f"history: {history}, found beside the dwells", markup=False, soft_wrap=True)
-    if history:
-        return dwells, read_history(history, archive=archive)
-    if is_file(source) or not _has_history(source, archive):
-        return dwells, None
-    return dwells, read_history(source, archive=archive)
-
-
-def history_beside(source: str) -> str:
-    """The history in the folder of a file of dwells: NAME-history, or history for a file called dwells; else empty."""
-    from pathlib import Path
-
-    dwells = Path(source)
-    stems = [f"{dwells.stem}-history", f"{dwells.stem}_history"]
-    if dwells.stem.endswith("dwells"):
-        stems.append(f"{dwells.stem.removesuffix('dwells')}history")
-    endings = dict.fromkeys((dwells.suffix, ".parquet", ".csv"))
-    found = (dwells.with_name(stem + ending) for stem in stems for ending in endings)
-    return next((str(path) for path in found if path.is_file()), "")
+    dwells, temperatures, place = inputs.dwells_and_history(source, history, archive)
+    if place and not history:
+        error_console().print(f"history: {place}, found beside the dwells", markup=False, soft_wrap=True)
+    return dwells, temperatures
 
 
 def judged_effects(source: str, archive: str | None, listed: str, model: Path | None, where: str) -> list[str] | None:
@@ -54,23 +35,25 @@ def judged_effects(source: str, archive: str | None, listed: str, model: Path | 
     listed : effects as they were named on the command line; empty where they were not
     where : the command, for its messages
     """
-    from pipelines.archive import Archive
-    from pipelines.importers.exchange import is_file
-    from pipelines.jobs.model_files import chosen_effects, use_formulas_of
+    from pipelines.diagnosis import inputs
 
-    chosen = chosen_effects(listed, model, where)
-    store = Archive(archive)
-    if chosen or is_file(source) or not store.runs():
-        return chosen
-    run = store.run(source)
-    use_formulas_of(run)
-    return list(run.about.get("recipe", {}).get("effects", ())) or None
+    return inputs.judged_effects(source, archive, listed, model, where)
 
 
-def _has_history(run: str, archive: str | None) -> bool:
-    from pipelines.archive import Archive
+def without_dwells(dwells: pd.DataFrame, listed: str) -> tuple[pd.DataFrame, list[str]]:
+    """The dwells without those that an option lists as UNIT:DWELL, divided by commas; and these, one by one."""
+    from pipelines.tables.leave_out import leave_out, named_dwells
 
-    return "history" in Archive(archive).run(run).tables()
+    named = named_dwells(listed)
+    return leave_out(dwells, named), [f"{unit}:{dwell}" for unit, dwell in named]
+
+
+def add_formulas(written: Sequence[str] | None, where: str) -> None:
+    """Formulas of the command line, in the catalogue from now on."""
+    if written:
+        from pipelines.diagnosis import inputs
+
+        inputs.use_written_formulas(written, where)
 
 
 def add_effect_files(paths: Sequence[Path] | None) -> None:

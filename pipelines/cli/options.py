@@ -91,6 +91,14 @@ EffectFileOption = Annotated[
     list[Path] | None,
     typer.Option("--effect-file", metavar="FILE.py", help="A Python file with effects of your own; may be repeated."),
 ]
+FormulaOption = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--formula",
+        metavar="ID=EXPRESSION",
+        help="An effect as a formula over recorded quantities, to be named in --effects; may be repeated.",
+    ),
+]
 SelectionArgument = Annotated[
     list[str],
     typer.Argument(

@@ -25,7 +25,6 @@ from schemas.errors import PART_FAILED
 if TYPE_CHECKING:
     from typer._click import Context
 
-    from inertial.noise.dwells import DwellNoise
     from pipelines.planning.plan import PlanContext
     from schemas.limits import Limits
     from schemas.recipe import Recipe
@@ -38,7 +37,6 @@ RAISED = 3.0
 """Factor by which 1/f and random walk must raise a floor to be listed."""
 
 RECIPE = "recipe"
-MICRO = 1e-6
 
 
 class _RecipeFirst(TyperGroup):
@@ -112,6 +110,7 @@ def command(
     """
     from pipelines.jobs.terms import planned_terms
     from pipelines.planning.plan import plan, plan_context
+    from pipelines.planning.preset_noise import noise_of
     from schemas.station import load_station
 
     config = load_station(station)
@@ -228,6 +227,7 @@ def optimise(
     recipe with the least station time that discriminates between these effects.
     """
     from pipelines.cli.optimal import OptimiseOptions, cheapest_recipe, missing_limits, print_optimum, written
+    from pipelines.planning.preset_noise import noise_of
     from schemas.station import load_station
 
     config = load_station(station)
@@ -294,21 +294,6 @@ def with_model(recipe: str, effects: str, model: Path | None, archive: str | Non
 
     found = load_recipe(recipe, line)
     return found.model_copy(update={"effects": list(chosen)}) if chosen else found
-
-
-def noise_of(recipe: Recipe, device: str, density: float | None, wander: float | None) -> DwellNoise:
-    """Noise of a preset, with given values in place of the preset's."""
-    from inertial.noise.dwells import DwellNoise
-    from inertial.noise.terms import FLICKER_FLOOR
-    from stations.plant.preset import load_preset
-
-    if density is not None and wander is not None:
-        return DwellNoise(density * MICRO, wander * MICRO / FLICKER_FLOOR)
-    preset = load_preset(device or recipe.device)
-    white = preset.noise_density_ug if density is None else density
-    if wander is not None:
-        return DwellNoise(white * MICRO, wander * MICRO / FLICKER_FLOOR)
-    return DwellNoise(white * MICRO, preset.bias_instability_ug * MICRO, preset.rate_random_walk_ug * MICRO)
 
 
 def _write(page: Path, document: dict[str, Any], context: PlanContext) -> None:

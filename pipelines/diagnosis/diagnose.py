@@ -34,7 +34,7 @@ from schemas.errors import DataRejected
 from schemas.units import MICRO
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Collection, Sequence
 
     import pandas as pd
 
@@ -94,14 +94,27 @@ def diagnose(
     return document(*examined(dwells, history, effects))
 
 
+MISSING = frozenset({"dropped_samples", "truncated_file"})
+"""Names of the faults of a unit that lacks dwells which others have."""
+
+
 def examined(
-    dwells: pd.DataFrame, history: pd.DataFrame | None, effects: Sequence[str] | None
+    dwells: pd.DataFrame,
+    history: pd.DataFrame | None,
+    effects: Sequence[str] | None,
+    left_out: Collection[str] = (),
 ) -> tuple[Measured, list[Fault], Diagnosis | None]:
-    """Readings, data faults and the diagnosis of the units without a fault; None where every unit has one."""
+    """Readings, data faults and the diagnosis of the units without a fault; None where every unit has one.
+
+    Parameters
+    ----------
+    left_out : ``UNIT:DWELL``, taken out of ``dwells`` on purpose: that a unit lacks these is no fault
+    """
     model = list(effects) if effects else default_model(dwells)
     catalogue.get_all(model)
     found = measured(condense(dwells), history)
     faults = find_faults(found.readings) if found.reference != "norm" else []
+    faults = [fault for fault in faults if not _on_purpose(found, fault, left_out)]
     blocked = {f.unit for f in faults}
     sound = [u for u in range(len(found.units)) if u not in blocked]
     if not sound:
@@ -113,6 +126,12 @@ def examined(
             return found, faults, diagnose_lot(lot, model, np.random.default_rng(_SEED))
     except InertialError as problem:
         raise DataRejected(str(problem)) from None
+
+
+def _on_purpose(found: Measured, fault: Fault, left_out: Collection[str]) -> bool:
+    """Whether a fault says no more than that dwells were left out."""
+    named = {f"{found.units[fault.unit]}:{int(found.dwells[k])}" for k in fault.dwells}
+    return fault.name in MISSING and bool(named) and named <= set(left_out)
 
 
 def document(

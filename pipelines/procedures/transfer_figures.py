@@ -170,8 +170,9 @@ def diagnosis_text(found: Diagnosis) -> list[tuple[str, str]]:
         ]
         out.append(("where the model fails", ", ".join(places)))
     for one in found.classes:
-        alike = f"; not told apart from {', '.join(one.effects[1:])}" if len(one.effects) > 1 else ""
-        out.append(("missing effect", f"{one.effects[0]} (p = {one.p_value:.1g}){alike}"))
+        first, *others = one.effects
+        alike = f"; not told apart from {', '.join(others)}" if others else ""
+        out.append(("missing effect", f"{first} (p = {one.p_value:.1g}){alike}"))
     if found.classes:
         before, after = found.left_out
         text = (

@@ -1,0 +1,85 @@
+"""``tumbleline workbench``: the archive, the model and what is missing, in a browser."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from pipelines.cli.options import StationOption, console, error_console
+from schemas.errors import WrongUse
+
+PART = "Is the model good enough, and what is missing?"
+ORDER = 205
+SUMMARY = "Show the archive, the model and what is missing in a browser."
+
+PATIENCE_S = 2  # open streams would hold up the end of the server
+
+
+def command(
+    archive: Annotated[
+        str, typer.Argument(metavar="[ARCHIVE]", help="The archive; TUMBLELINE_ARCHIVE or ./archive by default.")
+    ] = "",
+    folder: Annotated[
+        Path,
+        typer.Option("--folder", metavar="DIR", help="Folder of files of dwells, recipes, models, uploads and lots."),
+    ] = Path("workbench"),
+    station: StationOption = None,
+    port: Annotated[int, typer.Option("--port", min=0, max=65535, help="Port; 0: a free one.")] = 8321,
+    host: Annotated[str, typer.Option("--host", metavar="ADDRESS", help="Where it listens.")] = "127.0.0.1",
+    name: Annotated[
+        list[str] | None,
+        typer.Option("--name", metavar="HOST", help="A further host name by which it is called; may be repeated."),
+    ] = None,
+    certificate: Annotated[
+        Path | None, typer.Option("--certificate", metavar="FILE.pem", help="Certificate for HTTPS.")
+    ] = None,
+    key: Annotated[
+        Path | None, typer.Option("--key", metavar="FILE.pem", help="Private key of the certificate.")
+    ] = None,
+    workers: Annotated[int, typer.Option("--workers", min=1, max=32, help="Processes for diagnoses and fits.")] = 2,
+    *,
+    behind_proxy: Annotated[
+        bool,
+        typer.Option("--behind-proxy", help="A proxy in front encrypts; needed on other hosts without a certificate."),
+    ] = False,
+) -> None:
+    """Serve pages on this machine: units, what is missing, upload, operator, plan, station and audit.
+
+    Open the address that is printed: its token lets this browser start work; without it a browser on this machine may look.
+    Nothing is loaded from elsewhere, and nothing is sent.
+    """
+    import os
+    import socket
+
+    import uvicorn
+
+    from pipelines.archive import Archive
+    from pipelines.workbench.application import create_app
+    from pipelines.workbench.settings import Settings
+
+    if (certificate is None) != (key is None):
+        raise WrongUse("workbench: a certificate and its key are needed together; give both or neither")
+    place = (
+        socket.create_server((host, port), family=socket.AF_INET6 if ":" in host else socket.AF_INET)
+        if port == 0
+        else None
+    )
+    listening = place.getsockname()[1] if place is not None else port
+    given = os.environ.get("TUMBLELINE_WORKBENCH_TOKEN", "")
+    settings = Settings(
+        archive=Archive(archive or None).address, folder=folder, host=host, port=listening, names=tuple(name or ()),
+        tls=certificate is not None, proxied=behind_proxy, station=station, workers=workers,
+        **({"token": given} if given else {}),
+    )  # fmt: skip
+    app = create_app(settings)
+    console().print(f"{settings.address}/?token={settings.token}", soft_wrap=True)
+    sys.stdout.flush()  # a program that started it waits for the address
+    error_console().print("Open the address above; Ctrl-C ends the workbench.")
+    config = uvicorn.Config(
+        app, host=host, port=listening, log_level="warning", access_log=False, server_header=False, ws="none",
+        timeout_graceful_shutdown=PATIENCE_S, ssl_certfile=certificate, ssl_keyfile=key, proxy_headers=behind_proxy,
+    )  # fmt: skip
+    uvicorn.Server(config).run(sockets=[place] if place is not None else None)

@@ -1,0 +1,65 @@
+"""A diagnosis with everything that is told of it: the document for programs, the readings, the search."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from inertial import effects as catalogue
+from inertial.planning.reasons import reason
+from pipelines.diagnosis.diagnose import default_model, document, examined
+from pipelines.diagnosis.suggested_formula import as_toml, offer
+
+if TYPE_CHECKING:
+    from collections.abc import Collection, Sequence
+
+    import pandas as pd
+
+    from inertial.criticism.diagnosis import Diagnosis
+    from pipelines.tables.dwells import Measured
+
+
+@dataclass(frozen=True)
+class Examination:
+    """A diagnosis of dwells.
+
+    document : for programs, with what is told beyond its fixed keys
+    found, diagnosis : the readings, and what was found in them; None where every unit has a data fault
+    """
+
+    document: dict[str, Any]
+    found: Measured
+    diagnosis: Diagnosis | None
+
+
+def examination(
+    table: pd.DataFrame,
+    history: pd.DataFrame | None,
+    judged: Sequence[str] | None,
+    left_out: Collection[str] = (),
+) -> Examination:
+    """The diagnosis of dwells against a model.
+
+    Parameters
+    ----------
+    judged : the model; the default one where None
+    left_out : ``UNIT:DWELL``, which were taken out of ``table`` on purpose
+    """
+    effects = list(judged) if judged else default_model(table)
+    found, faults, diagnosis = examined(table, history, effects, left_out)
+    told = {**document(found, faults, diagnosis), **_extras(found.units, effects, diagnosis)}
+    return Examination(told, found, diagnosis)
+
+
+def _extras(units: tuple[str, ...], effects: list[str], diagnosis: Diagnosis | None) -> dict[str, Any]:
+    """What the document says beyond its fixed keys: the model judged, breakers of what was unseen, the suggested formula."""
+    extras: dict[str, Any] = {"effects": effects, "units": list(units), "breakers": {}, "offer": None}
+    if diagnosis is None:
+        return extras
+    extras["breakers"] = {name: catalogue.get(name).breaker for name in diagnosis.unseen}
+    state = diagnosis.problem.lot.state
+    extras["reasons"] = {name: reason(state, name, effects) for name in diagnosis.unseen}
+    if diagnosis.unexplained is not None:
+        formula = offer(diagnosis.unexplained, diagnosis.problem.lot.state)
+        extras["offer"] = None if formula is None else {**formula, "toml": as_toml(formula)}
+    return extras

@@ -1,0 +1,93 @@
+"""What a judgement of a model is made from: dwells with their history, a model, formulas, and dwells that are left out."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from pipelines.archive import Archive
+from pipelines.importers.exchange import is_file, read_dwells, read_history
+from pipelines.jobs.model_files import chosen_effects, use_formulas, use_formulas_of
+from schemas.errors import WrongUse
+from schemas.foreign import shown
+from schemas.recipe import FormulaSpec
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    import pandas as pd
+
+WHY = "entered as a formula"
+
+
+def dwells_and_history(source: str, history: str, archive: str | None) -> tuple[pd.DataFrame, pd.DataFrame | None, str]:
+    """The dwells of a file or run, their temperatures against time where there are any, and the file that these are from.
+
+    Parameters
+    ----------
+    history : a file; empty for the run's own, or for the one that stands beside a file of dwells
+    """
+    dwells = read_dwells(source, archive=archive)
+    beside = history or (history_beside(source) if is_file(source) else "")
+    if beside:
+        return dwells, read_history(beside, archive=archive), beside
+    if is_file(source) or "history" not in Archive(archive).run(source).tables():
+        return dwells, None, ""
+    return dwells, read_history(source, archive=archive), ""
+
+
+def history_beside(source: str) -> str:
+    """The history in the folder of a file of dwells: NAME-history, or history for a file called dwells; else empty."""
+    dwells = Path(source)
+    stems = [f"{dwells.stem}-history", f"{dwells.stem}_history"]
+    if dwells.stem.endswith("dwells"):
+        stems.append(f"{dwells.stem.removesuffix('dwells')}history")
+    endings = dict.fromkeys((dwells.suffix, ".parquet", ".csv"))
+    found = (dwells.with_name(stem + ending) for stem in stems for ending in endings)
+    return next((str(path) for path in found if path.is_file()), "")
+
+
+def judged_effects(source: str, archive: str | None, listed: str, model: Path | None, where: str) -> list[str] | None:
+    """The model that is judged: the one given, else a run's own; None where there is neither.
+
+    Parameters
+    ----------
+    listed : effects, divided by commas; empty where none is named
+    where : the command, for its messages
+    """
+    chosen = chosen_effects(listed, model, where)
+    store = Archive(archive)
+    if chosen or is_file(source) or not store.runs():
+        return chosen
+    run = store.run(source)
+    use_formulas_of(run)
+    return list(run.about.get("recipe", {}).get("effects", ())) or None
+
+
+def use_written_formulas(written: Sequence[str], where: str) -> list[str]:
+    """Make formulas ``id = expression; expression`` effects of the catalogue; their ids.
+
+    Raises
+    ------
+    WrongUse
+        One has no id or no expression.
+    RecipeInvalid
+        One is no formula.
+    """
+    specs = [_specified(text, where) for text in written]
+    use_formulas(specs, where)
+    return [spec.id for spec in specs]
+
+
+def _specified(text: str, where: str) -> FormulaSpec:
+    name, equals, rest = text.partition("=")
+    columns = [part.strip() for part in rest.split(";") if part.strip()]
+    if not (equals and name.strip() and columns):
+        raise WrongUse(
+            f"{where}: formula '{shown(text)}', id = expression is needed; write one such as humid = humidity_pct - 45"
+        )
+    if not name.strip().replace("_", "a").isalnum() or not name.strip()[0].isalpha():
+        raise WrongUse(
+            f"{where}: formula '{shown(text)}': an id of letters, digits and _ is needed; write one such as humid = …"
+        )
+    return FormulaSpec(id=name.strip().lower(), columns=columns, why=WHY)

@@ -1,0 +1,139 @@
+"""The description of a chart: arrays, labels with units, and the role of every trace; no drawing library.
+
+A page, a file of a report and a CSV file are drawn from the same description, so that they hold the same numbers.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Literal
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    Array = NDArray[np.float64]
+
+Role = Literal["x", "y", "z", "norm", "accent", "before", "after", "muted", "limit", "good", "ink"]
+Style = Literal["points", "line", "band", "bars", "density", "labels"]
+Symbol = Literal["circle", "triangle-up", "triangle-down", "square", "diamond"]
+
+ROLES: dict[Role, str] = {
+    "x": "#0072b2",
+    "y": "#d55e00",
+    "z": "#009e73",
+    "norm": "#0072b2",
+    "accent": "#0072b2",
+    "before": "#d55e00",
+    "after": "#0072b2",
+    "muted": "#9aa3ad",
+    "limit": "#b3261e",
+    "good": "#1b7f3b",
+    "ink": "#3a3f47",
+}
+"""Colours on a white page, told apart with any colour vision (Okabe and Ito); a page replaces them by those of its theme."""
+
+DIVERGING = ((0.0, "#2166ac"), (0.25, "#67a9cf"), (0.5, "#efefef"), (0.75, "#ef8a62"), (1.0, "#b2182b"))
+SEQUENTIAL = ((0.0, "#2b4b8f"), (0.25, "#5a6f96"), (0.5, "#8b8f86"), (0.75, "#c6b45d"), (1.0, "#fde333"))
+
+
+@dataclass(frozen=True)
+class PlotAxis:
+    """An axis: its label with the unit.
+
+    dates : whether values are days since 1970, UTC · names : of the places 0, 1, … where they stand for things
+    low, high : limits; None for those of the values
+    """
+
+    label: str
+    log: bool = False
+    dates: bool = False
+    names: tuple[str, ...] = ()
+    low: float | None = None
+    high: float | None = None
+
+
+@dataclass(frozen=True)
+class ColourScale:
+    """What colours stand for: a label with its unit, and the values at both ends."""
+
+    label: str
+    low: float
+    high: float
+    diverging: bool = True
+
+
+@dataclass(frozen=True, eq=False)
+class Trace:
+    """Values that are drawn alike.
+
+    x, y : (n,) · high : (n,), upper edge of a band · error : (n,), half length of an error bar
+    colour : (n,), values on the chart's colour scale; the role's colour where None
+    counts : (rows, columns), of a density; x and y are then the middles of columns and rows
+    texts : (n,), shown beside a label, or when a point is pointed at
+    picks : (n,), what a click on a point chooses; empty where it chooses nothing
+    """
+
+    name: str
+    x: Array
+    y: Array
+    style: Style = "points"
+    role: Role = "accent"
+    symbol: Symbol = "circle"
+    size: float = 6.0
+    dashed: bool = False
+    high: Array | None = None
+    error: Array | None = None
+    colour: Array | None = None
+    counts: Array | None = None
+    texts: tuple[str, ...] = ()
+    picks: tuple[str, ...] = ()
+    legend: bool = True
+
+
+@dataclass(frozen=True)
+class Plot:
+    """One pair of axes with its traces; a ``sphere`` has none and keeps its proportions."""
+
+    title: str
+    x: PlotAxis
+    y: PlotAxis
+    traces: tuple[Trace, ...]
+    sphere: bool = False
+
+
+@dataclass(frozen=True)
+class Chart:
+    """Plots side by side in ``columns`` columns, one colour scale for all.
+
+    title : says what is seen, for those who do not see it · height : of one row, in pixels of a page
+    """
+
+    title: str
+    plots: tuple[Plot, ...]
+    columns: int = 1
+    scale: ColourScale | None = None
+    height: int = 320
+    note: str = ""
+    tags: dict[str, str] = field(default_factory=dict[str, str])
+
+    @property
+    def rows(self) -> int:
+        """Number of rows of plots."""
+        return -(-len(self.plots) // self.columns)
+
+
+def symmetric(values: Array, label: str) -> ColourScale:
+    """A diverging scale about zero that holds all finite values."""
+    finite = values[np.isfinite(values)]
+    largest = float(np.max(np.abs(finite))) if finite.size else 1.0
+    return ColourScale(label, -(largest or 1.0), largest or 1.0)
+
+
+def density(x: Array, y: Array, *, columns: int = 80, rows: int = 60) -> Trace:
+    """Counts of many points in cells of a grid: what a crowd looks like where its points would cover each other."""
+    there = np.isfinite(x) & np.isfinite(y)
+    counts, xs, ys = np.histogram2d(x[there], y[there], bins=(columns, rows))
+    middle = lambda edges: 0.5 * (edges[1:] + edges[:-1])  # noqa: E731 - twice, in one line
+    return Trace("all units", middle(xs), middle(ys), "density", "muted", counts=counts.T)

@@ -1,0 +1,54 @@
+"""A chart as comma-separated values: one row per point, with what its axes are called."""
+
+from __future__ import annotations
+
+import csv
+import io
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from pipelines.report.charts.chart import Chart, Plot, Trace
+
+COLUMNS = ("plot", "series", "x_label", "x", "y_label", "y", "high", "error", "colour", "text", "pick")
+_LEADS = ("=", "+", "-", "@", "\t", "\r")
+
+
+def csv_text(chart: Chart) -> str:
+    """The numbers of a chart; the lines that only guide the eye are left out."""
+    sink = io.StringIO()
+    writer = csv.writer(sink, lineterminator="\n")
+    writer.writerow(COLUMNS)
+    for plot in chart.plots:
+        for trace in plot.traces:
+            if trace.name:
+                writer.writerows(_rows(plot, trace))
+    return sink.getvalue()
+
+
+def _rows(plot: Plot, trace: Trace) -> Iterator[list[str]]:
+    head = [_cell(plot.title), _cell(trace.name)]
+    if trace.counts is not None:
+        for row, y in enumerate(trace.y):
+            for column, x in enumerate(trace.x):
+                if trace.counts[row, column]:
+                    count = repr(float(trace.counts[row, column]))
+                    yield [*head, plot.x.label, repr(float(x)), plot.y.label, repr(float(y)), "", "", count, "", ""]
+        return
+    for k in range(trace.x.size):
+        values = [_number(array, k) for array in (trace.high, trace.error, trace.colour)]
+        texts = [_cell(texts[k]) if texts else "" for texts in (trace.texts, trace.picks)]
+        x, y = repr(float(trace.x[k])), _number(trace.y, k)
+        yield [*head, plot.x.label, x, plot.y.label, y, *values, *texts]
+
+
+def _number(values: np.ndarray | None, k: int) -> str:
+    return "" if values is None or not np.isfinite(values[k]) else repr(float(values[k]))
+
+
+def _cell(text: str) -> str:
+    """A name as a cell that no spreadsheet takes for a formula."""
+    return f"'{text}" if text.startswith(_LEADS) else text

@@ -1,0 +1,67 @@
+"""The whole sphere on one ellipse, areas kept: +x in the middle, ±z at the poles.
+
+Mollweide's projection (Snyder, Map Projections: A Working Manual, USGS 1395, 1987, eqs. 31-1 to 31-3).
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from pipelines.report.charts.chart import Plot, PlotAxis, Trace
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    Array = NDArray[np.float64]
+
+_STEPS = 30
+LETTERS = {
+    "+x": (1.0, 0.0, 0.0),
+    "+y": (0.0, 1.0, 0.0),
+    "−y": (0.0, -1.0, 0.0),
+    "+z": (0.0, 0.0, 1.0),
+    "−z": (0.0, 0.0, -1.0),
+}
+
+
+def project(direction: Array) -> tuple[Array, Array]:
+    """Places of directions, (n, 3) → (n,) and (n,): x from −2 to 2, y from −1 to 1."""
+    unit = direction / np.linalg.norm(direction, axis=-1, keepdims=True)
+    longitude, sine = np.arctan2(unit[..., 1], unit[..., 0]), np.clip(unit[..., 2], -1.0, 1.0)
+    angle = np.arcsin(sine)
+    for _ in range(_STEPS):  # Newton; near a pole it halves its error every step only, where the slope vanishes too
+        slope = 2.0 + 2.0 * np.cos(2.0 * angle)
+        step = np.where(
+            slope > 1e-12, (2.0 * angle + np.sin(2.0 * angle) - np.pi * sine) / np.maximum(slope, 1e-12), 0.0
+        )
+        angle = np.clip(angle - step, -0.5 * np.pi, 0.5 * np.pi)
+    return 2.0 * longitude / np.pi * np.cos(angle), np.sin(angle)
+
+
+def sphere(title: str, traces: tuple[Trace, ...]) -> Plot:
+    """A plot of traces that were projected, on the outline with its meridians, the equator and the axes' letters."""
+    return Plot(
+        title,
+        PlotAxis("", low=-2.12, high=2.12),  # room for the points at the edge
+        PlotAxis("", low=-1.16, high=1.16),
+        (*_graticule(), *traces),
+        sphere=True,
+    )
+
+
+def _graticule() -> tuple[Trace, ...]:
+    turn = np.linspace(0.0, 2.0 * np.pi, 121)
+    latitude = np.linspace(-0.5 * np.pi, 0.5 * np.pi, 41)
+    lines = [Trace("", 2.0 * np.cos(turn), np.sin(turn), "line", "muted", legend=False)]
+    for longitude in np.radians([-90.0, 0.0, 90.0]):
+        around = np.stack(
+            [np.cos(latitude) * np.cos(longitude), np.cos(latitude) * np.sin(longitude), np.sin(latitude)], axis=-1
+        )
+        lines.append(Trace("", *project(around), "line", "muted", legend=False))
+    lines.append(Trace("", np.array([-2.0, 2.0]), np.zeros(2), "line", "muted", legend=False))
+    x, y = project(np.array(list(LETTERS.values())))
+    beside = np.array([0.09, 0.09, -0.09, 0.0, 0.0]), np.array([0.08, 0.08, 0.08, 0.09, -0.09])
+    lines.append(Trace("", x + beside[0], y + beside[1], "labels", "ink", texts=tuple(LETTERS), legend=False))
+    return tuple(lines)

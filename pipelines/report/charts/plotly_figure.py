@@ -1,0 +1,209 @@
+"""A chart as a figure of Plotly: data and layout as JSON, without the Python package of that name.
+
+Colours are names of roles (``role:before``) that the page replaces by those of its theme. Arrays travel as 32-bit binary.
+"""
+
+from __future__ import annotations
+
+import base64
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from pipelines.report.charts.chart import DIVERGING, SEQUENTIAL
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from pipelines.report.charts.chart import Chart, Plot, PlotAxis, Trace
+
+MANY = 4000
+"""Points from which WebGL draws faster than SVG."""
+DAY_MS = 86_400_000.0
+GAP_X, GAP_PX = 0.06, 74.0
+SPHERE_GAP_X, SPHERE_GAP_PX = 0.012, 26.0
+NARROW_D = 20.0  # dates nearer together are shown with room around them
+LONGEST = 28
+CONFIG = {
+    "displaylogo": False,
+    "responsive": True,
+    "showSendToCloud": False,
+    "plotlyServerURL": "",
+    "topojsonURL": "/none",
+    "modeBarButtonsToRemove": ["sendChartToCloud", "select2d", "lasso2d", "autoScale2d"],
+}
+"""Nothing of a figure leaves the page: Plotly's toolbar offers to send it to its maker otherwise."""
+
+
+def plotly_figure(chart: Chart) -> dict[str, Any]:
+    """Data, layout and configuration of a figure; colours by role."""
+    data: list[dict[str, Any]] = []
+    layout: dict[str, Any] = {
+        "height": chart.height * chart.rows + 40,
+        "margin": {"l": 62, "r": 16, "t": 44, "b": 52},
+        "showlegend": any(t.legend and t.name for p in chart.plots for t in p.traces),
+        "legend": {"orientation": "h", "x": 0, "y": 1.0 + 30.0 / (chart.height * chart.rows), "yanchor": "bottom"},
+        "hovermode": "closest",
+        "annotations": [],
+        "barmode": "group",
+        "meta": {"title": _safe(chart.title)},
+    }
+    shown: set[str] = set()
+    for number, plot in enumerate(chart.plots):
+        names = _axis_names(number)
+        for trace in plot.traces:
+            data.append(_trace(trace, names, chart, shown))
+            shown.add(trace.name)
+        _place(layout, plot, number, chart)
+    if chart.scale is not None:
+        layout["coloraxis"] = _colour_axis(chart)
+        layout["margin"]["r"] = 78
+    if all(plot.sphere for plot in chart.plots):
+        layout["margin"] |= {"l": 8, "b": 8, "t": 34}
+        layout["height"] = chart.height * chart.rows + 20
+    return {"data": data, "layout": layout, "config": CONFIG}
+
+
+def _axis_names(number: int) -> tuple[str, str]:
+    end = "" if number == 0 else str(number + 1)
+    return f"x{end}", f"y{end}"
+
+
+def _place(layout: dict[str, Any], plot: Plot, number: int, chart: Chart) -> None:
+    """The axes of a plot at its place in the grid, with its title above."""
+    row, column = divmod(number, chart.columns)
+    beside, below = (SPHERE_GAP_X, SPHERE_GAP_PX) if plot.sphere else (GAP_X, GAP_PX)
+    width = (1.0 - beside * (chart.columns - 1)) / chart.columns
+    gap = below / (chart.height * chart.rows)
+    height = (1.0 - gap * (chart.rows - 1)) / chart.rows
+    left, top = column * (width + beside), 1.0 - row * (height + gap)
+    across, along = _axis_names(number)
+    for axis, name, domain, other in (
+        (plot.x, across, (left, left + width), along),
+        (plot.y, along, (top - height, top), across),
+    ):
+        layout[name.replace("x", "xaxis").replace("y", "yaxis")] = {
+            **_axis(axis, plot),
+            "domain": [max(domain[0], 0.0), min(domain[1], 1.0)],
+            "anchor": other,
+        }
+    if plot.sphere:
+        layout[along.replace("y", "yaxis")] |= {"scaleanchor": across, "scaleratio": 1.0}
+    elif column and chart.plots[number - 1].y.label == plot.y.label:
+        del layout[along.replace("y", "yaxis")]["title"]  # said at the left already
+    if plot.title:
+        layout["annotations"].append({
+            "text": f"<b>{_safe(plot.title)}</b>", "x": left, "y": top, "xref": "paper", "yref": "paper",
+            "xanchor": "left", "yanchor": "bottom", "showarrow": False, "yshift": 4,
+        })  # fmt: skip
+
+
+def _axis(axis: PlotAxis, plot: Plot) -> dict[str, Any]:
+    title = {"text": _safe(axis.label), "standoff": 8, "font": {"size": 13}}
+    out: dict[str, Any] = {"title": title, "automargin": True, "zeroline": False}
+    if plot.sphere:
+        return {"visible": False, "range": [axis.low, axis.high], "fixedrange": True}
+    if axis.log:
+        out |= {"type": "log", "exponentformat": "power"}
+    if axis.dates:
+        out["type"] = "date"
+        days = np.concatenate([trace.x for trace in plot.traces]) if plot.traces else np.zeros(0)
+        if days.size and np.ptp(days) < NARROW_D:
+            out["range"] = [DAY_MS * (float(days.min()) - NARROW_D), DAY_MS * (float(days.max()) + NARROW_D)]
+    if axis.names:
+        out |= {"tickvals": list(range(len(axis.names))), "ticktext": [_cut(name) for name in axis.names]}
+    if axis.low is not None and axis.high is not None:
+        out["range"] = [axis.low, axis.high]
+    return out
+
+
+def _trace(trace: Trace, names: tuple[str, str], chart: Chart, shown: set[str]) -> dict[str, Any]:
+    x = trace.x * DAY_MS if _dated(chart, names) else trace.x
+    out: dict[str, Any] = {
+        "xaxis": names[0],
+        "yaxis": names[1],
+        "name": _cut(trace.name),
+        "legendgroup": _safe(trace.name),
+        "showlegend": bool(trace.legend and trace.name and trace.name not in shown and trace.style != "density"),
+    }
+    colour = f"role:{trace.role}"
+    if trace.style == "density":
+        counts = np.asarray(trace.counts, dtype=float)
+        return out | {
+            "type": "heatmap", "x": packed(x), "y": packed(trace.y), "showscale": False, "hoverinfo": "skip",
+            "z": [[float(np.log10(n)) + 0.3 if n > 0.0 else None for n in row] for row in counts],
+            "colorscale": [[0, "role:faint"], [1, "role:muted"]], "zmin": 0,
+        }  # fmt: skip
+    if trace.style == "band":
+        # one closed line: up along the low edge, back along the high one
+        back = np.asarray(trace.high)[::-1]
+        return out | {
+            "type": "scatter", "mode": "lines", "fill": "toself", "fillcolor": f"{colour}:0.2", "line": {"width": 0},
+            "x": packed(np.concatenate([x, x[::-1]])), "y": packed(np.concatenate([trace.y, back])), "hoverinfo": "skip",
+        }  # fmt: skip
+    out |= {"x": packed(x, dates=_dated(chart, names)), "y": packed(trace.y)}
+    if trace.style == "bars":
+        return out | {"type": "bar", "marker": {"color": colour}, "hovertext": [_safe(text) for text in trace.texts]}
+    if trace.style == "labels":
+        return out | {
+            "type": "scatter", "mode": "text", "text": [_safe(t) for t in trace.texts], "textfont": {"color": colour},
+            "hoverinfo": "skip",
+        }  # fmt: skip
+    if trace.style == "line":
+        line = {"color": colour, "width": 1.0 if not trace.name else 1.8, **({"dash": "dash"} if trace.dashed else {})}
+        return out | {"type": "scatter", "mode": "lines", "line": line, **({} if trace.name else {"hoverinfo": "skip"})}
+    return out | _points(trace, colour)
+
+
+def _points(trace: Trace, colour: str) -> dict[str, Any]:
+    marker: dict[str, Any] = {"size": trace.size, "symbol": trace.symbol, "color": colour}
+    if trace.colour is not None:
+        marker |= {"color": packed(trace.colour), "coloraxis": "coloraxis", "line": {"width": 0.7, "color": "role:ink"}}
+    out: dict[str, Any] = {
+        "type": "scattergl" if trace.x.size > MANY else "scatter",
+        "mode": "markers",
+        "marker": marker,
+    }
+    if trace.error is not None:
+        out["error_y"] = {"type": "data", "array": packed(trace.error), "color": colour, "thickness": 1}
+    if trace.texts:
+        out |= {"text": [_safe(text) for text in trace.texts], "hovertemplate": "%{text}<extra></extra>"}
+    if trace.picks:
+        out["customdata"] = list(trace.picks)
+    return out
+
+
+def _dated(chart: Chart, names: tuple[str, str]) -> bool:
+    number = int(names[0][1:] or 1) - 1
+    return chart.plots[number].x.dates
+
+
+def _colour_axis(chart: Chart) -> dict[str, Any]:
+    scale = chart.scale
+    if scale is None:
+        return {}
+    colours = [list(one) for one in (DIVERGING if scale.diverging else SEQUENTIAL)]
+    if scale.diverging:
+        colours[len(colours) // 2][1] = "role:middle"  # zero is as quiet on a dark page as on a light one
+    title = {"text": _safe(scale.label), "side": "right", "font": {"size": 13}}
+    return {
+        "cmin": scale.low, "cmax": scale.high, "colorscale": colours,
+        "colorbar": {"title": title, "thickness": 12, "outlinewidth": 0},
+    }  # fmt: skip
+
+
+def packed(values: NDArray[np.float64], *, dates: bool = False) -> dict[str, str]:
+    """Numbers as Plotly reads them in binary: 32 bits, 64 where they are dates."""
+    kind = np.dtype("<f8") if dates else np.dtype("<f4")
+    data = np.ascontiguousarray(values, dtype=kind).tobytes()
+    return {"dtype": "f8" if dates else "f4", "bdata": base64.b64encode(data).decode()}
+
+
+def _safe(text: str) -> str:
+    """A text that Plotly takes for nothing but text."""
+    return text.replace("&", "&amp;").replace("<", "&lt;").replace(">", "&gt;")
+
+
+def _cut(text: str) -> str:
+    """A name for a legend: a long serial number would take half of the figure."""
+    return _safe(text if len(text) <= LONGEST else f"{text[: LONGEST - 9]}…{text[-8:]}")

@@ -1,0 +1,135 @@
+"""Residuals of a lot beside everything that was recorded with its dwells, as plain arrays for charts and other processes."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from inertial import effects as catalogue
+from inertial.criticism.comparison import estimate, residuals_of
+from inertial.criticism.drivers import drivers_of
+from inertial.criticism.model import Model
+from inertial.criticism.problem import Problem
+from inertial.criticism.refinement import terms_of
+from inertial.errors import InertialError
+from inertial.quantities import shown_factor
+from pipelines.report.residuals import LABELS, direction
+from pipelines.tables.dwells import lot_of, measured
+from schemas.errors import DataRejected
+from schemas.units import MICRO
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    import pandas as pd
+
+    from inertial.criticism.diagnosis import Diagnosis
+    from pipelines.tables.dwells import Measured
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class ResidualTable:
+    """Residuals of units × axes × dwells, µg, NaN where a dwell is missing, and what was recorded with each dwell.
+
+    force : (units, n, 3), g · turning : (units, n), 1 reached heating, −1 cooling, 0 neither
+    drivers : label, and values (units, n) or (units, n, 3), by name
+    """
+
+    units: tuple[str, ...]
+    dwells: NDArray[np.int64]
+    axes: tuple[str, ...]
+    residual: Array
+    force: Array
+    turning: NDArray[np.int64]
+    drivers: dict[str, tuple[str, Array]] = field(default_factory=dict[str, tuple[str, Array]])
+
+    def pick(self, unit: int, dwell: int) -> str:
+        """What a click on a point chooses."""
+        return f"{self.units[unit]}:{int(self.dwells[dwell])}"
+
+
+def residual_table(found: Measured, diagnosis: Diagnosis, units: tuple[str, ...]) -> ResidualTable:
+    """The residuals of the model that a diagnosis judged.
+
+    Parameters
+    ----------
+    units : those without a data fault, in the order of the diagnosis
+    """
+    return _tabled(found, diagnosis.base, units)
+
+
+def residuals_of_model(
+    dwells: pd.DataFrame, history: pd.DataFrame | None, effects: Sequence[str], units: Sequence[str]
+) -> Array:
+    """The residuals of another model on the same dwells, µg, (units, axes, n).
+
+    Raises
+    ------
+    DataRejected
+        The dwells do not determine the model, or lack a quantity that it needs.
+    """
+    try:
+        found = measured(dwells, history)
+        found = found.pick([found.units.index(unit) for unit in units])
+        problem = Problem(lot_of(found, square="misalignment" not in effects))
+        model = Model(problem, terms_of(catalogue.get_all(list(effects)), problem))
+        return _residuals(model, len(found.units))
+    except InertialError as problem_:
+        raise DataRejected(str(problem_)) from None
+
+
+def _residuals(model: Model, units: int) -> Array:
+    axes = 1 if model.problem.lot.radial else 3
+    return MICRO * residuals_of(model.problem, estimate(model)).reshape(units, axes, model.problem.n)
+
+
+def _tabled(found: Measured, model: Model, units: tuple[str, ...]) -> ResidualTable:
+    problem = model.problem
+    state = problem.lot.state
+    drivers: dict[str, tuple[str, Array]] = {}
+    for driver in drivers_of(problem):
+        recorded = driver.values  # noqa: PD011 - no table of pandas
+        if recorded is not None:
+            values = state.force_step if driver.name == "approach" else recorded
+            drivers[driver.name] = (LABELS.get(driver.name, driver.name), values * shown_factor(driver.name))
+    shape = (len(units), problem.n)
+    drivers["force"] = ("specific force along the axis / g", np.asarray(state.force, dtype=float))
+    drivers.setdefault("time_s", (LABELS["time_s"], state.time * shown_factor("time_s")))
+    drivers["dwell"] = ("number of the dwell", np.broadcast_to(found.dwells.astype(float), shape).copy())
+    if state.slot is not None:
+        slot = np.asarray(state.slot, dtype=float)
+        drivers["slot"] = ("slot", np.broadcast_to(slot.reshape(len(units), -1)[:, :1], shape).copy())
+    turning = np.zeros(shape, dtype=np.int64)
+    if state.temperature is not None:
+        turning = np.stack([direction(row) for row in state.temperature])
+    return ResidualTable(
+        units, found.dwells, ("norm",) if problem.lot.radial else ("x", "y", "z"), _residuals(model, len(units)),
+        np.asarray(state.force, dtype=float), turning, drivers,
+    )  # fmt: skip
+
+
+def ladder_of(diagnosis: Diagnosis) -> list[dict[str, Any]]:
+    """The candidates of the first step, best first.
+
+    Rows have ``effect``, ``symbol``, ``coefficients``, ``chi2`` that it takes off, ``behind`` the best after the penalty for
+    coefficients, and ``log10_p``.
+    """
+    if not diagnosis.ladder:
+        return []
+    variance, best = diagnosis.final.space.variance, diagnosis.ladder[0].cost
+    return [
+        {
+            "effect": rival.term.effect.id,
+            "symbol": rival.term.effect.symbol,
+            "coefficients": int(rival.rank),
+            "chi2": float(rival.drop / variance),
+            "behind": float(rival.cost - best),
+            "log10_p": float(max(rival.log_p, -1e6) / np.log(10.0)),
+        }
+        for rival in diagnosis.ladder
+    ]

@@ -1,0 +1,78 @@
+"""The application: pages that are found, errors as sentences, static files, and the guard around everything."""
+
+from __future__ import annotations
+
+from contextlib import asynccontextmanager
+from importlib import import_module
+from pkgutil import iter_modules
+from typing import TYPE_CHECKING
+
+from fastapi import FastAPI, Request
+from starlette.exceptions import HTTPException
+from starlette.responses import JSONResponse, RedirectResponse, Response
+
+from inertial.errors import InertialError
+from pipelines.workbench.pages import Workbench, page
+from pipelines.workbench.security import Guard
+from pipelines.workbench.services.jobs import Jobs
+from pipelines.workbench.services.lots import Stale
+from pipelines.workbench.state import PageState
+from schemas.errors import TumblelineError
+
+if TYPE_CHECKING:
+    from collections.abc import AsyncGenerator
+
+    from starlette.types import ASGIApp
+
+    from pipelines.workbench.settings import Settings
+
+ROUTES = "pipelines.workbench.routes"
+
+
+def create_app(settings: Settings) -> ASGIApp:
+    """The application, with the guard around it."""
+    settings.refuse_unsafe()
+    bench = Workbench(settings, Jobs(settings.folder / "jobs.json", settings.workers))
+
+    @asynccontextmanager
+    async def life(app: FastAPI) -> AsyncGenerator[None]:
+        del app
+        yield
+        bench.jobs.close()
+
+    app = FastAPI(openapi_url=None, docs_url=None, redoc_url=None, lifespan=life)
+    app.state.workbench = bench
+    found: list[tuple[int, str, str]] = []
+    for info in iter_modules(import_module(ROUTES).__path__):
+        module = import_module(f"{ROUTES}.{info.name}")
+        app.include_router(module.router)
+        if hasattr(module, "HEADING"):
+            found.append((module.ORDER, module.HEADING, module.ADDRESS))
+    bench.navigation = [(heading, address) for _, heading, address in sorted(found)]
+    app.add_api_route("/", lambda: RedirectResponse("/units", 303), include_in_schema=False)
+    app.add_exception_handler(TumblelineError, _problem)
+    app.add_exception_handler(InertialError, _problem)
+    app.add_exception_handler(HTTPException, _not_there)
+    app.add_exception_handler(Exception, _defect)
+    return Guard(app, settings)
+
+
+def _problem(request: Request, problem: Exception) -> Response:
+    """What a person can do something about, as a sentence."""
+    return _answer(request, str(problem), 409 if isinstance(problem, Stale) else 422)
+
+
+def _not_there(request: Request, problem: Exception) -> Response:
+    status = problem.status_code if isinstance(problem, HTTPException) else 404
+    return _answer(request, f"{request.url.path[:80]}: there is no such page; choose one above", status)
+
+
+def _defect(request: Request, problem: Exception) -> Response:
+    text = f"a defect of the program: {type(problem).__name__}: {problem}; the server's log has the details"
+    return _answer(request, text, 500)
+
+
+def _answer(request: Request, text: str, status: int) -> Response:
+    if "text/html" in request.headers.get("accept", "") and request.method == "GET":
+        return page(request, "problem.html", PageState(), status=status, text=text)
+    return JSONResponse({"problem": text}, status)

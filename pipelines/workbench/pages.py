@@ -1,0 +1,168 @@
+"""What every page has: the workbench behind it, its template, its figures in three forms, and errors as sentences."""
+
+from __future__ import annotations
+
+import hashlib
+import math
+import secrets
+from dataclasses import dataclass, field
+from functools import cache, lru_cache
+from importlib.resources import files
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, TypeVar
+
+from fastapi import Body, Request
+from jinja2 import Environment, FunctionLoader, StrictUndefined
+from starlette.responses import HTMLResponse, JSONResponse, Response
+
+from pipelines.archive import Archive
+from pipelines.report.charts import csv_text, plotly_figure, png_bytes
+from pipelines.report.numbers import plain
+from pipelines.workbench.services.jobs import Jobs
+from schemas.errors import WrongUse
+from schemas.units import MICRO
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+    import pandas as pd
+
+    from pipelines.report.charts import Chart
+    from pipelines.workbench.settings import Settings
+    from pipelines.workbench.state import PageState
+
+State = TypeVar("State", bound="PageState")
+Wanted = Annotated[dict[str, Any], Body()]
+"""What a change asks for, as JSON."""
+PARAMETER = {"json": "application/json", "csv": "text/csv; charset=utf-8", "png": "image/png"}
+
+
+@dataclass
+class Workbench:
+    """What handlers share.
+
+    boot : of this life of the server · navigation : heading and address of the pages, in order
+    """
+
+    settings: Settings
+    jobs: Jobs
+    boot: str = field(default_factory=lambda: secrets.token_hex(8))
+    navigation: list[tuple[str, str]] = field(default_factory=list[tuple[str, str]])
+
+    @property
+    def archive(self) -> Archive:
+        """The archive beside which it runs."""
+        return Archive(self.settings.archive)
+
+
+def workbench_of(request: Request) -> Workbench:
+    """The workbench that answers a request."""
+    found: Workbench = request.app.state.workbench
+    return found
+
+
+def state_of(request: Request, kind: type[State]) -> tuple[State, list[str]]:
+    """The state that an address says, and what of it cannot be."""
+    return kind.parse(request.query_params.multi_items())
+
+
+def page(
+    request: Request,
+    template: str,
+    state: PageState,
+    problems: list[str] | None = None,
+    status: int = 200,
+    **values: Any,
+) -> HTMLResponse:
+    """A page as HTML."""
+    bench = workbench_of(request)
+    text = _environment().get_template(template).render(
+        state=state, problems=problems or [], bench=bench, command=state.command(bench.settings.archive),
+        may_change=bool(getattr(request.state, "may_change", False)), static=static_version(), path=request.url.path,
+        number=plain, micro=MICRO, finite=math.isfinite, **values,
+    )  # fmt: skip
+    return HTMLResponse(text, status)
+
+
+def figure(chart: Chart | None, ending: str, name: str) -> Response:
+    """A chart as a figure for the page, as its numbers, or as a picture."""
+    if chart is None:
+        raise WrongUse(f"figure {name}: there is nothing to draw yet; wait until the work is done")
+    if ending == "json":
+        return JSONResponse(plotly_figure(chart))
+    if ending == "csv":
+        return Response(csv_text(chart), media_type=PARAMETER["csv"], headers=saved_as(f"{name}.csv"))
+    if ending == "png":
+        return Response(png_bytes(chart), media_type=PARAMETER["png"], headers=saved_as(f"{name}.png"))
+    raise WrongUse(f"figure {name}: '{ending[:10]}', one of json, csv, png is needed")
+
+
+def saved_as(name: str) -> dict[str, str]:
+    """Headers of an answer that a browser saves under a name."""
+    safe = "".join(letter if letter.isascii() and (letter.isalnum() or letter in "._-") else "_" for letter in name)
+    return {"content-disposition": f'attachment; filename="{safe}"'}
+
+
+def table_csv(rows: Sequence[Mapping[str, Any]], name: str) -> Response:
+    """Rows as comma-separated values."""
+    import csv
+    import io
+
+    sink = io.StringIO()
+    if rows:
+        writer = csv.DictWriter(sink, list(rows[0]), lineterminator="\n")
+        writer.writeheader()
+        writer.writerows({key: _cell(value) for key, value in row.items()} for row in rows)
+    return Response(sink.getvalue(), media_type=PARAMETER["csv"], headers=saved_as(f"{name}.csv"))
+
+
+def _cell(value: Any) -> Any:
+    """A value that no spreadsheet takes for a formula."""
+    return f"'{value}" if isinstance(value, str) and value.startswith(("=", "+", "-", "@", "\t", "\r")) else value
+
+
+def run_table(bench: Workbench, run: str, name: str) -> pd.DataFrame:
+    """A table of a run, kept while its manifest is the same."""
+    found = bench.archive.run(run)
+    place = found.path / f"{name}.json"
+    when = place.stat().st_mtime_ns if isinstance(place, Path) and place.is_file() else 0
+    return _table(bench.settings.archive, found.id, name, when)
+
+
+@lru_cache(maxsize=48)
+def _table(archive: str, run: str, name: str, when: int) -> pd.DataFrame:
+    del when
+    return Archive(archive).run(run).table(name)
+
+
+@cache
+def static_version() -> str:
+    """Part of the addresses of scripts and styles that changes with their content, so that browsers may keep them for ever."""
+    digest = hashlib.sha256()
+    for place in sorted((files("pipelines.workbench") / "static").iterdir(), key=lambda one: one.name):
+        if place.is_file():
+            digest.update(place.name.encode() + place.read_bytes())
+    return digest.hexdigest()[:12]
+
+
+@cache
+def _environment() -> Environment:
+    loader = FunctionLoader(
+        lambda name: (files("pipelines.workbench") / "templates" / name).read_text(encoding="utf-8")
+    )
+    environment = Environment(
+        loader=loader, autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
+    )
+    environment.filters["short"] = short
+    environment.filters["tuple_of"] = _tuple_of
+    return environment
+
+
+def _tuple_of(values: Any) -> tuple[Any, ...]:
+    return tuple(values)
+
+
+def short(text: object, most: int = 28) -> str:
+    """A long name with its middle left out; the whole stands in the title beside it."""
+    found = str(text)
+    return found if len(found) <= most else f"{found[: most - 9]}…{found[-8:]}"

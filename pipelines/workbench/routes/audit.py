@@ -1,0 +1,60 @@
+"""The audit: findings with their evidence, what is due, charts of stations and drifts."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from fastapi import APIRouter, Request
+from starlette.responses import Response
+
+from pipelines.audit.finding import WHO
+from pipelines.workbench.pages import figure, page, state_of, table_csv, workbench_of
+from pipelines.workbench.services import requests
+from pipelines.workbench.state import AuditPage
+from schemas.errors import TumblelineError, WrongUse
+
+if TYPE_CHECKING:
+    from pipelines.workbench.pages import Workbench
+
+router = APIRouter()
+HEADING, ORDER, ADDRESS = "Audit", 70, "/audit"
+DUE = 60
+
+
+@router.get("/audit")
+def audit(request: Request) -> Response:
+    """The page."""
+    bench = workbench_of(request)
+    state, problems = state_of(request, AuditPage)
+    found, job = None, None
+    try:
+        _, content = requests.audit(bench.settings, state)
+        found, job = bench.jobs.result("audit", content), bench.jobs.known("audit", content)
+    except TumblelineError as problem:
+        problems = [*problems, str(problem)]
+    return page(request, "audit.html", state, problems, found=found, job=job, who=WHO, most_due=DUE)
+
+
+@router.get("/audit/figure/{name}.{ending}")
+def drawn(request: Request, name: str, ending: str) -> Response:
+    """A figure of the page."""
+    found = _found(workbench_of(request), request)
+    if name not in found["charts"]:
+        raise WrongUse(f"figure: none of this page is called '{name[:40]}'")
+    return figure(found["charts"][name], ending, f"audit-{name}")
+
+
+@router.get("/audit/findings.csv")
+def findings(request: Request) -> Response:
+    """The findings."""
+    found = _found(workbench_of(request), request)
+    keys = ("who", "kind", "subject", "message")
+    return table_csv([{key: row[key] for key in keys} for row in found["document"]["findings"]], "findings")
+
+
+def _found(bench: Workbench, request: Request) -> dict[str, Any]:
+    state, _ = state_of(request, AuditPage)
+    found: dict[str, Any] | None = bench.jobs.result("audit", requests.audit(bench.settings, state)[1])
+    if found is None:
+        raise WrongUse("audit: it is not done yet; wait for it")
+    return found

@@ -1,0 +1,144 @@
+"""What is missing: is the model adequate, where does it fail, which effect explains it, what to measure next."""
+
+from __future__ import annotations
+
+from functools import partial
+from typing import TYPE_CHECKING
+
+from fastapi import APIRouter, Request
+from starlette.responses import JSONResponse, Response
+
+from pipelines.diagnosis.inputs import use_written_formulas
+from pipelines.report.diagnosis import chance
+from pipelines.workbench.pages import Wanted, figure, page, run_table, state_of, table_csv, workbench_of
+from pipelines.workbench.services import models, requests, sources
+from pipelines.workbench.services.samples import samples_of
+from pipelines.workbench.state import MissingPage
+from pipelines.workbench.views import missing_charts, unit_charts
+from schemas.errors import TumblelineError, WrongUse
+
+if TYPE_CHECKING:
+    from pipelines.report.charts import Chart
+    from pipelines.workbench.pages import Workbench
+    from pipelines.workbench.results import Diagnosed
+
+router = APIRouter()
+HEADING, ORDER, ADDRESS = "What is missing", 20, "/missing"
+CANDIDATES, INFLUENCE = 12, 12
+
+
+@router.get("/missing")
+def missing(request: Request) -> Response:
+    """The page; what is not computed yet is asked for by the page itself."""
+    bench = workbench_of(request)
+    state, problems = state_of(request, MissingPage)
+    chosen, found, rows, work = sources.sources(bench.settings), None, None, {}
+    if state.source:
+        try:
+            state = requests.settled(bench.settings, state)
+            work = {kind: requests.KINDS[kind][1](bench.settings, state) for kind in ("diagnose", "ladder")}
+            found = bench.jobs.result("diagnose", work["diagnose"][1])
+            rows = bench.jobs.result("ladder", work["ladder"][1])
+        except TumblelineError as problem:
+            problems, work = [*problems, str(problem)], {}
+    return page(
+        request, "missing.html", state, problems, sources=chosen, found=found, rows=rows, chance=chance,
+        jobs={kind: bench.jobs.known(kind, content) for kind, (_, content) in work.items()},
+        twin=sources.twin(bench.settings, state.source) if state.source and not state.fresh else "",
+        models=models.models(bench.settings),
+        ladder_command=state.ladder_command(bench.settings.archive),
+        unit=_unit(found, state), against="" if found is None else missing_charts.chosen_driver(found, state),
+        candidates=CANDIDATES, influence=INFLUENCE, drivers=_drivers(found),
+        is_file=any(one.is_file and one.name == state.source for one in chosen),
+    )  # fmt: skip
+
+
+@router.get("/missing/figure/{name}.{ending}")
+def drawn(request: Request, name: str, ending: str) -> Response:
+    """A figure of the page."""
+    bench = workbench_of(request)
+    state, _ = state_of(request, MissingPage)
+    return figure(_chart(bench, state, name), ending, f"missing-{name}")
+
+
+@router.get("/missing/candidates.csv")
+def candidates(request: Request) -> Response:
+    """The candidates of the first step."""
+    bench = workbench_of(request)
+    state, _ = state_of(request, MissingPage)
+    found = _diagnosed(bench, state)
+    return table_csv([] if found is None else list(found.ladder), "candidates")
+
+
+@router.post("/missing/save")
+def save(request: Request, wanted: Wanted) -> JSONResponse:
+    """Save the model of a page's address as the next version of a model file."""
+    bench = workbench_of(request)
+    state, _ = MissingPage.parse(_pairs(str(wanted.get("address", ""))))
+    found = _diagnosed(bench, state)
+    if found is None:
+        raise WrongUse("model: the diagnosis of this model is not done yet; wait for it, then save")
+    added = list(state.added)
+    start = [name for name in found.document["effects"] if name not in added]
+    name, why = str(wanted.get("name", "")), str(wanted.get("why", ""))
+    place, version = models.save(bench.settings, name, start, added, state.formula, why, state.source)
+    return JSONResponse({"done": f"{place}: version {version} is saved"})
+
+
+@router.post("/missing/formula")
+def formula(wanted: Wanted) -> JSONResponse:
+    """The address of the page with a formula tried beside the model; refused where it is no formula."""
+    from inertial import effects
+
+    state, _ = MissingPage.parse(_pairs(str(wanted.get("address", ""))))
+    written = str(wanted.get("formula", "")).strip()
+    with effects.additions_forgotten():
+        (name,) = use_written_formulas([written], "formula")
+    kept = tuple(text for text in state.formula if text.partition("=")[0].strip().lower() != name)
+    added = tuple(one for one in state.added if one != name)
+    return JSONResponse({"address": state.address(formula=(*kept, written), added=(*added, name))})
+
+
+def _pairs(address: str) -> list[tuple[str, str]]:
+    from urllib.parse import parse_qsl, urlsplit
+
+    return parse_qsl(urlsplit(address).query, keep_blank_values=True)
+
+
+def _diagnosed(bench: Workbench, state: MissingPage) -> Diagnosed | None:
+    _, content = requests.diagnosis(bench.settings, state)
+    found: Diagnosed | None = bench.jobs.result("diagnose", content)
+    return found
+
+
+def _chart(bench: Workbench, state: MissingPage, name: str) -> Chart | None:
+    if name == "samples":
+        samples, out_unit, title = samples_of(
+            bench.archive, state.source, state.dwell, partial(run_table, bench, state.source)
+        )
+        return unit_charts.samples_chart(samples, title, out_unit)
+    if name == "ladder":
+        _, content = requests.ladder(bench.settings, state)
+        rows = bench.jobs.result("ladder", content)
+        return None if rows is None else missing_charts.ladder_chart(rows)
+    draw = {
+        "sphere": missing_charts.sphere_chart,
+        "drivers": missing_charts.driver_chart,
+        "slots": missing_charts.slot_chart,
+    }
+    if name not in draw:
+        raise WrongUse(f"figure: none of this page is called '{name[:40]}'")
+    found = _diagnosed(bench, state)
+    return None if found is None else draw[name](found, state)
+
+
+def _unit(found: Diagnosed | None, state: MissingPage) -> str:
+    if found is None or found.table is None:
+        return state.unit
+    return found.table.units[missing_charts.chosen_unit(found.table, state)]
+
+
+def _drivers(found: Diagnosed | None) -> list[tuple[str, str]]:
+    if found is None or found.table is None:
+        return []
+    return [(name, label) for name, (label, _) in found.table.drivers.items()]

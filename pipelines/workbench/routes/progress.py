@@ -1,0 +1,60 @@
+"""Jobs begun and stopped, and the stream that tells how far they are."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+from urllib.parse import parse_qsl, urlsplit
+
+from fastapi import APIRouter, Request
+from starlette.responses import JSONResponse, Response, StreamingResponse
+
+from pipelines.workbench.pages import Wanted, workbench_of
+from pipelines.workbench.services import lots, requests
+from pipelines.workbench.services.events import stream
+from schemas.errors import WrongUse
+
+if TYPE_CHECKING:
+    from pipelines.workbench.pages import Workbench
+
+router = APIRouter()
+
+
+@router.post("/jobs")
+def start(request: Request, wanted: Wanted) -> JSONResponse:
+    """Begin the work that a page needs: ``kind`` and the page's ``address``; the job that does it."""
+    bench = workbench_of(request)
+    kind, address = str(wanted.get("kind", "")), urlsplit(str(wanted.get("address", "")))
+    title, content = requests.of_address(
+        bench.settings, kind, address.path, parse_qsl(address.query, keep_blank_values=True)
+    )
+    return JSONResponse(bench.jobs.submit(kind, title, content).document(), 202)
+
+
+@router.post("/jobs/{name}/stop")
+def stop(request: Request, name: str) -> JSONResponse:
+    """End a job."""
+    job = workbench_of(request).jobs.stop(name)
+    if job is None:
+        raise WrongUse(f"jobs: none is called '{name[:40]}'; it may have been of a server before this one")
+    return JSONResponse(job.document())
+
+
+@router.get("/jobs/{name}")
+def look(request: Request, name: str) -> JSONResponse:
+    """How far a job is."""
+    job = workbench_of(request).jobs.get(name)
+    if job is None:
+        raise WrongUse(f"jobs: none is called '{name[:40]}'")
+    return JSONResponse(job.document())
+
+
+@router.get("/events")
+async def events(request: Request) -> Response:
+    """The stream of events."""
+    bench = workbench_of(request)
+    content = stream(request, bench.boot, bench.jobs, lambda: _stamps(bench))
+    return StreamingResponse(content, media_type="text/event-stream", headers={"x-accel-buffering": "no"})
+
+
+def _stamps(bench: Workbench) -> dict[str, str]:
+    return {"lots": lots.stamp(bench.settings)}

@@ -1,0 +1,65 @@
+"""A run: its units, each with its result and figures."""
+
+from __future__ import annotations
+
+from fastapi import APIRouter, Request
+from starlette.responses import Response
+
+from pipelines.certificates.statement import stated
+from pipelines.tables.frames import rows_of
+from pipelines.workbench.pages import page, run_table, saved_as, state_of, table_csv, workbench_of
+from pipelines.workbench.state import RunPage
+from schemas.errors import TumblelineError, WrongUse
+
+router = APIRouter()
+SHOWN = (
+    "residual_rms_ug",
+    "verification_norm_ug",
+    "bias_error_ug",
+    "velocity_random_walk_ug_rtHz",
+    "bias_instability_ug",
+)
+
+
+@router.get("/run")
+def run(request: Request) -> Response:
+    """Result and figures of every unit of a run."""
+    bench = workbench_of(request)
+    state, problems = state_of(request, RunPage)
+    found = bench.archive.run(state.run)
+    state = state.model_copy(update={"run": found.id})
+    tables, about = found.tables(), found.about
+    grades = rows_of(run_table(bench, found.id, "grades").sort_values("slot")) if "grades" in tables else []
+    figures = run_table(bench, found.id, "figures") if "figures" in tables else None
+    cells: dict[str, dict[str, float]] = {}
+    if figures is not None:
+        chosen = figures[figures["figure"].isin(SHOWN)]
+        for row in rows_of(chosen):
+            cells.setdefault(str(row["unit"]), {})[str(row["figure"])] = float(row["value"])
+    try:
+        certificates = {unit: one.words() for unit, one in stated(found, [str(row["unit"]) for row in grades]).items()}
+    except TumblelineError as problem:
+        certificates, problems = {}, [*problems, str(problem)]
+    events = rows_of(run_table(bench, found.id, "events")) if "events" in tables else []
+    return page(
+        request, "run.html", state, problems, run=found, about=about, grades=grades, cells=cells, shown=SHOWN, tables=tables,
+        certificates=certificates, events=events,
+    )  # fmt: skip
+
+
+@router.get("/run/table/{name}.csv")
+def table(request: Request, name: str) -> Response:
+    """A table of a run."""
+    bench = workbench_of(request)
+    state, _ = state_of(request, RunPage)
+    return table_csv(rows_of(run_table(bench, state.run, name)), f"{state.run}-{name}")
+
+
+@router.get("/run/report.html")
+def report(request: Request) -> Response:
+    """The report of a run, as a file."""
+    state, _ = state_of(request, RunPage)
+    found = workbench_of(request).archive.run(state.run)
+    if not found.report.is_file():
+        raise WrongUse(f"run {found.id} has no report; make it with 'tumbleline report {found.id}'")
+    return Response(found.report.read_bytes(), media_type="text/html", headers=saved_as(f"{found.id}.html"))

@@ -1,0 +1,120 @@
+"""A unit of a run: model and measurement, coefficients, noise, history, certificates."""
+
+from __future__ import annotations
+
+from functools import partial
+from typing import TYPE_CHECKING, Any
+
+from fastapi import APIRouter, Request
+from starlette.responses import Response
+
+from pipelines.audit.calibrations import day_of
+from pipelines.audit.sql import ask
+from pipelines.certificates import Ledger
+from pipelines.stages.figures import FIGURES
+from pipelines.tables.frames import rows_of
+from pipelines.workbench.pages import figure, page, run_table, state_of, workbench_of
+from pipelines.workbench.questions import history_question
+from pipelines.workbench.services.samples import samples_of
+from pipelines.workbench.state import UnitPage
+from pipelines.workbench.views import unit_charts
+from schemas.errors import WrongUse
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+    from pipelines.report.charts import Chart
+    from pipelines.workbench.pages import Workbench
+
+router = APIRouter()
+CERTIFICATES = 20
+
+
+@router.get("/unit")
+def unit(request: Request) -> Response:
+    """Everything that is known of a unit in a run."""
+    bench = workbench_of(request)
+    state, problems = state_of(request, UnitPage)
+    run = bench.archive.run(state.run)
+    units = [str(one["serial"]) for one in run.about.get("lot", {}).get("units", [])]
+    state = state.model_copy(update={"run": run.id, "unit": state.unit or (units[0] if units else "")})
+    if state.unit not in units:
+        raise WrongUse(f"unit '{state.unit[:80]}' is not in run {run.id}; its units are {', '.join(units[:8])}")
+    tables = run.tables()
+    own = {
+        name: _own(bench, state, name)
+        for name in ("grades", "figures", "coefficients", "noise", "verdicts")
+        if name in tables
+    }
+    grade = next(iter(own.get("grades", [])), None)
+    history = _history(bench, state.unit)
+    parameters = unit_charts.parameters_of(history)
+    if parameters and state.parameter not in parameters:
+        state = state.model_copy(update={"parameter": parameters[0]})
+    place = units.index(state.unit)
+    return page(
+        request, "unit.html", state, problems, run=run, grade=grade, own=own, tables=tables, units=units,
+        before=units[place - 1] if place else "", after=units[place + 1] if place + 1 < len(units) else "",
+        coefficients=_by_axis(own.get("coefficients", [])), parameters=parameters,
+        labels={name: kind.label for name, kind in FIGURES.items()},
+        certificates=Ledger(bench.archive).calibrations(state.unit)[-CERTIFICATES:][::-1],
+    )  # fmt: skip
+
+
+@router.get("/unit/figure/{name}.{ending}")
+def drawn(request: Request, name: str, ending: str) -> Response:
+    """A figure of the page."""
+    bench = workbench_of(request)
+    state, _ = state_of(request, UnitPage)
+    return figure(_chart(bench, state, name), ending, f"{state.unit}-{name}")
+
+
+def _chart(bench: Workbench, state: UnitPage, name: str) -> Chart:
+    if name == "samples":
+        samples, out_unit, title = samples_of(
+            bench.archive, state.run, state.dwell, partial(run_table, bench, state.run)
+        )
+        return unit_charts.samples_chart(samples, title, out_unit)
+    if name == "history":
+        rows = [row for row in _history(bench, state.unit) if unit_charts.parameter_of(row) == state.parameter]
+        return unit_charts.history_chart(rows, state.parameter, str(rows[0]["unit_text"]) if rows else "")
+    if name == "allan":
+        return unit_charts.allan_chart(_table(bench, state, "allan"))
+    if name in {"residuals", "response"}:
+        residuals, dwells = _table(bench, state, "residuals"), _table(bench, state, "dwells")
+        draw = unit_charts.residual_chart if name == "residuals" else unit_charts.response_chart
+        return draw(state, residuals, dwells)
+    raise WrongUse(f"figure: none of this page is called '{name[:40]}'")
+
+
+def _table(bench: Workbench, state: UnitPage, name: str) -> pd.DataFrame:
+    found = run_table(bench, state.run, name)
+    return found[found["unit"] == state.unit]
+
+
+def _own(bench: Workbench, state: UnitPage, name: str) -> list[dict[str, Any]]:
+    return rows_of(_table(bench, state, name))
+
+
+def _history(bench: Workbench, serial: str) -> list[dict[str, Any]]:
+    """The unit's coefficients in all its runs, with the day of each."""
+    answer = ask(bench.archive, history_question(serial))
+    rows = [dict(zip(answer.columns, row, strict=True)) for row in answer.rows]
+    return [{**row, "day": day_of(str(row["measured"]))} for row in rows if row["measured"]]
+
+
+def _by_axis(rows: list[dict[str, Any]]) -> list[dict[str, Any]]:
+    """One line per effect, its axes side by side."""
+    lines: dict[tuple[str, int], dict[str, Any]] = {}
+    count: dict[tuple[str, str], int] = {}
+    for row in rows:
+        effect, axis = str(row["effect"]), str(row["axis"])
+        place = count.get((effect, axis), 0)
+        count[effect, axis] = place + 1
+        line = lines.setdefault((effect, place), {"effect": effect, "unit": row["unit_text"], "cells": {}})
+        line["cells"]["x" if axis == "*" else axis] = (
+            row["name"],
+            float(row["value"]),
+            2.0 * float(row["standard_error"]),
+        )
+    return list(lines.values())

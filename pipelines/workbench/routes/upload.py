@@ -1,0 +1,71 @@
+"""A file of one's own: what it is read as, corrected, imported, with coefficients out."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from fastapi import APIRouter, Request
+from starlette.responses import JSONResponse, Response
+
+from pipelines.importers.mapping import OUTPUT_UNITS, TEMPERATURE_UNITS, TIME_UNITS
+from pipelines.workbench.pages import page, state_of, table_csv, workbench_of
+from pipelines.workbench.services import requests, uploads
+from pipelines.workbench.state import UploadPage
+from schemas.errors import TumblelineError, WrongUse
+
+router = APIRouter()
+HEADING, ORDER, ADDRESS = "Upload", 30, "/upload"
+MEANINGS = ("time", "x", "y", "z", "temperature", "unit", "dwell")
+
+
+@router.get("/upload")
+def upload(request: Request) -> Response:
+    """The page: drop a file, see what it is read as, correct it, import it."""
+    bench = workbench_of(request)
+    state, problems = state_of(request, UploadPage)
+    found, job, done = None, None, None
+    if state.file:
+        try:
+            found = uploads.reading(bench.settings, state)
+            if state.columns and state.output and not found.problem:
+                _, content = requests.bring_in(bench.settings, state)
+                job, done = bench.jobs.known("import", content), bench.jobs.result("import", content)
+        except TumblelineError as problem:
+            problems = [*problems, str(problem)]
+    folder = bench.settings.folder / uploads.FOLDER
+    there = sorted(folder.iterdir(), key=lambda one: -one.stat().st_mtime)[:12] if folder.is_dir() else []
+    return page(
+        request, "upload.html", state, problems, found=found, job=job, done=done, there=[str(one) for one in there],
+        meanings=MEANINGS, mapped=dict(pair.split("=", 1) for pair in state.columns if "=" in pair),
+        outputs=list(OUTPUT_UNITS), times=[*TIME_UNITS, "samples"], temperatures=TEMPERATURE_UNITS,
+    )  # fmt: skip
+
+
+@router.put("/upload/file")
+async def dropped(request: Request, name: str) -> JSONResponse:
+    """Keep a file; the address of the page that shows it."""
+    parts: list[bytes] = []
+    size = 0
+    async for part in request.stream():
+        size += len(part)
+        if size > uploads.LARGEST:
+            raise WrongUse(
+                f"upload: more than {uploads.LARGEST // 10**6} MB; import it with 'tumbleline import {name[:80]}'"
+            )
+        parts.append(part)
+    if not size:
+        raise WrongUse(f"upload: '{name[:80]}' is empty; choose another file")
+    place = uploads.keep(workbench_of(request).settings, name, b"".join(parts))
+    return JSONResponse({"address": UploadPage(file=place).address()})
+
+
+@router.get("/upload/coefficients.csv")
+def coefficients(request: Request) -> Response:
+    """The coefficients of an import."""
+    bench = workbench_of(request)
+    state, _ = state_of(request, UploadPage)
+    _, content = requests.bring_in(bench.settings, state)
+    done: dict[str, Any] | None = bench.jobs.result("import", content)
+    if done is None:
+        raise WrongUse("upload: this file is not imported yet; import it first")
+    return table_csv(done["coefficients"], "coefficients")

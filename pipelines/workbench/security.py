@@ -1,0 +1,162 @@
+"""Who may ask, and who may change something: a pure ASGI application around everything, event streams too.
+
+Reading needs a host name of ours, so that no foreign page reaches the service by a name of its own that leads here; from
+another machine it also needs the token. A change needs, besides, the same origin and the token.
+"""
+
+from __future__ import annotations
+
+import secrets
+from contextlib import suppress
+from http.cookies import CookieError, SimpleCookie
+from typing import TYPE_CHECKING, Any
+from urllib.parse import parse_qsl, urlencode
+
+from starlette.datastructures import Headers, MutableHeaders
+from starlette.responses import PlainTextResponse, RedirectResponse
+
+if TYPE_CHECKING:
+    from starlette.types import ASGIApp, Message, Receive, Scope, Send
+
+    from pipelines.workbench.settings import Settings
+
+READING = frozenset({"GET", "HEAD"})
+CHANGING = frozenset({"POST", "PUT", "DELETE"})
+POLICY = (
+    "default-src 'none'; script-src 'self'; style-src 'self' 'unsafe-inline'; img-src 'self' data: blob:; "
+    "connect-src 'self'; worker-src 'self' blob:; font-src 'self'; form-action 'self'; base-uri 'none'; "
+    "frame-ancestors 'none'; manifest-src 'self'"
+)
+"""No script but our files. Plotly writes styles of its own, and makes PNG from data and blob addresses."""
+HEADERS = {
+    "content-security-policy": POLICY,
+    "x-content-type-options": "nosniff",
+    "referrer-policy": "no-referrer",
+    "cross-origin-resource-policy": "same-origin",
+    "cross-origin-opener-policy": "same-origin",
+    "permissions-policy": "camera=(), microphone=(), geolocation=(), payment=(), usb=()",
+}
+
+
+class Guard:
+    """Lets through what may be asked; everything it lets through carries the headers above."""
+
+    def __init__(self, app: ASGIApp, settings: Settings) -> None:
+        self._app, self._settings = app, settings
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Answer, refuse, or hand on."""
+        if scope["type"] == "lifespan":
+            await self._app(scope, receive, send)
+            return
+        refusal = _refused(scope, self._settings)
+        if scope["type"] != "http":  # nothing here speaks over a socket
+            await send({"type": "websocket.close", "code": 1008})
+            return
+        if refusal is None and (entered := _entering(scope, self._settings)) is not None:
+            await entered(scope, receive, _with_headers(send))
+            return
+        if refusal is not None:
+            await PlainTextResponse(refusal, 403)(scope, receive, _with_headers(send))
+            return
+        scope["state"] = {**scope.get("state", {}), "may_change": _token_given(scope, self._settings)}
+        await self._app(scope, receive, _with_headers(send))
+
+
+def _refused(scope: Scope, settings: Settings) -> str | None:
+    """Why a request is refused; None where it is not."""
+    headers = Headers(scope=scope)
+    name = _host(headers)
+    if name not in settings.hosts:
+        return f"workbench: host '{name[:80]}' is not one of this service; open {settings.address}"
+    if scope["type"] != "http":
+        return "workbench: no sockets here"
+    if scope["method"] in READING:
+        return _refused_to_read(scope, headers, settings)
+    if scope["method"] in CHANGING:
+        return _refused_to_change(scope, headers, settings)
+    return f"workbench: method {scope['method'][:20]} is not known here"
+
+
+def _host(headers: Headers) -> str:
+    """The name by which the service was called, without its port; an IPv6 address keeps its brackets."""
+    text = headers.get("host", "").lower()
+    before, bracket, _ = text.rpartition("]")
+    return before + bracket if bracket else text.partition(":")[0]
+
+
+def _refused_to_read(scope: Scope, headers: Headers, settings: Settings) -> str | None:
+    if headers.get("sec-fetch-site") == "cross-site" and headers.get("sec-fetch-mode") not in {None, "navigate"}:
+        return "workbench: parts of other sites are not served"
+    if not settings.local and not _token_given(scope, settings) and not _asks_to_enter(scope):
+        return "workbench: from another machine the token is needed; open the address that the command printed"
+    return None
+
+
+def _refused_to_change(scope: Scope, headers: Headers, settings: Settings) -> str | None:
+    origin = headers.get("origin")
+    if origin is None and not _bearer(headers):
+        return "workbench: a change without an origin is refused; send the token as 'Authorization: Bearer …'"
+    if origin is not None and origin not in _origins(headers, settings):
+        return f"workbench: origin '{origin[:80]}' may not change anything here"
+    if not _token_given(scope, settings):
+        return "workbench: this browser may look, not change; open the address with the token that the command printed"
+    return None
+
+
+def _origins(headers: Headers, settings: Settings) -> set[str]:
+    """Origins of this service as it was called."""
+    host = headers.get("host", "").lower()
+    schemes = ("https",) if settings.tls else ("https", "http") if settings.proxied else ("http",)
+    return {f"{scheme}://{host}" for scheme in schemes}
+
+
+def _bearer(headers: Headers) -> str:
+    kind, _, value = headers.get("authorization", "").partition(" ")
+    return value.strip() if kind.lower() == "bearer" else ""
+
+
+def _token_given(scope: Scope, settings: Settings) -> bool:
+    headers = Headers(scope=scope)
+    cookie: Any = None
+    with suppress(CookieError):
+        cookie = SimpleCookie(headers.get("cookie", "")).get(settings.cookie)
+    offered = [_bearer(headers), "" if cookie is None else cookie.value]
+    return any(secrets.compare_digest(one.encode(), settings.token.encode()) for one in offered)
+
+
+def _asks_to_enter(scope: Scope) -> bool:
+    return any(name == "token" for name, _ in parse_qsl(scope["query_string"].decode("latin-1")))
+
+
+def _entering(scope: Scope, settings: Settings) -> RedirectResponse | PlainTextResponse | None:
+    """The token of the address exchanged for a cookie, so that it stands in no address that is sent on."""
+    if scope["method"] not in READING or not _asks_to_enter(scope):
+        return None
+    query = parse_qsl(scope["query_string"].decode("latin-1"), keep_blank_values=True)
+    token = next(value for name, value in query if name == "token")
+    if not secrets.compare_digest(token.encode(), settings.token.encode()):
+        return PlainTextResponse("workbench: this token is not the one of this service; look at what it printed", 403)
+    rest = urlencode([one for one in query if one[0] != "token"])
+    answer = RedirectResponse(f"{scope['path']}{'?' + rest if rest else ''}", 303)
+    answer.set_cookie(
+        settings.cookie,
+        settings.token,
+        httponly=True,
+        samesite="strict",
+        secure=settings.tls or settings.proxied,
+        path="/",
+    )
+    return answer
+
+
+def _with_headers(send: Send) -> Send:
+    async def sending(message: Message) -> None:
+        if message["type"] == "http.response.start":
+            headers = MutableHeaders(scope=message)
+            for name, value in HEADERS.items():
+                headers[name] = value
+            headers.setdefault("cache-control", "no-store")
+        await send(message)
+
+    return sending

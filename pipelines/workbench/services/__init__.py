@@ -1,0 +1,1 @@
+"""What pages share: sources of dwells, work in other processes, its progress, lots on the station."""

@@ -1,0 +1,58 @@
+"""One stream of server-sent events: which server it is, which jobs have moved, which lots and runs have changed.
+
+The first event names the server's life; a page that sees another one fetches itself again.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import json
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from collections.abc import AsyncIterator, Callable
+
+    from starlette.requests import Request
+
+    from pipelines.workbench.services.jobs import Jobs
+
+EVERY_S = 0.15
+HEARTBEAT = 60  # looks without news after which the line is kept alive
+STAMP_EVERY = 4
+
+
+async def stream(request: Request, boot: str, jobs: Jobs, stamps: Callable[[], dict[str, str]]) -> AsyncIterator[str]:
+    """The events, until the browser goes.
+
+    Parameters
+    ----------
+    boot : of this life of the server
+    stamps : of things that other processes change; a page is told which changed
+    """
+    seen, known, quiet = jobs.version, await asyncio.to_thread(stamps), 0
+    yield _event(
+        "boot", {"boot": boot, "jobs": [job.document() for job in jobs.all() if job.state in {"waiting", "running"}]}
+    )
+    look = 0
+    while not await request.is_disconnected():
+        await asyncio.sleep(EVERY_S)
+        look += 1
+        version = jobs.version
+        if version > seen:
+            for job in jobs.all(seen):
+                yield _event("job", job.document())
+            seen, quiet = version, 0
+        if look % STAMP_EVERY == 0:
+            now = await asyncio.to_thread(stamps)
+            for name in sorted(now):
+                if now[name] != known.get(name):
+                    yield _event("changed", {"what": name, "stamp": now[name]})
+            known = now
+        quiet += 1
+        if quiet >= HEARTBEAT:
+            quiet = 0
+            yield ": still here\n\n"
+
+
+def _event(name: str, content: dict[str, Any]) -> str:
+    return f"event: {name}\ndata: {json.dumps(content, ensure_ascii=False)}\n\n"

@@ -1,0 +1,121 @@
+"""The process that measures one lot, with the pages in the operator's place: ``python -m … FOLDER``."""
+
+from __future__ import annotations
+
+import os
+import signal
+import sys
+import time
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NoReturn
+
+from pipelines.archive import Archive, files
+from pipelines.chain.attendance import JUDGED, Attendance
+from pipelines.chain.runner import Runner
+from pipelines.jobs.job import Request
+from pipelines.tables.frames import rows_of
+from pipelines.workbench.services.lots import write_state
+from schemas.errors import OperatorNeeded, TumblelineError
+
+if TYPE_CHECKING:
+    from pipelines.chain.attendance import Answer, Prompt
+
+POLL_S = 0.2
+EVERY_S = 0.25
+
+
+class Pages:
+    """The state of a lot, written for the pages; and their answers."""
+
+    def __init__(self, place: Path, before: dict[str, Any]) -> None:
+        self._place, self._told = place, 0.0
+        self._state: dict[str, Any] = {
+            **before,
+            "pid": os.getpid(),
+            "question": None,
+            "problem": "",
+            "phase": "starting",
+        }
+        self.put()
+
+    def put(self, **changes: Any) -> None:
+        """Write the state with some values changed."""
+        self._state |= changes
+        write_state(self._place, self._state)
+        self._told = time.monotonic()
+
+    def progress(self, done: int, total: int, note: str) -> None:
+        """How far the capture is; not every record is worth a file."""
+        if time.monotonic() - self._told > EVERY_S or done == total:
+            self.put(phase="measuring", done=done, total=total, note=note)
+
+    def ask(self, prompt: Prompt) -> Answer:
+        """The answer of whoever is at a page, however long it takes."""
+        number = int(self._state["number"]) + 1
+        question = {"kind": prompt.kind, "text": prompt.text, "slots": [list(one) for one in prompt.slots]}
+        self.put(phase="asks", question=question, number=number)
+        place = self._place / f"answer-{number}.json"
+        while not place.is_file() or place.stat().st_size == 0:
+            time.sleep(POLL_S)
+        reply = str(files.read_json(place)["answer"])
+        self.put(phase="measuring", question=None)
+        return "stop" if reply == "stop" else "go"
+
+
+def measure(place: Path) -> str:
+    """Measure the lot of a folder; the phase in which it ended."""
+    request = files.read_json(place / "request.json")
+    pages = Pages(place, files.read_json(place / "state.json"))
+    signal.signal(signal.SIGTERM, _stopped)
+    try:
+        _measured(request, pages)
+    except KeyboardInterrupt:
+        pages.put(phase="stopped", question=None, note="stopped; the station was made safe")
+        return "stopped"
+    except OperatorNeeded as problem:
+        pages.put(phase="stopped", question=None, note="", problem=str(problem))
+        return "stopped"
+    except TumblelineError as problem:
+        pages.put(phase="failed", question=None, problem=str(problem))
+        return "failed"
+    except Exception as problem:
+        pages.put(
+            phase="failed", question=None, problem=f"a defect of the program: {type(problem).__name__}: {problem}"
+        )
+        raise
+    return "done"
+
+
+def _measured(request: dict[str, Any], pages: Pages) -> None:
+    keys = ("units", "slots", "faults")
+    wanted = Request(
+        recipe=request["recipe"], station=Path(request["station"]) if request["station"] else None, seed=request["seed"],
+        repeat=int(request["repeat"]), **{key: tuple(request[key]) for key in keys},
+    )  # fmt: skip
+    archive = Archive(request["archive"])
+    job = wanted.job(archive)
+    runner = Runner(job, archive, pages.progress)
+    pages.put(run=runner.run.id)
+    beside = Attendance(pages, job, runner.run.id)
+    beside.capture(runner, lambda: runner.stage("capture"))
+    for done in runner.all():
+        pages.put(phase="computing", note=done.stage, question=None)
+        if done.stage == JUDGED:
+            grades = rows_of(runner.run.table("grades"))
+            pages.put(results=[[int(row["slot"]), _result(row)] for row in grades])
+            beside.unload(runner.run)
+    pages.put(phase="done", note="", question=None)
+
+
+def _result(row: dict[str, Any]) -> str:
+    why = f": {row['reasons']}" if row["reasons"] and row["outcome"] != "pass" else ""
+    return f"{row['outcome']}{why}"
+
+
+def _stopped(number: int, frame: object) -> NoReturn:
+    del number, frame
+    raise KeyboardInterrupt
+
+
+if __name__ == "__main__":
+    sys.exit(0 if measure(Path(sys.argv[1])) in {"done", "stopped"} else 3)

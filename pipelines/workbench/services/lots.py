@@ -1,0 +1,214 @@
+"""Lots on the station: each is measured by a process of its own that outlives the server; its state lies in small files.
+
+``lots/<id>/request.json`` is what was asked for, ``state.json`` how far it is, ``answer-<n>.json`` the answer to question n,
+created once: of two answers to one question the second is refused.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from pipelines.archive import files
+from pipelines.archive.keys import digest
+from schemas.errors import TumblelineError, WrongUse
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from pipelines.workbench.settings import Settings
+
+FOLDER = "lots"
+ENDED = frozenset({"done", "stopped", "failed", "interrupted"})
+NEWEST = 12
+
+
+class Stale(TumblelineError):
+    """An action that was based on a state which is not the present one any more."""
+
+
+@dataclass(frozen=True)
+class LotState:
+    """How far a lot is.
+
+    phase : ``starting``, ``measuring``, ``asks``, ``computing``, ``done``, ``stopped``, ``failed``, ``interrupted``
+    number : of the question, which its answer names · slots : slot, serial, result
+    """
+
+    id: str
+    phase: str
+    recipe: str
+    units: tuple[str, ...]
+    slots: tuple[tuple[int, str, str], ...] = ()
+    done: int = 0
+    total: int = 0
+    note: str = ""
+    question: dict[str, Any] | None = None
+    number: int = 0
+    problem: str = ""
+    run: str = ""
+    since: float = 0.0
+    pid: int = 0
+    extra: dict[str, Any] = field(default_factory=dict[str, Any])
+
+    @property
+    def ended(self) -> bool:
+        """Whether nothing is under way any more."""
+        return self.phase in ENDED
+
+
+def start(
+    settings: Settings, recipe: str, units: Sequence[str], slots: Sequence[int], faults: Sequence[str], repeat: int
+) -> LotState:
+    """A lot begun, or gone on with where the same one was stopped.
+
+    Raises
+    ------
+    TumblelineError
+        The recipe, the seats or the faults cannot be; nothing was moved.
+    """
+    from pipelines.archive import Archive
+    from pipelines.jobs.job import Request
+
+    if len(set(units)) < len(units):
+        twice = next(unit for unit in units if list(units).count(unit) > 1)
+        raise WrongUse(f"lot: serial '{twice}' is in two slots, each unit has one; scan the slots again")
+    wanted = Request(
+        recipe=recipe,
+        station=settings.station,
+        units=tuple(units),
+        slots=tuple(slots),
+        repeat=repeat,
+        faults=tuple(faults),
+    )
+    job = wanted.job(Archive(settings.archive))
+    content = {**wanted.parameters(), "archive": settings.archive, "seats": [[u.slot, u.serial] for u in job.lot.units]}
+    name = digest(content)[:12]
+    for other in lots(settings):
+        if not other.ended and other.id != name:
+            raise WrongUse(
+                f"lot: the station is at lot {other.id}, one lot at a time is measured; finish or stop that one first"
+            )
+    place = settings.folder / FOLDER / name
+    known = state_of(place) if (place / "state.json").is_file() else None
+    if known is not None and not known.ended:
+        return known
+    place.mkdir(parents=True, exist_ok=True)
+    for old in place.glob("answer-*.json"):
+        old.unlink()
+    files.publish(place / "request.json", files.json_bytes(content), "lot", files.ELSEWHERE)
+    write_state(place, {"phase": "starting", "since": time.time(), "number": 0 if known is None else known.number})
+    with (place / "log.txt").open("ab") as log:
+        subprocess.Popen(  # noqa: S603 - our own interpreter and module
+            [sys.executable, "-m", "pipelines.workbench.services.lot_process", str(place)],
+            stdin=subprocess.DEVNULL, stdout=log, stderr=log, start_new_session=True,
+        )  # fmt: skip
+    return state_of(place)
+
+
+def again(settings: Settings, name: str) -> LotState:
+    """A lot that was stopped, gone on with."""
+    request = files.read_json(place_of(settings, name) / "request.json")
+    return start(
+        settings, request["recipe"], request["units"], request["slots"], request["faults"], int(request["repeat"])
+    )
+
+
+def answer(settings: Settings, name: str, number: int, reply: str) -> LotState:
+    """The answer to question ``number`` of a lot.
+
+    Raises
+    ------
+    Stale
+        The lot asks something else by now, or was answered already.
+    """
+    place = place_of(settings, name)
+    now = state_of(place)
+    if now.phase != "asks" or now.number != number:
+        raise Stale(f"lot {name}: the question was answered already; the page shows what is asked now")
+    try:
+        handle = os.open(place / f"answer-{number}.json", os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o644)
+    except FileExistsError:
+        raise Stale(
+            f"lot {name}: the question was answered at the same moment elsewhere; nothing more is needed"
+        ) from None
+    with os.fdopen(handle, "w") as file:
+        json.dump({"answer": "stop" if reply == "stop" else "go"}, file)
+    return now
+
+
+def stop(settings: Settings, name: str) -> LotState:
+    """Have a lot's process make the station safe and end; it goes on when it is started again."""
+    place = place_of(settings, name)
+    now = state_of(place)
+    if not now.ended and now.pid and _alive(now.pid):
+        os.kill(now.pid, signal.SIGTERM)
+    return state_of(place)
+
+
+def lots(settings: Settings) -> list[LotState]:
+    """The newest lots, the newest first."""
+    top = settings.folder / FOLDER
+    if not top.is_dir():
+        return []
+    found = [state_of(place) for place in top.iterdir() if (place / "state.json").is_file()]
+    return sorted(found, key=lambda one: -one.since)[:NEWEST]
+
+
+def place_of(settings: Settings, name: str) -> Path:
+    """The folder of a lot."""
+    place = settings.folder / FOLDER / name
+    if not (name.isalnum() and (place / "state.json").is_file()):
+        raise WrongUse(f"lot: none is called '{name[:40]}'; choose one of the page")
+    return place
+
+
+def state_of(place: Path) -> LotState:
+    """The state of a lot; one whose process is gone without an end is interrupted."""
+    request, now = files.read_json(place / "request.json"), files.read_json(place / "state.json")
+    phase = str(now["phase"])
+    pid = int(now.get("pid", 0))
+    lost = (pid and not _alive(pid)) or (not pid and time.time() - float(now.get("since", 0.0)) > 60.0)
+    if phase not in ENDED and lost:
+        phase = "interrupted"
+    results = {int(slot): str(text) for slot, text in now.get("results", [])}
+    seats = [(int(slot), str(serial)) for slot, serial in request["seats"]]
+    return LotState(
+        id=place.name, phase=phase, recipe=str(request["recipe"]), units=tuple(serial for _, serial in seats),
+        slots=tuple((slot, serial, results.get(slot, "")) for slot, serial in seats),
+        done=int(now.get("done", 0)), total=int(now.get("total", 0)), note=str(now.get("note", "")),
+        question=now.get("question"), number=int(now.get("number", 0)), problem=str(now.get("problem", "")),
+        run=str(now.get("run", "")), since=float(now.get("since", 0.0)), pid=pid,
+    )  # fmt: skip
+
+
+def write_state(place: Path, content: dict[str, Any]) -> None:
+    """Put a lot's state in the place of the one before, whole."""
+    files.publish(place / "state.json", files.json_bytes(content), "lot", files.ELSEWHERE)
+
+
+def stamp(settings: Settings) -> str:
+    """What changes when any lot does."""
+    top = settings.folder / FOLDER
+    if not top.is_dir():
+        return ""
+    newest = [place.stat().st_mtime_ns for place in top.glob("*/state.json")]
+    return f"{len(newest)}.{max(newest, default=0)}"
+
+
+def _alive(pid: int) -> bool:
+    try:
+        os.kill(pid, 0)
+    except ProcessLookupError:
+        return False
+    except PermissionError:
+        return True
+    status = Path(f"/proc/{pid}/stat")
+    return not (status.is_file() and status.read_text().rpartition(")")[2].split()[:1] == ["Z"])

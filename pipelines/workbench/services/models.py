@@ -1,0 +1,87 @@
+"""A model as it stands on a page, saved as the next version of a model file, with the reason."""
+
+from __future__ import annotations
+
+import getpass
+import re
+import threading
+from datetime import UTC, datetime
+from typing import TYPE_CHECKING
+
+from inertial import effects
+from pipelines.diagnosis.inputs import WHY, use_written_formulas
+from pipelines.jobs.model_files import ModelStep, extended, model_text, new_model, publish_model
+from schemas.errors import WrongUse
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+    from pathlib import Path
+
+    from pipelines.workbench.settings import Settings
+
+FOLDER = "models"
+NAME = re.compile(r"[a-z0-9][a-z0-9_-]{0,60}")
+_ALONE = threading.Lock()
+
+
+def models(settings: Settings) -> list[str]:
+    """Names of the model files that there are."""
+    folder = settings.folder / FOLDER
+    return sorted(place.stem for place in folder.glob("*.toml")) if folder.is_dir() else []
+
+
+def save(
+    settings: Settings,
+    name: str,
+    start: Sequence[str],
+    added: Sequence[str],
+    formulas: Sequence[str],
+    why: str,
+    source: str,
+) -> tuple[Path, int]:
+    """The file and the version after every effect of ``added`` that it lacks is a version of its own.
+
+    Parameters
+    ----------
+    start : the model that a new file begins with · formulas : ``id = expression`` of those that are used
+    why, source : the reason, and the dwells that showed it
+
+    Raises
+    ------
+    WrongUse
+        The name or the reason is missing, or there is nothing to save.
+    """
+    if not NAME.fullmatch(name):
+        raise WrongUse(
+            f"model: name '{name[:60]}', lower-case letters, digits, - and _ are needed; write one such as line-1"
+        )
+    if not why.strip():
+        raise WrongUse("model: no reason is given, one sentence is needed; write why the effect is added")
+    place = settings.folder / FOLDER / f"{name}.toml"
+    by, at = getpass.getuser(), datetime.now(UTC).replace(microsecond=0)
+    with _ALONE, effects.additions_forgotten():
+        use_written_formulas(formulas, "model")
+        text = model_text(place) if place.is_file() else new_model(place, list(start), by, at)
+        text = _with_formulas(text, formulas, [*start, *added])
+        version = 0
+        for effect in added:
+            if f'"{effect}"' in text.partition("[[change]]")[0]:
+                continue
+            text, after = extended(text, ModelStep(effect, by, at, why.strip(), source), f"model {place.name}")
+            version = after.model.version
+        if version == 0 and place.is_file():
+            raise WrongUse(f"model: {place} holds these effects already; nothing was written")
+        place.parent.mkdir(parents=True, exist_ok=True)
+        publish_model(place, text)
+    return place, version or 1
+
+
+def _with_formulas(text: str, formulas: Sequence[str], used: Sequence[str]) -> str:
+    """The text with the formulas that are used and that it lacks."""
+    for written in formulas:
+        name, _, rest = written.partition("=")
+        known = name.strip().lower()
+        if known in used and f'id = "{known}"' not in text:
+            columns = ", ".join(f'"{part.strip()}"' for part in rest.split(";") if part.strip())
+            text = f'{text.rstrip()}\n\n[[formula]]\nid = "{known}"\ncolumns = [{columns}]\nwhy = "{WHY}"\n'
+    return text

@@ -1,0 +1,137 @@
+"""The work that a page needs, from its state: what a browser asks for is a page's address, never a request as such."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from pipelines.workbench.services import sources, uploads
+from pipelines.workbench.state import AuditPage, MissingPage, PageState, PlanPage, UploadPage
+from schemas.errors import WrongUse, did_you_mean
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterable
+
+    from pipelines.workbench.settings import Settings
+
+Request = tuple[str, dict[str, Any]]
+
+
+def of_address(settings: Settings, kind: str, path: str, query: Iterable[tuple[str, str]]) -> Request:
+    """Title and request of a kind of work for the page of an address."""
+    if kind not in KINDS or path != KINDS[kind][0].PATH:
+        raise WrongUse(f"jobs: no page needs '{kind[:40]}'; {did_you_mean(kind, KINDS)}")
+    state, problems = KINDS[kind][0].parse(query)
+    if problems:
+        raise WrongUse(problems[0])
+    return KINDS[kind][1](settings, state)
+
+
+def diagnosis(settings: Settings, page: MissingPage) -> Request:
+    """A diagnosis."""
+    return f"diagnosis of {page.source}", _judging(settings, page)
+
+
+def ladder(settings: Settings, page: MissingPage) -> Request:
+    """The errors of every version."""
+    content = _judging(settings, page)
+    fresh = sources.resolve(settings, page.fresh, "compare") if page.fresh else ""
+    content |= {"fresh": fresh, "fresh_stamp": sources.stamp(settings, fresh) if fresh else ""}
+    return f"errors on {page.source}", content
+
+
+def _judging(settings: Settings, page: MissingPage) -> dict[str, Any]:
+    page = settled(settings, page)
+    name = page.source
+    return {
+        "archive": settings.archive, "source": name, "stamp": sources.stamp(settings, name), "effects": list(page.effects),
+        "added": list(page.added), "without": list(page.without), "formula": list(page.formula),
+    }  # fmt: skip
+
+
+def settled(settings: Settings, page: MissingPage) -> MissingPage:
+    """The page with the source's own name, and with the model that it begins with where none is named."""
+    name = sources.resolve(settings, page.source, "source")
+    if page.effects:
+        return page.model_copy(update={"source": name})
+    return page.model_copy(
+        update={"source": name, "effects": _starting_model(settings.archive, name, sources.stamp(settings, name))}
+    )
+
+
+@lru_cache(maxsize=64)
+def _starting_model(archive: str, name: str, stamp: str) -> tuple[str, ...]:
+    """The model that a diagnosis of these dwells judges where none is named."""
+    from inertial import effects
+    from pipelines.diagnosis.diagnose import default_model
+    from pipelines.diagnosis.inputs import judged_effects
+    from pipelines.importers.exchange import read_dwells
+
+    del stamp  # another content is another answer
+    with effects.additions_forgotten():
+        judged = judged_effects(name, archive, "", None, "diagnose")
+    return tuple(judged or default_model(read_dwells(name, archive=archive)))
+
+
+def plan(settings: Settings, page: PlanPage) -> Request:
+    """The plan of a recipe."""
+    if page.recipe not in recipes(settings):
+        raise WrongUse(
+            f"plan: no recipe is called '{page.recipe[:60]}'; {did_you_mean(page.recipe, recipes(settings))}"
+        )
+    place = Path(page.recipe)
+    stamp = place.stat().st_mtime_ns if place.is_file() else 0
+    station = str(settings.station) if settings.station else ""
+    content = {
+        "archive": settings.archive,
+        "recipe": page.recipe,
+        "effects": list(page.effects),
+        "station": station,
+        "stamp": stamp,
+    }
+    return f"plan of {page.recipe}", content
+
+
+def audit(settings: Settings, page: AuditPage) -> Request:
+    """The audit of the archive."""
+    from pipelines.archive import Archive
+
+    place = Archive(settings.archive).root / "runs"
+    stamp = place.stat().st_mtime_ns if isinstance(place, Path) and place.is_dir() else 0
+    names = ("since", "until", "device", "station")
+    return "audit of the archive", {
+        "archive": settings.archive,
+        "stamp": stamp,
+        **{name: getattr(page, name) for name in names},
+    }
+
+
+def bring_in(settings: Settings, page: UploadPage) -> Request:
+    """The import of a file."""
+    place = uploads.resolve(settings, page.file)
+    content = page.model_dump(mode="json", exclude={"run"})
+    return f"import of {place.name}", {**content, "archive": settings.archive}
+
+
+def recipes(settings: Settings) -> list[str]:
+    """Recipes that can be chosen: the built-in one, and files of the workbench's folder."""
+    found = [str(place) for place in sorted(settings.folder.glob("*.toml"))] if settings.folder.is_dir() else []
+    return ["production", *(name for name in found if _is_recipe(Path(name)))]
+
+
+def _is_recipe(place: Path) -> bool:
+    try:
+        text = place.read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError):
+        return False
+    return not place.is_symlink() and "[model]" not in text and ("poses" in text or "temperatures_C" in text)
+
+
+KINDS: dict[str, tuple[type[PageState], Callable[[Settings, Any], Request]]] = {
+    "diagnose": (MissingPage, diagnosis),
+    "ladder": (MissingPage, ladder),
+    "plan": (PlanPage, plan),
+    "audit": (AuditPage, audit),
+    "import": (UploadPage, bring_in),
+}

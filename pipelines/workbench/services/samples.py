@@ -1,0 +1,58 @@
+"""The samples behind a dwell, from the capture of a run or from an imported record."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from schemas.errors import WrongUse
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    import pandas as pd
+
+    from pipelines.archive import Archive
+
+
+def samples_of(
+    archive: Archive, run: str, dwell: str, read: Callable[[str], pd.DataFrame]
+) -> tuple[pd.DataFrame, str, str]:
+    """Samples of a dwell ``UNIT:DWELL``, the unit of their values, and what they are called.
+
+    Parameters
+    ----------
+    read : gives a table of the run by its name
+
+    Raises
+    ------
+    WrongUse
+        There is no such dwell, or its samples were never recorded.
+    """
+    found = archive.run(run)
+    unit, _, number = dwell.rpartition(":")
+    table = read("dwells")
+    rows = table[(table["unit"] == unit) & (table["dwell"].astype(str) == number)]
+    if rows.empty:
+        raise WrongUse(f"run {found.id} has no dwell '{dwell[:80]}'; click a residual")
+    row = rows.iloc[0]
+    record = int(row["record"]) if "record" in rows.columns else int(number)
+    if found.records is not None:
+        tables = list(found.records.samples({record}))
+    elif "samples" in found.tables():
+        samples = read("samples")
+        tables = [samples[samples["record"] == record]]
+    else:
+        raise WrongUse(f"run {found.id} was imported as dwells: its samples were not recorded")
+    own = [one[one["unit"] == unit] for one in tables]
+    kept = [one for one in own if len(one)]
+    if not kept:
+        raise WrongUse(f"run {found.id}: no samples of dwell {number} of unit {unit} are kept")
+    import pandas as pd
+
+    out_unit = str(row["out_unit"]) if "out_unit" in rows.columns else ""
+    pose = str(row["pose"]) if "pose" in rows.columns else ""
+    return (
+        pd.concat(kept, ignore_index=True),
+        out_unit,
+        f"Unit {unit}, dwell {number}{', pose ' + pose if pose else ''}",
+    )

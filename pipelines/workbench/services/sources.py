@@ -1,0 +1,94 @@
+"""What can be looked at: runs of the archive, and files of dwells in the workbench's folder; nothing else of the machine."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from pipelines.archive import Archive
+from schemas.errors import WrongUse, did_you_mean
+
+if TYPE_CHECKING:
+    from pipelines.workbench.settings import Settings
+
+ENDINGS = (".parquet", ".csv", ".tsv", ".parquet.gz", ".csv.gz")
+OWN = ("lots", "models")
+NEWEST = 200
+MOST_FILES = 500
+
+
+@dataclass(frozen=True)
+class Source:
+    """Dwells that can be chosen: ``name`` as a command line has it."""
+
+    name: str
+    label: str
+    is_file: bool
+    units: int = 0
+
+
+def sources(settings: Settings) -> list[Source]:
+    """Files of dwells, then the newest runs first."""
+    return [*_files(settings.folder), *_runs(settings)]
+
+
+def resolve(settings: Settings, name: str, where: str) -> str:
+    """The name of a source that is there.
+
+    Raises
+    ------
+    WrongUse
+        It is neither a run of the archive nor a file of the folder.
+    """
+    files = {one.name for one in _files(settings.folder)}
+    if name in files:
+        return name
+    if "/" in name or "\\" in name or name.endswith(ENDINGS):
+        raise WrongUse(f"{where}: no file '{name}' in {settings.folder}; {did_you_mean(name, files or {'none'})}")
+    return Archive(settings.archive).run(name).id
+
+
+def stamp(settings: Settings, name: str) -> str:
+    """What changes with the content of a source."""
+    place = Path(name)
+    if place.suffix and place.is_file():
+        about = place.stat()
+        return f"{about.st_size}.{about.st_mtime_ns}"
+    run = Archive(settings.archive).run(name)
+    return run.id if "dwells" not in run.tables() else str(run.manifest("dwells")["sha256"])
+
+
+def twin(settings: Settings, name: str) -> str:
+    """The fresh measurement that stands beside a file of dwells; empty where there is none."""
+    place = Path(name)
+    for stem in (place.stem.replace("dwells", "fresh"), f"{place.stem}-fresh", f"fresh-{place.stem}"):
+        beside = place.with_name(stem + place.suffix)
+        if beside != place and str(beside) in {one.name for one in _files(settings.folder)}:
+            return str(beside)
+    return ""
+
+
+def _files(folder: Path) -> list[Source]:
+    if not folder.is_dir():
+        return []
+    found: list[Source] = []
+    for place in sorted([*folder.iterdir(), *(p for sub in folder.iterdir() if _is_open(sub) for p in sub.iterdir())]):
+        usable = place.name.endswith(ENDINGS) and place.is_file() and not place.name.startswith(".")
+        if usable and "history" not in place.name and not place.is_symlink():
+            found.append(Source(str(place), place.name, is_file=True))
+    return found[:MOST_FILES]
+
+
+def _is_open(folder: Path) -> bool:
+    """Whether files of a folder inside may be dwells."""
+    return folder.is_dir() and folder.name not in OWN and not folder.name.startswith(".") and not folder.is_symlink()
+
+
+def _runs(settings: Settings) -> list[Source]:
+    infos = Archive(settings.archive).runs()[-NEWEST:][::-1]
+    return [
+        Source(one.id, f"{one.id} · {one.started[:10]}", is_file=False, units=len(one.units))
+        for one in infos
+        if {"reduce", "import"} & set(one.stages)
+    ]

@@ -1,0 +1,188 @@
+"""A file of somebody's own: kept in the folder, read as it is said to be, brought into the archive."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from pipelines.tables.dwell_columns import REQUIRED
+from pipelines.tables.frames import rows_of
+from schemas.errors import DataRejected, TumblelineError, WrongUse
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping as Mapped
+
+    import pandas as pd
+
+    from pipelines.workbench.settings import Settings
+    from pipelines.workbench.state import UploadPage
+
+FOLDER = "uploads"
+LARGEST = 400_000_000
+NAME = re.compile(r"[^A-Za-z0-9._ -]+")
+ENDINGS = (".csv", ".tsv", ".txt", ".dat", ".parquet", ".mat", ".csv.gz", ".tsv.gz", ".txt.gz", ".parquet.gz")
+GUESSES: dict[str, tuple[str, ...]] = {
+    "time": ("time", "time_s", "t", "timestamp", "times", "seconds", "time [s]", "time (s)"),
+    "x": ("x", "ax", "acc_x", "accx", "accel_x", "accelerometer_x", "out_x", "a_x", "acc_x (g)"),
+    "y": ("y", "ay", "acc_y", "accy", "accel_y", "accelerometer_y", "out_y", "a_y", "acc_y (g)"),
+    "z": ("z", "az", "acc_z", "accz", "accel_z", "accelerometer_z", "out_z", "a_z", "acc_z (g)"),
+    "temperature": ("temperature", "temp", "unit_c", "t_c", "temperature_c", "temp_c"),
+    "unit": ("unit", "serial", "sn", "device"),
+    "dwell": ("dwell",),
+}
+"""Columns that are offered for a meaning, by their names; whoever uploads says whether it is so."""
+MOST_ROWS = 8
+
+
+@dataclass(frozen=True)
+class Reading:
+    """A file as it was read.
+
+    columns : its own · head : the first rows · offered : meanings with the columns that their names suggest
+    data : what it comes to with the mapping, rows of its dwells · problem : why it cannot be read so
+    """
+
+    file: str
+    rows: int
+    columns: tuple[str, ...]
+    head: list[list[str]]
+    offered: dict[str, str]
+    is_exchange: bool
+    units: tuple[str, ...] = ()
+    out_unit: str = ""
+    samples: int = 0
+    rate_hz: float = 0.0
+    dwells: tuple[dict[str, Any], ...] = ()
+    remarks: tuple[str, ...] = ()
+    problem: str = ""
+
+
+def keep(settings: Settings, name: str, content: bytes) -> str:
+    """The place of a file that was dropped; one of the same name and other content gets a number.
+
+    Raises
+    ------
+    WrongUse
+        Its name has an ending that no reader knows.
+    """
+    plain = NAME.sub("_", Path(name.replace("\\", "/")).name).strip(" .")[-120:]
+    if not plain.lower().endswith(ENDINGS):
+        raise WrongUse(
+            f"upload: '{plain or 'a file without a name'}', one of {', '.join(ENDINGS)} is needed; save it as one of them"
+        )
+    folder = settings.folder / FOLDER
+    folder.mkdir(parents=True, exist_ok=True)
+    stem, dot, ending = plain.partition(".")
+    for number in range(1000):
+        place = folder / (plain if number == 0 else f"{stem}-{number}{dot}{ending}")
+        if place.is_file() and place.read_bytes() == content:
+            return str(place)
+        if not place.exists():
+            place.write_bytes(content)
+            return str(place)
+    raise WrongUse(f"upload: {folder} holds a thousand files called '{plain}'; remove some")
+
+
+def resolve(settings: Settings, name: str) -> Path:
+    """The place of an uploaded file, and of no other."""
+    folder = settings.folder / FOLDER
+    place = Path(name)
+    if place.parent != folder or not place.is_file() or place.is_symlink():
+        raise WrongUse(f"upload: no uploaded file is called '{name[:80]}'; drop it again")
+    return place
+
+
+def reading(settings: Settings, page: UploadPage) -> Reading:
+    """The file of a page as it is read."""
+    from pipelines.importers import files
+
+    place = resolve(settings, page.file)
+    table, _ = files.read(place)
+    names = tuple(str(column) for column in table.columns)
+    offered = _offered(names)
+    plain = Reading(
+        file=page.file, rows=len(table), columns=names, head=_head(table), offered=offered,
+        is_exchange=set(REQUIRED) <= set(names),
+    )  # fmt: skip
+    if not page.columns or not page.output:
+        return plain
+    try:
+        return _read_as(plain, table, page)
+    except TumblelineError as problem:
+        return replace(plain, problem=str(problem))
+
+
+def _read_as(plain: Reading, table: pd.DataFrame, page: UploadPage) -> Reading:
+    from pipelines.importers import record
+
+    data = record.imported(table, mapping_of(page.model_dump()), Path(page.file).name)
+    rate = 0.0
+    if data.samples is not None and len(data.samples) > 1:
+        rate = record_rate(data.samples)
+    dwells = [] if data.dwells is None else rows_of(data.dwells)
+    return replace(
+        plain, units=tuple(data.units), out_unit=data.out_unit, remarks=data.remarks, rate_hz=rate,
+        samples=0 if data.samples is None else len(data.samples), dwells=tuple(dwells),
+    )  # fmt: skip
+
+
+def record_rate(samples: pd.DataFrame) -> float:
+    """Samples in a second, by the whole record."""
+    time = samples["time_s"].to_numpy()
+    span = float(time[-1] - time[0])
+    return (len(time) - 1) / span if span > 0.0 else 0.0
+
+
+def mapping_of(request: Mapped[str, Any]) -> Any:
+    """The mapping of an import, from the values of the page."""
+    from pipelines.importers import mapping
+
+    units = {"output": request["output"], "time": request["time"], "temperature": request["temperature"]}
+    wanted: dict[str, Any] = {
+        "columns": mapping.pairs(",".join(request["columns"]), "columns"),
+        "units": units,
+        "rows": request["rows"],
+    }
+    wanted |= {"unit": request["serial"]} if request["serial"] else {}
+    wanted |= {"rate_hz": request["rate"]} if request["rate"] else {}
+    wanted |= {"local_gravity_m_s2": request["gravity"]} if request["gravity"] else {}
+    wanted |= {"poses": mapping.pairs(request["poses"], "poses")} if request["poses"] else {}
+    return mapping.build(wanted, "upload")
+
+
+def imported(request: Mapped[str, Any]) -> dict[str, Any]:
+    """A file brought into the archive, with the fit that was wanted."""
+    from pipelines.diagnosis.imported import judge
+    from pipelines.importers import files, keep, record
+
+    place = Path(request["file"])
+    how = mapping_of(request)
+    content, source = files.read_content(place)
+    data = record.imported(content.table, how, place.name, content)
+    if data.dwells is None:
+        raise DataRejected(
+            f"{place.name}: nothing stands still in it, dwells are needed; record every pose for some seconds"
+        )
+    judged = judge(request["fit"], data, how) if request["fit"] else None
+    run = keep.keep(data, source, how, judged, request["archive"])
+    return {
+        "run": run.id, "units": data.units, "dwells": len(data.dwells), "adequate": None if judged is None else judged.adequate,
+        "lines": [] if judged is None else list(judged.lines), "remarks": list(data.remarks), "fit": request["fit"],
+        "coefficients": [] if judged is None else [dict(row) for row in judged.coefficients or []],
+    }  # fmt: skip
+
+
+def _offered(names: tuple[str, ...]) -> dict[str, str]:
+    lower = {name.lower().strip(): name for name in reversed(names)}
+    found: dict[str, str] = {}
+    for meaning, words in GUESSES.items():
+        column = next((lower[word] for word in words if word in lower), None)
+        if column is not None:
+            found[meaning] = column
+    return found
+
+
+def _head(table: pd.DataFrame) -> list[list[str]]:
+    return [[str(value)[:40] for value in row] for row in table.head(MOST_ROWS).itertuples(index=False)]

@@ -1,0 +1,142 @@
+"""The work of jobs, in a process of its own: each calls what a command calls. Results are plain and can be sent."""
+
+from __future__ import annotations
+
+import traceback
+from typing import TYPE_CHECKING, Any
+
+from pipelines.workbench.results import Diagnosed
+from schemas.errors import TumblelineError
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping
+
+    Tell = Callable[[int, int, str], None]
+
+
+def done_in_process(kind: str, request: Mapping[str, Any], tell: Tell) -> tuple[str, Any]:
+    """What came of a request: ``done`` with the result, or ``failed`` with a sentence."""
+    from threadpoolctl import threadpool_limits
+
+    from inertial import effects
+    from inertial.errors import InertialError
+
+    try:
+        with threadpool_limits(1), effects.additions_forgotten():
+            return "done", WORK[kind](request, tell)
+    except (TumblelineError, InertialError) as problem:
+        return "failed", str(problem)
+    except Exception as problem:  # noqa: BLE001 - a defect: the page says so, the details go to the server's log
+        traceback.print_exc()
+        return (
+            "failed",
+            f"a defect of the program ({type(problem).__name__}: {problem}); the server's log has the details",
+        )
+
+
+def _inputs(request: Mapping[str, Any], where: str) -> tuple[Any, Any, list[str] | None]:
+    """Dwells, history and the model of a request."""
+    from pipelines.diagnosis.inputs import dwells_and_history, judged_effects, use_written_formulas
+    from pipelines.tables.leave_out import leave_out, named_dwells
+
+    use_written_formulas(request["formula"], where)
+    listed = ",".join(request["effects"])
+    judged = judged_effects(request["source"], request["archive"], listed, None, where)
+    table, history, _ = dwells_and_history(request["source"], "", request["archive"])
+    return leave_out(table, named_dwells(",".join(request["without"]))), history, judged
+
+
+def diagnose(request: Mapping[str, Any], tell: Tell) -> Diagnosed:
+    """The diagnosis of a source against a model; and the residuals of the model before it."""
+    steps = 4
+    tell(0, steps, "reading the dwells")
+    from inertial.quantities import formula_names
+    from pipelines.diagnosis.condense import condense
+    from pipelines.diagnosis.diagnose import default_model
+    from pipelines.diagnosis.examination import examination
+    from pipelines.report.residual_table import ladder_of, residual_table, residuals_of_model
+    from pipelines.tables.dwell_table import covariates
+
+    dwells, history, judged = _inputs(request, "diagnose")
+    added = list(request["added"])
+    model = [*(judged or default_model(dwells)), *added]
+    tell(1, steps, "searching for missing effects")
+    made = examination(dwells, history, model, request["without"])
+    faulty = {unit for fault in made.document["blocked_by"] for unit in fault["units"]}
+    units = tuple(unit for unit in made.found.units if unit not in faulty)
+    table, ladder, before = None, [], None
+    if made.diagnosis is not None:
+        tell(2, steps, "laying out the residuals")
+        table, ladder = residual_table(made.found, made.diagnosis, units), ladder_of(made.diagnosis)
+        if added:
+            tell(3, steps, "fitting the model before")
+            before = residuals_of_model(condense(dwells), history, model[:-1], units)
+    state = made.found.state
+    known = {name: one for name, one in formula_names().items() if getattr(state, one[0]) is not None}
+    names = {name: meaning for name, (_, _, meaning) in known.items() if not meaning.startswith("the same")}
+    names |= dict.fromkeys(covariates(dwells), "recorded column")
+    return Diagnosed(made.document, table, ladder, before, names)
+
+
+def ladder(request: Mapping[str, Any], tell: Tell) -> list[dict[str, Any]]:
+    """The errors of every version of a model: fitted, cross-validated, on a fresh run, and the floor."""
+    from pipelines.diagnosis.compare import compare
+    from pipelines.diagnosis.diagnose import default_model
+    from pipelines.diagnosis.inputs import dwells_and_history
+    from pipelines.diagnosis.model_history import evolution
+    from pipelines.jobs.model_files import Version
+
+    dwells, history, judged = _inputs(request, "compare")
+    start = tuple(judged or default_model(dwells))
+    fresh, fresh_history = None, None
+    if request["fresh"]:
+        fresh, fresh_history, _ = dwells_and_history(request["fresh"], "", request["archive"])
+    added = list(request["added"])
+    versions = [
+        Version(k + 1, (*start, *added[:k]), tuple(added[k - 1 : k]) if k else (), (), None)
+        for k in range(len(added) + 1)
+    ]
+    count = 0
+
+    def compared(effects: list[str], before: list[str] | None) -> dict[str, Any]:
+        nonlocal count
+        tell(count, len(versions), f"fitting version {count + 1}")
+        count += 1
+        return compare(dwells, effects, history, fresh, fresh_history, before)
+
+    return evolution(versions, compared)
+
+
+def plan(request: Mapping[str, Any], tell: Tell) -> dict[str, Any]:
+    """The plan of a recipe, and what its pictures are drawn from."""
+    tell(0, 2, "reading the recipe")
+    from pipelines.workbench.views.planned import planned
+
+    tell(1, 2, "what the plan sees")
+    return planned(request)
+
+
+def audit(request: Mapping[str, Any], tell: Tell) -> dict[str, Any]:
+    """The audit of the archive, and what its pictures are drawn from."""
+    tell(0, 2, "reading the runs")
+    from pipelines.workbench.views.audited import audited
+
+    return audited(request, tell)
+
+
+def bring_in(request: Mapping[str, Any], tell: Tell) -> dict[str, Any]:
+    """A file of somebody's own, in the archive."""
+    tell(0, 2, "reading the file")
+    from pipelines.workbench.services.uploads import imported
+
+    tell(1, 2, "importing")
+    return imported(request)
+
+
+WORK: dict[str, Any] = {
+    "diagnose": diagnose,
+    "ladder": ladder,
+    "plan": plan,
+    "audit": audit,
+    "import": bring_in,
+}

@@ -1,0 +1,66 @@
+"""What a workbench is started with."""
+
+from __future__ import annotations
+
+import secrets
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+from schemas.errors import WrongUse
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+LOOPBACK = ("127.0.0.1", "localhost", "::1")
+PORT = 8321
+
+
+@dataclass(frozen=True)
+class Settings:
+    """A workbench beside an archive.
+
+    archive : its address · folder : of files of dwells, models, uploads and the state of jobs and lots
+    host, port : where it listens · names : further host names by which it may be called
+    token : lets a browser change something · tls : whether it answers by HTTPS · proxied : whether a proxy does that for it
+    """
+
+    archive: str
+    folder: Path
+    host: str = "127.0.0.1"
+    port: int = PORT
+    names: tuple[str, ...] = ()
+    token: str = field(default_factory=lambda: secrets.token_urlsafe(24))
+    tls: bool = False
+    proxied: bool = False
+    station: Path | None = None
+    workers: int = 2
+
+    @property
+    def local(self) -> bool:
+        """Whether only this machine reaches it."""
+        return self.host in LOOPBACK
+
+    @property
+    def hosts(self) -> frozenset[str]:
+        """Host names, without a port, by which it may be called."""
+        return frozenset({*LOOPBACK, "[::1]", *self.names, *([] if self.host in {"0.0.0.0", "::"} else [self.host])})  # noqa: S104
+
+    @property
+    def cookie(self) -> str:
+        """Name of the cookie; cookies know no ports, and two workbenches may run side by side."""
+        return f"tumbleline-workbench-{self.port}"
+
+    @property
+    def address(self) -> str:
+        """Where a browser begins, without the token."""
+        scheme = "https" if self.tls else "http"
+        host = "127.0.0.1" if self.host in {"0.0.0.0", "::"} else self.host  # noqa: S104
+        return f"{scheme}://{f'[{host}]' if ':' in host else host}:{self.port}"
+
+    def refuse_unsafe(self) -> None:
+        """Refuse to be reached from elsewhere without encryption."""
+        if not self.local and not self.tls and not self.proxied:
+            raise WrongUse(
+                f"workbench: host {self.host} is reached by other machines, encryption is needed; give --certificate and --key, "
+                "or --behind-proxy where a proxy does it, or leave --host out"
+            )

@@ -1,0 +1,263 @@
+"""The state of a page: what its address says, and the command line that gives the same numbers.
+
+``parse`` after ``address`` is the identity. What an address says that cannot be is left out, with a sentence for the page.
+"""
+
+from __future__ import annotations
+
+import shlex
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, Self
+from urllib.parse import urlencode
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+
+from schemas.foreign import shown
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+
+Text = Annotated[str, Field(max_length=200)]
+Texts = Annotated[tuple[Annotated[str, Field(min_length=1, max_length=400)], ...], Field(max_length=60)]
+Outcome = Literal["", "pass", "fail", "refused"]
+
+
+class PageState(BaseModel):
+    """Base of the states."""
+
+    model_config = ConfigDict(frozen=True, extra="ignore")
+    PATH: ClassVar[str] = "/"
+
+    @classmethod
+    def parse(cls, query: Iterable[tuple[str, str]]) -> tuple[Self, list[str]]:
+        """The state of an address, and a sentence for every part of it that cannot be."""
+        values: dict[str, Any] = {}
+        for name, value in query:
+            if name in cls.model_fields:
+                several = cls.model_fields[name].annotation is not None and "tuple" in str(
+                    cls.model_fields[name].annotation
+                )
+                values[name] = (*values.get(name, ()), value) if several else value
+        problems: list[str] = []
+        while True:
+            try:
+                return cls.model_validate(values), problems
+            except ValidationError as problem:
+                for error in problem.errors():
+                    name = str(error["loc"][0])
+                    if name in values:
+                        found = shown(str(error["input"]), 60)
+                        problems.append(
+                            f"address: {name} = {found} cannot be used ({error['msg'].lower()}); it is left out"
+                        )
+                        del values[name]
+
+    def query(self, **changes: Any) -> str:
+        """The address' part behind the question mark, with some values changed; nothing that is as it is by itself."""
+        new = self.model_copy(update=changes) if changes else self
+        pairs: list[tuple[str, str]] = []
+        for name, about in type(self).model_fields.items():
+            value = getattr(new, name)
+            if value != about.default:
+                pairs += [(name, str(one)) for one in (value if isinstance(value, tuple) else (value,))]
+        return urlencode(pairs)
+
+    def address(self, **changes: Any) -> str:
+        """The address of the page, with some values changed."""
+        query = self.query(**changes)
+        return f"{self.PATH}?{query}" if query else self.PATH
+
+    def figure(self, name: str, ending: str = "json", **changes: Any) -> str:
+        """The address of a figure of the page, or of its numbers."""
+        query = self.query(**changes)
+        return f"{self.PATH}/figure/{name}.{ending}" + (f"?{query}" if query else "")
+
+    def words(self) -> list[str]:
+        """The command that gives the same numbers, without the archive."""
+        return []
+
+    def command(self, archive: str) -> str:
+        """The command line that gives the same numbers."""
+        words = self.words()
+        return shlex.join(["tumbleline", *words, "--archive", archive]) if words else ""
+
+
+class UnitsPage(PageState):
+    """Runs and units, searched."""
+
+    PATH: ClassVar[str] = "/units"
+    search: Text = ""
+    outcome: Outcome = ""
+    station: Text = ""
+    device: Text = ""
+    since: Annotated[str, Field(pattern=r"^(\d{4}-\d\d-\d\d)?$")] = ""
+    until: Annotated[str, Field(pattern=r"^(\d{4}-\d\d-\d\d)?$")] = ""
+    order: Literal["measured", "unit", "outcome", "station"] = "measured"
+    page: Annotated[int, Field(ge=1, le=100_000)] = 1
+
+    def words(self) -> list[str]:
+        """A question in SQL."""
+        from pipelines.workbench.questions import units_question
+
+        return ["query", units_question(self)]
+
+
+class RunPage(PageState):
+    """A run: its units against their limits."""
+
+    PATH: ClassVar[str] = "/run"
+    run: Text = "latest"
+
+    def words(self) -> list[str]:
+        """The run's summary."""
+        return ["show", self.run]
+
+
+Against = Literal["force", "unit_C", "time", "pose"]
+
+
+class UnitPage(PageState):
+    """A unit of a run: model and measurement."""
+
+    PATH: ClassVar[str] = "/unit"
+    run: Text = "latest"
+    unit: Text = ""
+    against: Against = "unit_C"
+    dwell: Text = ""
+    parameter: Text = "bias x"
+
+    def words(self) -> list[str]:
+        """The table of residuals."""
+        return ["show", self.run, "residuals"]
+
+
+class MissingPage(PageState):
+    """A model against dwells: is it adequate, where does it fail, what is missing.
+
+    source, fresh : runs of the archive, or files of the workbench's folder
+    effects : the model to begin with; empty for the run's own, or the default one · added : effects that were added to it
+    without : dwells left out, ``UNIT:DWELL`` · formula : formulas, ``id = expression``
+    """
+
+    PATH: ClassVar[str] = "/missing"
+    source: Text = ""
+    fresh: Text = ""
+    effects: Texts = ()
+    added: Texts = ()
+    without: Texts = ()
+    formula: Texts = ()
+    unit: Text = ""
+    against: Text = ""
+    colour: Literal["axis", "direction", "slot"] = "axis"
+    dwell: Text = ""
+
+    @property
+    def judged(self) -> tuple[str, ...]:
+        """The effects of the model that is judged; empty for the one that the source comes with."""
+        return (*self.effects, *self.added)
+
+    def words(self) -> list[str]:
+        """The diagnosis."""
+        if not self.source:
+            return []
+        words = ["diagnose", self.source]
+        words += ["--effects", ",".join(self.judged)] if self.judged else []
+        for text in self.formula:
+            words += ["--formula", text]
+        return words + (["--leave-out", ",".join(self.without)] if self.without else [])
+
+    def ladder_command(self, archive: str) -> str:
+        """The command line for the errors of the model as it is now."""
+        words = self.words()
+        if not words:
+            return ""
+        words[0] = "compare"
+        words += ["--fresh", self.fresh] if self.fresh else []
+        return shlex.join(["tumbleline", *words, "--archive", archive])
+
+
+class UploadPage(PageState):
+    """A file, and what its columns are taken for."""
+
+    PATH: ClassVar[str] = "/upload"
+    file: Text = ""
+    rows: Literal["samples", "dwells"] = "samples"
+    columns: Texts = ()
+    output: Text = ""
+    time: Text = "s"
+    temperature: Text = "degC"
+    serial: Text = ""
+    rate: Annotated[float, Field(ge=0.0, le=1e6, allow_inf_nan=False)] = 0.0
+    gravity: Annotated[float, Field(ge=0.0, le=20.0, allow_inf_nan=False)] = 0.0
+    poses: Text = ""
+    fit: Literal["", "norm", "faces", "temperature"] = "norm"
+    run: Text = ""
+
+    def words(self) -> list[str]:
+        """The import."""
+        if not self.file:
+            return []
+        words = ["import", self.file, "--map", ",".join(self.columns)] if self.columns else ["import", self.file]
+        units = [f"output={self.output}"] if self.output else []
+        units += [f"time={self.time}"] if self.time != "s" else []
+        units += [f"temperature={self.temperature}"] if self.temperature != "degC" else []
+        words += ["--units", ",".join(units)] if units else []
+        words += ["--unit", self.serial] if self.serial else []
+        words += ["--rows", self.rows] if self.rows != "samples" else []
+        words += ["--rate", repr(self.rate)] if self.rate else []
+        words += ["--local-g", repr(self.gravity)] if self.gravity else []
+        words += ["--poses", self.poses] if self.poses else []
+        return words + (["--fit", self.fit] if self.fit else [])
+
+
+class PlanPage(PageState):
+    """A recipe: what it sees and what it costs."""
+
+    PATH: ClassVar[str] = "/plan"
+    recipe: Text = "production"
+    effects: Texts = ()
+
+    def words(self) -> list[str]:
+        """The plan."""
+        return ["plan", self.recipe, *(["--effects", ",".join(self.effects)] if self.effects else [])]
+
+
+class StationPage(PageState):
+    """The station of a run: what happened, temperatures over time."""
+
+    PATH: ClassVar[str] = "/station"
+    run: Text = "latest"
+
+    def words(self) -> list[str]:
+        """The station's log."""
+        return ["station", "log", self.run]
+
+
+class AuditPage(PageState):
+    """What drifts and what is due."""
+
+    PATH: ClassVar[str] = "/audit"
+    since: Annotated[str, Field(pattern=r"^(\d{4}-\d\d-\d\d)?$")] = ""
+    until: Annotated[str, Field(pattern=r"^(\d{4}-\d\d-\d\d)?$")] = ""
+    device: Text = ""
+    station: Text = ""
+    finding: Text = ""
+
+    def words(self) -> list[str]:
+        """The audit."""
+        words = ["audit"]
+        for name in ("since", "until", "device", "station"):
+            words += [f"--{name}", getattr(self, name)] if getattr(self, name) else []
+        return words
+
+
+class OperatorPage(PageState):
+    """Lots on the station."""
+
+    PATH: ClassVar[str] = "/operator"
+    lot: Text = ""
+    slots: Annotated[int, Field(ge=1, le=64)] = 8
+
+
+PAGES: tuple[type[PageState], ...] = (
+    UnitsPage, RunPage, UnitPage, MissingPage, UploadPage, PlanPage, StationPage, AuditPage, OperatorPage,
+)  # fmt: skip

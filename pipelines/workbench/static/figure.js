@@ -1,0 +1,89 @@
+// Figures: fetched when they come into sight, drawn in the colours of the theme, a click on a point changes the address.
+const PLOTLY = "plotly-strict-4.1.1.min.js";
+let library = null;
+
+function plotly() {
+  library ??= new Promise((resolve, reject) => {
+    const script = document.createElement("script");
+    script.src = `${document.body.dataset.static}/${PLOTLY}`;
+    script.onload = () => resolve(window.Plotly);
+    script.onerror = () => { library = null; reject(new Error("the drawing library was not loaded")); };
+    document.head.append(script);
+  });
+  return library;
+}
+
+// "role:before" and "role:before:0.2" (with its opacity) in the colours of the theme
+function themed(value, style) {
+  if (typeof value === "string" && value.startsWith("role:")) {
+    const [, role, opacity] = value.split(":");
+    const colour = style.getPropertyValue(`--role-${role}`).trim();
+    return opacity ? colour + Math.round(255 * Number(opacity)).toString(16).padStart(2, "0") : colour;
+  }
+  if (Array.isArray(value)) return value.map((one) => themed(one, style));
+  if (value && typeof value === "object" && !ArrayBuffer.isView(value)) {
+    return Object.fromEntries(Object.entries(value).map(([key, one]) => [key, key === "bdata" ? one : themed(one, style)]));
+  }
+  return value;
+}
+
+function dressed(layout, style) {
+  const grid = style.getPropertyValue("--grid").trim(), text = style.getPropertyValue("--text").trim();
+  const out = { ...themed(layout, style), paper_bgcolor: "rgba(0,0,0,0)", plot_bgcolor: "rgba(0,0,0,0)", uirevision: "kept",
+    font: { family: getComputedStyle(document.body).fontFamily, size: 13, color: text },
+    hoverlabel: { bgcolor: style.getPropertyValue("--panel").trim(), bordercolor: style.getPropertyValue("--line").trim(), font: { color: text } },
+    modebar: { bgcolor: "rgba(0,0,0,0)", color: style.getPropertyValue("--quiet").trim(), activecolor: text, orientation: "h" } };
+  for (const [name, axis] of Object.entries(out)) if (/^[xy]axis\d*$/.test(name)) out[name] = { ...axis, gridcolor: grid, linecolor: grid, tickcolor: grid };
+  return out;
+}
+
+export async function draw(place) {
+  if (place.dataset.busy === place.dataset.figure) return;
+  place.dataset.busy = place.dataset.figure;
+  place.classList.add("waiting");
+  try {
+    const [library, answer] = await Promise.all([plotly(), fetch(place.dataset.figure, { headers: { accept: "application/json" } })]);
+    const content = await answer.json();
+    if (!answer.ok) throw new Error(content.problem || "the figure was not made");
+    if (!place.isConnected) return;
+    place.figure = content;
+    await paint(place, library);
+  } catch (problem) {
+    place.replaceChildren(Object.assign(document.createElement("p"), { className: "note", textContent: problem.message }));
+    place.style.minHeight = "0";
+  } finally {
+    place.classList.remove("waiting");
+    delete place.dataset.busy;
+  }
+}
+
+async function paint(place, library) {
+  const style = getComputedStyle(document.documentElement), { data, layout, config } = place.figure;
+  await library.react(place, themed(data, style), dressed(layout, style), config);
+  place.dataset.drawn = place.dataset.figure;
+  if (!place.dataset.pick || place.dataset.listens) return;
+  place.dataset.listens = "yes";
+  place.on("plotly_click", (event) => {
+    const chosen = event.points.map((point) => point.customdata).find((one) => typeof one === "string");
+    if (chosen) place.dispatchEvent(new CustomEvent("pick", { bubbles: true, detail: { name: place.dataset.pick, value: chosen, part: place.dataset.swapPart } }));
+  });
+}
+
+const seen = new IntersectionObserver((entries) => {
+  for (const one of entries) if (one.isIntersecting) { seen.unobserve(one.target); draw(one.target); }
+}, { rootMargin: "200px" });
+
+export function drawAll(root) {
+  for (const place of root.querySelectorAll("[data-figure]")) if (!place.dataset.drawn) seen.observe(place);
+}
+
+export function forget(root) {
+  if (!window.Plotly) return;
+  for (const place of root.querySelectorAll("[data-drawn]")) window.Plotly.purge(place);
+}
+
+export async function repaint() {
+  if (!library) return;
+  const loaded = await library;
+  for (const place of document.querySelectorAll("[data-drawn]")) await paint(place, loaded);
+}

@@ -1,0 +1,232 @@
+// What every page does: addresses without a reload, figures, work with its progress, forms, and the line to the server.
+import { draw, drawAll, forget, repaint } from "./figure.js";
+import { listen, start } from "./events.js";
+
+const main = () => document.getElementById("main");
+let boot = document.body.dataset.boot, going = null;
+
+export async function go(address, { push = true, part = "", focus = false, renews = false } = {}) {
+  if (renews && going && !going.renews) return;  // a page that somebody has asked for is on its way
+  going?.abort();
+  const now = (going = Object.assign(new AbortController(), { renews }));
+  let answer, text;
+  try {
+    answer = await fetch(address, { headers: { accept: "text/html" }, signal: now.signal });
+    text = await answer.text();
+  } catch (problem) {
+    if (problem.name !== "AbortError") lost(true);
+    return;
+  } finally {
+    if (going === now) going = null;
+  }
+  const page = new DOMParser().parseFromString(text, "text/html");
+  if (push) history.pushState(null, "", answer.redirected ? answer.url : address);
+  document.title = page.title;
+  const wanted = part ? [...document.querySelectorAll(`[data-swap="${CSS.escape(part)}"]`)] : [];
+  const fresh = part ? [...page.querySelectorAll(`[data-swap="${CSS.escape(part)}"]`)] : [];
+  if (part && wanted.length && wanted.length === fresh.length) {
+    wanted.forEach((old, k) => { forget(old); old.replaceWith(document.adoptNode(fresh[k])); });
+    const line = page.querySelector(".command"), shown = main().querySelector(".command");
+    if (line && shown) shown.replaceWith(document.adoptNode(line));
+  } else {
+    const next = page.getElementById("main");
+    if (!next) { location.assign(address); return; }
+    forget(main());
+    main().replaceWith(document.adoptNode(next));
+    for (const link of document.querySelectorAll(".bar nav a")) {
+      if (link.pathname === location.pathname) link.setAttribute("aria-current", "page"); else link.removeAttribute("aria-current");
+    }
+    if (push) window.scrollTo(0, 0);
+    if (focus) main().focus({ preventScroll: true });
+  }
+  arrived();
+}
+
+function arrived() {
+  drawAll(document);
+  for (const place of document.querySelectorAll("[data-job-kind]")) {
+    begin(place);
+    if (["waiting", "running"].includes(place.dataset.jobState)) look(place.dataset.job);  // it may have ended while the page came
+  }
+  document.querySelector("[data-scan-field]")?.focus();
+  document.body.dataset.ready = location.pathname + location.search;
+}
+
+// --- changes -----------------------------------------------------------------------------------------------------------
+async function change(address, content, method = "POST") {
+  const body = method === "PUT" ? content : JSON.stringify(content ?? {});
+  const headers = method === "PUT" ? {} : { "content-type": "application/json" };
+  const answer = await fetch(address, { method, body, headers });
+  const text = await answer.text();
+  let found = {};
+  try { found = JSON.parse(text); } catch { found = { problem: text }; }
+  if (!answer.ok) throw Object.assign(new Error(found.problem || text || "not done"), { status: answer.status });
+  return found;
+}
+
+function say(element, text) {
+  if (!element) return;
+  element.textContent = text;
+  element.hidden = !text;
+}
+
+// --- work --------------------------------------------------------------------------------------------------------------
+async function begin(place, pressed = false) {
+  const state = place.dataset.jobState;
+  if (!pressed && (place.dataset.start !== "yes" || place.dataset.begun || ["failed", "stopped", "interrupted", "waiting", "running"].includes(state))) return;
+  place.dataset.begun = "yes";
+  try {
+    const job = await change("/jobs", { kind: place.dataset.jobKind, address: place.dataset.jobAddress });
+    place.dataset.job = job.id;
+    if (pressed && !place.querySelector("progress")) { go(location.href, { push: false }); return; }
+    told(job);
+  } catch (problem) {
+    say(place.querySelector("[data-job-problem]"), problem.message);
+  }
+}
+
+function told(job) {
+  for (const place of document.querySelectorAll(`[data-job="${CSS.escape(job.id)}"]`)) {
+    place.dataset.jobState = job.state;
+    if (["done", "failed", "stopped"].includes(job.state)) { go(location.href, { push: false, renews: true }); return; }
+    const bar = place.querySelector("progress"), note = place.querySelector("[data-job-note]");
+    if (bar) { bar.max = job.total || 4; bar.value = job.done; }
+    if (note) note.textContent = `${job.note}${job.seconds > 1 ? `, ${Math.round(job.seconds)} s` : ""}`;
+  }
+}
+
+// --- the line to the server --------------------------------------------------------------------------------------------
+function lost(is) { document.querySelector("[data-lost]").hidden = !is; }
+
+listen((message) => {
+  if (message.kind === "lost") lost(true);
+  if (message.kind === "boot") {
+    lost(false);
+    if (message.boot !== boot) { boot = message.boot; go(location.href, { push: false, renews: true }); } else {
+      for (const place of document.querySelectorAll("[data-job]")) if (["waiting", "running"].includes(place.dataset.jobState)) look(place.dataset.job);
+    }
+  }
+  if (message.kind === "job") told(message.job);
+  if (message.kind === "changed" && document.querySelector(`[data-live="${CSS.escape(message.what)}"]`)) {
+    const had = Boolean(document.querySelector("[data-phase]"));
+    if (had || !document.activeElement?.matches("input")) go(location.href, { push: false, part: had ? message.what : "", renews: true });
+  }
+});
+
+async function look(id) {
+  const answer = await fetch(`/jobs/${encodeURIComponent(id)}`);
+  if (answer.ok) told(await answer.json()); else go(location.href, { push: false, renews: true });
+}
+
+// --- what is pressed ---------------------------------------------------------------------------------------------------
+document.addEventListener("click", async (event) => {
+  const one = event.target.closest("a, button, [data-drop]");
+  if (!one) return;
+  const { dataset } = one;
+  if ("themeSwitch" in dataset) {
+    const theme = document.documentElement.dataset.theme === "dark" ? "light" : "dark";
+    document.documentElement.dataset.theme = theme;
+    try { localStorage.setItem("tumbleline-theme", theme); } catch { /* a browser that keeps nothing */ }
+    repaint();
+  } else if ("copy" in dataset) {
+    await navigator.clipboard?.writeText(dataset.copy);
+    one.textContent = "Copied";
+    setTimeout(() => { one.textContent = "Copy"; }, 1500);
+  } else if ("jobStart" in dataset) begin(one.closest("[data-job-kind]"), true);
+  else if ("jobStop" in dataset) change(`/jobs/${encodeURIComponent(one.closest("[data-job-kind]").dataset.job)}/stop`).then(told).catch(() => {});
+  else if ("act" in dataset) act(one);
+  else if ("insert" in dataset) insert(one.closest("form").elements.formula, dataset.insert);
+  else if ("drop" in dataset && event.target.tagName !== "INPUT") one.querySelector("[data-file]").click();
+  else if (one.tagName === "A" && one.origin === location.origin && !one.hasAttribute("download") && !one.hash && !event.ctrlKey && !event.metaKey && !event.shiftKey && event.button === 0) {
+    event.preventDefault();
+    go(one.href, { focus: true });
+  }
+});
+
+async function act(button) {
+  const problem = button.closest("section").querySelector("[data-act-problem]");
+  button.disabled = true;
+  try {
+    const { address } = await change(button.dataset.act, { number: button.dataset.number, answer: button.dataset.answer });
+    go(address);
+  } catch (found) {
+    if (found.status === 409) await go(location.href, { push: false });
+    say(document.querySelector("[data-act-problem]") ?? problem, found.message);
+    button.disabled = false;
+  }
+}
+
+function insert(field, text) {
+  const at = field.selectionStart ?? field.value.length;
+  field.setRangeText(text, at, field.selectionEnd ?? at, "end");
+  field.focus();
+}
+
+document.addEventListener("submit", async (event) => {
+  const form = event.target;
+  event.preventDefault();
+  if (form.dataset.get) { go(addressOf(form), { focus: true }); return; }
+  const problem = form.querySelector(".problem"), done = form.querySelector(".done"), button = form.querySelector("button:not([type])");
+  say(problem, ""); say(done, "");
+  if (button) button.disabled = true;
+  try {
+    const found = await change(form.dataset.post, Object.fromEntries(new FormData(form)));
+    if (found.address) go(found.address); else say(done, found.done ?? "");
+  } catch (failed) {
+    say(problem, failed.message);
+  }
+  if (button) button.disabled = false;
+});
+
+function addressOf(form) {
+  const pairs = [...new FormData(form)].filter(([, value]) => value !== "");
+  for (const field of form.querySelectorAll("[data-column]")) if (field.value) pairs.push(["columns", `${field.dataset.column}=${field.value}`]);
+  const query = new URLSearchParams(pairs).toString();
+  return form.dataset.get + (query ? `?${query}` : "");
+}
+
+document.addEventListener("change", (event) => {
+  if (event.target.matches("[data-submit]")) event.target.form.requestSubmit();
+  if (event.target.matches("[data-file]") && event.target.files.length) send(event.target.closest("[data-drop]"), event.target.files[0]);
+});
+
+document.addEventListener("keydown", (event) => {
+  const field = event.target;
+  if (event.key === "Enter" && field.matches("[data-drop]")) field.querySelector("[data-file]").click();
+  if (event.key !== "Enter" || !field.matches("[data-scan-field]")) return;
+  event.preventDefault();  // a scanner ends each serial number with Enter
+  const fields = [...document.querySelectorAll("[data-scan-field]")], next = fields[fields.indexOf(field) + 1];
+  if (next) next.focus(); else field.form.querySelector("button").focus();
+});
+
+document.addEventListener("pick", (event) => {
+  const address = new URL(location.href);
+  address.searchParams.set(event.detail.name, event.detail.value);
+  go(address.pathname + address.search, { part: event.detail.part });
+});
+
+// --- files -------------------------------------------------------------------------------------------------------------
+for (const kind of ["dragover", "dragleave", "drop"]) {
+  document.addEventListener(kind, (event) => {
+    const place = event.target.closest?.("[data-drop]");
+    if (kind !== "dragleave") event.preventDefault();
+    place?.classList.toggle("over", kind === "dragover");
+    if (kind === "drop" && place && event.dataTransfer.files.length) send(place, event.dataTransfer.files[0]);
+  });
+}
+
+async function send(place, file) {
+  const problem = place.querySelector(".problem");
+  say(problem, "");
+  try {
+    const { address } = await change(`/upload/file?name=${encodeURIComponent(file.name)}`, file, "PUT");
+    go(address);
+  } catch (failed) {
+    say(problem, failed.message);
+  }
+}
+
+window.addEventListener("popstate", () => go(location.href, { push: false }));
+start();
+arrived();
+window.tumbleline = { draw };

@@ -1,0 +1,213 @@
+"""The workbench in a real browser: pages that are drawn, a hidden effect found, names that stay names, a server that dies."""
+
+import os
+import signal
+import urllib.parse
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import pytest
+from browser import Served, chromium, served, tab, until
+from capture_double import small_run
+from numpy.typing import NDArray
+
+from inertial import poses
+from inertial.frames import force_from_angles
+
+SCRIPT = "<img src=x onerror=window.ran=1>"
+LONG = "L" * 64
+PAGES = (
+    "/units",
+    "/run?run=latest",
+    "/unit?run=latest",
+    "/missing",
+    "/upload",
+    "/operator",
+    "/plan",
+    "/station",
+    "/audit",
+)
+
+
+def lot_with_a_hardening_spring(folder: Path, name: str, seed: int) -> str:
+    """Dwells of three units whose mass is held by a spring with f = x + h·x³, solved for x; 4 µg of noise."""
+    rng = np.random.default_rng(seed)
+    angles = np.radians(np.concatenate([poses.plan("fibonacci24")] * 2))
+    force = force_from_angles(angles[:, 0], angles[:, 1])
+    rows = []
+    for unit in range(3):
+        output = displaced(force, 60e-6) + 1e-3 * (unit + 1) + 4e-6 * rng.normal(size=force.shape)
+        for dwell, (out, f, (o, i)) in enumerate(zip(output, force, np.degrees(angles), strict=True)):
+            rows.append(
+                [
+                    f"SP-{unit}" if unit else LONG,
+                    dwell,
+                    10.0 * dwell,
+                    *out,
+                    *f,
+                    o,
+                    i,
+                    45.0 + rng.normal(),
+                    100,
+                    *[4e-5] * 3,
+                ]
+            )
+    axes = [f"{part}_{axis}" for part in ("out", "force") for axis in "xyz"]
+    columns = ["unit", "dwell", "time_s", *axes, "outer_deg", "inner_deg", SCRIPT, "n", "sd_x", "sd_y", "sd_z"]
+    place = folder / name
+    pd.DataFrame(rows, columns=columns).drop(columns=["outer_deg", "inner_deg"]).to_csv(place, index=False)
+    return str(place)
+
+
+def displaced(force: NDArray[np.float64], hardening: float) -> NDArray[np.float64]:
+    """Displacement x with force = x + h·x³, by Newton."""
+    x = force.copy()
+    for _ in range(20):
+        x -= (x + hardening * x**3 - force) / (1.0 + 3.0 * hardening * x**2)
+    return x
+
+
+@pytest.fixture(scope="module")
+def bench(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Served]:
+    top = tmp_path_factory.mktemp("bench")
+    small_run(top)
+    folder = top / "bench"
+    folder.mkdir()
+    lot_with_a_hardening_spring(folder, "dwells.csv", 1)
+    lot_with_a_hardening_spring(folder, "fresh.csv", 2)
+    with served(top / "archive", folder) as one:
+        yield one
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[Any]:
+    with chromium() as found:
+        yield found
+
+
+@pytest.fixture(scope="module")
+def pictures(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Where pictures are kept: TUMBLELINE_PICTURES, else the folder of the run."""
+    folder = Path(os.environ.get("TUMBLELINE_PICTURES") or tmp_path_factory.mktemp("pictures"))
+    folder.mkdir(parents=True, exist_ok=True)
+    return folder
+
+
+def test_every_page_is_drawn_reaches_nothing_outside_and_can_be_read_by_everybody(bench: Served, browser: Any) -> None:
+    with tab(browser, bench.address) as one:
+        for path in PAGES:
+            one.open(path)
+            assert one.findings() == [], path
+        assert one.outside == []
+        assert one.errors == []
+
+
+def test_a_hidden_effect_is_found_added_confirmed_and_taken_out_again(
+    bench: Served, browser: Any, pictures: Path
+) -> None:
+    source = urllib.parse.quote(str(bench.folder / "dwells.csv"))
+    with tab(browser, bench.address) as one:
+        one.open(f"/missing?source={source}")
+        assert "Missing: third_order" in one.page.inner_text(".verdict")
+        one.press("text=as the fresh measurement")
+        one.sees("[data-version='1']")
+        one.shot(pictures, "story-before")
+        one.press("[data-add='third_order']")
+        one.sees("[data-version='2']")
+        one.ready()
+        assert "Adequate" in one.page.inner_text(".verdict")
+        errors = [
+            float(one.page.get_attribute(f"[data-version='{version}']", "data-fresh") or "nan") for version in (1, 2)
+        ]
+        assert 8.0 < errors[0] < 16.0  # the cubic of 60 µg, as a plain fit leaves it
+        assert errors[1] < 5.5
+        assert "confirmed" in one.page.inner_text("#errors")
+        one.shot(pictures, "story-after")
+        assert one.findings() == []
+        one.page.fill("input[name=name]", "line-1")
+        one.page.fill("input[name=why]", "the fresh run confirms it")
+        one.press("text=Save >> nth=-1")
+        one.sees(".done:not([hidden])")
+        saved = (bench.folder / "models" / "line-1.toml").read_text()
+        assert "third_order" in saved
+        assert "the fresh run confirms it" in saved
+        one.press("[data-undo]")
+        until(lambda: "Missing: third_order" in one.page.inner_text(".verdict"), "the effect is out of the model")
+        one.page.go_back()
+        until(lambda: "Adequate" in one.page.inner_text(".verdict"), "the way back leads to the model with the effect")
+        assert one.page.evaluate("() => window.ran") is None  # a column is called like a script
+        assert one.outside == []
+        assert one.errors == []
+
+
+def test_a_click_on_a_residual_shows_the_samples_of_its_dwell(bench: Served, browser: Any) -> None:
+    with tab(browser, bench.address) as one:
+        one.open("/unit?run=latest&unit=A1&against=force")
+        one.click_point("residuals", 0, 3)
+        until(lambda: "dwell=A1" in one.page.evaluate("() => location.href"), "the dwell is in the address")
+        one.sees("[data-name='samples'][data-drawn]")
+        drawn = one.page.evaluate("() => document.querySelector('[data-name=samples]')._fullData[0].x.length")
+        assert drawn >= 100  # a dwell of 1 s at 100 Hz
+        for word in ("hare", "loud", "Send"):  # "Share chart…" would send the data to the maker of the library
+            assert one.page.locator(f".modebar-btn[data-title*='{word}']").count() == 0
+        assert one.page.locator(".modebar-btn").count() > 0
+        one.page.reload()
+        one.ready()
+        one.sees("[data-name='samples'][data-drawn]")
+        assert one.errors == []
+
+
+def test_a_browser_without_the_token_may_look_and_not_compute(bench: Served, browser: Any) -> None:
+    source = urllib.parse.quote(str(bench.folder / "fresh.csv"))
+    with tab(browser, bench.address, token=False) as one:
+        one.page.goto(f"{bench.address}/missing?source={source}")
+        until(lambda: "may look, not change" in one.page.inner_text("main"), "the page says why nothing begins")
+
+
+def test_a_server_that_is_killed_is_said_and_the_page_goes_on(bench: Served, browser: Any) -> None:
+    with tab(browser, bench.address) as one:
+        one.open("/units")
+        bench.end(signal.SIGKILL)
+        until(lambda: one.page.locator("[data-lost]").is_visible(), "the page says that nobody answers")
+        bench.begin()
+        until(lambda: not one.page.locator("[data-lost]").is_visible(), "the page goes on")
+        one.page.fill("input[name=search]", "A2")
+        one.press("text=Search")
+        until(lambda: one.page.locator("main tbody tr").count() == 2, "the search answers: one unit, one run")
+
+
+def test_an_upload_in_a_wrong_unit_says_so_and_is_corrected(bench: Served, browser: Any, tmp_path: Path) -> None:
+    rng = np.random.default_rng(3)
+    general = np.array(
+        [[0.6, 0.8, 0.0], [0.0, 0.6, -0.8], [0.8, 0.0, 0.6], [-0.6, 0.0, 0.8], [0.0, -0.8, -0.6], [-0.8, -0.6, 0.0]]
+    )
+    faces = np.concatenate([np.eye(3), -np.eye(3), general])
+    moving = 0.2 * rng.normal(size=(len(faces), 40, 3))
+    parts = [np.concatenate([np.tile(face, (200, 1)), face + moved]) for face, moved in zip(faces, moving, strict=True)]
+    output = 9.80665 * (np.concatenate(parts) + 1e-4 * rng.normal(size=(len(faces) * 240, 3)))
+    frame = pd.DataFrame(
+        {"t": np.arange(len(output)) / 50.0, **dict(zip(("ax", "ay", "az"), output.T, strict=True)), SCRIPT: 1}
+    )
+    frame.to_csv(tmp_path / "hand.csv", index=False)
+    with tab(browser, bench.address) as one:
+        one.open("/upload")
+        one.page.set_input_files("[data-file]", str(tmp_path / "hand.csv"))
+        one.sees("[data-mapping]")
+        one.page.select_option("select[name=output]", "g")
+        one.page.fill("input[name=serial]", "HAND-1")
+        one.page.fill("input[name=gravity]", "9.80665")
+        one.press("text=Read it so")
+        one.sees("[data-reading-problem]")
+        assert "m/s^2" in one.page.inner_text("[data-reading-problem]")
+        one.page.select_option("select[name=output]", "m/s^2")
+        one.press("text=Read it so")
+        one.sees("[data-dwells]")
+        assert 12 <= int(one.page.inner_text("[data-dwells]")) <= 14
+        one.press("text=Import it")
+        one.sees("text=Diagnose it")
+        assert one.page.evaluate("() => window.ran") is None
+        assert one.findings() == []
+        assert one.errors == [] == one.outside

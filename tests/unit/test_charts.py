@@ -1,0 +1,111 @@
+"""One description of a chart, drawn three ways: the same points, labels and units in each."""
+
+import base64
+import csv
+import io
+import re
+
+import numpy as np
+import pytest
+
+from pipelines.report.charts import (
+    Chart,
+    ColourScale,
+    Plot,
+    PlotAxis,
+    Trace,
+    csv_text,
+    plotly_figure,
+    png_bytes,
+    svg_text,
+)
+from pipelines.report.charts.chart import density
+from pipelines.report.charts.mollweide import project, sphere
+
+
+def chart() -> Chart:
+    x = np.array([0.0, 1.0, 2.0])
+    traces = (
+        Trace("measured", x, 2.0 * x, texts=("a", "b", "c"), picks=("U:0", "U:1", "U:2"), colour=x - 1.0),
+        Trace("band", x, x - 1.0, "band", high=x + 1.0),
+        Trace("line", x, x, "line", "limit", dashed=True),
+        Trace("bars", x, x, "bars"),
+    )
+    plots = (Plot("one", PlotAxis("time / s"), PlotAxis("residual / µg"), traces), sphere("two", ()))
+    return Chart("a chart", plots, 2, ColourScale("mean / µg", -1.0, 1.0))
+
+
+def unpacked(values: dict[str, str]) -> np.ndarray:
+    return np.frombuffer(base64.b64decode(values["bdata"]), dtype="<" + values["dtype"])
+
+
+def test_the_numbers_of_a_figure_are_those_of_its_csv() -> None:
+    figure = plotly_figure(chart())
+    rows = list(csv.DictReader(io.StringIO(csv_text(chart()))))
+    own = [row for row in rows if row["series"] == "measured"]
+    measured = next(one for one in figure["data"] if one["name"] == "measured")
+    assert unpacked(measured["x"]).tolist() == [float(row["x"]) for row in own]
+    assert unpacked(measured["y"]).tolist() == [float(row["y"]) for row in own]
+    assert measured["customdata"] == [row["pick"] for row in own]
+    assert {row["x_label"] for row in own} == {figure["layout"]["xaxis"]["title"]["text"]} == {"time / s"}
+
+
+def test_a_file_without_a_browser_says_the_same() -> None:
+    text = svg_text(chart())
+    for label in ("time / s", "residual / µg", "mean / µg", "one", "measured"):
+        assert label in text
+    assert png_bytes(chart())[:4] == b"\x89PNG"
+
+
+def test_nothing_of_a_figure_leaves_the_page() -> None:
+    config = plotly_figure(chart())["config"]
+    assert config["showSendToCloud"] is False
+    assert config["plotlyServerURL"] == ""
+    assert config["displaylogo"] is False
+    assert "geo" not in str(plotly_figure(chart())["layout"])
+
+
+def test_names_become_no_markup_and_no_formula_of_a_spreadsheet() -> None:
+    bad = Trace("<b>=cmd()</b>", np.zeros(1), np.zeros(1), texts=("<a href='javascript:1'>",))
+    plot = Plot("=1+1", PlotAxis("<i>"), PlotAxis("y"), (bad,))
+    figure = plotly_figure(Chart("c", (plot,)))
+    assert not re.search(r"<(?!b>|/b>|extra>|/extra>)", str(figure))
+    assert "<b>=cmd" not in str(figure)
+    assert "'=1+1" in csv_text(Chart("c", (plot,)))
+
+
+def test_a_long_serial_is_cut_in_the_legend_only() -> None:
+    name = "S" * 64
+    figure = plotly_figure(
+        Chart("c", (Plot("", PlotAxis("x"), PlotAxis("y"), (Trace(name, np.zeros(1), np.zeros(1)),)),))
+    )
+    assert len(figure["data"][0]["name"]) < 32
+    assert figure["data"][0]["legendgroup"] == name
+
+
+def test_a_crowd_is_counted_and_loses_no_point(rng: np.random.Generator) -> None:
+    x, y = rng.normal(size=(2, 5000))
+    y[7] = np.nan
+    assert density(x, y).counts.sum() == 4999
+
+
+def test_mollweide_keeps_areas_and_places(rng: np.random.Generator) -> None:
+    """Points even on the sphere are even on the ellipse: the share of any part of its area (Snyder, USGS 1395, p. 249)."""
+    points = rng.normal(size=(200_000, 3))
+    x, y = project(points)
+    assert np.max((x / 2.0) ** 2 + y**2) <= 1.0 + 1e-9
+    inner = np.mean((x / 2.0) ** 2 + y**2 < 0.25)
+    assert inner == pytest.approx(0.25, abs=0.004)
+    assert np.mean((x > 0.0) & (y > 0.0)) == pytest.approx(0.25, abs=0.004)
+
+
+@pytest.mark.parametrize("latitude", [-90.0, -45.0, 0.0, 10.0, 30.0, 60.0, 85.0, 89.9, 90.0])
+def test_mollweide_solves_its_equation_at_every_latitude(latitude: float) -> None:
+    """sin θ with 2θ + sin 2θ = π sin φ (Snyder, USGS 1395, eqs. 31-1 to 31-3), here by bisection."""
+    low, high = -0.5 * np.pi, 0.5 * np.pi
+    for _ in range(80):
+        middle = 0.5 * (low + high)
+        short = 2.0 * middle + np.sin(2.0 * middle) < np.pi * np.sin(np.radians(latitude))
+        low, high = (middle, high) if short else (low, middle)
+    direction = np.array([[np.cos(np.radians(latitude)), 0.0, np.sin(np.radians(latitude))]])
+    assert project(direction)[1][0] == pytest.approx(np.sin(low), abs=1e-6)

@@ -1,0 +1,165 @@
+"""Work of the workbench: jobs that end, are shared and are told of after a crash; lots whose questions are answered once."""
+
+import json
+import os
+import time
+from pathlib import Path
+
+import pandas as pd
+import pytest
+
+from pipelines.jobs.model_files import read_model
+from pipelines.workbench.services import jobs as job_table
+from pipelines.workbench.services import lots, models, sources, uploads
+from pipelines.workbench.services.jobs import Jobs
+from pipelines.workbench.services.work import done_in_process
+from pipelines.workbench.settings import Settings
+from schemas.errors import TumblelineError, WrongUse
+
+
+@pytest.fixture
+def settings(tmp_path: Path) -> Settings:
+    return Settings(archive=str(tmp_path / "archive"), folder=tmp_path / "bench", token="t")
+
+
+def ended(table: Jobs, name: str) -> job_table.Job:
+    end = time.monotonic() + 60.0
+    while (job := table.get(name)).state not in job_table.ENDED:
+        assert time.monotonic() < end
+        time.sleep(0.02)
+    return job
+
+
+def test_two_that_want_the_same_share_a_job_and_a_failure_is_a_sentence(tmp_path: Path) -> None:
+    table = Jobs(tmp_path / "jobs.json", workers=1)
+    request = {"recipe": str(tmp_path / "none.toml"), "effects": [], "station": "", "archive": str(tmp_path)}
+    first, second = table.submit("plan", "a plan", request), table.submit("plan", "a plan", request)
+    assert first is second
+    job = ended(table, first.id)
+    assert job.state == "failed"
+    assert "none.toml" in job.problem
+    assert table.result("plan", request) is None
+    assert table.submit("plan", "a plan", request).id == first.id  # a failure can be tried again
+    table.close()
+
+
+def test_a_stopped_job_ends_its_process_and_the_next_one_runs(tmp_path: Path) -> None:
+    table = Jobs(tmp_path / "jobs.json", workers=1)
+    request = {"recipe": "production", "effects": [], "station": "", "archive": str(tmp_path)}
+    job = table.submit("plan", "a plan", request)
+    end = time.monotonic() + 60.0
+    while table.get(job.id).state == "waiting":
+        assert time.monotonic() < end
+        time.sleep(0.01)
+    assert table.stop(job.id).state == "stopped"
+    other = table.submit("plan", "another", {**request, "recipe": str(tmp_path / "none.toml")})
+    assert ended(table, other.id).state == "failed"
+    assert table.get(job.id).state == "stopped"
+    assert table.result("plan", request) is None
+    table.close()
+
+
+def test_what_a_dead_server_was_at_is_interrupted_and_never_running(tmp_path: Path) -> None:
+    place = tmp_path / "jobs.json"
+    running = {"id": "a", "kind": "plan", "title": "t", "state": "running"}
+    place.write_text(json.dumps({"jobs": [running, {**running, "id": "b", "state": "done"}]}))
+    table = Jobs(place, workers=1)
+    assert table.get("a").state == "interrupted"
+    assert table.get("b") is None
+    place.write_text("no json")
+    assert Jobs(place, workers=1).all() == []
+
+
+def test_a_defect_in_work_is_said_and_does_not_end_the_process(capsys: pytest.CaptureFixture[str]) -> None:
+    state, text = done_in_process("diagnose", {}, lambda *_: None)
+    assert state == "failed"
+    assert "defect" in text
+    assert "Traceback" in capsys.readouterr().err
+
+
+def lot_of(settings: Settings, **state: object) -> str:
+    place = settings.folder / "lots" / "abc"
+    place.mkdir(parents=True)
+    (place / "request.json").write_text(
+        json.dumps({"recipe": "r", "seats": [[0, "A1"], [3, "A2"]], "units": ["A1", "A2"]})
+    )
+    (place / "state.json").write_text(
+        json.dumps({"phase": "asks", "number": 2, "since": time.time(), "pid": os.getpid(), **state})
+    )
+    return "abc"
+
+
+def test_a_question_is_answered_once_and_by_its_number(settings: Settings) -> None:
+    name = lot_of(settings)
+    with pytest.raises(lots.Stale):
+        lots.answer(settings, name, 1, "go")
+    lots.answer(settings, name, 2, "go")
+    with pytest.raises(lots.Stale, match="elsewhere"):
+        lots.answer(settings, name, 2, "stop")
+    assert json.loads((settings.folder / "lots" / name / "answer-2.json").read_text()) == {"answer": "go"}
+    with pytest.raises(WrongUse):
+        lots.answer(settings, "../abc", 2, "go")
+
+
+def test_a_lot_whose_process_is_gone_is_interrupted(settings: Settings) -> None:
+    gone = os.fork()
+    if gone == 0:
+        os._exit(0)
+    os.waitpid(gone, 0)
+    name = lot_of(settings, pid=gone)
+    (found,) = lots.lots(settings)
+    assert found.id == name
+    assert found.phase == "interrupted"
+    assert found.ended
+    assert found.slots == ((0, "A1", ""), (3, "A2", ""))
+
+
+@pytest.mark.parametrize("units", [["A1", "A1"], ["<script>"], ["A" * 65]])
+def test_a_lot_with_a_serial_that_cannot_be_moves_nothing(settings: Settings, units: list[str]) -> None:
+    with pytest.raises(TumblelineError):
+        lots.start(settings, "production", units, list(range(len(units))), [], 0)
+    assert not (settings.folder / "lots").exists()
+
+
+def test_a_model_is_saved_version_by_version_with_its_formulas(settings: Settings) -> None:
+    start, formulas = ["bias", "scale"], ["humid = humidity_pct - 45"]
+    place, version = models.save(settings, "line-1", start, ["third_order", "humid"], formulas, "seen twice", "run-7")
+    assert version == 3
+    model = read_model(place)
+    assert model.model.effects == ["bias", "scale", "third_order", "humid"]
+    assert [change.why for change in model.change][1:] == ["seen twice", "seen twice"]
+    assert (
+        models.save(settings, "line-1", start, ["third_order", "humid", "second_order"], formulas, "more", "run-8")[1]
+        == 4
+    )
+    with pytest.raises(WrongUse, match="already"):
+        models.save(settings, "line-1", start, ["third_order"], [], "again", "run-8")
+    for name, why in (("../x", "a reason"), ("ok", "  "), ("", "a reason")):
+        with pytest.raises(WrongUse):
+            models.save(settings, name, start, ["third_order"], [], why, "")
+
+
+def test_only_files_of_the_folder_are_sources(settings: Settings, tmp_path: Path) -> None:
+    settings.folder.mkdir()
+    frame = pd.DataFrame({"unit": ["U"], "dwell": [0]})
+    for name in ("dwells.csv", "fresh.csv", "dwells-history.csv"):
+        frame.to_csv(settings.folder / name)
+    frame.to_csv(tmp_path / "other.csv")
+    (settings.folder / "link.csv").symlink_to(tmp_path / "other.csv")
+    assert [one.label for one in sources.sources(settings)] == ["dwells.csv", "fresh.csv"]
+    assert sources.twin(settings, str(settings.folder / "dwells.csv")) == str(settings.folder / "fresh.csv")
+    for name in (str(tmp_path / "other.csv"), str(settings.folder / "link.csv"), f"{settings.folder}/../other.csv"):
+        with pytest.raises(WrongUse):
+            sources.resolve(settings, name, "source")
+
+
+def test_an_uploaded_file_stays_in_its_folder_whatever_it_is_called(settings: Settings) -> None:
+    first = uploads.keep(settings, "../../etc/a<b>.csv", b"1")
+    assert Path(first).parent == settings.folder / "uploads"
+    assert uploads.keep(settings, "../../etc/a<b>.csv", b"1") == first
+    assert uploads.keep(settings, "a<b>.csv", b"2") != first
+    for name in ("a.exe", "", ".."):
+        with pytest.raises(WrongUse):
+            uploads.keep(settings, name, b"1")
+    with pytest.raises(WrongUse):
+        uploads.resolve(settings, "/etc/passwd")
