@@ -57,7 +57,9 @@ def agreed(question: str) -> bool:
             return True
         if answer in STOP:
             return False
-        message = f"'{answer}' is neither yes nor no: y or Enter measures it, n does not; Ctrl-C stops, the command continues"
+        message = (
+            f"'{answer}' is neither yes nor no: y or Enter measures it, n does not; Ctrl-C stops, the command continues"
+        )
         error_console().print(message, style="yellow", markup=False, soft_wrap=True)
 
 

@@ -1,4 +1,4 @@
-"""A lineage as W3C PROV-O (Recommendation of 30 April 2013) in JSON-LD; the context is inside, nothing is fetched."""
+"""A lineage as W3C PROV-O (Recommendation of 30 April 2013) in JSON-LD; the context is included, so that no network is needed."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ if TYPE_CHECKING:
     from pipelines.lineage.targets import Lineage
 
 BASE = "urn:x-tumbleline:"
-SETTINGS = {"run", "recipe", "limits", "station", "reference"}  # used, but nothing is derived from them
+SETTINGS = {"run", "recipe", "limits", "station", "reference"}  # used, but no result is derived from them
 LINKS = (
     "used", "wasGeneratedBy", "wasDerivedFrom", "wasRevisionOf", "wasAssociatedWith", "wasInvalidatedBy", "agent", "hadPlan",
     "wasAttributedTo",
@@ -38,7 +38,7 @@ def prov_of(found: Lineage) -> dict[str, Any]:
 
 
 def iri(kind: str, name: str) -> str:
-    """An identifier that every part of a document uses for the same thing."""
+    """The identifier of a node or agent, the same in every part of a document."""
     return f"{BASE}{kind}/{quote(name, safe='/:@._-~')}"
 
 
@@ -71,7 +71,7 @@ def _entity(node: Node, graph: Graph) -> dict[str, Any]:
 
 
 def _told(node: Node) -> dict[str, Any]:
-    """What is worth telling of a thing beyond its name, flat."""
+    """Properties of a node beside its name, without nesting."""
     keys = {
         "certificate": ("serial", "device", "from", "until", "state", "grade", "station"),
         "reference": ("what", "certificate", "laboratory", "due"),
@@ -107,7 +107,7 @@ def _activity(step: Activity, graph: Graph, agents: dict[str, dict[str, Any]]) -
 
 
 def _agents(step: Activity, agents: dict[str, dict[str, Any]]) -> list[str]:
-    """The person and the program that did a step."""
+    """The person and the program of a step."""
     found: list[str] = []
     if step.about.get("who"):
         name = iri("agent", _person(step))
