@@ -1,4 +1,4 @@
-"""The audit's index held against the runs that it was made from: every row derived anew."""
+"""Check of the index of the audit: every row is made again from the runs and compared."""
 
 from __future__ import annotations
 
@@ -25,9 +25,9 @@ REMEDY = "remove it, it is made again from the runs"
 
 
 def check_index(archive: Archive, checked: CheckedPart) -> None:
-    """What is wrong with the index of an archive.
+    """The findings about the index of an archive.
 
-    A part of another version is used by nobody and is passed over, as are runs that were written to since.
+    Parts of another version, which are never used, and runs that changed since are not checked.
     """
     stamps, version = stamps_of(archive.root), version_of_rows()
     for part in part_folders(archive.root / FOLDER):
@@ -48,7 +48,7 @@ def _check_rows(archive: Archive, part: Place, runs: list[tuple[str, str]], chec
         table = pq.read_table(pa.BufferReader(place.read_bytes()) if isinstance(place, ObjectPath) else str(place))
         found = table.filter(pc.field("run").isin(pa.array(chosen, pa.string())))
         if not _same(found, wanted[name], SCHEMAS[name]):
-            checked.wrong(CHANGED, place, f"tells other rows than the runs that it was made from: {REMEDY}")
+            checked.wrong(CHANGED, place, f"has other rows than the runs that it was made from: {REMEDY}")
 
 
 def _same(found: pa.Table, wanted: pa.Table, schema: pa.Schema) -> bool:

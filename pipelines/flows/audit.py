@@ -89,8 +89,10 @@ def _summary(audit_result: Audit, listed: list[AuditFinding], page: Path) -> str
     number = counts(audit_result)
     lines = [
         f"# Audit until {date_of(audit_result.scope.until - 1.0)}",
-        f"{number_of(number['calibrations'], 'calibration')} of {number_of(number['units'], 'unit')} "
-        f"in {number_of(number['runs'], 'run')}. Report: `{page.resolve()}`",
+        (
+            f"{number_of(number['calibrations'], 'calibration')} of {number_of(number['units'], 'unit')} "
+            f"in {number_of(number['runs'], 'run')}. Report: `{page.resolve()}`"
+        ),
     ]
     for who, role in WHO.items():
         own = [finding for finding in listed if finding.who == who]
