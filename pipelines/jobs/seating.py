@@ -1,4 +1,4 @@
-"""Which unit sits in which slot: a list, a slot map in a file, or a scan, slot by slot."""
+"""Seating of the units in the slots: a list, a slot map in a file, or a scan, slot by slot."""
 
 from __future__ import annotations
 
@@ -22,20 +22,20 @@ if TYPE_CHECKING:
 SCAN = "scan"
 COLUMNS = ["slot", "serial"]
 DIVIDERS = (",", ";", "\t")
-"""Of the cells of a slot map: Excel writes the second where the comma is the decimal sign."""
+"""Separators of the cells of a slot map; Excel writes the second where the comma is the decimal sign."""
 LONGEST_SLOT = 4
 
 
 @dataclass(frozen=True)
 class Seating:
-    """Serial numbers, and the slot of each where a slot map says; without, they sit slot by slot from 0."""
+    """Serial numbers, and the slot of each from a slot map; without one the units sit in the slots from 0 on."""
 
     units: tuple[str, ...] = ()
     slots: tuple[int, ...] = ()
 
 
 def read_seating(text: str) -> Seating:
-    """The seating in a slot map's file, or in a comma-separated list of serial numbers; empty where the text is."""
+    """The seating from a slot map file, or from a comma-separated list of serial numbers; empty for an empty text."""
     path = Path(text)
     if text and path.suffix.lower() in {".csv", ".toml"}:
         content = read_text(path, "slot map", "CSV or TOML")
@@ -45,13 +45,13 @@ def read_seating(text: str) -> Seating:
 
 
 def scan(slots: int, read: Callable[[int], str], refuse: Callable[[str], None]) -> Seating:
-    """The seating as scanned at the station, slot by slot; an empty line leaves a slot empty.
+    """The seating, scanned at the station slot by slot; an empty line leaves a slot empty.
 
     Parameters
     ----------
-    slots : how many there are.
-    read : gives the line for a slot.
-    refuse : is told what is wrong with a line, before the slot is asked for again.
+    slots : number of slots.
+    read : returns the line for a slot.
+    refuse : called with the fault of a line, before the slot is scanned again.
     """
     found: list[tuple[int, str]] = []
     for slot in range(slots):
@@ -63,16 +63,14 @@ def scan(slots: int, read: Callable[[int], str], refuse: Callable[[str], None]) 
             if not twice:
                 found.append((slot, serial))
                 break
-            refuse(
-                f"slot {slot}: {serial} was scanned for slot {twice[0]} already; scan the unit that sits in slot {slot}"
-            )
+            refuse(f"slot {slot}: {serial} was scanned for slot {twice[0]} already; scan the unit in slot {slot}")
     return Seating(tuple(serial for _, serial in found), tuple(slot for slot, _ in found))
 
 
 def disagreements(station: Station, lot: Lot) -> list[str]:
-    """What the slots say against the lot's slot map, one sentence per slot; empty where they agree.
+    """Differences between the slots and the lot's slot map, one sentence for each slot; empty where they agree.
 
-    A slot that does not answer says nothing against it: its unit is refused later, and the others go on.
+    A slot that does not answer is no difference: its unit is refused later, and the others continue.
     """
     from schemas.errors import StationError
 
@@ -88,7 +86,7 @@ def disagreements(station: Station, lot: Lot) -> list[str]:
 
 
 def _csv_rows(content: str, path: Path) -> list[tuple[str, str]]:
-    """Slot and serial number of every line but blank ones; cells are divided as in the first line."""
+    """Slot and serial number of every line that is not blank; cells are separated as in the first line."""
     where = f"slot map {path.name}"
     lines = content.splitlines()
     first = lines[0] if lines else ""
@@ -136,7 +134,7 @@ def _checked(rows: Sequence[tuple[str, str]], source: str) -> Seating:
         refuse_unusable_serials([serial.strip()], f"{source}: row {number}: slot {text}", "correct the row", WrongUse)
         if int(slot) in slots:
             raise WrongUse(
-                f"{source}: row {number}: slot {int(slot)} is there twice, it can hold one unit; correct the map"
+                f"{source}: row {number}: slot {int(slot)} is listed twice, it can have one unit; correct the map"
             )
         slots.append(int(slot))
     if not slots:
@@ -144,5 +142,5 @@ def _checked(rows: Sequence[tuple[str, str]], source: str) -> Seating:
     serials = tuple(serial.strip() for _, serial in rows)
     twice = next((serial for serial in serials if serials.count(serial) > 1), "")
     if twice:
-        raise WrongUse(f"{source}: serial {twice} is there twice, it can sit in one slot; correct the map")
+        raise WrongUse(f"{source}: serial {twice} is listed twice, a unit has one slot; correct the map")
     return Seating(serials, tuple(slots))

@@ -162,7 +162,7 @@ def test_a_paused_flow_run_is_answered_from_another_terminal(tmp_path: Path) -> 
     assert questions[0].startswith("load: seat the units as listed")
     assert "slot 1: A2" in questions[0]
     assert questions[1].startswith("unload")
-    assert "passed; take the units out" in questions[1]
+    assert "passed; remove the units" in questions[1]
     [info] = Archive(archive).runs()
     assert info.finished
 
