@@ -68,7 +68,7 @@ def test_results_are_shown_slot_by_slot_before_the_units_are_taken_out(tmp_path:
     assert results[1].startswith("A2  refused: ")
     assert all(results[slot].split("  ")[1].split(",")[0].split(":")[0] in {"pass", "fail"} for slot in (0, 2))
     passed = sum("  pass" in text for text in results.values())
-    assert unload.text.startswith(f"{passed} of 3 passed")
+    assert unload.text.startswith(f"{passed} of 3 units passed")
 
 
 def test_a_run_that_lost_its_lease_ends_though_somebody_is_beside_it(tmp_path: Path) -> None:
