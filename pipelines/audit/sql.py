@@ -117,7 +117,7 @@ def _kinds(sql: str) -> str:
 
 def _refuse(statement: str) -> NoReturn:
     raise WrongUse(
-        f"query: statement {statement}, one SELECT is needed (the archive is read only); give one query at a time"
+        f"query: found {statement}, one SELECT is needed (the archive is read only); give one query at a time"
     )
 
 

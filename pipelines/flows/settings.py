@@ -78,7 +78,7 @@ def use_key(variable: str) -> str:
     if len(key) < SHORTEST_KEY or ":" not in key:
         fault = "no key" if not key else f"a key of {len(key)} characters"
         raise WrongUse(
-            f"orchestrator: {fault} was fault, one of the form user:password with at least {SHORTEST_KEY} characters is needed; "
+            f"orchestrator: {fault} was found, one of the form user:password with at least {SHORTEST_KEY} characters is needed; "
             f"give it in {variable}, or name a file of mode 0600 with the key in {KEY_FILE}"
         )
     os.environ[variable] = key
