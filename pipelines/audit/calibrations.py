@@ -76,8 +76,8 @@ def codes(texts: NDArray[Any]) -> NDArray[np.int64]:
 
 def day_of(moment: str) -> float:
     """Days since 1970 of an ISO time; one without zone is UTC."""
-    found = datetime.fromisoformat(moment)
-    return (found if found.tzinfo else found.replace(tzinfo=UTC)).timestamp() / DAY_S
+    instant = datetime.fromisoformat(moment)
+    return (instant if instant.tzinfo else instant.replace(tzinfo=UTC)).timestamp() / DAY_S
 
 
 def date_of(day: float) -> str:
@@ -115,8 +115,8 @@ def undated(index: AuditIndex) -> list[tuple[str, str]]:
 def later(index: AuditIndex, day: float) -> list[tuple[str, float]]:
     """Runs with a date of measurement on a day or after it, with their days."""
     runs = index.table("runs", ["run", "measured"]).to_pydict()
-    found = ((run, _day_or_nan(moment)) for run, moment in zip(runs["run"], runs["measured"], strict=True) if moment)
-    return sorted((one for one in found if one[1] >= day), key=lambda one: (one[1], one[0]))
+    dated = ((run, _day_or_nan(moment)) for run, moment in zip(runs["run"], runs["measured"], strict=True) if moment)
+    return sorted((one for one in dated if one[1] >= day), key=lambda one: (one[1], one[0]))
 
 
 def _day_or_nan(moment: str) -> float:
@@ -142,7 +142,7 @@ def load(index: AuditIndex, runs: pd.DataFrame) -> Calibrations:
         frame["run"] = frame["run"].astype(str)
     frame = values.merge(runs, on="run").merge(units.astype({"unit": str}), on=["run", "unit"], how="left")
     frame = frame.sort_values(["unit", "device", "day", "run"], ignore_index=True, kind="stable")
-    found = Calibrations(
+    loaded = Calibrations(
         run=frame["run"].to_numpy(object),
         unit=frame["unit"].astype(str).to_numpy(object),
         device=frame["device"].astype(str).to_numpy(object),
@@ -153,18 +153,18 @@ def load(index: AuditIndex, runs: pd.DataFrame) -> Calibrations:
         values=frame[list(NAMES)].to_numpy(float),
         errors=frame[[f"{name}_error" for name in NAMES]].to_numpy(float),
     )
-    return _scale_in_ppm(found)
+    return _scale_in_ppm(loaded)
 
 
-def _scale_in_ppm(found: Calibrations) -> Calibrations:
+def _scale_in_ppm(loaded: Calibrations) -> Calibrations:
     """The scale factors as deviations from the median of their kind and axis, ppm."""
-    values, errors = np.array(found.values), np.array(found.errors)
+    values, errors = np.array(loaded.values), np.array(loaded.errors)
     for column in (k for k, name in enumerate(NAMES) if FAMILY_OF[name] == "scale"):
-        for device in np.unique(found.device.astype(str)):
-            own = found.device == device
+        for device in np.unique(loaded.device.astype(str)):
+            own = loaded.device == device
             finite = np.isfinite(values[own, column])
             if finite.any():
                 nominal = float(np.median(values[own, column][finite]))
                 values[own, column] = 1e6 * (values[own, column] / nominal - 1.0)
                 errors[own, column] = 1e6 * errors[own, column] / abs(nominal)
-    return replace(found, values=values, errors=errors)
+    return replace(loaded, values=values, errors=errors)

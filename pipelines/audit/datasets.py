@@ -52,9 +52,9 @@ def of_runs(names: Sequence[str]) -> ds.Dataset:
     from pyarrow.fs import LocalFileSystem
 
     with ThreadPoolExecutor(READERS) as pool:
-        found = list(pool.map(_schema, names))
+        file_schemas = list(pool.map(_schema, names))
     try:
-        columns = pa.unify_schemas(found, promote_options="permissive").remove_metadata()
+        columns = pa.unify_schemas(file_schemas, promote_options="permissive").remove_metadata()
     except (pa.ArrowInvalid, pa.ArrowTypeError) as problem:
         raise ArchiveUnusable(
             f"query: tables {Path(names[0]).name} of the runs do not fit together ({first_line(problem)}); see 'tumbleline "

@@ -33,17 +33,17 @@ def exchanged_pairs(all_: Calibrations, own: Index, before: Index, rules: Rules)
     """
     device = str(all_.device[own[0]]) if own.size else ""
     bound = np.array([rules.tolerance_of(device, FAMILY_OF[name]) for name in NAMES])
-    found, past = list[tuple[int, int, float]](), [int(own[place]) for place in before]
+    pairs, past = list[tuple[int, int, float]](), [int(own[place]) for place in before]
     for run in np.unique(all_.run[own[before >= 0]].astype(str)):
         here = np.flatnonzero((all_.run[own] == run) & (before >= 0))
         far = [int(k) for k in here if not _fits(all_, own[k], past[k], bound)]
-        found += [
+        pairs += [
             (k, other, _distance(all_, own[k], past[k], bound))
             for k in far
             for other in far
             if k != other and _fits(all_, own[k], past[other], bound) and _fits(all_, own[other], past[k], bound)
         ]
-    return found
+    return pairs
 
 
 def _fits(all_: Calibrations, row: int, past: int, bound: Array) -> bool:

@@ -53,9 +53,9 @@ def studies(all_: Calibrations, good: Flags, rules: Rules) -> list[Study]:
         for name in OWN:
             values = all_.column(name)[rows]
             if np.isfinite(values).all():
-                found = gauge_study(values)
-                share = 100.0 * SIX_SIGMA * found.gauge / (2.0 * rules.tolerance_of(device, FAMILY_OF[name]))
-                out.append(Study(device, name, stations, float(days.min()), float(days.max()), runs, found, share))
+                components = gauge_study(values)
+                share = 100.0 * SIX_SIGMA * components.gauge / (2.0 * rules.tolerance_of(device, FAMILY_OF[name]))
+                out.append(Study(device, name, stations, float(days.min()), float(days.max()), runs, components, share))
     return out
 
 

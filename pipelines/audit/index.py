@@ -99,7 +99,7 @@ class AuditIndex:
         chosen = list(columns) if columns is not None else SCHEMAS[name].names
         texts = [field.name for field in SCHEMAS[name] if pa.types.is_string(field.type) and field.name in chosen]
         try:
-            found = [
+            tables = [
                 pq.read_table(_opened(part / f"{name}.parquet"), columns=chosen, read_dictionary=texts)
                 for part in self.parts
             ]
@@ -108,9 +108,9 @@ class AuditIndex:
             raise ArchiveUnusable(
                 f"archive: index {where} cannot be read ({first_line(problem)}); remove {where}, it is made again automatically"
             ) from None
-        if not found:
+        if not tables:
             return pa.table({n: pa.array([], SCHEMAS[name].field(n).type) for n in chosen})
-        return pa.concat_tables(found).unify_dictionaries()
+        return pa.concat_tables(tables).unify_dictionaries()
 
     def files(self, name: str) -> list[str]:
         """The files of one table, for direct reading."""

@@ -76,8 +76,8 @@ class Rules(Strict):
 
     def tolerance_of(self, device: str, family: str) -> float:
         """The tolerance of a family of parameters of a kind of device; infinite without one."""
-        found = self._kind(device).tolerance.get(family) or self.tolerance.get(family)
-        return found.max if found is not None else float("inf")
+        entry = self._kind(device).tolerance.get(family) or self.tolerance.get(family)
+        return entry.max if entry is not None else float("inf")
 
     def is_standard(self, serial: str) -> bool:
         """Whether a unit is a check standard of the stations."""

@@ -75,7 +75,7 @@ class _Run(NamedTuple):
     tables: Mapping[str, pa.Table]
 
 
-def rows_of_runs(found: Iterable[RunFiles]) -> dict[str, pa.Table]:
+def rows_of_runs(run_files: Iterable[RunFiles]) -> dict[str, pa.Table]:
     """The rows of runs in every table of the index.
 
     An unreadable run (changed byte, foreign file, incomplete run) has no rows and its problem in ``runs``, so that one bad file
@@ -83,7 +83,7 @@ def rows_of_runs(found: Iterable[RunFiles]) -> dict[str, pa.Table]:
     """
     lines: list[tuple[str, ...]] = []
     runs: list[_Run] = []
-    for files in found:
+    for files in run_files:
         about: dict[str, Any] = {}
         problem = files.trouble
         try:
@@ -136,16 +136,16 @@ def _table(name: str, content: Mapping[str, bytes]) -> pa.Table:
     return _in_schema(table, wanted)
 
 
-def _in_schema(table: pa.Table, wanted: pa.Schema) -> pa.Table:
+def _in_schema(table: pa.Table, expected: pa.Schema) -> pa.Table:
     """The columns of a schema, in its order and types; missing columns are empty."""
-    found = [table.schema.field(name).type if name in table.column_names else None for name in wanted.names]
-    if found == wanted.types:
-        return table.select(wanted.names)
+    actual_types = [table.schema.field(name).type if name in table.column_names else None for name in expected.names]
+    if actual_types == expected.types:
+        return table.select(expected.names)
     columns = [
         pa.nulls(len(table), field.type) if type_ is None else table.column(field.name).cast(field.type)
-        for field, type_ in zip(wanted, found, strict=True)
+        for field, type_ in zip(expected, actual_types, strict=True)
     ]
-    return pa.table(columns, schema=wanted)
+    return pa.table(columns, schema=expected)
 
 
 def _line(files: RunFiles, about: Mapping[str, Any], problem: str) -> tuple[str, ...]:

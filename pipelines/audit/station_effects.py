@@ -64,8 +64,8 @@ def station_values(
 
 def followed() -> list[StationEffect]:
     """The effects of the station for the audit: without nonlinear parameters, more general ones first."""
-    found = [e for e in effects.catalogue().values() if isinstance(e, StationEffect) and not e.nonlinear]
-    return sorted(found, key=lambda effect: (-len(effect.names()), effect.simplicity, effect.id))
+    chosen = [e for e in effects.catalogue().values() if isinstance(e, StationEffect) and not e.nonlinear]
+    return sorted(chosen, key=lambda effect: (-len(effect.names()), effect.simplicity, effect.id))
 
 
 def _effect(name: str) -> object:

@@ -80,8 +80,8 @@ def event_of(content: Mapping[str, Any], where: str) -> LedgerEntry:
     known = {("start" if name == "from" else name): value for name, value in content.items()}
     missing = sorted(_NAMES - known.keys())
     if missing or known["action"] not in get_args(Action):
-        found = f"no {missing[0]}" if missing else f"action {known['action']!r}"
-        raise ArchiveUnusable(f"calibrations: {where} is no event of this ledger ({found}); restore it from a copy")
+        fault = f"no {missing[0]}" if missing else f"action {known['action']!r}"
+        raise ArchiveUnusable(f"calibrations: {where} is no event of this ledger ({fault}); restore it from a copy")
     known["ends"] = tuple(known["ends"])
     known["evidence"] = tuple(sorted(known["evidence"].items()))
     return LedgerEntry(**{name: known[name] for name in _NAMES})

@@ -114,9 +114,9 @@ def main() -> None:
                 f"'{shown(str(problem.filename))}': the file name is too long for this system; give a shorter one",
                 UNUSABLE,
             )
-        from pipelines.cli.unexpected import told
+        from pipelines.cli.unexpected import write_report
 
-        _leave(told(problem), UNEXPECTED)
+        _leave(write_report(problem), UNEXPECTED)
 
 
 def _leave(message: str, status: int) -> None:

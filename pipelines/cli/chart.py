@@ -83,11 +83,11 @@ def _drawn(
 
 def _joined(dots: Sequence[tuple[int, int]]) -> list[tuple[int, int]]:
     """The dots with straight lines between them."""
-    found = list(dots[:1])
+    joined = list(dots[:1])
     for (x, y), (u, v) in itertools.pairwise(dots):
         steps = max(abs(u - x), abs(v - y))
-        found += [(round(x + (u - x) * k / steps), round(y + (v - y) * k / steps)) for k in range(1, steps + 1)]
-    return found
+        joined += [(round(x + (u - x) * k / steps), round(y + (v - y) * k / steps)) for k in range(1, steps + 1)]
+    return joined
 
 
 def _round(low: float, high: float) -> tuple[float, float]:

@@ -80,8 +80,8 @@ def _reason(row: dict[str, Any]) -> str:
     """The reasons that only one of the runs gives."""
     before, after = (set(filter(None, text.split("; "))) for text in row["reasons"])
     gone, new = (sorted(one.split(":")[0] for one in part) for part in (before - after, after - before))
-    said = [f"now {name}" for name in new] + [f"no longer {name}" for name in gone if name not in new]
-    return "; ".join(said)
+    changes = [f"now {name}" for name in new] + [f"no longer {name}" for name in gone if name not in new]
+    return "; ".join(changes)
 
 
 def _print_changes(rows: list[dict[str, Any]], key: tuple[str, ...], what: str, most: int | None) -> None:

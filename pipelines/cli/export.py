@@ -54,12 +54,12 @@ def command(
     form = "json" if as_json else form
     if form not in FORMATS:
         raise WrongUse(f"export: no format is called '{form}'; {did_you_mean(form, FORMATS)}")
-    found = Archive(archive).run(run)
-    use_formulas_of(found)
+    source = Archive(archive).run(run)
+    use_formulas_of(source)
     serials = tuple(serial.strip() for serial in units.split(",")) if units else ()
-    chosen = unit_calibrations(found, serials, failed=failed, revoked=revoked)
-    text = export_text(form, chosen, found.id, nominal)
-    _tell_certificates(found, chosen, signature_remarks(found, [c.unit for c in chosen]))
+    chosen = unit_calibrations(source, serials, failed=failed, revoked=revoked)
+    text = export_text(form, chosen, source.id, nominal)
+    _tell_certificates(source, chosen, signature_remarks(source, [c.unit for c in chosen]))
     if output is None:
         typer.echo(text, nl=False)
         return

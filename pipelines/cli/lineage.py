@@ -45,18 +45,18 @@ def command(
 
     store = Archive(archive)
     store.refuse_none()
-    found = lineage(store, target)
+    traced = lineage(store, target)
     if prov is not None and str(prov) == "-":
-        print_json(prov_of(found))
+        print_json(prov_of(traced))
         return
     if prov is not None:
-        files.publish(prov, files.json_bytes(prov_of(found)), "lineage", "give another file with --prov")
-    copied = write_crate(store, found, crate) if crate is not None else 0
+        files.publish(prov, files.json_bytes(prov_of(traced)), "lineage", "give another file with --prov")
+    copied = write_crate(store, traced, crate) if crate is not None else 0
     if as_json:
-        print_json({**found.document(), "prov": str(prov) if prov else None, "crate": str(crate) if crate else None})
+        print_json({**traced.document(), "prov": str(prov) if prov else None, "crate": str(crate) if crate else None})
         return
     if prov is None and crate is None:
-        console().print(tree_of(found), soft_wrap=True)
+        console().print(tree_of(traced), soft_wrap=True)
     for what in ([f"PROV in {prov}"] if prov else []) + (
         [f"RO-Crate with {number_of(copied, 'file')} in {crate}"] if crate else []
     ):

@@ -76,7 +76,7 @@ def command(
     config = load_station(station)
     slots = config.devices.slots.count
     seating = scanned(slots) if units == SCAN else read_seating(units)
-    wanted = Request(
+    request_of_lot = Request(
         recipe=recipe,
         station=station,
         units=seating.units,
@@ -86,7 +86,7 @@ def command(
         faults=tuple(fault or ()),
     )
     asks = prompts if prompts is not None else attended() and not as_json
-    requests = wanted.fillings(slots) if asks else [wanted]
+    requests = request_of_lot.fillings(slots) if asks else [request_of_lot]
     asks = asks and (bool(prompts) or len(requests) > 1 or config.kind == "modbus")
     jobs = [request.job(Archive(archive)) for request in requests]
     runs = [

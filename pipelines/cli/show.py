@@ -58,11 +58,11 @@ def command(
         from pipelines.cli.validity import show_validity
 
         raise typer.Exit(DONE if show_validity(store, run, at, known, as_json=as_json) else PART_FAILED)
-    found = store.run(run)
+    shown_run = store.run(run)
     if table:
-        _show_table(found, table, as_json=as_json)
+        _show_table(shown_run, table, as_json=as_json)
     else:
-        _show_run(found, as_json=as_json)
+        _show_run(shown_run, as_json=as_json)
 
 
 def _is_unit(archive: Archive, name: str) -> bool:

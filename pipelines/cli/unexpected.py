@@ -19,7 +19,7 @@ KEPT = 20
 _SECRET = re.compile(r"//[^/@\s]+@")
 
 
-def told(problem: Exception) -> str:
+def write_report(problem: Exception) -> str:
     """Write the report; return one line with the kind of the exception and the place of the report."""
     place = _place(problem)
     what = f"unexpected {type(problem).__name__} in {place} ({reason(problem)})"

@@ -112,7 +112,7 @@ def _once(recipe: Recipe, chosen: Scene, seed: int, repeat: int, progress: Progr
 def _recipe(chosen: Scene) -> Recipe:
     rng = np.random.default_rng(20)
     angles = np.concatenate([rng.permutation(poses.plan(chosen.plan)) for _ in range(chosen.repeats)])
-    wanted: dict[str, Any] = {
+    changes: dict[str, Any] = {
         "name": f"demo-{chosen.kind.replace('_', '-')}",
         "description": "a small plan of the demonstration",
         "poses": [Pose(name=f"p{k + 1:03d}", outer_deg=o, inner_deg=i) for k, (o, i) in enumerate(angles.tolist())],
@@ -126,7 +126,7 @@ def _recipe(chosen: Scene) -> Recipe:
         "static_record_s": 0.0,
         "effects": list(chosen.model),
     }
-    return load_recipe().model_copy(update=wanted)
+    return load_recipe().model_copy(update=changes)
 
 
 def _station(chosen: Scene, seed: int) -> StationConfig:

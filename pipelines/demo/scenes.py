@@ -120,8 +120,8 @@ def scene(name: str, seed: int) -> Scene:
     if name == "random":
         able = [s for s in SCENES if s.kind not in HIDDEN_FROM_ONE_RUN]
         return able[int(np.random.default_rng([seed, 1293]).integers(len(able)))]
-    for found in SCENES:
-        if name in {found.kind, found.effect}:
-            return found
+    for candidate in SCENES:
+        if name in {candidate.kind, candidate.effect}:
+            return candidate
     known = {s.kind for s in SCENES} | {s.effect for s in SCENES}
     raise WrongUse(f"demo: no hidden effect is called '{name}'; {did_you_mean(name, [*known, 'random'])}")

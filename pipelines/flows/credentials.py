@@ -23,7 +23,7 @@ ADDRESS = re.compile(r"[A-Za-z][A-Za-z0-9+.-]*://[^\s\"'<>\\]+")
 
 def credentials_in(text: str) -> bool:
     """Whether an address in a text has credentials."""
-    return any(without_credentials(found) != found for found in ADDRESS.findall(text))
+    return any(without_credentials(candidate) != candidate for candidate in ADDRESS.findall(text))
 
 
 def without_credentials(address: str) -> str:

@@ -73,13 +73,13 @@ def _refuse_silent(address: str) -> None:
 
     try:
         with Client(address, timeout=CONNECT_S, set_as_default=False) as client:
-            found = len(client.scheduler_info()["workers"])
+            worker_count = len(client.scheduler_info()["workers"])
     except (OSError, TimeoutError, ValueError) as problem:
         raise LinkLost(
             f"--dask {address}: no Dask scheduler answers within {CONNECT_S} s ({type(problem).__name__}); start it with "
             "'dask scheduler', or correct the address"
         ) from None
-    if not found:
+    if not worker_count:
         raise LinkLost(
             f"--dask {address}: the scheduler has no worker, at least one is needed; start one with 'dask worker {address}'"
         )

@@ -64,10 +64,10 @@ def _of_block(name: str) -> str:
 
     try:
         block: Any = Secret  # load can be synchronous or not; its types name only the other kind
-        found = block.load(name, _sync=True)
+        secret = block.load(name, _sync=True)
     except ValueError:
         raise WrongUse(
             f"archive: the orchestrator has no Secret block '{name}', one with the archive's address is needed; save it on the "
             "server's page under Blocks"
         ) from None
-    return str(found.get())
+    return str(secret.get())

@@ -65,14 +65,14 @@ class Release:
         }
 
 
-def _matches(wanted: str, found: str) -> bool:
-    return not wanted or wanted.lower() == found.lower()
+def _matches(scope: str, name: str) -> bool:
+    return not scope or scope.lower() == name.lower()
 
 
-def model_digest(wanted: ModelChange) -> str:
+def model_digest(change: ModelChange) -> str:
     """Hash of the effects and formulas of a model, without its name."""
-    formulas = [formula.model_dump(mode="json") for formula in wanted.formulas]
-    return digest({"effects": sorted(wanted.effects or ()), "formulas": formulas})
+    formulas = [formula.model_dump(mode="json") for formula in change.formulas]
+    return digest({"effects": sorted(change.effects or ()), "formulas": formulas})
 
 
 def keep_evidence(archive: Archive, wanted: ModelChange, document: Mapping[str, Any], runs: list[str]) -> str:
@@ -90,15 +90,15 @@ def keep_evidence(archive: Archive, wanted: ModelChange, document: Mapping[str, 
 def evidence_for(archive: Archive, wanted: ModelChange, device: str, station: str) -> dict[str, Any] | None:
     """The newest what-if of a model with lots of this device and station; None without one."""
     model = model_digest(wanted)
-    found: list[dict[str, Any]] = []
+    matches: list[dict[str, Any]] = []
     for place in (archive.root / EVIDENCE).glob(f"{model[:10]}-*.json"):
         content = files.read_json(place)
         groups = content.get("groups", [])
         if content.get("model") == model and any(
             _matches(device, row["device"]) and _matches(station, row["station"]) for row in groups
         ):
-            found.append({**content, "name": place.stem})
-    return max(found, key=lambda one: str(one["when"]), default=None)
+            matches.append({**content, "name": place.stem})
+    return max(matches, key=lambda one: str(one["when"]), default=None)
 
 
 def release(

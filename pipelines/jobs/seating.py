@@ -53,18 +53,18 @@ def scan(slots: int, read: Callable[[int], str], refuse: Callable[[str], None]) 
     read : returns the line for a slot.
     refuse : called with the fault of a line, before the slot is scanned again.
     """
-    found: list[tuple[int, str]] = []
+    entries: list[tuple[int, str]] = []
     for slot in range(slots):
         while serial := read(slot).strip():
             if fault := serial_fault(serial):
                 refuse(f"slot {slot}: {fault}; scan it again, or clean the label")
                 continue
-            twice = [where for where, other in found if other == serial]
+            twice = [where for where, other in entries if other == serial]
             if not twice:
-                found.append((slot, serial))
+                entries.append((slot, serial))
                 break
             refuse(f"slot {slot}: {serial} was scanned for slot {twice[0]} already; scan the unit in slot {slot}")
-    return Seating(tuple(serial for _, serial in found), tuple(slot for slot, _ in found))
+    return Seating(tuple(serial for _, serial in entries), tuple(slot for slot, _ in entries))
 
 
 def disagreements(station: Station, lot: Lot) -> list[str]:
@@ -74,15 +74,15 @@ def disagreements(station: Station, lot: Lot) -> list[str]:
     """
     from schemas.errors import StationError
 
-    found: list[str] = []
+    entries: list[str] = []
     for unit in lot.units:
         try:
             serial = station.reader.slots[unit.slot].identity().serial
         except StationError:
             continue
         if serial != unit.serial:
-            found.append(f"slot {unit.slot}: '{serial}' sits there, '{unit.serial}' is needed")
-    return found
+            entries.append(f"slot {unit.slot}: '{serial}' sits there, '{unit.serial}' is needed")
+    return entries
 
 
 def _csv_rows(content: str, path: Path) -> list[tuple[str, str]]:
@@ -96,7 +96,7 @@ def _csv_rows(content: str, path: Path) -> list[tuple[str, str]]:
     head = [cell.strip().lower() for cell in rows[0]] if rows else []
     if head[:2] != COLUMNS:
         raise WrongUse(f"{where}: begins with '{shown(','.join(head))}', a first line 'slot,serial' is needed; add it")
-    found: list[tuple[str, str]] = []
+    entries: list[tuple[str, str]] = []
     for number, row in enumerate(rows[1:], start=1):
         if not any(cell.strip() for cell in row):
             continue
@@ -105,8 +105,8 @@ def _csv_rows(content: str, path: Path) -> list[tuple[str, str]]:
                 f"{where}: row {number}: {len(row)} cells ({shown(divider.join(row))}), the {len(head)} of the first line are "
                 "needed; correct the row"
             )
-        found.append((row[0], row[1]))
-    return found
+        entries.append((row[0], row[1]))
+    return entries
 
 
 def _toml_rows(content: str, path: Path) -> list[tuple[str, str]]:
@@ -116,8 +116,8 @@ def _toml_rows(content: str, path: Path) -> list[tuple[str, str]]:
         raise WrongUse(f'{where}: no table [slots], one with lines like 0 = "SN1" is needed; add it')
     for slot, serial in table.items():
         if not isinstance(serial, str):
-            found, written = f"slot {shown(slot)}: found {shown(serial)}", f'"{shown(serial)}"'
-            raise WrongUse(f"{where}: {found}, a serial number in quotes is needed; write {written}")
+            entries, written = f"slot {shown(slot)}: entries {shown(serial)}", f'"{shown(serial)}"'
+            raise WrongUse(f"{where}: {entries}, a serial number in quotes is needed; write {written}")
     return list(table.items())
 
 
@@ -134,7 +134,7 @@ def _checked(rows: Sequence[tuple[str, str]], source: str) -> Seating:
         refuse_unusable_serials([serial.strip()], f"{source}: row {number}: slot {text}", "correct the row", WrongUse)
         if int(slot) in slots:
             raise WrongUse(
-                f"{source}: row {number}: slot {int(slot)} is listed twice, it can have one unit; correct the map"
+                f"{source}: row {number}: slot {int(slot)} is there twice, it can hold one unit; correct the map"
             )
         slots.append(int(slot))
     if not slots:
@@ -142,5 +142,5 @@ def _checked(rows: Sequence[tuple[str, str]], source: str) -> Seating:
     serials = tuple(serial.strip() for _, serial in rows)
     twice = next((serial for serial in serials if serials.count(serial) > 1), "")
     if twice:
-        raise WrongUse(f"{source}: serial {twice} is listed twice, a unit has one slot; correct the map")
+        raise WrongUse(f"{source}: serial {twice} is there twice, it can sit in one slot; correct the map")
     return Seating(serials, tuple(slots))

@@ -28,9 +28,9 @@ CONTEXT: dict[str, Any] = {
 }
 
 
-def prov_of(found: Lineage) -> dict[str, Any]:
+def prov_of(traced: Lineage) -> dict[str, Any]:
     """The document: entities, activities and agents of a lineage."""
-    graph = found.graph
+    graph = traced.graph
     agents: dict[str, dict[str, Any]] = {}
     activities = [_activity(step, graph, agents) for step in graph.steps.values()]
     entities = [_entity(node, graph) for node in graph.nodes.values()]
@@ -54,7 +54,7 @@ def _entity(node: Node, graph: Graph) -> dict[str, Any]:
         entity["tl:sha256"] = node.sha256
     if node.file:
         entity["tl:file"] = node.file
-    entity |= {f"tl:{key}": str(value) for key, value in _told(node).items() if value not in {None, ""}}
+    entity |= {f"tl:{key}": str(value) for key, value in _properties(node).items() if value not in {None, ""}}
     if made:
         entity["wasGeneratedBy"] = [iri("step", step.id) for step in made]
         sources = [name for step in made for name in step.used]
@@ -70,7 +70,7 @@ def _entity(node: Node, graph: Graph) -> dict[str, Any]:
     return {key: value for key, value in entity.items() if value != []}
 
 
-def _told(node: Node) -> dict[str, Any]:
+def _properties(node: Node) -> dict[str, Any]:
     """Properties of a node beside its name, without nesting."""
     keys = {
         "certificate": ("serial", "device", "from", "until", "state", "grade", "station"),

@@ -24,13 +24,13 @@ ENCODINGS = {".parquet": "application/vnd.apache.parquet", ".json": "application
 SETTINGS = ("recipe", "limits", "station")
 
 
-def write_crate(archive: Archive, found: Lineage, folder: Path) -> int:
+def write_crate(archive: Archive, traced: Lineage, folder: Path) -> int:
     """Write a crate into a new folder; return the number of copied files."""
     if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
         raise WrongUse(
             f"lineage: {folder} exists and is not empty, a new or empty folder is needed for the crate; give another with --crate"
         )
-    contents = _contents(archive, found.graph)
+    contents = _contents(archive, traced.graph)
     for name in contents:
         if not is_below(name):  # readable manifests never name such a place
             raise ArchiveUnusable(
@@ -38,27 +38,27 @@ def write_crate(archive: Archive, found: Lineage, folder: Path) -> int:
             )
     for name, data in contents.items():
         files.publish(folder / name, data, "lineage", "give another folder with --crate")
-    document = json.dumps(crate_of(found, contents), indent=1, ensure_ascii=False, sort_keys=True) + "\n"
+    document = json.dumps(crate_of(traced, contents), indent=1, ensure_ascii=False, sort_keys=True) + "\n"
     files.publish(folder / METADATA, document.encode(), "lineage", "give another folder with --crate")
     return len(contents)
 
 
-def crate_of(found: Lineage, contents: dict[str, bytes]) -> dict[str, Any]:
+def crate_of(traced: Lineage, contents: dict[str, bytes]) -> dict[str, Any]:
     """The description of the crate.
 
     Parameters
     ----------
     contents : the other files of the crate, by name.
     """
-    graph = found.graph
+    graph = traced.graph
     described = {_id(node): node for node in graph.nodes.values()}
     parts = [_file(name, data, described) for name, data in sorted(contents.items())]
     actions = [_action(step, graph) for step in graph.steps.values()]
     people, programs = _agents(graph)
     published = max((str(step.about.get("when", "")) for step in graph.steps.values()), default="")[:10] or "1970-01-01"
     root = {
-        "@id": "./", "@type": "Dataset", "name": f"Lineage of {found.kind} {found.target}",
-        "description": f"From certificate to raw samples: all sources and all results of {found.kind} {found.target}.",
+        "@id": "./", "@type": "Dataset", "name": f"Lineage of {traced.kind} {traced.target}",
+        "description": f"From certificate to raw samples: all sources and all results of {traced.kind} {traced.target}.",
         "datePublished": published, "license": {"@id": "#license"}, "publisher": {"@id": "#owner"},
         "author": _one_or_all([{"@id": person["@id"]} for person in people]),
         "hasPart": _one_or_all([{"@id": one["@id"]} for one in parts]),
@@ -85,11 +85,11 @@ def _contents(archive: Archive, graph: Graph) -> dict[str, bytes]:
         if node.file.startswith("captures/"):
             capture, record = node.file.split("/")[1:3]
             names |= {f"captures/{capture}/{record}/record.json", f"captures/{capture}/complete.json"}
-    found = {name: (archive.root / name).read_bytes() for name in sorted(names) if (archive.root / name).is_file()}
+    traced = {name: (archive.root / name).read_bytes() for name in sorted(names) if (archive.root / name).is_file()}
     for node in graph.nodes.values():
         if node.kind in SETTINGS:
-            found[_place(node)] = files.json_bytes(node.about)
-    return found
+            traced[_place(node)] = files.json_bytes(node.about)
+    return traced
 
 
 def _file(name: str, data: bytes, described: dict[str, Node]) -> dict[str, Any]:

@@ -23,27 +23,27 @@ STYLES = {
 }
 
 
-def tree_of(found: Lineage) -> Tree:
+def tree_of(traced: Lineage) -> Tree:
     """The tree: origin of the target, and the results made from it."""
-    top = Tree(Text(f"{found.kind} {found.target}", style="bold"))
-    drawer = _Drawer(found.graph)
-    came = top.add(Text("made from", style="dim")) if found.kind != "unit" else top
-    for name in _ends(found):
+    top = Tree(Text(f"{traced.kind} {traced.target}", style="bold"))
+    drawer = _Drawer(traced.graph)
+    came = top.add(Text("made from", style="dim")) if traced.kind != "unit" else top
+    for name in _ends(traced):
         drawer.up(came, name)
-    results = sorted(name for name in found.graph.results(found.focus) if found.graph.nodes[name].kind in RESULTS)
+    results = sorted(name for name in traced.graph.results(traced.focus) if traced.graph.nodes[name].kind in RESULTS)
     if results:
         went = top.add(Text("used for", style="dim"))
         for name in results:
-            went.add(_thing(found.graph.nodes[name]))
+            went.add(_thing(traced.graph.nodes[name]))
     return top
 
 
-def _ends(found: Lineage) -> list[str]:
+def _ends(traced: Lineage) -> list[str]:
     """The nodes of the target, without those that other nodes of the target were made from: these appear below them."""
-    used = found.graph.used_by()
-    target = set(found.focus)
-    within = {n for n in found.focus for step in used.get(n, []) if target & set(step.made)}
-    return [name for name in found.focus if name not in within] or list(found.focus)
+    used = traced.graph.used_by()
+    target = set(traced.focus)
+    within = {n for n in traced.focus for step in used.get(n, []) if target & set(step.made)}
+    return [name for name in traced.focus if name not in within] or list(traced.focus)
 
 
 class _Drawer:

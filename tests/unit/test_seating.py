@@ -40,7 +40,7 @@ def test_a_slot_map_says_where_each_unit_sits(tmp_path: Path, name: str, text: s
         ("map.csv", "A1\nA2\n", "begins with 'a1', a first line 'slot,serial' is needed"),
         ("map.csv", "slot,serial\nx,A1\n", "row 1: slot 'x', a whole number"),
         ("map.csv", "slot,serial\n-1,A1\n", "row 1: slot '-1', a whole number"),
-        ("map.csv", "slot,serial\n1,A1\n1,A2\n", "row 2: slot 1 is listed twice"),
+        ("map.csv", "slot,serial\n1,A1\n1,A2\n", "row 2: slot 1 is there twice"),
         ("map.csv", "slot,serial\n1,\n", "slot 1 has no serial number"),
         ("map.csv", "slot,serial\n", "no slot has a unit"),
         ("map.toml", "seats = 1\n", r"no table \[slots\]"),
