@@ -47,7 +47,7 @@ def clean(
     for run in done.sealed:
         out.print(f"sealed   {run}", markup=False, soft_wrap=True)
     word = "found" if only_look else "removed"
-    out.print(f"{len(done.removed)} left by killed writers {word} ({number_of(done.bytes, 'byte')})")
+    out.print(f"{number_of(len(done.removed), 'leftover')} of killed writers {word} ({number_of(done.bytes, 'byte')})")
     if done.anchored:
         out.print(f"{number_of(done.anchored, 'calibration')} added to the chain")
 
@@ -92,4 +92,4 @@ def key(
     out.print(f"public   {hexadecimal}", markup=False, soft_wrap=True)
     out.print(f"private  {place}", markup=False, soft_wrap=True)
     if output is not None and not public:
-        out.print(f"sign with it by TUMBLELINE_SIGNING_KEY={place}", markup=False, soft_wrap=True)
+        out.print(f"to sign with this key, set TUMBLELINE_SIGNING_KEY={place}", markup=False, soft_wrap=True)
