@@ -1,1 +1,1 @@
-"""The audit: what drifts, what is due, which station moved, and how the population stands; from the archive alone."""
+"""The audit: drift, units that are due, stations that moved, and statistics of the population, from the archive alone."""

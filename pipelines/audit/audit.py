@@ -1,4 +1,4 @@
-"""The whole audit of an archive, from the index to the findings."""
+"""The audit of an archive, from the index to the results behind the findings."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ if TYPE_CHECKING:
 
     Flags = NDArray[np.bool_]
 
-LIMITED = {  # families whose value itself has a limit: figure, and the parameter's unit per unit of the figure
+LIMITED = {  # families with a limit of the value: figure, and units of the parameter per unit of the figure
     "bias": ("zero_g_offset_mg", 1e3),
     "bias_temperature": ("bias_temperature_ug_K", 1.0),
     "scale_temperature": ("scale_temperature_ppm_K", 1.0),
@@ -45,9 +45,9 @@ LIMITED = {  # families whose value itself has a limit: figure, and the paramete
 
 @dataclass(frozen=True)
 class Scope:
-    """What is looked at: days since 1970 (from ``since`` up to before ``until``), and a device or a station where named.
+    """The scope of an audit: days since 1970 (``since`` included, ``until`` excluded), and one device or station where given.
 
-    tomorrow : the day after the one on which the audit is made; infinite where nobody says which that is
+    tomorrow : the day after the audit; infinite where unknown
     """
 
     since: float
@@ -59,11 +59,11 @@ class Scope:
 
 @dataclass(frozen=True)
 class Audit:
-    """Everything that an audit found.
+    """The results of an audit.
 
-    good : calibrations that are of the unit their serial names; product : those of no check standard
-    period : those of the product that the scope chooses
-    problems : runs that cannot be used, and why; later : runs that say that they were measured after today
+    good : calibrations that belong to the unit of their serial; product : those that are not of a check standard
+    period : those of the product in the scope
+    problems : runs that cannot be used, with the reason; later : runs with a date of measurement after today
     """
 
     scope: Scope
@@ -91,83 +91,89 @@ class Audit:
 
 
 def audit(archive: Archive, rules: Rules, scope: Scope, *, spread: Spread | None = None, workers: int = 1) -> Audit:
-    """What an archive tells of its units, its stations and its population up to a day.
+    """Audit the units, stations and population of an archive up to a day.
 
-    Histories are looked at whole; ``since`` chooses which changes, signals and figures are told of.
+    Histories are analysed completely; ``since`` selects the changes, signals and figures that are reported.
 
     Parameters
     ----------
-    spread, workers : where the runs are read, see :func:`pipelines.parallel.map_partitions`
+    spread, workers : where runs are read, see :func:`pipelines.parallel.map_partitions`
     """
     index = up_to_date(archive, spread, workers)
     runs = runs_of(index, scope.until)
-    all_ = load(index, runs)
-    found = tuple(strangers(all_, rules))
-    good = np.ones(len(all_), dtype=bool)
-    good[[one.row for one in found]] = False
-    product = ~np.array([rules.is_standard(str(unit)) for unit in all_.unit], dtype=bool)
-    inside = product & _named(all_, scope)
-    period = inside & (all_.day >= scope.since)
-    figures = figures_of(index, all_, period)
+    calibrations = load(index, runs)
+    foreign = tuple(strangers(calibrations, rules))
+    good = np.ones(len(calibrations), dtype=bool)
+    good[[one.row for one in foreign]] = False
+    product = ~np.array([rules.is_standard(str(unit)) for unit in calibrations.unit], dtype=bool)
+    inside = product & _named(calibrations, scope)
+    period = inside & (calibrations.day >= scope.since)
+    figures = figures_of(index, calibrations, period)
     ledger = certificates_of(archive.root, scope.until, captures_of(index))
-    kinds = kind_drifts(all_, good & inside, rules, scope.since)
-    units = unit_drifts(all_, good & inside, kinds, rules, _limits(all_, figures))
+    kinds = kind_drifts(calibrations, good & inside, rules, scope.since)
+    units = unit_drifts(calibrations, good & inside, kinds, rules, _limits(calibrations, figures))
     station = index.table("station").to_pandas()
     station["run"] = station["run"].astype(str)
     if scope.station:
         runs = runs[runs["station"] == scope.station]
-    slots, means = slot_series(all_, good & product & _at(all_, scope))
-    able, different = abilities(all_, figures)
+    slots, means = slot_series(calibrations, good & product & _at(calibrations, scope))
+    able, different = abilities(calibrations, figures)
     return Audit(
         scope=scope,
         rules=rules,
-        all=all_,
+        all=calibrations,
         good=good,
         product=product,
         period=period,
         problems=(*_problems(index.table("runs", ["run", "problem"]).to_pydict()), *undated(index)),
         later=tuple(later(index, scope.tomorrow)),
-        strangers=tuple(one for one in found if all_.day[one.row] >= scope.since),
+        strangers=tuple(one for one in foreign if calibrations.day[one.row] >= scope.since),
         kinds=tuple(kinds),
         units=units,
         due=last_measured(
-            all_, due(all_, good & product & _of_device(all_, scope), rules, kinds, units, ledger), scope.station
+            calibrations,
+            due(calibrations, good & product & _of_device(calibrations, scope), rules, kinds, units, ledger),
+            scope.station,
         ),
         certificates=ledger,
         stations=tuple(station_series(station, runs)),
         slots=tuple(slots),
         slot_means=tuple(means),
-        charts=tuple(charts(all_.chosen(_at(all_, scope)), rules, scope.since)),
-        yields=tuple(yields(all_, period)),
+        charts=tuple(charts(calibrations.chosen(_at(calibrations, scope)), rules, scope.since)),
+        yields=tuple(yields(calibrations, period)),
         abilities=tuple(able),
         differences=tuple(different),
-        odd=tuple(odd_ones(all_, period)),
-        studies=tuple(study for study in studies(all_, good & inside, rules) if study.last_day >= scope.since),
+        odd=tuple(odd_ones(calibrations, period)),
+        studies=tuple(study for study in studies(calibrations, good & inside, rules) if study.last_day >= scope.since),
     )
 
 
-def _named(all_: Calibrations, scope: Scope) -> Flags:
-    return _of_device(all_, scope) & _at(all_, scope)
+def _named(calibrations: Calibrations, scope: Scope) -> Flags:
+    return _of_device(calibrations, scope) & _at(calibrations, scope)
 
 
-def _of_device(all_: Calibrations, scope: Scope) -> Flags:
-    return np.array([not scope.device or str(d) == scope.device.upper() for d in all_.device], dtype=bool)
+def _of_device(calibrations: Calibrations, scope: Scope) -> Flags:
+    return np.array([not scope.device or str(d) == scope.device.upper() for d in calibrations.device], dtype=bool)
 
 
-def _at(all_: Calibrations, scope: Scope) -> Flags:
-    return np.full(len(all_), fill_value=True) if not scope.station else np.asarray(all_.station == scope.station)
+def _at(calibrations: Calibrations, scope: Scope) -> Flags:
+    return (
+        np.full(len(calibrations), fill_value=True)
+        if not scope.station
+        else np.asarray(calibrations.station == scope.station)
+    )
 
 
 def _problems(columns: dict[str, list[str]]) -> tuple[tuple[str, str], ...]:
     return tuple((run, text) for run, text in zip(columns["run"], columns["problem"], strict=True) if text)
 
 
-def _limits(all_: Calibrations, figures: Figures) -> dict[tuple[str, str], float]:
-    """The product's limits by device and family, as the calibrations looked at were decided."""
+def _limits(calibrations: Calibrations, figures: Figures) -> dict[tuple[str, str], float]:
+    """Limits of the product by device and family, from the decisions on these calibrations."""
     out: dict[tuple[str, str], float] = {}
     for family, (figure, factor) in LIMITED.items():
         own = np.flatnonzero((figures.figure == figure) & np.isfinite(figures.limit))
-        devices = all_.device[figures.row[own]]
+        devices = calibrations.device[figures.row[own]]
         for device in np.unique(devices.astype(str)):
             out[str(device), family] = factor * float(np.median(figures.limit[own][devices == device]))
     return out

@@ -1,4 +1,4 @@
-"""All calibrations of an archive side by side: who, where, when, and the parameters."""
+"""All calibrations of an archive as arrays: unit, station, day and parameters."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     Flags = NDArray[np.bool_]
 
 DAY_S = 86400.0
-CLOCK_SET_D = 366.0  # a clock that was never set says 1970
+CLOCK_SET_D = 366.0  # a clock that was never set shows 1970
 
 
 @dataclass(frozen=True)
@@ -47,7 +47,7 @@ class Calibrations:
         return self.day.size
 
     def chosen(self, which: Flags | NDArray[np.int64]) -> Calibrations:
-        """Those that are chosen, in their order."""
+        """The chosen calibrations, in their order."""
         return Calibrations(*(getattr(self, name)[which] for name in self.__dataclass_fields__))
 
     def column(self, name: str) -> Array:
@@ -64,7 +64,7 @@ class Calibrations:
 
     @property
     def histories(self) -> NDArray[np.int64]:
-        """Number of the unit of every calibration, from 0; one serial on two kinds of device is two units."""
+        """Number of the unit of every calibration, from 0; the same serial on two kinds of device is two units."""
         pair = (self.unit[1:] != self.unit[:-1]) | (self.device[1:] != self.device[:-1])
         return np.concatenate([[0], np.cumsum(pair)]) if len(self) else np.zeros(0, dtype=np.int64)
 
@@ -76,8 +76,8 @@ def codes(texts: NDArray[Any]) -> NDArray[np.int64]:
 
 def day_of(moment: str) -> float:
     """Days since 1970 of an ISO time; one without zone is UTC."""
-    found = datetime.fromisoformat(moment)
-    return (found if found.tzinfo else found.replace(tzinfo=UTC)).timestamp() / DAY_S
+    instant = datetime.fromisoformat(moment)
+    return (instant if instant.tzinfo else instant.replace(tzinfo=UTC)).timestamp() / DAY_S
 
 
 def date_of(day: float) -> str:
@@ -88,7 +88,7 @@ def date_of(day: float) -> str:
 def runs_of(index: AuditIndex, until: float) -> pd.DataFrame:
     """Runs that were measured before ``until``, with their day, device and station; each capture once.
 
-    A capture counts as it was first worked on, not as it was run again.
+    Of each capture only the first run counts, not its re-runs.
     """
     runs = index.table("runs").to_pandas()
     runs = runs[(runs["rerun_of"].astype(str) == "") & (runs["measured"].astype(str) != "")].astype({"run": str})
@@ -100,12 +100,12 @@ def runs_of(index: AuditIndex, until: float) -> pd.DataFrame:
 
 
 def undated(index: AuditIndex) -> list[tuple[str, str]]:
-    """Runs whose date cannot be read, and what is wrong with each."""
+    """Runs whose date cannot be read, with the fault of each."""
     runs = index.table("runs", ["run", "measured"]).to_pydict()
     return [
         (
             run,
-            f"its date {moment!r} is none, or that of a clock that was never set; one such as 2026-05-01T09:30:00Z is needed",
+            f"its date {moment!r} is invalid, or from a clock that was never set; a date such as 2026-05-01T09:30:00Z is needed",
         )
         for run, moment in zip(runs["run"], runs["measured"], strict=True)
         if moment and np.isnan(_day_or_nan(moment))
@@ -113,14 +113,14 @@ def undated(index: AuditIndex) -> list[tuple[str, str]]:
 
 
 def later(index: AuditIndex, day: float) -> list[tuple[str, float]]:
-    """Runs that say that they were measured on a day or after it, with their days."""
+    """Runs with a date of measurement on a day or after it, with their days."""
     runs = index.table("runs", ["run", "measured"]).to_pydict()
-    found = ((run, _day_or_nan(moment)) for run, moment in zip(runs["run"], runs["measured"], strict=True) if moment)
-    return sorted((one for one in found if one[1] >= day), key=lambda one: (one[1], one[0]))
+    dated = ((run, _day_or_nan(moment)) for run, moment in zip(runs["run"], runs["measured"], strict=True) if moment)
+    return sorted((one for one in dated if one[1] >= day), key=lambda one: (one[1], one[0]))
 
 
 def _day_or_nan(moment: str) -> float:
-    """Days since 1970; NaN for what is no date, or that of a clock that was never set."""
+    """Days since 1970; NaN for an invalid date, or a date from a clock that was never set."""
     try:
         day = day_of(moment)
     except ValueError:
@@ -135,14 +135,14 @@ def captures_of(index: AuditIndex) -> dict[str, str]:
 
 
 def load(index: AuditIndex, runs: pd.DataFrame) -> Calibrations:
-    """The calibrations of chosen runs."""
+    """The calibrations of some runs."""
     units = index.table("units").to_pandas()
     values = index.table("parameters").to_pandas()
     for frame in (units, values):
         frame["run"] = frame["run"].astype(str)
     frame = values.merge(runs, on="run").merge(units.astype({"unit": str}), on=["run", "unit"], how="left")
     frame = frame.sort_values(["unit", "device", "day", "run"], ignore_index=True, kind="stable")
-    found = Calibrations(
+    loaded = Calibrations(
         run=frame["run"].to_numpy(object),
         unit=frame["unit"].astype(str).to_numpy(object),
         device=frame["device"].astype(str).to_numpy(object),
@@ -153,18 +153,18 @@ def load(index: AuditIndex, runs: pd.DataFrame) -> Calibrations:
         values=frame[list(NAMES)].to_numpy(float),
         errors=frame[[f"{name}_error" for name in NAMES]].to_numpy(float),
     )
-    return _scale_in_ppm(found)
+    return _scale_in_ppm(loaded)
 
 
-def _scale_in_ppm(found: Calibrations) -> Calibrations:
+def _scale_in_ppm(loaded: Calibrations) -> Calibrations:
     """The scale factors as deviations from the median of their kind and axis, ppm."""
-    values, errors = np.array(found.values), np.array(found.errors)
+    values, errors = np.array(loaded.values), np.array(loaded.errors)
     for column in (k for k, name in enumerate(NAMES) if FAMILY_OF[name] == "scale"):
-        for device in np.unique(found.device.astype(str)):
-            own = found.device == device
+        for device in np.unique(loaded.device.astype(str)):
+            own = loaded.device == device
             finite = np.isfinite(values[own, column])
             if finite.any():
                 nominal = float(np.median(values[own, column][finite]))
                 values[own, column] = 1e6 * (values[own, column] / nominal - 1.0)
                 errors[own, column] = 1e6 * errors[own, column] / abs(nominal)
-    return replace(found, values=values, errors=errors)
+    return replace(loaded, values=values, errors=errors)

@@ -1,4 +1,4 @@
-"""What the ledger says of the units on a day: which certificate holds, which was revoked, what was never certified."""
+"""State of the units in the ledger on a day: valid, revoked and missing certificates."""
 
 from __future__ import annotations
 
@@ -17,12 +17,12 @@ if TYPE_CHECKING:
 
 
 class CertificateState(NamedTuple):
-    """How a unit stands in the ledger on a day.
+    """The state of a unit in the ledger on a day.
 
-    certificate : the one that holds, else the one certified last, even if it ended; state : of it, on that day: ``valid``,
+    certificate : the valid one, else the last one, even if it ended; state : its state on that day: ``valid``,
         ``ended``, ``revoked`` or ``later`` (it begins later)
     until : day since 1970 with which it ends or ended
-    entered : whether what was measured last is certified, in whatever state
+    entered : whether the last measurement is certified, in any state
     """
 
     certificate: str
@@ -33,11 +33,11 @@ class CertificateState(NamedTuple):
 
 @dataclass(frozen=True)
 class Certificates:
-    """The ledger as it was known at the end of a day.
+    """The ledger at the end of a day.
 
-    of : calibrations by kind of device and serial, in the order in which they were certified
-    captures : of runs; a run again of a capture certifies the same measurement
-    problems : units of which the ledger cannot tell, by their folder
+    of : calibrations by kind of device and serial, in the order of certification
+    captures : of runs; a re-run of a capture certifies the same measurement
+    problems : units with a fault in the ledger, by their folder
     """
 
     day: str
@@ -50,11 +50,11 @@ class Certificates:
         return sum(len(own) for own in self.of.values())
 
     def standing(self, device: str, serial: str, run: str) -> CertificateState | None:
-        """How a unit stands; None where nothing of it was ever certified.
+        """The state of a unit; None for a unit that was never certified.
 
         Parameters
         ----------
-        run : in which the unit was measured last
+        run : the last run of the unit
         """
         known = self.of.get((device, serial), ())
         if not known:
@@ -80,21 +80,21 @@ def certificates_of(root: Place, until: float, captures: Mapping[str, str]) -> C
 
     Parameters
     ----------
-    until : end of the day up to which is known what was written
+    until : end of the last day whose events count
     captures : of runs, by their names
     """
     day = date_of(until - 1.0)
-    found = histories_of(root)
+    histories = histories_of(root)
     of: dict[tuple[str, str], list[Calibration]] = {}
-    for events in found.units:
+    for events in histories.units:
         known = calibrations_of(event for event in events if event.when[:10] <= day)
         for one in known:
             of.setdefault((one.event.device.upper(), one.serial), []).append(one)
-    return Certificates(day, of, captures, found.problems)
+    return Certificates(day, of, captures, histories.problems)
 
 
 def _end(revoked: Calibration) -> float:
-    """When a revoked calibration ended; one that was revoked from its first day, when that was written."""
+    """Day on which a revoked calibration ended; for one revoked from its first day the day of the revocation."""
     if revoked.until > revoked.start or revoked.ended_by is None:
         return day_of(revoked.until)
     return day_of(revoked.ended_by.when[:10])

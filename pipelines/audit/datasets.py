@@ -1,6 +1,6 @@
-"""Tables of many runs as one Arrow data set: read where they lie, by whoever scans them, and never written through.
+"""Tables of many runs as one read-only Arrow data set, read from their files when they are scanned.
 
-A query engine that is given these needs no access to any file, and so can be denied all of it.
+A query engine with these data sets needs no access to files, so that it can be denied.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ def of_index(names: Sequence[str], schema: pa.Schema) -> ds.Dataset:
 
     Parameters
     ----------
-    schema : of every one of them.
+    schema : of every file.
     """
     from pyarrow.fs import LocalFileSystem
 
@@ -47,14 +47,14 @@ def of_runs(names: Sequence[str]) -> ds.Dataset:
     Raises
     ------
     ArchiveUnusable
-        One of them is no Parquet file, or they have a column of different types.
+        A file is no Parquet file, or a column has different types.
     """
     from pyarrow.fs import LocalFileSystem
 
     with ThreadPoolExecutor(READERS) as pool:
-        found = list(pool.map(_schema, names))
+        file_schemas = list(pool.map(_schema, names))
     try:
-        columns = pa.unify_schemas(found, promote_options="permissive").remove_metadata()
+        columns = pa.unify_schemas(file_schemas, promote_options="permissive").remove_metadata()
     except (pa.ArrowInvalid, pa.ArrowTypeError) as problem:
         raise ArchiveUnusable(
             f"query: tables {Path(names[0]).name} of the runs do not fit together ({first_line(problem)}); see 'tumbleline "
@@ -70,7 +70,7 @@ def of_runs(names: Sequence[str]) -> ds.Dataset:
 
 
 def gathered(places: Iterable[Place]) -> pa.Table:
-    """Tables of an object store, read here, with the column ``run`` in front."""
+    """Tables of an object store, read into memory, with the column ``run`` in front."""
     parts: list[pa.Table] = []
     for place in places:
         table = pq.ParquetFile(pa.BufferReader(place.read_bytes())).read()
@@ -83,6 +83,6 @@ def _schema(name: str) -> pa.Schema:
         return pq.read_schema(name).remove_metadata()
     except (OSError, pa.ArrowInvalid) as problem:
         raise ArchiveUnusable(
-            f"query: {name} is not a whole Parquet file ({first_line(problem)}); restore it from a copy, see 'tumbleline "
+            f"query: {name} is not a complete Parquet file ({first_line(problem)}); restore it from a copy, see 'tumbleline "
             "verify'"
         ) from None

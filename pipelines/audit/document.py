@@ -18,12 +18,12 @@ if TYPE_CHECKING:
     from pipelines.audit.drifts import UnitDrift
     from pipelines.audit.stations_over_time import Chart, StationSeries
 
-MOST_UNITS = 200  # histories in the document; every one is in a finding or can be asked for by its serial
+MOST_UNITS = 200  # histories in the document; ``tumbleline query`` gives the others by their serial
 SCHEMA = 1
 
 
-def document(audit: Audit, found: list[AuditFinding], archive: str) -> dict[str, Any]:
-    """Everything that the audit found, findings first; dates are ISO and UTC."""
+def document(audit: Audit, listed: list[AuditFinding], archive: str) -> dict[str, Any]:
+    """The results of the audit, findings first; dates are ISO and UTC."""
     return {
         "schema": SCHEMA,
         "archive": archive,
@@ -32,7 +32,7 @@ def document(audit: Audit, found: list[AuditFinding], archive: str) -> dict[str,
         "device": audit.scope.device,
         "station": audit.scope.station,
         "counts": counts(audit),
-        "findings": [{**asdict(finding), "whose": WHO[finding.who]} for finding in found],
+        "findings": [{**asdict(finding), "whose": WHO[finding.who]} for finding in listed],
         "due": _due(audit),
         "drift": {"kinds": _kinds(audit), "units": [_unit(d) for d in furthest(audit, MOST_UNITS)]},
         "stations": [_series(series) for series in (*audit.stations, *audit.slots)],
@@ -50,7 +50,7 @@ def document(audit: Audit, found: list[AuditFinding], archive: str) -> dict[str,
 
 
 def counts(audit: Audit) -> dict[str, int]:
-    """How much was looked at."""
+    """Numbers of audited runs, units and calibrations."""
     own = audit.all
     return {
         "calibrations": len(own),

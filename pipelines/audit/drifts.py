@@ -1,4 +1,4 @@
-"""Drift since the last calibration: per kind of device and parameter, per unit, and when a unit leaves its tolerance."""
+"""Drift since the last calibration: per kind of device and parameter, per unit, and the date when a unit leaves its tolerance."""
 
 from __future__ import annotations
 
@@ -39,8 +39,8 @@ MONTH_D = YEAR_D / 12.0
 OWN = tuple(name for name in NAMES if FAMILIES[FAMILY_OF[name]].own)
 FEWEST_PAIRS = 8
 PAIRS_A_DOF = 6.0
-"""Pairs for each degree of freedom of the mounting's variance: three variances are taken apart from the same pairs. By
-simulation of units that stand still, 20 units of three calibrations whose stated uncertainty is a fifth of their scatter: |E_n|
+"""Pairs for each degree of freedom of the mounting's variance: three variances are estimated from the same pairs. By
+simulation of units without drift, 20 units of three calibrations whose stated uncertainty is a fifth of their scatter: |E_n|
 > 1 in 4.4 % (8.3 % with a coverage factor of 2)."""
 AHEAD = np.arange(0.0, 10.0 + 1e-9, 1.0 / 24.0)  # years, in steps of half a month
 
@@ -56,12 +56,12 @@ class Pairs:
 
 @dataclass(frozen=True)
 class KindDrift:
-    """How one parameter of one kind of device drifts, and how the last changes compare with the uncertainty of both.
+    """Drift of one parameter of one kind of device, and the last changes relative to the uncertainty of both values.
 
-    ahead : what forecasts take for it, see :func:`~inertial.population.drift.prudent`
-    beyond : share of the pairs with |E_n| > 1; out : share that moved further than the tolerance; median : of |change|
-    reliable_months : for how long a unit of the kind stays in all its tolerances with the target's probability; NaN without one
-    known : whether any pair lies far enough apart to tell a drift; where none does, nothing is forecast
+    ahead : the drift for forecasts, see :func:`~inertial.population.drift.prudent`
+    beyond : share of the pairs with |E_n| > 1; out : share with a change above the tolerance; median : of |change|
+    reliable_months : time in which a unit of the kind stays in all tolerances with the target's probability; NaN without one
+    known : whether any pair is long enough apart to identify a drift; without one there is no forecast
     """
 
     device: str
@@ -78,13 +78,13 @@ class KindDrift:
 
 @dataclass(frozen=True)
 class UnitDrift:
-    """One parameter of one unit, where it came from and where it goes; days since 1970, changes in the parameter's unit.
+    """History and forecast of one parameter of one unit; days since 1970, changes in the parameter's unit.
 
-    leaves, soonest, latest : day when it is expected to leave its tolerance and the 95 % interval of it; infinite for never
-    limit, limit_day : the product's limit of the value itself, and day (expected, soonest, latest) when it leaves that
-    reliable_day : until when the unit stays in tolerance with the target's probability, in all its parameters together
-    odd : distance of its slope from its kind's, in σ; calibrations : that this rests on
-    slope, odd : NaN for a unit whose calibrations lie within 30 days: no drift is stated of it
+    leaves, soonest, latest : expected day of leaving the tolerance and its 95 % interval; infinite for never
+    limit, limit_day : the product's limit of the value, and day (expected, soonest, latest) of leaving it
+    reliable_day : last day on which all parameters of the unit together stay in tolerance with the target's probability
+    odd : distance of its slope from its kind's, in σ; calibrations : number of them
+    slope, odd : NaN for a unit whose calibrations lie within 30 days, for which no drift is stated
     """
 
     unit: str
@@ -107,28 +107,28 @@ class UnitDrift:
     calibrations: int
 
 
-def pairs_of(all_: Calibrations, good: Flags) -> Pairs:
-    """Every good calibration with the good one before it of the same unit."""
+def pairs_of(calibrations: Calibrations, good: Flags) -> Pairs:
+    """Every good calibration with the previous good one of the same unit."""
     rows = np.flatnonzero(good)
-    same = all_.histories[rows[1:]] == all_.histories[rows[:-1]]
+    same = calibrations.histories[rows[1:]] == calibrations.histories[rows[:-1]]
     later, earlier = rows[1:][same], rows[:-1][same]
-    return Pairs(later, earlier, (all_.day[later] - all_.day[earlier]) / YEAR_D)
+    return Pairs(later, earlier, (calibrations.day[later] - calibrations.day[earlier]) / YEAR_D)
 
 
-def kind_drifts(all_: Calibrations, good: Flags, rules: Rules, since: float) -> list[KindDrift]:
-    """How every parameter of every kind drifts, from all pairs; the shares are of those that end in the period."""
-    pairs, out = pairs_of(all_, good), list[KindDrift]()
-    spans = _spans(all_, pairs)
-    for device in np.unique(all_.device.astype(str)):
-        of_kind = all_.device[pairs.later] == device
+def kind_drifts(calibrations: Calibrations, good: Flags, rules: Rules, since: float) -> list[KindDrift]:
+    """Drift of every parameter of every kind, from all pairs; the shares are of the pairs that end in the period."""
+    pairs, out = pairs_of(calibrations, good), list[KindDrift]()
+    spans = _spans(calibrations, pairs)
+    for device in np.unique(calibrations.device.astype(str)):
+        of_kind = calibrations.device[pairs.later] == device
         if of_kind.sum() < FEWEST_PAIRS:
             continue
         own: list[KindDrift] = []
         for name in OWN:
-            change, known = _changes(all_, pairs, name)
-            longer, longer_known = _changes(all_, spans, name)
+            change, known = _changes(calibrations, pairs, name)
+            longer, longer_known = _changes(calibrations, spans, name)
             kept = of_kind & np.isfinite(change + known)
-            whole = (all_.device[spans.later] == device) & np.isfinite(longer + longer_known)
+            whole = (calibrations.device[spans.later] == device) & np.isfinite(longer + longer_known)
             if kept.sum() < FEWEST_PAIRS:
                 continue
             both = (
@@ -138,22 +138,26 @@ def kind_drifts(all_: Calibrations, good: Flags, rules: Rules, since: float) -> 
             )
             together = tuple(np.concatenate(parts) for parts in both)
             kind = kind_of(*together)
-            recent = kept & (all_.day[pairs.later] >= since)
-            found = _kind_drift(all_, pairs, recent, device, name, (kind, prudent(kind, *together)), rules)
-            own.append(replace(found, known=drifts_known(together[1])))
+            recent = kept & (calibrations.day[pairs.later] >= since)
+            drift_of_kind = _kind_drift(
+                calibrations, pairs, recent, device, name, (kind, prudent(kind, *together)), rules
+            )
+            own.append(replace(drift_of_kind, known=drifts_known(together[1])))
         forecast_known = all(one.known for one in own)
-        months = float("nan") if not forecast_known else _reliable_months(all_, pairs, own, rules.reliability_target)
+        months = (
+            float("nan") if not forecast_known else _reliable_months(calibrations, pairs, own, rules.reliability_target)
+        )
         out += [replace(one, reliable_months=months if np.isfinite(one.tolerance) else float("nan")) for one in own]
     return out
 
 
-def _reliable_months(all_: Calibrations, pairs: Pairs, kinds: list[KindDrift], target: float) -> float:
-    """For how long a new unit stays in all tolerances of its kind with the target's probability, months."""
+def _reliable_months(calibrations: Calibrations, pairs: Pairs, kinds: list[KindDrift], target: float) -> float:
+    """Time in which a new unit stays in all tolerances of its kind with the target's probability, months."""
     probability = np.ones((1, AHEAD.size))
     for one in kinds:
         if np.isfinite(one.tolerance):
-            of_kind = all_.device[pairs.later] == one.device
-            sigma = float(np.nanmedian(all_.error(one.parameter)[pairs.later[of_kind]]))
+            of_kind = calibrations.device[pairs.later] == one.device
+            sigma = float(np.nanmedian(calibrations.error(one.parameter)[pairs.later[of_kind]]))
             start, fresh = np.array([0.0]), np.array([sigma**2 + one.ahead.mount_sd**2])
             slope, spread = np.array([one.ahead.mean_slope]), np.array([one.ahead.slope_sd**2])
             new = LatestState(start, slope, fresh, start, spread, start, start)
@@ -162,7 +166,7 @@ def _reliable_months(all_: Calibrations, pairs: Pairs, kinds: list[KindDrift], t
 
 
 def _kind_drift(
-    all_: Calibrations,
+    calibrations: Calibrations,
     pairs: Pairs,
     recent: Flags,
     device: str,
@@ -172,8 +176,8 @@ def _kind_drift(
 ) -> KindDrift:
     tolerance = rules.tolerance_of(device, FAMILY_OF[name])
     kind, ahead = kinds
-    change, _ = _changes(all_, pairs, name)
-    numbers, moved = _e_n(all_, pairs, name, kind)[recent], np.abs(change[recent])
+    change, _ = _changes(calibrations, pairs, name)
+    numbers, moved = _e_n(calibrations, pairs, name, kind)[recent], np.abs(change[recent])
     numbers, moved = numbers[np.isfinite(numbers)], moved[np.isfinite(moved)]
     return KindDrift(
         device=device,
@@ -189,7 +193,11 @@ def _kind_drift(
 
 
 def unit_drifts(
-    all_: Calibrations, good: Flags, kinds: list[KindDrift], rules: Rules, limits: Mapping[tuple[str, str], float]
+    calibrations: Calibrations,
+    good: Flags,
+    kinds: list[KindDrift],
+    rules: Rules,
+    limits: Mapping[tuple[str, str], float],
 ) -> dict[str, list[UnitDrift]]:
     """Every parameter of every unit with two calibrations or more: its last change, and its forecast; by device and unit.
 
@@ -197,33 +205,42 @@ def unit_drifts(
     ----------
     limits : of the product, by device and family, in the parameter's unit
     """
-    pairs = pairs_of(all_, good)
-    last = _last_of_each(all_.histories[pairs.later])
+    pairs = pairs_of(calibrations, good)
+    last = _last_of_each(calibrations.histories[pairs.later])
     final = Pairs(pairs.later[last], pairs.earlier[last], pairs.years[last])
     out: dict[str, list[UnitDrift]] = {}
-    for device in dict.fromkeys(found.device for found in kinds):
-        own = np.flatnonzero(all_.device[final.later] == device)
+    for device in dict.fromkeys(drift_of_kind.device for drift_of_kind in kinds):
+        own = np.flatnonzero(calibrations.device[final.later] == device)
         rows = Pairs(final.later[own], final.earlier[own], final.years[own])
-        # of all parameters together, as if each moved by itself
+        # of all parameters together, assumed independent
         probability = np.ones((own.size, AHEAD.size), dtype=np.float32)
         courses = [
-            _course(all_, good, rows, found, limits.get((device, FAMILY_OF[found.parameter]), np.inf), probability)
-            for found in kinds
-            if found.device == device
+            _course(
+                calibrations,
+                good,
+                rows,
+                drift_of_kind,
+                limits.get((device, FAMILY_OF[drift_of_kind.parameter]), np.inf),
+                probability,
+            )
+            for drift_of_kind in kinds
+            if drift_of_kind.device == device
         ]
-        bounded = any(np.isfinite(course.found.tolerance) for course in courses) and all(c.found.known for c in courses)
+        bounded = any(np.isfinite(course.drift_of_kind.tolerance) for course in courses) and all(
+            c.drift_of_kind.known for c in courses
+        )
         years = last_reliable(probability, rules.reliability_target, AHEAD) if bounded else np.inf
-        until = all_.day[rows.later] + YEAR_D * years
+        until = calibrations.day[rows.later] + YEAR_D * years
         for course in courses:
-            for drift in _unit_drifts(all_, rows, course, until):
+            for drift in _unit_drifts(calibrations, rows, course, until):
                 out.setdefault(f"{drift.device} {drift.unit}", []).append(drift)
     return out
 
 
 class _Course(NamedTuple):
-    """Where the units of a kind stand in one parameter, (units,), and when they leave its tolerance and its limit."""
+    """Present state of the units of a kind in one parameter, (units,), and the days when they leave tolerance and limit."""
 
-    found: KindDrift
+    drift_of_kind: KindDrift
     now: LatestState
     counts: Index
     times: tuple[Array, Array, Array]
@@ -232,42 +249,44 @@ class _Course(NamedTuple):
 
 
 def _course(
-    all_: Calibrations,
+    calibrations: Calibrations,
     good: Flags,
     rows: Pairs,
-    found: KindDrift,
+    drift_of_kind: KindDrift,
     limit: float,
     probability: NDArray[np.float32],
 ) -> _Course:
-    """The course of the last calibrations given; ``probability`` (units, times) is multiplied by that of being in tolerance."""
-    padded = _padded(all_, good, rows, found.parameter)
-    now, counts = standing(*padded, found.ahead), np.isfinite(padded[0]).sum(axis=1)
-    mean, deviation = forecast(now, found.ahead, AHEAD, origin=now.last)
-    day = all_.day[rows.later]
-    if np.isfinite(found.tolerance):
+    """The course after the last calibrations; ``probability`` (units, times) is multiplied by that of being in tolerance."""
+    padded = _padded(calibrations, good, rows, drift_of_kind.parameter)
+    now, counts = standing(*padded, drift_of_kind.ahead), np.isfinite(padded[0]).sum(axis=1)
+    mean, deviation = forecast(now, drift_of_kind.ahead, AHEAD, origin=now.last)
+    day = calibrations.day[rows.later]
+    if np.isfinite(drift_of_kind.tolerance):
         known = np.isfinite(now.last)
-        probability[known] *= in_tolerance(mean[known], deviation[known], found.tolerance).astype(np.float32)
-    bounds = (found.tolerance, limit) if found.known else (np.inf, np.inf)
+        probability[known] *= in_tolerance(mean[known], deviation[known], drift_of_kind.tolerance).astype(np.float32)
+    bounds = (drift_of_kind.tolerance, limit) if drift_of_kind.known else (np.inf, np.inf)
     times = _leaving(mean, deviation, bounds[0], day)
-    return _Course(found, now, counts, times, limit, _leaving(mean + now.last[:, None], deviation, bounds[1], day))
+    return _Course(
+        drift_of_kind, now, counts, times, limit, _leaving(mean + now.last[:, None], deviation, bounds[1], day)
+    )
 
 
-def _unit_drifts(all_: Calibrations, rows: Pairs, course: _Course, until: Array) -> list[UnitDrift]:
-    found, now, times, beyond = course.found, course.now, course.times, course.beyond
-    change, _ = _changes(all_, rows, found.parameter)
-    numbers = _e_n(all_, rows, found.parameter, found.kind)
+def _unit_drifts(calibrations: Calibrations, rows: Pairs, course: _Course, until: Array) -> list[UnitDrift]:
+    drift_of_kind, now, times, beyond = course.drift_of_kind, course.now, course.times, course.beyond
+    change, _ = _changes(calibrations, rows, drift_of_kind.parameter)
+    numbers = _e_n(calibrations, rows, drift_of_kind.parameter, drift_of_kind.kind)
     return [
         UnitDrift(
-            unit=str(all_.unit[row]),
-            device=found.device,
-            parameter=found.parameter,
-            day=float(all_.day[row]),
-            run=str(all_.run[row]),
+            unit=str(calibrations.unit[row]),
+            device=drift_of_kind.device,
+            parameter=drift_of_kind.parameter,
+            day=float(calibrations.day[row]),
+            run=str(calibrations.run[row]),
             change=float(change[k]),
             years=float(rows.years[k]),
             e_n=float(numbers[k]),
             slope=float(now.slope[k]) if np.isfinite(now.odd[k]) else float("nan"),
-            tolerance=found.tolerance,
+            tolerance=drift_of_kind.tolerance,
             leaves=float(times[0][k]),
             soonest=float(times[1][k]),
             latest=float(times[2][k]),
@@ -291,30 +310,30 @@ def _leaving(mean: Array, deviation: Array, bound: float, day: Array) -> tuple[A
     return day + YEAR_D * expected, day + YEAR_D * soonest, day + YEAR_D * latest
 
 
-def _changes(all_: Calibrations, pairs: Pairs, name: str) -> tuple[Array, Array]:
+def _changes(calibrations: Calibrations, pairs: Pairs, name: str) -> tuple[Array, Array]:
     """Change of a parameter over every pair, and the sum of both variances."""
-    value, error = all_.column(name), all_.error(name)
+    value, error = calibrations.column(name), calibrations.error(name)
     return value[pairs.later] - value[pairs.earlier], error[pairs.later] ** 2 + error[pairs.earlier] ** 2
 
 
-def _e_n(all_: Calibrations, pairs: Pairs, name: str, kind: DeviceDrift) -> Array:
-    """E_n of every pair; what mounting adds belongs to the uncertainty of both, and is known from the kind's pairs alone."""
-    value = all_.column(name)
-    error = np.hypot(all_.error(name), kind.mount_sd)
+def _e_n(calibrations: Calibrations, pairs: Pairs, name: str, kind: DeviceDrift) -> Array:
+    """E_n of every pair; the mounting's variance is part of both uncertainties and is known only from the pairs of the kind."""
+    value = calibrations.column(name)
+    error = np.hypot(calibrations.error(name), kind.mount_sd)
     total = error[pairs.later] ** 2 + error[pairs.earlier] ** 2
     share = np.maximum(2.0 * kind.mount_sd**2 / total, 1e-6)
     dof = max(kind.pairs / PAIRS_A_DOF, 1.0) / share**2  # Welch and Satterthwaite (JCGM 100, G.4.1)
     return e_n(value[pairs.later], value[pairs.earlier], error[pairs.later], error[pairs.earlier], dof)
 
 
-def _spans(all_: Calibrations, pairs: Pairs) -> Pairs:
-    """The last calibration of every unit with its first, where others lie between: the long times tell slope from walk."""
-    unit = all_.histories[pairs.later]
+def _spans(calibrations: Calibrations, pairs: Pairs) -> Pairs:
+    """The last calibration of every unit with its first, where others lie between: long times separate slope from random walk."""
+    unit = calibrations.histories[pairs.later]
     last = _last_of_each(unit)
     first = np.concatenate([[0], last[:-1] + 1]) if last.size else last
     longer = last > first
     later, earlier = pairs.later[last[longer]], pairs.earlier[first[longer]]
-    return Pairs(later, earlier, (all_.day[later] - all_.day[earlier]) / YEAR_D)
+    return Pairs(later, earlier, (calibrations.day[later] - calibrations.day[earlier]) / YEAR_D)
 
 
 def _last_of_each(numbers: Index) -> Index:
@@ -324,21 +343,21 @@ def _last_of_each(numbers: Index) -> Index:
     return np.flatnonzero(np.concatenate([numbers[1:] != numbers[:-1], [True]]))
 
 
-def _padded(all_: Calibrations, good: Flags, rows: Pairs, name: str) -> tuple[Array, Array, Array]:
-    """Values, errors and years of the units whose last calibrations are given, (units, most), filled up with NaN."""
-    units = all_.histories[rows.later]
-    place = np.full(int(all_.histories.max()) + 1, -1)
+def _padded(calibrations: Calibrations, good: Flags, rows: Pairs, name: str) -> tuple[Array, Array, Array]:
+    """Values, errors and years of the units of these last calibrations, (units, most), filled with NaN."""
+    units = calibrations.histories[rows.later]
+    place = np.full(int(calibrations.histories.max()) + 1, -1)
     place[units] = np.arange(units.size)
-    value, error = all_.column(name), all_.error(name)
-    use = np.flatnonzero(good & (place[all_.histories] >= 0) & np.isfinite(value + error))
-    unit = place[all_.histories[use]]
+    value, error = calibrations.column(name), calibrations.error(name)
+    use = np.flatnonzero(good & (place[calibrations.histories] >= 0) & np.isfinite(value + error))
+    unit = place[calibrations.histories[use]]
     starts = (
         np.flatnonzero(np.concatenate([[True], unit[1:] != unit[:-1]])) if use.size else np.zeros(0, dtype=np.int64)
     )
     order = np.arange(use.size) - np.repeat(starts, np.diff(np.append(starts, use.size)))
     shape = (units.size, int(order.max()) + 1 if use.size else 1)
     filled: list[Array] = []
-    for content in (value, error, all_.day / YEAR_D):
+    for content in (value, error, calibrations.day / YEAR_D):
         target = np.full(shape, np.nan)
         target[unit, order] = content[use]
         filled.append(target)

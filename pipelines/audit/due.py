@@ -1,4 +1,4 @@
-"""Which units are to be calibrated again, and when."""
+"""Units that are due for re-calibration, and when."""
 
 from __future__ import annotations
 
@@ -25,13 +25,13 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Due:
-    """The last calibrations of the units, in order of unit: row among the calibrations, day when each is due, and why then.
+    """The last calibrations of the units, in order of unit: row among the calibrations, day when each is due, and the reason.
 
-    months : the interval that the rules give
+    months : the interval of the rules
     because : ``fixed`` or ``drift`` (the interval after the last pass), ``certificate`` (it ends, or has ended), ``revoked``, or
         ``did not pass``
-    certificate : the one that holds on the day of the audit, else the one certified last; empty where there is none
-    valid : whether one holds; entered : whether what was measured last is certified, in whatever state
+    certificate : the one valid on the day of the audit, else the last one; empty without one
+    valid : whether a certificate is valid; entered : whether the last measurement is certified, in any state
     """
 
     row: NDArray[np.int64]
@@ -44,29 +44,33 @@ class Due:
 
 
 def due(
-    all_: Calibrations,
+    calibrations: Calibrations,
     good: Flags,
     rules: Rules,
     kinds: list[KindDrift],
     units: Mapping[str, list[UnitDrift]],
     certificates: Certificates | None = None,
 ) -> Due:
-    """When every unit is due: when its certificate ends, or did; at once where it was revoked or the unit did not pass.
+    """Day when every unit is due: the end of its certificate; at once where it was revoked or the unit did not pass.
 
-    Without a certificate for its last measurement a unit is due a fixed interval of its kind after that. Where drift decides
-    it is due when its drift uses its reliability up (by the unit's own forecast where it has a history, else by its kind's,
-    inside the rules' bounds), unless its certificate ends before.
+    Without a certificate for its last measurement a unit is due after the fixed interval of its kind. With the rule ``drift``
+    it is due when its probability of being in tolerance falls to the target (by the forecast of the unit if it has a history,
+    else of its kind, inside the bounds of the rules), unless its certificate ends before.
     """
     rows = np.flatnonzero(good)
-    last = rows[np.concatenate([all_.histories[rows[1:]] != all_.histories[rows[:-1]], [True]])] if rows.size else rows
-    fixed = {device: float(rules.months(device)) for device in np.unique(all_.device.astype(str))}
-    months = np.array([fixed[str(device)] for device in all_.device[last]])
+    last = (
+        rows[np.concatenate([calibrations.histories[rows[1:]] != calibrations.histories[rows[:-1]], [True]])]
+        if rows.size
+        else rows
+    )
+    fixed = {device: float(rules.months(device)) for device in np.unique(calibrations.device.astype(str))}
+    months = np.array([fixed[str(device)] for device in calibrations.device[last]])
     because = np.full(last.size, "fixed", dtype=object)
     if rules.interval == "drift":
-        months, because = _by_drift(all_, last, months, rules, kinds, units)
-    found = Due(
+        months, because = _by_drift(calibrations, last, months, rules, kinds, units)
+    due_units = Due(
         last,
-        _months_after(all_.day[last], months),
+        _months_after(calibrations.day[last], months),
         months,
         because,
         np.full(last.size, "", dtype=object),
@@ -74,44 +78,52 @@ def due(
         np.zeros(last.size, dtype=bool),
     )
     if certificates is not None:
-        _by_certificate(all_, found, certificates)
-    # imported results have no decision: they count
-    failed = (all_.outcome[last] != "pass") & (all_.outcome[last] != "")
-    found.day[failed], found.because[failed] = all_.day[last][failed], "did not pass"
-    return found
+        _by_certificate(calibrations, due_units, certificates)
+    # imported results have no decision; they count
+    failed = (calibrations.outcome[last] != "pass") & (calibrations.outcome[last] != "")
+    due_units.day[failed], due_units.because[failed] = calibrations.day[last][failed], "did not pass"
+    return due_units
 
 
-def last_measured(all_: Calibrations, found: Due, station: str) -> Due:
-    """The units that a station measured last; all where none is named. What others measured before counts for their history."""
+def last_measured(calibrations: Calibrations, due_units: Due, station: str) -> Due:
+    """The units whose last measurement was on a station; all without a station. Earlier measurements count as history."""
     if not station:
-        return found
-    own = all_.station[found.row] == station
-    return Due(*(getattr(found, name)[own] for name in Due.__dataclass_fields__))
+        return due_units
+    own = calibrations.station[due_units.row] == station
+    return Due(*(getattr(due_units, name)[own] for name in Due.__dataclass_fields__))
 
 
-def uncertified(all_: Calibrations, found: Due, certificates: Certificates) -> NDArray[np.int64]:
-    """Units that passed last and were not certified for it, as places among those that are due; none without a ledger."""
+def uncertified(calibrations: Calibrations, due_units: Due, certificates: Certificates) -> NDArray[np.int64]:
+    """Units that passed last without a certificate for it, as indices into ``due``; none without a ledger."""
     if not len(certificates):
         return np.zeros(0, dtype=np.int64)
-    return np.flatnonzero((all_.outcome[found.row] == "pass") & ~found.entered)
+    return np.flatnonzero((calibrations.outcome[due_units.row] == "pass") & ~due_units.entered)
 
 
-def _by_certificate(all_: Calibrations, found: Due, certificates: Certificates) -> None:
-    """Put what the ledger says of every unit in the place of the interval."""
-    for k, row in enumerate(found.row):
-        one = certificates.standing(str(all_.device[row]), str(all_.unit[row]), str(all_.run[row]))
+def _by_certificate(calibrations: Calibrations, due_units: Due, certificates: Certificates) -> None:
+    """Replace the interval of every unit by the state of its certificate."""
+    for k, row in enumerate(due_units.row):
+        one = certificates.standing(
+            str(calibrations.device[row]), str(calibrations.unit[row]), str(calibrations.run[row])
+        )
         if one is None:
             continue
-        found.certificate[k], found.valid[k], found.entered[k] = one.certificate, one.state == "valid", one.entered
-        if one.state != "valid" and not one.entered:  # measured again after it ended: the interval counts from that
+        due_units.certificate[k], due_units.valid[k], due_units.entered[k] = (
+            one.certificate,
+            one.state == "valid",
+            one.entered,
+        )
+        if (
+            one.state != "valid" and not one.entered
+        ):  # measured again after its end: the interval counts from the measurement
             continue
-        if found.because[k] == "drift" and one.state != "revoked" and found.day[k] < one.until:
+        if due_units.because[k] == "drift" and one.state != "revoked" and due_units.day[k] < one.until:
             continue
-        found.day[k], found.because[k] = one.until, "revoked" if one.state == "revoked" else "certificate"
+        due_units.day[k], due_units.because[k] = one.until, "revoked" if one.state == "revoked" else "certificate"
 
 
 def _by_drift(
-    all_: Calibrations,
+    calibrations: Calibrations,
     last: NDArray[np.int64],
     fixed: Array,
     rules: Rules,
@@ -124,17 +136,17 @@ def _by_drift(
             of_kind[kind.device] = min(of_kind.get(kind.device, np.inf), kind.reliable_months)
     months, because = fixed.copy(), np.full(last.size, "fixed", dtype=object)
     for k, row in enumerate(last):
-        device = str(all_.device[row])
-        own = [(d.reliable_day - d.day) / MONTH_D for d in units.get(f"{device} {all_.unit[row]}", ())]
-        found = min(own) if own else of_kind.get(device, np.nan)
-        if np.isfinite(found):
-            months[k] = np.clip(np.floor(found), rules.shortest_months, rules.longest_months)
+        device = str(calibrations.device[row])
+        own = [(d.reliable_day - d.day) / MONTH_D for d in units.get(f"{device} {calibrations.unit[row]}", ())]
+        due_units = min(own) if own else of_kind.get(device, np.nan)
+        if np.isfinite(due_units):
+            months[k] = np.clip(np.floor(due_units), rules.shortest_months, rules.longest_months)
             because[k] = "drift"
     return months, because
 
 
 def _months_after(day: Array, months: Array) -> Array:
-    """The same day of the month so many months later, or the last of a month that has no such day; days since 1970."""
+    """The same day of the month some months later, or the last day of a shorter month; days since 1970."""
     date = np.floor(day).astype("datetime64[D]")
     month = date.astype("datetime64[M]")
     of_month = (date - month.astype("datetime64[D]")).astype(int)

@@ -1,4 +1,4 @@
-"""Findings about what is due: units to call in, certificates that do not agree with what was measured."""
+"""Findings about due units: units to recall, and certificates that contradict the measurements."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ import numpy as np
 from pipelines.audit.calibrations import date_of
 from pipelines.audit.due import uncertified
 from pipelines.audit.finding import AuditFinding, some
+from schemas.counts import number_of
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -19,7 +20,7 @@ if TYPE_CHECKING:
 
     Numbers = NDArray[np.int64]
 
-REASONS = {  # why units are overdue, as a sentence tells it
+REASONS = {  # reasons in a sentence about overdue units
     "certificate": "their certificate has ended",
     "fixed": "their interval is over",
     "drift": "they drift",
@@ -29,25 +30,25 @@ REASONS = {  # why units are overdue, as a sentence tells it
 
 
 def of_certificates(audit: Audit) -> Iterator[AuditFinding]:
-    """Where the ledger and the measurements say different things."""
+    """Contradictions between the ledger and the measurements."""
     yield from _held_but_failed(audit)
     yield from _uncertified(audit)
 
 
 def of_what_is_due(audit: Audit) -> Iterator[AuditFinding]:
-    """What is overdue, then what comes due."""
+    """Overdue units, then units that come due."""
     yield from _overdue(audit)
     yield from _coming_due(audit)
 
 
 def _held_but_failed(audit: Audit) -> Iterator[AuditFinding]:
-    """Units that did not pass when they were measured last, and have a certificate that holds; by kind of device."""
+    """Units that failed their last measurement and have a valid certificate, by kind of device."""
     own = audit.due
     for device, chosen in _by_device(audit, np.flatnonzero(own.valid & (own.because == "did not pass"))):
         units, certificates = _units(audit, chosen), tuple(str(one) for one in own.certificate[chosen])
         message = (
-            f"{device}: {len(units)} units did not pass when they were measured last, their certificates hold all the same; "
-            "revoke each from the day on which its unit is no longer to be relied on, and measure it again "
+            f"{device}: {number_of(len(units), 'unit')} with a valid certificate did not pass the last measurement; "
+            "revoke each certificate from the first doubtful day, and measure the unit again "
             f"({some(certificates)})"
         )
         runs = [str(run) for run in audit.all.run[own.row[chosen]]]
@@ -56,14 +57,14 @@ def _held_but_failed(audit: Audit) -> Iterator[AuditFinding]:
 
 
 def _uncertified(audit: Audit) -> Iterator[AuditFinding]:
-    """Units that passed and were not certified for it, by kind of device; none in an archive without a ledger."""
-    found = uncertified(audit.all, audit.due, audit.certificates)
-    for device, own in _by_device(audit, found):
+    """Units that passed without a certificate for it, by kind of device; none in an archive without a ledger."""
+    without_certificate = uncertified(audit.all, audit.due, audit.certificates)
+    for device, own in _by_device(audit, without_certificate):
         units = _units(audit, own)
         without = int(np.count_nonzero(~audit.due.valid[own]))
         message = (
-            f"{device}: {len(units)} units passed when they were measured last and were not certified for it, {without} of them "
-            f"have no certificate that holds; certify their runs, or note why not ({some(units)})"
+            f"{device}: {number_of(len(units), 'unit')} passed the last measurement without a certificate for it, {without} "
+            f"without any valid certificate; certify their runs, or record the reason ({some(units)})"
         )
         runs = sorted({str(run) for run in audit.all.run[audit.due.row[own]]})
         yield AuditFinding("quality", "uncertified", device, message, units, {"without": without, "runs": runs})
@@ -74,7 +75,10 @@ def _overdue(audit: Audit) -> Iterator[AuditFinding]:
         units, oldest = _units(audit, own), date_of(float(audit.due.day[own].min()))
         counts = {why: int(np.count_nonzero(audit.due.because[own] == why)) for why in REASONS}
         because = ", ".join(f"{count} because {REASONS[why]}" for why, count in counts.items() if count)
-        message = f"{device}: {len(units)} units are overdue ({because}), the first since {oldest}; call them in ({some(units)})"
+        message = (
+            f"{device}: {number_of(len(units), 'unit')} overdue ({because}), the first since {oldest}; "
+            f"recall and calibrate ({some(units)})"
+        )
         evidence = {"oldest": oldest, "because": {why: count for why, count in counts.items() if count}}
         yield AuditFinding("line", "overdue", device, message, units, evidence)
 
@@ -85,13 +89,14 @@ def _coming_due(audit: Audit) -> Iterator[AuditFinding]:
     for device, own in _by_device(audit, soon):
         units = _units(audit, own)
         message = (
-            f"{device}: {len(units)} units come due within {audit.rules.notice_days} days; plan them ({some(units)})"
+            f"{device}: {number_of(len(units), 'unit')} due within {audit.rules.notice_days} days; "
+            f"schedule the calibration ({some(units)})"
         )
         yield AuditFinding("line", "due", device, message, units)
 
 
 def _by_device(audit: Audit, chosen: Numbers) -> Iterator[tuple[str, Numbers]]:
-    """Places among the units that are due, by kind of device."""
+    """Indices into the due units, by kind of device."""
     devices = audit.all.device[audit.due.row[chosen]].astype(str)
     for device in np.unique(devices):
         yield str(device), chosen[devices == device]

@@ -1,4 +1,4 @@
-"""Exchanged serials where there are too few calibrations of a kind to know how it usually changes: told by the tolerances."""
+"""Exchanged serials among few calibrations of a kind, whose usual change is unknown: detected by the tolerances."""
 
 from __future__ import annotations
 
@@ -21,29 +21,29 @@ COVERAGE = 2.0
 
 
 def exchanged_pairs(all_: Calibrations, own: Index, before: Index, rules: Rules) -> list[tuple[int, int, float]]:
-    """Two calibrations of one run that each fit the other unit's past and not their own: both ways, with their distance.
+    """Pairs of calibrations of one run that fit each other's history and not their own; both directions, with the distance.
 
-    A calibration fits a past where every parameter with a tolerance stays in it, or outside by no more than the uncertainty of
-    both. The distance is from its own past, in tolerances (rms).
+    A calibration fits a history where every parameter with a tolerance stays in it, or outside by at most the uncertainty of
+    both. The distance is to its own history, in tolerances (rms).
 
     Parameters
     ----------
     own : rows of one kind of device
-    before : (m,), of each the place among them of the unit's calibration before; −1 where there is none
+    before : (m,), index among them of the unit's previous calibration; −1 without one
     """
     device = str(all_.device[own[0]]) if own.size else ""
     bound = np.array([rules.tolerance_of(device, FAMILY_OF[name]) for name in NAMES])
-    found, past = list[tuple[int, int, float]](), [int(own[place]) for place in before]
+    pairs, past = list[tuple[int, int, float]](), [int(own[place]) for place in before]
     for run in np.unique(all_.run[own[before >= 0]].astype(str)):
         here = np.flatnonzero((all_.run[own] == run) & (before >= 0))
         far = [int(k) for k in here if not _fits(all_, own[k], past[k], bound)]
-        found += [
+        pairs += [
             (k, other, _distance(all_, own[k], past[k], bound))
             for k in far
             for other in far
             if k != other and _fits(all_, own[k], past[other], bound) and _fits(all_, own[other], past[k], bound)
         ]
-    return found
+    return pairs
 
 
 def _fits(all_: Calibrations, row: int, past: int, bound: Array) -> bool:
@@ -51,7 +51,7 @@ def _fits(all_: Calibrations, row: int, past: int, bound: Array) -> bool:
     expanded = COVERAGE * np.hypot(all_.errors[row], all_.errors[past])
     told = np.isfinite(change) & np.isfinite(
         bound
-    )  # what a model has not is NaN, and says nothing; nothing at all fits nothing
+    )  # parameters outside the model are NaN and are ignored; without any parameter nothing fits
     return bool(told.any() and np.all(change[told] <= (bound + expanded)[told]))
 
 

@@ -1,4 +1,4 @@
-"""A finding: one thing that somebody must do something about."""
+"""A finding: one fact that needs an action."""
 
 from __future__ import annotations
 
@@ -9,22 +9,22 @@ import numpy as np
 
 from pipelines.audit.calibrations import date_of
 
-WHO = {  # in the order in which they are told
+WHO = {  # in the order of the report
     "quality": "quality: certificates and units outside",
-    "station": "whoever keeps the stations",
-    "line": "the line: units to measure",
-    "product": "engineering of the product",
-    "archive": "whoever keeps the archive",
+    "station": "stations: maintenance",
+    "line": "line: units to measure",
+    "product": "product engineering",
+    "archive": "archive: administration",
 }
-MORE = 20  # units named in a sentence's list
+MORE = 20  # units listed in a sentence
 
 
 @dataclass(frozen=True)
 class AuditFinding:
-    """One thing to do.
+    """One finding with its action.
 
-    who : a key of :data:`WHO`; kind : of the finding, for machines; subject : what it is about
-    units : serials concerned; evidence : the numbers behind it
+    who : a key of :data:`WHO`; kind : of the finding, for programs; subject : unit, station, device or run
+    units : serials concerned; evidence : its numbers
     """
 
     who: str
@@ -36,11 +36,11 @@ class AuditFinding:
 
 
 def date_or_never(day: float) -> str:
-    """A date; ``never`` for what does not happen."""
+    """A date; ``never`` for infinity."""
     return date_of(day) if np.isfinite(day) else "never"
 
 
 def some(units: tuple[str, ...]) -> str:
-    """The first of many units, for a sentence."""
+    """The first units of a list, for a sentence."""
     named = ", ".join(units[:MORE])
     return f"{named}, …" if len(units) > MORE else named

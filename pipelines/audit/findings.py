@@ -1,4 +1,4 @@
-"""Findings: what somebody must do something about, sorted by who that is."""
+"""All findings, sorted by who must act."""
 
 from __future__ import annotations
 
@@ -16,8 +16,8 @@ if TYPE_CHECKING:
 
 
 def findings(audit: Audit) -> list[AuditFinding]:
-    """All findings: those of quality first, within one person's the weightiest kind first."""
-    found = [
+    """All findings: quality first; for each role the most serious kind first."""
+    collected = [
         *of_units(audit),
         *of_certificates(audit),
         *of_stations(audit),
@@ -28,7 +28,7 @@ def findings(audit: Audit) -> list[AuditFinding]:
         *(_broken(folder, text) for folder, text in audit.certificates.problems.items()),
     ]
     order = list(WHO)
-    return sorted(found, key=lambda finding: order.index(finding.who))
+    return sorted(collected, key=lambda finding: order.index(finding.who))
 
 
 def _unreadable(run: str, text: str) -> AuditFinding:
@@ -38,7 +38,7 @@ def _unreadable(run: str, text: str) -> AuditFinding:
 
 def _later(run: str, day: float) -> AuditFinding:
     message = (
-        f"run {run} says that it was measured on {date_of(day)}, which is yet to come: it was left out; set the clock of the "
+        f"run {run} was left out: its date of measurement {date_of(day)} is in the future; set the clock of the "
         "host that wrote it, and measure the units again"
     )
     return AuditFinding("archive", "clock", run, message, (), {"date": date_of(day)})

@@ -1,4 +1,4 @@
-"""Gauge studies in the archive: the same units seated again and again within days, on one station or on several."""
+"""Gauge studies in the archive: the same units seated repeatedly within days, on one or several stations."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ FEWEST_PARTS = 3
 
 @dataclass(frozen=True)
 class Study:
-    """A gauge study of one parameter: where and when it was made, what came out, and its share of the tolerance in %."""
+    """A gauge study of one parameter: stations, days, results, and its share of the tolerance in %."""
 
     device: str
     parameter: str
@@ -40,7 +40,7 @@ class Study:
 
 
 def studies(all_: Calibrations, good: Flags, rules: Rules) -> list[Study]:
-    """Every gauge study of every parameter; the units are the parts, the stations stand for appraisers."""
+    """Every gauge study of every parameter; the units are the parts, the stations the appraisers."""
     out: list[Study] = []
     for group in _groups(all_, good, rules.gauge_days):
         chosen = _crossed(all_, group)
@@ -53,9 +53,9 @@ def studies(all_: Calibrations, good: Flags, rules: Rules) -> list[Study]:
         for name in OWN:
             values = all_.column(name)[rows]
             if np.isfinite(values).all():
-                found = gauge_study(values)
-                share = 100.0 * SIX_SIGMA * found.gauge / (2.0 * rules.tolerance_of(device, FAMILY_OF[name]))
-                out.append(Study(device, name, stations, float(days.min()), float(days.max()), runs, found, share))
+                components = gauge_study(values)
+                share = 100.0 * SIX_SIGMA * components.gauge / (2.0 * rules.tolerance_of(device, FAMILY_OF[name]))
+                out.append(Study(device, name, stations, float(days.min()), float(days.max()), runs, components, share))
     return out
 
 
@@ -84,7 +84,7 @@ def _groups(all_: Calibrations, good: Flags, within_days: float) -> list[dict[st
 
 
 def _crossed(all_: Calibrations, group: dict[str, Index]) -> tuple[tuple[str, ...], Index] | None:
-    """Stations, and rows (parts, stations, mounts) of a study in which every station has as many mounts; None without repeats."""
+    """Stations, and rows (parts, stations, mounts) of a study with equal numbers of mounts; None without repeats."""
     by_station: dict[str, list[Index]] = {}
     for rows in group.values():
         by_station.setdefault(str(all_.station[rows[0]]), []).append(rows)

@@ -1,8 +1,8 @@
-"""The index: the rows that the audit needs of all runs, in few large files instead of many small ones.
+"""The index: the rows of all runs that the audit needs, in few large files instead of many small ones.
 
-``index/<part>/<table>.parquet`` holds some hundred runs each. It is derived from the runs' own files and from nothing else,
-may be deleted at any time, and is brought up to date before every use: a part whose runs have changed is made again, new
-runs make new parts. So it is never a second truth.
+Each ``index/<part>/<table>.parquet`` has some hundred runs. The index is made only from the files of the runs,
+may be deleted at any time, and is updated before every use: a part whose runs have changed is made again, new
+runs make new parts.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ if TYPE_CHECKING:
 
 FOLDER = "index"
 RUNS_PER_PART = 500
-MOST_SMALL = 24  # parts with less than half of that, before they are put together
+MOST_SMALL = 24  # parts with less than half of that, before they are merged
 SOURCES = ("run_files.py", "run_rows.py", "parameters.py", "station_effects.py")
 VERSION = b"tumbleline.index"
 NAME = re.compile("[0-9a-f]{16}")
@@ -51,9 +51,9 @@ READERS = 4
 
 
 class Portion(NamedTuple):
-    """Work for one process: a part of the index that is to be made of these runs.
+    """Work for one process: a part of the index for these runs.
 
-    archive : its address; place : folder of the index where it is not the archive's own, else empty
+    archive : its address; place : folder of the index outside the archive; empty: in the archive
     runs : with their stamps; version : of the code that makes the rows
     """
 
@@ -64,7 +64,7 @@ class Portion(NamedTuple):
 
 
 class _Fleeting:
-    """A temporary folder that goes with whoever holds it."""
+    """A temporary folder that is removed with its holder."""
 
     def __init__(self) -> None:
         self.path = Path(mkdtemp(prefix="tumbleline-index-"))
@@ -72,7 +72,7 @@ class _Fleeting:
 
 
 class _Reading:
-    """Parts of a folder are not taken away as long as somebody holds this; the system ends it when a process dies."""
+    """A shared lock: parts of the folder are not removed while a process holds it; it is released when the process dies."""
 
     def __init__(self, place: Path) -> None:
         handle = os.open(place, os.O_RDONLY)
@@ -83,10 +83,10 @@ class _Reading:
 
 @dataclass(frozen=True)
 class AuditIndex:
-    """The parts of an index that is up to date, and what had to be done for that.
+    """The parts of an up-to-date index, and the work for the update.
 
-    made, kept : numbers of runs that were read anew, and whose rows were there
-    holder : keeps the parts there for as long as they may be read
+    made, kept : numbers of runs that were read, and of runs with existing rows
+    holder : keeps the parts while they may be read
     """
 
     parts: tuple[Place, ...]
@@ -95,39 +95,39 @@ class AuditIndex:
     holder: _Fleeting | _Reading | None = None
 
     def table(self, name: str, columns: Sequence[str] | None = None) -> pa.Table:
-        """All rows of one of :data:`TABLES`; texts as dictionaries."""
+        """All rows of one of :data:`TABLES`; texts are dictionary-encoded."""
         chosen = list(columns) if columns is not None else SCHEMAS[name].names
         texts = [field.name for field in SCHEMAS[name] if pa.types.is_string(field.type) and field.name in chosen]
         try:
-            found = [
+            tables = [
                 pq.read_table(_opened(part / f"{name}.parquet"), columns=chosen, read_dictionary=texts)
                 for part in self.parts
             ]
         except (OSError, pa.ArrowInvalid) as problem:
             where = self.parts[0].parent
             raise ArchiveUnusable(
-                f"archive: index {where} cannot be read ({first_line(problem)}); remove {where}, it is made again by itself"
+                f"archive: index {where} cannot be read ({first_line(problem)}); remove {where}, it is made again automatically"
             ) from None
-        if not found:
+        if not tables:
             return pa.table({n: pa.array([], SCHEMAS[name].field(n).type) for n in chosen})
-        return pa.concat_tables(found).unify_dictionaries()
+        return pa.concat_tables(tables).unify_dictionaries()
 
     def files(self, name: str) -> list[str]:
-        """The files of one table, for those who read them themselves."""
+        """The files of one table, for direct reading."""
         return [str(part / f"{name}.parquet") for part in self.parts]
 
 
 def up_to_date(archive: Archive, spread: Spread | None = None, workers: int = 1) -> AuditIndex:
-    """The index of an archive with every run as it is now.
+    """The index of an archive with the present state of every run.
 
-    Where the archive cannot be written the index is made in a temporary folder, for this once.
+    Where the archive cannot be written the index is made in a temporary folder.
 
     Parameters
     ----------
     spread, workers : where parts are made, see :func:`pipelines.parallel.map_partitions`
     """
     place = archive.root / FOLDER
-    if not (archive.root / "runs").is_dir():  # an address with a slip of the pen is not made into a folder
+    if not (archive.root / "runs").is_dir():  # a mistyped address must not become a folder
         return AuditIndex((), 0, 0)
     try:
         with alone(place, wait=True):
@@ -143,7 +143,7 @@ def up_to_date(archive: Archive, spread: Spread | None = None, workers: int = 1)
 def _refreshed(archive: Archive, place: Place, spread: Spread | None, workers: int) -> AuditIndex:
     stamps, version = stamps_of(archive.root), version_of_rows()
     parts = _believed(part_folders(place), version)
-    _remove(place, [part for part, runs in parts.items() if not runs])  # one that is made anew may have its name
+    _remove(place, [part for part, runs in parts.items() if not runs])  # a new part may have its name
     good = {part: runs for part, runs in parts.items() if runs and runs.items() <= stamps.items()}
     good = _without_doubles(good)
     small = [part for part, runs in good.items() if len(runs) < RUNS_PER_PART // 2]
@@ -161,11 +161,11 @@ def _refreshed(archive: Archive, place: Place, spread: Spread | None, workers: i
 
 
 def make_part(portion: Portion) -> str:
-    """Name of a part of the index, made of its runs' files and published."""
+    """Make and publish a part of the index from the files of its runs; return its name."""
     root = place_of(portion.archive)
     runs, place = root / "runs", Path(portion.place) if portion.place else root / FOLDER
     found = rows_of_runs(read_runs(runs, portion.runs))
-    # ``runs`` last: where it is, all are
+    # ``runs`` last: it shows that all others exist
     content = {f"{name}.parquet": _encoded(found[name], portion.version) for name in reversed(TABLES)}
     hashes = {file: files.hash_of(data) for file, data in content.items()}
     content = {SEAL: files.json_bytes(derived.seal(hashes)), **content}
@@ -183,7 +183,7 @@ def _encoded(table: pa.Table, version: str) -> bytes:
 
 
 def version_of_rows() -> str:
-    """Hash of the code that makes the rows: an index made by other code is made again."""
+    """Hash of the code that makes the rows; an index of other code is made again."""
     total = hashlib.sha256()
     for name in SOURCES:
         total.update((Path(__file__).parent / name).read_bytes())
@@ -191,7 +191,7 @@ def version_of_rows() -> str:
 
 
 def _believed(folders: Sequence[Place], version: str) -> dict[Place, dict[str, str]]:
-    """Runs of parts with their stamps; of a part that is not as it was made, none, and it is said that it was edited."""
+    """Runs of parts with their stamps; none of an edited part, with a warning."""
     with ThreadPoolExecutor(READERS) as pool:
         states = dict(zip(folders, pool.map(standing_of, folders), strict=True))
     for part, state in states.items():
@@ -201,7 +201,7 @@ def _believed(folders: Sequence[Place], version: str) -> dict[Place, dict[str, s
 
 
 def standing_of(part: Place) -> str:
-    """How the seal of a part stands, see :func:`pipelines.archive.derived.standing`; a part of an older version has none."""
+    """State of the seal of a part, see :func:`pipelines.archive.derived.standing`; a part of an older version has none."""
     names = [f"{name}.parquet" for name in TABLES]
     if not all((part / name).is_file() for name in (*names, SEAL)):
         return derived.OTHERS
@@ -214,14 +214,14 @@ def standing_of(part: Place) -> str:
 
 
 def part_folders(place: Place) -> list[Place]:
-    """Folders of an index that are parts by their name."""
+    """Folders of an index with the name of a part."""
     if not place.is_dir():
         return []
     return sorted((part for part in place.iterdir() if NAME.fullmatch(part.name)), key=str)
 
 
 def runs_of(part: Place, version: str) -> dict[str, str]:
-    """Runs of a part with their stamps; empty where it is not of this version, lacks a table or cannot be read."""
+    """Runs of a part with their stamps; empty where it has another version, lacks a table or cannot be read."""
     if not all((part / f"{name}.parquet").is_file() for name in TABLES):
         return {}
     try:
@@ -234,7 +234,7 @@ def runs_of(part: Place, version: str) -> dict[str, str]:
 
 
 def _without_doubles(parts: Mapping[Place, dict[str, str]]) -> dict[Place, dict[str, str]]:
-    """The parts, less those that hold a run that another holds already."""
+    """The parts without those with a run that another part already has."""
     seen: set[str] = set()
     kept: dict[Place, dict[str, str]] = {}
     for part, runs in sorted(parts.items(), key=lambda item: (-len(item[1]), str(item[0]))):
@@ -249,7 +249,7 @@ def _opened(file: Place) -> pa.BufferReader | str:
 
 
 def _remove(place: Place, parts: Collection[Place]) -> None:
-    """Take parts away that are of no use any more, unless somebody may still be reading them: then the next one does."""
+    """Remove obsolete parts, unless another process may still read them; then a later update removes them."""
     if isinstance(place, ObjectPath):
         for part in parts:
             (place / part.name).remove_all()

@@ -1,4 +1,4 @@
-"""The audit's index held against the runs that it was made from: every row derived anew."""
+"""Check of the index of the audit: every row is made again from the runs and compared."""
 
 from __future__ import annotations
 
@@ -25,9 +25,9 @@ REMEDY = "remove it, it is made again from the runs"
 
 
 def check_index(archive: Archive, checked: CheckedPart) -> None:
-    """What is wrong with the index of an archive.
+    """The findings about the index of an archive.
 
-    A part of another version is used by nobody and is passed over, as are runs that were written to since.
+    Parts of another version, which are never used, and runs that changed since are not checked.
     """
     stamps, version = stamps_of(archive.root), version_of_rows()
     for part in part_folders(archive.root / FOLDER):
@@ -41,24 +41,24 @@ def check_index(archive: Archive, checked: CheckedPart) -> None:
 
 
 def _check_rows(archive: Archive, part: Place, runs: list[tuple[str, str]], checked: CheckedPart) -> None:
-    wanted = rows_of_runs(read_runs(archive.root / "runs", runs))
+    expected = rows_of_runs(read_runs(archive.root / "runs", runs))
     chosen = [run for run, _ in runs]
     for name in TABLES:
         place = part / f"{name}.parquet"
         table = pq.read_table(pa.BufferReader(place.read_bytes()) if isinstance(place, ObjectPath) else str(place))
-        found = table.filter(pc.field("run").isin(pa.array(chosen, pa.string())))
-        if not _same(found, wanted[name], SCHEMAS[name]):
-            checked.wrong(CHANGED, place, f"tells other rows than the runs that it was made from: {REMEDY}")
+        actual = table.filter(pc.field("run").isin(pa.array(chosen, pa.string())))
+        if not _same(actual, expected[name], SCHEMAS[name]):
+            checked.wrong(CHANGED, place, f"has other rows than the runs that it was made from: {REMEDY}")
 
 
-def _same(found: pa.Table, wanted: pa.Table, schema: pa.Schema) -> bool:
-    if found.schema.names != schema.names or len(found) != len(wanted):
+def _same(actual: pa.Table, expected: pa.Table, schema: pa.Schema) -> bool:
+    if actual.schema.names != schema.names or len(actual) != len(expected):
         return False
-    return all(_same_column(found[name], wanted[name], schema.field(name).type) for name in schema.names)
+    return all(_same_column(actual[name], expected[name], schema.field(name).type) for name in schema.names)
 
 
-def _same_column(found: pa.ChunkedArray, wanted: pa.ChunkedArray, kind: pa.DataType) -> bool:
-    a, b = found.cast(kind), wanted.cast(kind)
+def _same_column(actual: pa.ChunkedArray, expected: pa.ChunkedArray, kind: pa.DataType) -> bool:
+    a, b = actual.cast(kind), expected.cast(kind)
     if not pa.types.is_floating(kind):
         return a.combine_chunks().equals(b.combine_chunks())
     return a.null_count == b.null_count and np.array_equal(a.to_numpy(), b.to_numpy(), equal_nan=True)

@@ -1,4 +1,4 @@
-"""The audit as one page that opens without a network."""
+"""The audit as one page that needs no network."""
 
 from __future__ import annotations
 
@@ -24,8 +24,8 @@ if TYPE_CHECKING:
 MOST_SERIES, MOST_CHARTS, MOST_HISTORIES, MOST_ROWS, MOST_OF_KIND = 8, 4, 4, 25, 40
 
 
-def render(audit: Audit, found: list[AuditFinding], archive: str) -> str:
-    """The report as one HTML text that needs no other file."""
+def render(audit: Audit, listed: list[AuditFinding], archive: str) -> str:
+    """The page as one HTML text without other files."""
     months = [share for share in audit.yields if share.of == "month"]
     series, charts, drifts = _telling_series(audit), _telling_charts(audit), _telling_drifts(audit)
     return template("audit.html").render(
@@ -34,8 +34,8 @@ def render(audit: Audit, found: list[AuditFinding], archive: str) -> str:
         until=date_of(audit.scope.until - 1.0),
         scope=", ".join(part for part in (audit.scope.device, audit.scope.station) if part),
         counts=counts(audit),
-        groups=_groups(found),
-        total=len(found),
+        groups=_groups(listed),
+        total=len(listed),
         passed=next((share for share in audit.yields if share.of == "all"), None),
         overdue=int(np.count_nonzero(audit.due.day < audit.scope.until)),
         valid=int(audit.due.valid.sum()),
@@ -69,11 +69,11 @@ SAME_EVENT_D = 14.0
 _BEGINNING = -700000.0  # days before any calibration
 
 
-def _groups(found: list[AuditFinding]) -> list[dict[str, Any]]:
-    """Findings by who must act, the first of a kind shown and the rest counted."""
+def _groups(listed: list[AuditFinding]) -> list[dict[str, Any]]:
+    """Findings by role; the first of each kind are shown, the others counted."""
     out: list[dict[str, Any]] = []
-    for who, words in WHO.items():
-        own = [finding for finding in found if finding.who == who]
+    for who, role in WHO.items():
+        own = [finding for finding in listed if finding.who == who]
         shown: list[AuditFinding] = []
         more: dict[str, int] = {}
         for finding in own:
@@ -82,20 +82,20 @@ def _groups(found: list[AuditFinding]) -> list[dict[str, Any]]:
             else:
                 more[finding.kind] = more.get(finding.kind, 0) + 1
         if own:
-            out.append({"who": words, "findings": shown, "more": more, "count": len(own)})
+            out.append({"who": role, "findings": shown, "more": more, "count": len(own)})
     return out
 
 
 def _telling_series(audit: Audit) -> list[StationSeries]:
-    """The series whose level changed, the plainest first and each event once; where none did the stations' levels."""
+    """The series with a change of level, most significant first and each event once; without one the levels of the stations."""
     moved = [one for one in (*audit.stations, *audit.slots) if one.changes]
-    told: list[tuple[str, bool, float]] = []
+    events: list[tuple[str, bool, float]] = []
     kept: list[StationSeries] = []
     for one in sorted(moved, key=lambda s: -max(abs(c.shift) / c.error for c in s.changes)):
         plainest = max(one.changes, key=lambda c: abs(c.shift) / c.error)
         event = (one.station, one.where.startswith("slot"), float(one.day[plainest.first]))
-        if not any(event[:2] == known[:2] and abs(event[2] - known[2]) < SAME_EVENT_D for known in told):
-            told.append(event)
+        if not any(event[:2] == known[:2] and abs(event[2] - known[2]) < SAME_EVENT_D for known in events):
+            events.append(event)
             kept.append(one)
     if kept:
         return kept[:MOST_SERIES]
@@ -107,7 +107,7 @@ def _telling_charts(audit: Audit) -> list[Chart]:
 
 
 def _telling_drifts(audit: Audit) -> list[UnitDrift]:
-    """The histories least like their kind."""
+    """The histories that differ most from their kind."""
     worst = [max(drifts, key=lambda d: abs(d.odd)) for drifts in audit.units.values()]
     several = [drift for drift in worst if drift.calibrations > 2]
     return sorted(several, key=lambda d: (-abs(d.odd), d.unit))[:MOST_HISTORIES]

@@ -1,7 +1,7 @@
-"""The parameters that the audit follows: what the coefficients of a unit come to, in units that units share.
+"""The parameters of the audit: computed from the coefficients of a unit, in the same unit for all units.
 
-Misalignment is split in two: what is left when the sensor is turned as a whole is the unit's own (``square``: the
-angle between two axes less 90°), the turn is that of its seat (``rotation``). Seating a unit anew moves the second, not the
+Misalignment has two parts: the non-orthogonality belongs to the unit (``square``: the angle between two axes minus 90°), the
+rotation of the whole sensor to its seat (``rotation``). A new seating changes the second, not the
 first (Geist 2017, NIST J. Res. 122.032: intrinsic parameters).
 """
 
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 
 class Family(NamedTuple):
-    """Parameters of one kind: their unit, and the coefficient they come from; ``own`` where they belong to the unit."""
+    """Parameters of one kind: their unit, and the coefficient they are computed from; ``own`` where they belong to the unit."""
 
     unit: str
     names: tuple[str, ...]
@@ -76,9 +76,9 @@ def parameters_of(
             return nothing, nothing
         places = [numbers == known.index(word) for (known, numbers), word in zip(texts.values(), words, strict=True)]
         own = np.flatnonzero(places[0] & places[1] & places[2])
-        found = nothing.copy(), nothing.copy()
-        found[0][row[own]], found[1][row[own]] = value[own], error[own]
-        return found
+        value_and_error = nothing.copy(), nothing.copy()
+        value_and_error[0][row[own]], value_and_error[1][row[own]] = value[own], error[own]
+        return value_and_error
 
     scale = [pick("scale", "K1", axis) for axis in AXES]
     out: dict[str, Array] = {}

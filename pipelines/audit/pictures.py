@@ -1,4 +1,4 @@
-"""Pictures of an audit, as SVG that stands inside the page."""
+"""Plots of an audit, as SVG inside the page."""
 
 from __future__ import annotations
 
@@ -14,6 +14,7 @@ from matplotlib.ticker import MaxNLocator
 from pipelines.audit.drifts import YEAR_D
 from pipelines.audit.parameters import unit_text
 from pipelines.report.plots import STYLE, WIDTH_IN, svg
+from schemas.counts import number_of
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -54,7 +55,7 @@ def series_plot(series: Sequence[StationSeries]) -> str:
 
 
 def chart_plot(charts: Sequence[Chart]) -> str:
-    """Control charts: every value with the limits of 1, 2 and 3 σ, the moving average in its own, signals in red."""
+    """Control charts: every value with the limits of 1, 2 and 3 σ, the moving average with its own limits, signals in red."""
     figure, places = _rows(len(charts))
     with mpl.rc_context(STYLE):
         for place, one in zip(places, charts, strict=True):
@@ -67,7 +68,8 @@ def chart_plot(charts: Sequence[Chart]) -> str:
             place.scatter(one.day[hit], one.value[hit], s=16, c=RED, linewidths=0, label="signal of a rule")
             outside = one.outside
             place.scatter(one.day[outside], one.average[outside], s=12, c=ORANGE, marker="s", linewidths=0)
-            title = f"{one.station}: {one.standard}, {one.parameter}: {one.alarms} alarms, {one.expected:.1f} by chance"
+            title = f"{one.station}: {one.standard}, {one.parameter}: "
+            f"{number_of(one.alarms, 'alarm')}, {one.expected:.1f} expected by chance"
             place.set(title=title, ylabel=one.unit_text)
             place.grid(visible=False)
             place.yaxis.set_major_locator(MaxNLocator(TICKS))
@@ -105,14 +107,14 @@ def due_plot(audit: Audit) -> str:
         place.bar(np.arange(24) + 0.5, ahead, width=0.8, color=BLUE)
         place.set_xticks(range(0, 25, 3))
         late = int(np.count_nonzero(months < 0.0))
-        place.set(xlabel=f"months ahead ({late} units are overdue and stand in none of them)", ylabel="units due")
+        place.set(xlabel=f"months ahead ({number_of(late, 'overdue unit')} not shown)", ylabel="units due")
         place.yaxis.set_major_locator(MaxNLocator(TICKS, integer=True))
         place.grid(visible=False, axis="x")
         return svg(figure)
 
 
 def drift_plot(audit: Audit, drifts: Sequence[UnitDrift]) -> str:
-    """Histories of units: every calibration, the tolerance about the last, and where the drift leads."""
+    """Histories of units: every calibration, the tolerance about the last one, and the forecast of the drift."""
     figure, places = _rows(len(drifts))
     with mpl.rc_context(STYLE):
         for place, one in zip(places, drifts, strict=True):
@@ -153,7 +155,7 @@ def _rows(count: int) -> tuple[Figure, list[Axes]]:
 
 
 def _calm(place: Axes, values: NDArray[np.float64]) -> None:
-    """Limits that single wild values do not stretch."""
+    """Limits of an axis that ignore single outliers."""
     low, high = np.percentile(values, (0.5, 99.5))
     room = 0.25 * (high - low) + 1e-9
     place.set_ylim(low - room, high + room)

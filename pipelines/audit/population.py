@@ -1,4 +1,4 @@
-"""The population: yield, capability against the limits, what differs between stations, slots and lots, and what stands out."""
+"""The population: yield, capability, differences between stations, slots and lots, and outliers."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ MEDIAN_OVER_MEAN = 1.2533  # standard error of a median over that of a mean, nor
 
 @dataclass(frozen=True)
 class Share:
-    """Units that passed, of how many, with the exact 95 % interval; of a device, a station or a month."""
+    """Share of units that passed, with the exact 95 % interval; for a device, a station or a month."""
 
     of: str
     name: str
@@ -43,16 +43,16 @@ class Share:
     interval: Capability
 
 
-def yields(all_: Calibrations, chosen: Flags) -> list[Share]:
-    """Yield in all, by kind of device, by station and by month."""
-    rows = np.flatnonzero(chosen & (all_.outcome != ""))
-    passed = all_.outcome[rows] == "pass"
-    months = np.array([date_of(day)[:7] for day in all_.day[rows]], dtype=object)
+def yields(calibrations: Calibrations, chosen: Flags) -> list[Share]:
+    """Yield of all units, by kind of device, by station and by month."""
+    rows = np.flatnonzero(chosen & (calibrations.outcome != ""))
+    passed = calibrations.outcome[rows] == "pass"
+    months = np.array([date_of(day)[:7] for day in calibrations.day[rows]], dtype=object)
     out: list[Share] = []
     for of, names in (
         ("all", np.full(rows.size, "all", dtype=object)),
-        ("device", all_.device[rows]),
-        ("station", all_.station[rows]),
+        ("device", calibrations.device[rows]),
+        ("station", calibrations.station[rows]),
         ("month", months),
     ):
         kinds, number = np.unique(names.astype(str), return_inverse=True)
@@ -102,11 +102,11 @@ class Figures:
     unit_text: Texts
 
 
-def figures_of(index: AuditIndex, all_: Calibrations, chosen: Flags) -> Figures:
+def figures_of(index: AuditIndex, calibrations: Calibrations, chosen: Flags) -> Figures:
     """Figures of the chosen calibrations."""
     frame = index.table("figures", ["run", "unit", "figure", "value", "limit", "unit_text"]).to_pandas()
-    runs, run = np.unique(all_.run.astype(str), return_inverse=True)
-    units, unit = np.unique(all_.unit.astype(str), return_inverse=True)
+    runs, run = np.unique(calibrations.run.astype(str), return_inverse=True)
+    units, unit = np.unique(calibrations.unit.astype(str), return_inverse=True)
     own = run.astype(np.int64) * max(units.size, 1) + unit
     order = np.argsort(own)
     wanted_run, wanted_unit = (_numbers_in(frame[n], known) for n, known in (("run", runs), ("unit", units)))
@@ -129,7 +129,7 @@ def figures_of(index: AuditIndex, all_: Calibrations, chosen: Flags) -> Figures:
 
 
 def _numbers_in(column: pd.Series, known: NDArray[np.str_]) -> Numbers:
-    """Place of every text of a categorical column in the sorted texts that are known; −1 where it is not."""
+    """Index of every text of a categorical column in the sorted known texts; −1 for an unknown text."""
     column = column.astype("category")
     categories = np.asarray(column.cat.categories, dtype=str)
     place = np.searchsorted(known, categories)
@@ -138,14 +138,14 @@ def _numbers_in(column: pd.Series, known: NDArray[np.str_]) -> Numbers:
     return np.where(there, place, -1)[np.asarray(column.cat.codes)]
 
 
-def abilities(all_: Calibrations, figures: Figures) -> tuple[list[Ability], list[Difference]]:
-    """Capability of every figure with a limit, and whether stations, slots and lots differ in it.
+def abilities(calibrations: Calibrations, figures: Figures) -> tuple[list[Ability], list[Difference]]:
+    """Capability of every figure with a limit, and tests for differences between stations, slots and lots.
 
-    Every unit counts once, as it first was: one that comes back to its station again and again is no new evidence of it.
+    Every unit counts once, with its first calibration, because repeated calibrations are not independent.
     """
-    figures = _first_of_each(all_, figures)
-    device, lot = all_.device[figures.row].astype(str), codes(all_.run[figures.row])
-    groups = {"station": codes(all_.station[figures.row]), "slot": all_.slot[figures.row], "lot": lot}
+    figures = _first_of_each(calibrations, figures)
+    device, lot = calibrations.device[figures.row].astype(str), codes(calibrations.run[figures.row])
+    groups = {"station": codes(calibrations.station[figures.row]), "slot": calibrations.slot[figures.row], "lot": lot}
     able: list[Ability] = []
     differences: list[Difference] = []
     for kind in np.unique(device):
@@ -174,10 +174,10 @@ def _compared(values: Array, groups: Numbers, lot: Numbers, by: str) -> Comparis
     return None if means is None else replace(found, f_p=means.f_p, rank_p=means.rank_p)
 
 
-def _first_of_each(all_: Calibrations, figures: Figures) -> Figures:
+def _first_of_each(calibrations: Calibrations, figures: Figures) -> Figures:
     """The figures of every unit's first calibration among those given."""
     rows = np.unique(figures.row)
-    unit = all_.histories[rows]
+    unit = calibrations.histories[rows]
     first = rows[np.concatenate([[True], unit[1:] != unit[:-1]])] if rows.size else rows
     kept = np.isin(figures.row, first)
     return Figures(*(getattr(figures, name)[kept] for name in Figures.__dataclass_fields__))
@@ -200,7 +200,7 @@ def _ability(device: str, figure: str, figures: Figures, own: Numbers, lot: Numb
 
 @dataclass(frozen=True)
 class Odd:
-    """A lot or a unit that stands out of its kind in a parameter, by so many σ (median and MAD of the others)."""
+    """A lot or a unit that is an outlier of its kind in a parameter, with its distance in σ (median and MAD of the others)."""
 
     kind: str
     name: str
@@ -214,39 +214,41 @@ class Odd:
     units: int
 
 
-def odd_ones(all_: Calibrations, chosen: Flags) -> list[Odd]:
-    """Lots and single units that stand out when they are new, the furthest first; each once, by its worst parameter.
+def odd_ones(calibrations: Calibrations, chosen: Flags) -> list[Odd]:
+    """Lots and single units that are outliers at their first calibration, the furthest first; each once, by its worst parameter.
 
-    Units are looked at in their first calibration only, so that what comes back often does not weigh more.
+    Only the first calibration of a unit counts, so that frequent calibrations have no larger weight.
     """
     first = (
-        np.concatenate([[True], all_.histories[1:] != all_.histories[:-1]]) if len(all_) else np.zeros(0, dtype=bool)
+        np.concatenate([[True], calibrations.histories[1:] != calibrations.histories[:-1]])
+        if len(calibrations)
+        else np.zeros(0, dtype=bool)
     )
     out: list[Odd] = []
-    for device in np.unique(all_.device.astype(str)):
-        rows = np.flatnonzero(chosen & first & (all_.device == device))
-        values = np.stack([all_.column(name)[rows] for name in OWN], axis=1)
+    for device in np.unique(calibrations.device.astype(str)):
+        rows = np.flatnonzero(chosen & first & (calibrations.device == device))
+        values = np.stack([calibrations.column(name)[rows] for name in OWN], axis=1)
         usable = np.isfinite(values).any(axis=0)
         if rows.size < FEWEST or not usable.any():
             continue
-        lots = _odd_lots(all_, device, rows, values)
-        out += [*lots, *_odd_units(all_, device, rows, values, {lot.run for lot in lots})]
+        lots = _odd_lots(calibrations, device, rows, values)
+        out += [*lots, *_odd_units(calibrations, device, rows, values, {lot.run for lot in lots})]
     return sorted(out, key=lambda odd: (odd.kind, -abs(odd.z), odd.name))
 
 
-def _odd_units(all_: Calibrations, device: str, rows: Numbers, values: Array, odd_lots: set[str]) -> list[Odd]:
+def _odd_units(calibrations: Calibrations, device: str, rows: Numbers, values: Array, odd_lots: set[str]) -> list[Odd]:
     z = np.nan_to_num(robust_z(values))
     worst = np.argmax(np.abs(z), axis=1)
     size = np.abs(z[np.arange(rows.size), worst])
-    found: list[Odd] = []
+    outliers: list[Odd] = []
     for k in np.flatnonzero(size > outlier_limit(z.size, rows.size)):
         row, column = rows[k], worst[k]
-        if str(all_.run[row]) not in odd_lots:
-            found.append(
-                Odd("unit", str(all_.unit[row]), device, str(all_.station[row]), str(all_.run[row]), float(all_.day[row]),
-                    OWN[column], float(values[k, column]), float(z[k, column]), 1)
+        if str(calibrations.run[row]) not in odd_lots:
+            outliers.append(
+                Odd("unit", str(calibrations.unit[row]), device, str(calibrations.station[row]), str(calibrations.run[row]),
+                    float(calibrations.day[row]), OWN[column], float(values[k, column]), float(z[k, column]), 1)
             )  # fmt: skip
-    return found
+    return outliers
 
 
 def _error_of_lots(values: Array, lot: Numbers) -> Array:
@@ -258,13 +260,13 @@ def _error_of_lots(values: Array, lot: Numbers) -> Array:
     return MEDIAN_OVER_MEAN * inside / np.sqrt(counts)[:, None]
 
 
-def _odd_lots(all_: Calibrations, device: str, rows: Numbers, values: Array) -> list[Odd]:
-    runs, lot = np.unique(all_.run[rows].astype(str), return_inverse=True)
+def _odd_lots(calibrations: Calibrations, device: str, rows: Numbers, values: Array) -> list[Odd]:
+    runs, lot = np.unique(calibrations.run[rows].astype(str), return_inverse=True)
     counts = np.bincount(lot)
     large = np.flatnonzero(counts >= FEWEST_OF_LOT)
     if large.size < FEWEST:
         return []
-    # medians: one wild unit is told as a unit, not as its lot
+    # medians, so that a single outlier is reported as a unit and not as its lot
     means = np.stack([group_medians(values[:, c], lot) for c in range(values.shape[1])], axis=1)[large]
     z = np.nan_to_num(unlike(means, _error_of_lots(values, lot)[large]))
     worst = np.argmax(np.abs(z), axis=1)
@@ -274,7 +276,7 @@ def _odd_lots(all_: Calibrations, device: str, rows: Numbers, values: Array) -> 
         run, column = str(runs[large[k]]), worst[k]
         row = rows[np.flatnonzero(lot == large[k])[0]]
         out.append(
-            Odd("lot", run, device, str(all_.station[row]), run, float(all_.day[row]), OWN[column],
+            Odd("lot", run, device, str(calibrations.station[row]), run, float(calibrations.day[row]), OWN[column],
                 float(means[k, column]), float(z[k, column]), int(counts[large[k]]))
         )  # fmt: skip
     return out

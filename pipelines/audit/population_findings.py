@@ -1,4 +1,4 @@
-"""Findings about the population: what stands out, what the limits are too narrow for, what differs between groups."""
+"""Findings about the population: outliers, low capability, and differences between groups."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from pipelines.audit.calibrations import date_of
 from pipelines.audit.finding import AuditFinding
 from pipelines.audit.parameters import unit_text
 from pipelines.report.numbers import plain
+from schemas.counts import number_of
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -15,12 +16,12 @@ if TYPE_CHECKING:
     from pipelines.audit.audit import Audit
     from pipelines.audit.population import Ability
 
-TELLING_EFFECT = 0.02  # share of the variance between groups, below which a difference matters to nobody
+TELLING_EFFECT = 0.02  # smaller shares of the variance between groups are not relevant
 DIFFERENT_P = 1e-3
 
 
 def of_population(audit: Audit) -> Iterator[AuditFinding]:
-    """All of them, what stands out first."""
+    """All findings about the population, outliers first."""
     yield from _odd(audit)
     yield from _incapable(audit)
     yield from _different(audit)
@@ -28,11 +29,11 @@ def of_population(audit: Audit) -> Iterator[AuditFinding]:
 
 def _odd(audit: Audit) -> Iterator[AuditFinding]:
     for odd in audit.odd:
-        what = f"lot of run {odd.run} ({odd.units} units)" if odd.kind == "lot" else f"unit {odd.name}"
+        what = f"lot of run {odd.run} ({number_of(odd.units, 'unit')})" if odd.kind == "lot" else f"unit {odd.name}"
         text = unit_text(odd.parameter)
         message = (
-            f"{odd.device}: {what} of {date_of(odd.day)} stands out in {odd.parameter}: {plain(odd.value, 4)} {text}, "
-            f"{odd.z:+.1f} σ from its kind; look for what was different in making it"
+            f"{odd.device}: {what} of {date_of(odd.day)} is an outlier in {odd.parameter}: {plain(odd.value, 4)} {text}, "
+            f"{odd.z:+.1f} σ from its kind; look for a change in its production"
         )
         evidence = {"run": odd.run, "station": odd.station, "parameter": odd.parameter, "value": odd.value, "z": odd.z}
         yield AuditFinding(
@@ -46,7 +47,7 @@ def _incapable(audit: Audit) -> Iterator[AuditFinding]:
             message = (
                 f"{able.device}: {able.figure} has Ppk {able.ppk.value:.2f} ({able.ppk.low:.2f} to {able.ppk.high:.2f}) "
                 f"against {_limit(able)}, at least {audit.rules.ppk_least:g} is needed; "
-                f"{100 * able.outside.value:.2g} % are outside: narrow the spread, or widen the limit"
+                f"{100 * able.outside.value:.2g} % are outside: reduce the spread, or widen the limit"
             )
             evidence = {
                 "figure": able.figure,

@@ -1,4 +1,4 @@
-"""The audit's rules: intervals, tolerances, check standards; what the file ``default.toml`` beside this module says in full."""
+"""The audit's rules: intervals, tolerances, check standards; complete values in the file ``default.toml`` of this package."""
 
 from __future__ import annotations
 
@@ -21,14 +21,14 @@ Months = Annotated[int, Field(ge=1, le=120)]
 
 
 class Tolerance(Strict):
-    """How far a parameter may move from its certified value, in the parameter's unit, which the file states again."""
+    """Allowed change of a parameter from its certified value, in the parameter's unit, which the file repeats."""
 
     max: Positive
     unit: str
 
 
 class DeviceRules(Strict):
-    """What is different for one kind of device."""
+    """Rules for one kind of device."""
 
     interval_months: Months | None = None
     tolerance: dict[str, Tolerance] = Field(default_factory=dict[str, Tolerance])
@@ -65,7 +65,7 @@ class Rules(Strict):
     def _ordered(self) -> Rules:
         if self.shortest_months > self.longest_months:
             raise ValueError(
-                f"shortest_months: {self.shortest_months} is above longest_months, {self.longest_months}; exchange them"
+                f"shortest_months: {self.shortest_months} is above longest_months ({self.longest_months}); exchange them"
             )
         return self
 
@@ -75,12 +75,12 @@ class Rules(Strict):
         return own if own is not None else self.interval_months
 
     def tolerance_of(self, device: str, family: str) -> float:
-        """The tolerance of a family of parameters of a kind of device; infinite where there is none."""
-        found = self._kind(device).tolerance.get(family) or self.tolerance.get(family)
-        return found.max if found is not None else float("inf")
+        """The tolerance of a family of parameters of a kind of device; infinite without one."""
+        entry = self._kind(device).tolerance.get(family) or self.tolerance.get(family)
+        return entry.max if entry is not None else float("inf")
 
     def is_standard(self, serial: str) -> bool:
-        """Whether a unit is one that the stations watch themselves with."""
+        """Whether a unit is a check standard of the stations."""
         return any(fnmatchcase(serial, pattern) for pattern in self.check_standards)
 
     def _kind(self, device: str) -> DeviceRules:
@@ -88,7 +88,7 @@ class Rules(Strict):
 
 
 def load_rules(path: Path | None = None) -> Rules:
-    """The built-in rules, with what a file says instead."""
+    """The built-in rules, with the changes of a file."""
     content = tomllib.loads((files("pipelines.audit") / "default.toml").read_text(encoding="utf-8"))
     if path is None:
         return Rules.model_validate(content)
@@ -100,7 +100,7 @@ def load_rules(path: Path | None = None) -> Rules:
 
 
 def _over(content: dict[str, Any], own: dict[str, Any]) -> dict[str, Any]:
-    """Tables put over one another, key by key."""
+    """Tables merged key by key; later values replace earlier ones."""
     out = dict(content)
     for key, value in own.items():
         both = isinstance(value, dict) and isinstance(out.get(key), dict) and set(value) != {"max", "unit"}

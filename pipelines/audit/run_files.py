@@ -1,6 +1,6 @@
-"""The files of runs that the index is made from: what they look like, and their bytes.
+"""The files of runs for the index: sizes, times and content.
 
-A disk that is cold answers many questions at once as fast as one; so files are looked at and read by several threads.
+An uncached disk serves many requests in the time of one, so files are checked and read by several threads.
 """
 
 from __future__ import annotations
@@ -23,13 +23,13 @@ START = "run.json"
 NAMES = ("coefficients", "figures", "grades", "residuals")  # tables that are read
 WATCHED = (START, *(f"{name}{end}" for name in NAMES for end in (".json", ".parquet")))
 READERS = 8
-AT_ONCE = 128  # runs that one thread looks at in one go
+AT_ONCE = 128  # runs for one task of a thread
 
 
 class RunFiles(NamedTuple):
-    """Files of a run by their names, those of :data:`WATCHED` that are there; ``trouble`` where they cannot be read.
+    """Files of a run by their names, those of :data:`WATCHED` that exist; ``trouble``: the error where they cannot be read.
 
-    stamp : what they looked like before they were read, from which a change is seen
+    stamp : sizes and times before reading, to detect a change
     """
 
     run: str
@@ -39,7 +39,7 @@ class RunFiles(NamedTuple):
 
 
 def read_runs(runs: Place, stamps: Sequence[tuple[str, str]]) -> Iterator[RunFiles]:
-    """The files of runs, in the order given, read ahead of whoever uses them.
+    """The files of runs, in the given order, read ahead by threads.
 
     Parameters
     ----------
@@ -51,7 +51,7 @@ def read_runs(runs: Place, stamps: Sequence[tuple[str, str]]) -> Iterator[RunFil
 
 
 def stamps_of(root: Place) -> dict[str, str]:
-    """What the files of every run look like, by run: size and time of each that the index is made from."""
+    """Stamps of every run: size and time of each file for the index."""
     runs = root / "runs"
     if isinstance(runs, ObjectPath):
         return _stamps_of_objects(runs)
@@ -89,7 +89,7 @@ def _stamps(runs: str, names: Iterable[str]) -> dict[str, str]:
     out: dict[str, str] = {}
     for run in names:
         marks = [_mark(f"{runs}/{run}/{name}") for name in WATCHED]
-        if marks[0]:  # a run without run.json has not begun
+        if marks[0]:  # a run without run.json has not started
             out[run] = _short(marks)
     return out
 

@@ -1,6 +1,6 @@
-"""What the audit keeps of runs: their rows in the tables of the index, made from their files and from nothing else.
+"""The rows of runs in the tables of the index, made only from the files of the runs.
 
-Files are read run by run, what follows is done for all runs of a part together: a call costs more than a run's few rows.
+Files are read run by run, then all runs of a part are processed together, because a call costs more than the rows of a run.
 """
 
 from __future__ import annotations
@@ -30,8 +30,8 @@ if TYPE_CHECKING:
     from pipelines.audit.run_files import RunFiles
 
 _TEXT, _NUMBER = pa.string(), pa.float64()
-_FEW = pa.dictionary(pa.int32(), _TEXT)  # texts of which there are few different ones
-READ: Mapping[str, pa.Schema] = {  # what is read of the runs' tables
+_FEW = pa.dictionary(pa.int32(), _TEXT)  # texts with few different values
+READ: Mapping[str, pa.Schema] = {  # columns of the runs' tables
     "coefficients": pa.schema(
         [*((n, _FEW) for n in ("unit", "axis", "effect", "name")), ("value", _NUMBER), ("standard_error", _NUMBER),
          ("unit_text", _FEW)]
@@ -51,7 +51,7 @@ RUN_FIELDS = ("run", "measured", "started", "recipe", "device", "station", "capt
 
 
 def _kept(schema: pa.Schema) -> pa.Schema:
-    """Columns of a run's table as the index has them: with the run in front, texts as texts."""
+    """Columns of a run's table in the index: the run first, texts not encoded."""
     return pa.schema([("run", _TEXT), *((f.name, _TEXT if f.type == _FEW else f.type) for f in schema)])
 
 
@@ -68,22 +68,22 @@ SCHEMAS: Mapping[str, pa.Schema] = {
 
 
 class _Run(NamedTuple):
-    """A run that could be read: its name, its ``run.json`` and its tables."""
+    """A readable run: its name, its ``run.json`` and its tables."""
 
     id: str
     about: Mapping[str, Any]
     tables: Mapping[str, pa.Table]
 
 
-def rows_of_runs(found: Iterable[RunFiles]) -> dict[str, pa.Table]:
+def rows_of_runs(run_files: Iterable[RunFiles]) -> dict[str, pa.Table]:
     """The rows of runs in every table of the index.
 
-    What cannot be read (a changed byte, a foreign file, a run cut off) makes a run without rows, with the problem in ``runs``:
-    one bad file must not hide the rest of an archive.
+    An unreadable run (changed byte, foreign file, incomplete run) has no rows and its problem in ``runs``, so that one bad file
+    does not hide the rest of an archive.
     """
     lines: list[tuple[str, ...]] = []
     runs: list[_Run] = []
-    for files in found:
+    for files in run_files:
         about: dict[str, Any] = {}
         problem = files.trouble
         try:
@@ -106,12 +106,12 @@ def _about(files: RunFiles) -> dict[str, Any]:
         raise ValueError(files.trouble)
     content = json.loads(files.content[START])
     if not isinstance(content, dict):
-        raise ValueError(f"{START} holds no manifest")  # noqa: TRY004 - what stands in a file, not what a caller gave
+        raise ValueError(f"{START} is no manifest")  # noqa: TRY004 - content of a file, not an argument
     return content
 
 
 def _tables(files: RunFiles) -> dict[str, pa.Table]:
-    """The tables of a run as they were written, those that it has."""
+    """The existing tables of a run, checked against their manifests."""
     there = [name for name in READ if f"{name}.parquet" in files.content]
     return {name: _table(name, files.content) for name in there}
 
@@ -127,25 +127,25 @@ def _table(name: str, content: Mapping[str, bytes]) -> pa.Table:
     marks = file.schema_arrow.metadata or {}
     mark = marks.get(TABLE_MARK, b"").decode(errors="replace")
     if mark != name:
-        raise ValueError(f"{name}.parquet holds '{mark or 'a foreign table'}'")
+        raise ValueError(f"{name}.parquet has '{mark or 'a foreign table'}'")
     version = int(marks.get(SCHEMA_MARK, b"1"))
     if version == VERSION:
         table = file.read(columns=wanted.names, use_threads=False)  # threads cost more than so few rows
     else:
         table = pa.Table.from_pandas(upgraded(name, file.read().to_pandas(), version, f"{name}.parquet"))
-    return _as_wanted(table, wanted)
+    return _in_schema(table, wanted)
 
 
-def _as_wanted(table: pa.Table, wanted: pa.Schema) -> pa.Table:
-    """The columns that are wanted, in their order and types; empty ones where there are none."""
-    found = [table.schema.field(name).type if name in table.column_names else None for name in wanted.names]
-    if found == wanted.types:
-        return table.select(wanted.names)
+def _in_schema(table: pa.Table, expected: pa.Schema) -> pa.Table:
+    """The columns of a schema, in its order and types; missing columns are empty."""
+    actual_types = [table.schema.field(name).type if name in table.column_names else None for name in expected.names]
+    if actual_types == expected.types:
+        return table.select(expected.names)
     columns = [
         pa.nulls(len(table), field.type) if type_ is None else table.column(field.name).cast(field.type)
-        for field, type_ in zip(wanted, found, strict=True)
+        for field, type_ in zip(expected, actual_types, strict=True)
     ]
-    return pa.table(columns, schema=wanted)
+    return pa.table(columns, schema=expected)
 
 
 def _line(files: RunFiles, about: Mapping[str, Any], problem: str) -> tuple[str, ...]:
@@ -177,7 +177,7 @@ def _together(runs: Sequence[_Run], name: str, schema: pa.Schema) -> pa.Table:
 
 
 def _parameters(runs: Sequence[_Run]) -> pa.Table:
-    """The parameters of every unit of every run, in the order in which the runs' coefficients name them."""
+    """The parameters of every unit of every run, in the order of the coefficients of the runs."""
     schema = SCHEMAS["parameters"]
     if not runs:
         return schema.empty_table()
@@ -198,7 +198,7 @@ def _parameters(runs: Sequence[_Run]) -> pa.Table:
 
 
 def _station(run: _Run) -> list[tuple[Any, ...]]:
-    """The station's values that the residuals tell, on top of those that the run's own model has taken up."""
+    """The parameters of the station from the residuals, added to those in the run's own model."""
     recipe, residuals = run.about.get("recipe") or {}, run.tables.get("residuals")
     coefficients = run.tables.get("coefficients")
     if residuals is None or not len(residuals) or not coefficients or not recipe.get("poses"):
@@ -216,7 +216,7 @@ def _station(run: _Run) -> list[tuple[Any, ...]]:
 
 
 def _of_the_model(coefficients: pa.Table) -> dict[tuple[str, str], float]:
-    """The station's own coefficients in the run's model, in millionths, by effect and name."""
+    """Coefficients of the station in the run's model, in millionths, by effect and name."""
     if "*" not in _coded(coefficients, "axis")[0]:
         return {}
     rows = coefficients.select(["axis", "effect", "name", "value"]).to_pylist()

@@ -1,4 +1,4 @@
-"""SQL over the archive: DuckDB reads the Parquet files where they lie; nothing is loaded beforehand, nothing can be written."""
+"""SQL over the archive: DuckDB reads the Parquet files in place; nothing is loaded before, nothing can be written."""
 
 from __future__ import annotations
 
@@ -21,7 +21,9 @@ if TYPE_CHECKING:
     from pipelines.archive import Archive
     from pipelines.certificates.validity import Calibration
 
-SHUT_IN: dict[str, str | bool | int | float | list[str]] = {  # no file, network, extension or variable of ours
+SHUT_IN: dict[
+    str, str | bool | int | float | list[str]
+] = {  # no access to files, network, extensions or Python variables
     "enable_external_access": False,
     "autoinstall_known_extensions": False,
     "autoload_known_extensions": False,
@@ -31,7 +33,7 @@ BLANK = r"(?:\s|--[^\n]*\n|/\*(?:[^*]|\*(?!/))*\*/)*"
 EXPLAINS = re.compile(  # the beginning of an EXPLAIN with its options, with comments between the words
     rf"{BLANK}EXPLAIN\b{BLANK}(?:ANALY[SZ]E\b|\((?=\s*(?:ANALY[SZ]E|FORMAT)\b)[\w\s',]*\))?", re.IGNORECASE
 )
-FILES: tuple[str, ...] = (  # tables of the runs that are read where they lie
+FILES: tuple[str, ...] = (  # tables of the runs that are read in place
     "dwells", "residuals", "readings", "history", "verdicts", "covariance", "predictions", "wander", "verification",
     "verification_poses", "allan", "noise", "grades",
 )  # fmt: skip
@@ -41,28 +43,28 @@ WORD = re.compile(r"[A-Za-z_]\w*")
 
 @dataclass(frozen=True)
 class Answer:
-    """Names of the columns, and the rows of an answer."""
+    """Column names and rows of an answer."""
 
     columns: tuple[str, ...]
     rows: list[tuple[Any, ...]]
 
 
 def ask(archive: Archive, sql: str, *, workers: int = 1, compact: bool = True) -> Answer:
-    """The answer to a question in SQL.
+    """The answer to an SQL query.
 
     Views: those of the index (``runs``, ``units``, ``parameters``, ``station``, ``coefficients``, ``figures``), every other
     table of the runs by its name, with the column ``run`` in front, and ``calibrations``, the ledger. Only the files of the
-    views that a question names are opened, to be read, and by us: the engine that answers may reach no file at all.
+    views in the query are opened, for reading, by this program: the query engine has no access to files.
 
     Parameters
     ----------
-    compact : whether ``coefficients``, ``figures`` … are read from the index; else from the runs' own files, which is the same
+    compact : whether ``coefficients``, ``figures`` … are read from the index; else from the files of the runs
     """
     statement = one_reading_statement(sql)
-    wanted = {word.lower() for word in WORD.findall(sql)} & set(VIEWS)
+    views = {word.lower() for word in WORD.findall(sql)} & set(VIEWS)
     with duckdb.connect(":memory:", config=SHUT_IN) as connection:
-        index = up_to_date(archive, workers=workers) if wanted & SCHEMAS.keys() else None
-        for name in sorted(wanted):
+        index = up_to_date(archive, workers=workers) if views & SCHEMAS.keys() else None
+        for name in sorted(views):
             connection.register(name, _views(archive, index, compact=compact)[name]())
         connection.execute("SET enable_progress_bar = false; SET lock_configuration = true")
         return _answered(connection, statement)
@@ -77,15 +79,15 @@ def _answered(connection: duckdb.DuckDBPyConnection, statement: str) -> Answer:
 
 
 def one_reading_statement(sql: str) -> str:
-    """The one SELECT that a question is, or the EXPLAIN of one.
+    """The single SELECT of a query, or the EXPLAIN of one.
 
-    A common table expression may hold a COPY and still be a SELECT for the parser, and other versions of DuckDB may know
-    more such ways; that nothing is written does not rest on this alone, see :data:`SHUT_IN`.
+    A common table expression with a COPY is a SELECT for the parser, and other versions of DuckDB may have more such
+    statements; protection against writing also comes from :data:`SHUT_IN`.
 
     Raises
     ------
     WrongUse
-        It is something else, or more than one.
+        The query is another statement, or more than one.
     """
     statement = _one_statement(sql)
     text = str(statement.query)
@@ -113,21 +115,23 @@ def _kinds(sql: str) -> str:
     return ", ".join(statement.type.name for statement in duckdb.extract_statements(sql)).lower()
 
 
-def _refuse(found: str) -> NoReturn:
-    raise WrongUse(f"query: found {found}, one SELECT is needed (the archive is only read); ask one question at a time")
+def _refuse(statement: str) -> NoReturn:
+    raise WrongUse(
+        f"query: found {statement}, one SELECT is needed (the archive is read only); give one query at a time"
+    )
 
 
 def _explained(problem: duckdb.Error) -> str:
-    """What DuckDB says, in one sentence, with the views that are there where a table is unknown."""
+    """The message of DuckDB in one sentence, with the existing views where a table is unknown."""
     text = str(problem).splitlines()[0]
     unknown = re.search(r"Table with name (\S+) does not exist", text)
     if unknown:
         return f"query: no view is called '{unknown[1]}', one of the archive's is needed; {did_you_mean(unknown[1], VIEWS)}"
-    return f"query: {text}; correct the question (views: {', '.join(VIEWS)})"
+    return f"query: {text}; correct the query (views: {', '.join(VIEWS)})"
 
 
 def _views(archive: Archive, index: AuditIndex | None, *, compact: bool) -> Mapping[str, Callable[[], Any]]:
-    """How the content of every view is come by, as something of Arrow."""
+    """Functions that give the content of every view as Arrow data."""
     out: dict[str, Callable[[], Any]] = {name: partial(_of_runs, archive, name) for name in FILES}
     for name in SCHEMAS:
         plain = not compact and name in {"coefficients", "figures"}
@@ -149,11 +153,11 @@ def _of_runs(archive: Archive, name: str) -> Any:
         return datasets.gathered(runs.glob(f"*/{name}.parquet"))
     names = sorted(str(place) for place in runs.glob(f"*/{name}.parquet"))
     if not names:
-        raise WrongUse(f"query: no run in {archive.root} has a table '{name}'; there is nothing to ask")
+        raise WrongUse(f"query: no run in {archive.root} has a table '{name}', one is needed; query another view")
     return datasets.of_runs(names)
 
 
-LEDGER: Mapping[str, Callable[[Calibration], str]] = {  # columns of the view, as a calibration's document names them
+LEDGER: Mapping[str, Callable[[Calibration], str]] = {  # columns of the view, with the keys of a calibration's document
     "certificate": lambda one: one.certificate,
     "serial": lambda one: one.serial,
     "device": lambda one: one.event.device,

@@ -1,8 +1,8 @@
-"""What the residuals of a run have in common over its units: the station's part, one effect of the catalogue after the other.
+"""The common part of the residuals of all units of a run: the station's errors, by effects of the catalogue.
 
-Residuals of a unit hold what its own model could not take up. What is common to all units of a run is the station's doing. Each
-effect of the station is fitted to the mean residual alone, after both are freed of everything that the units' model can take
-up; so it does not matter how the run's own fit weighted its dwells.
+Residuals of a unit contain the errors outside its model. Errors common to all units of a run come from the station. Each
+effect of the station is fitted alone to the mean residual, after both are projected orthogonally to the units' model, so that
+the weights of the run's own fit have no influence.
 """
 
 from __future__ import annotations
@@ -24,9 +24,9 @@ if TYPE_CHECKING:
 
     Array = NDArray[np.float64]
 
-FEWEST_UNITS = 3  # below, one odd unit passes for the station
-SEEN = 0.02  # share of an effect's columns that the units' model leaves; less cannot be told from the units
-ALIKE = 0.98  # correlation of what is left of two effects, above which they are one
+FEWEST_UNITS = 3  # with fewer units a single outlier could be attributed to the station
+SEEN = 0.02  # share of an effect's columns outside the units' model; a smaller share cannot be separated from the units
+ALIKE = 0.98  # effects with a larger correlation of their projected columns are the same
 
 
 class StationValue(NamedTuple):
@@ -41,7 +41,7 @@ class StationValue(NamedTuple):
 def station_values(
     residuals: Mapping[str, NDArray[Any]], recipe: Mapping[str, Any], model: Sequence[str]
 ) -> list[StationValue]:
-    """Parameters of the station's effects that a run shows; none where there are too few units, angles or dwells.
+    """Parameters of the station's effects in a run; empty with too few units, angles or dwells.
 
     Parameters
     ----------
@@ -63,16 +63,16 @@ def station_values(
 
 
 def followed() -> list[StationEffect]:
-    """The station's effects that are followed: those without nonlinear parameters, the ones that hold others in them first."""
-    found = [e for e in effects.catalogue().values() if isinstance(e, StationEffect) and not e.nonlinear]
-    return sorted(found, key=lambda effect: (-len(effect.names()), effect.simplicity, effect.id))
+    """The effects of the station for the audit: without nonlinear parameters, more general ones first."""
+    chosen = [e for e in effects.catalogue().values() if isinstance(e, StationEffect) and not e.nonlinear]
+    return sorted(chosen, key=lambda effect: (-len(effect.names()), effect.simplicity, effect.id))
 
 
 def _effect(name: str) -> object:
     try:
         return effects.get(name)
     except InertialError:
-        return None  # of a model file that is not at hand
+        return None  # an effect of a model file that is not available
 
 
 def _grid(residuals: Mapping[str, NDArray[Any]]) -> tuple[Array, State] | None:
@@ -91,7 +91,7 @@ def _grid(residuals: Mapping[str, NDArray[Any]]) -> tuple[Array, State] | None:
 
 
 class _Seen(NamedTuple):
-    """What a plan lets see: the units' columns by axis, and by effect its own columns, freed of those, with their inverse."""
+    """The columns of the units' model by axis, and for each effect its projected columns with their inverse."""
 
     bases: list[Array]
     effects: list[tuple[StationEffect, Array, Array]]
@@ -102,9 +102,9 @@ _seen: dict[tuple[object, ...], _Seen] = {}
 
 
 def _what_is_seen(exact: State, model: Sequence[str]) -> _Seen:
-    """What a plan lets see; worked out once for all runs of a recipe whose temperatures agree within a kelvin.
+    """The projected columns of a plan; computed once for all runs of a recipe whose temperatures agree within a kelvin.
 
-    It is worked out of the rounded state, so that a run's values do not depend on which runs were looked at before it.
+    It is computed from the rounded state, so that the values of a run do not depend on earlier runs.
     """
     state = _rounded(exact)
     parts = (state.force, state.temperature, state.outer, state.inner)
@@ -122,7 +122,7 @@ def _what_is_seen(exact: State, model: Sequence[str]) -> _Seen:
 
 
 def _rounded(state: State) -> State:
-    """The state to a milli-g, a kelvin and 10 µrad; a zero has no sign."""
+    """The state rounded to a milli-g, a kelvin and 10 µrad; zeros have no sign."""
     temperature = None if state.temperature is None else np.round(state.temperature) + 0.0
     angles = {name: np.round(getattr(state, name), 5) + 0.0 for name in ("outer", "inner")}
     return replace(state, force=np.round(state.force, 3) + 0.0, temperature=temperature, **angles)
@@ -150,7 +150,7 @@ def _bases(state: State, model: Sequence[str]) -> list[Array]:
         try:
             columns = design.local_columns(kept, state, design.starting_values(kept, state))
             break
-        except MissingInput as lack:  # what the residuals do not carry is not projected out
+        except MissingInput as lack:  # components that the residuals do not have are not projected out
             kept = [e for e in kept if e.id != lack.effect]
     return [np.linalg.qr(columns[axis])[0] for axis in range(3)]
 
@@ -160,7 +160,7 @@ def _without(values: Array, base: Array) -> Array:
 
 
 def _projected(effect: StationEffect, state: State, bases: list[Array]) -> Array | None:
-    """An effect's columns (3n, q) without what the units take up; None where nothing is left or the state does not tell."""
+    """Columns of an effect (3n, q) projected orthogonally to the units' model; None without a remainder or a quantity."""
     try:
         change = effect.force_change(state, **design.starting_values([effect], state).get(effect.id, {}))
     except MissingInput:
@@ -172,6 +172,6 @@ def _projected(effect: StationEffect, state: State, bases: list[Array]) -> Array
 
 
 def _alike(columns: Array, other: Array) -> bool:
-    """Whether some mixture of the columns is, to the eye of the residuals, one of the other's."""
+    """Whether a linear combination of the columns is nearly equal to one of the other columns."""
     ours, theirs = np.linalg.qr(columns)[0], np.linalg.qr(other)[0]
     return bool(np.linalg.svd(ours.T @ theirs, compute_uv=False)[0] > ALIKE)

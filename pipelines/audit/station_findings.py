@@ -1,4 +1,4 @@
-"""Findings about stations: levels and slots that moved, check standards out of control, gauges that take too much."""
+"""Findings about stations: changes of level and slots, check standards out of control, gauge studies above the limit."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ import numpy as np
 
 from pipelines.audit.calibrations import date_of
 from pipelines.audit.finding import AuditFinding
+from schemas.counts import number_of
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -18,7 +19,7 @@ if TYPE_CHECKING:
 
 
 def of_stations(audit: Audit) -> Iterator[AuditFinding]:
-    """All of them, the weightiest kind first."""
+    """All findings about stations, the most serious kind first."""
     yield from _moved_stations(audit)
     yield from _moved_slots(audit)
     yield from _standards(audit)
@@ -26,13 +27,13 @@ def of_stations(audit: Audit) -> Iterator[AuditFinding]:
 
 
 def _moved_stations(audit: Audit) -> Iterator[AuditFinding]:
-    """Changes of a station's level, each told once: by the effect in which it is plainest."""
-    told: list[tuple[str, float]] = []
-    found = [(abs(c.shift) / c.error, series, c) for series in audit.stations for c in series.changes]
-    for _, series, change in sorted(found, key=lambda item: -item[0]):
+    """Changes of a station's level, each reported once, by its most significant effect."""
+    reported: list[tuple[str, float]] = []
+    changes = [(abs(c.shift) / c.error, series, c) for series in audit.stations for c in series.changes]
+    for _, series, change in sorted(changes, key=lambda item: -item[0]):
         first = float(series.day[change.first])
-        near = any(station == series.station and abs(day - first) < _reach(series, change) for station, day in told)
-        told.append((series.station, first))
+        near = any(station == series.station and abs(day - first) < _reach(series, change) for station, day in reported)
+        reported.append((series.station, first))
         if not near and first >= audit.scope.since:
             yield _moved(audit, series, change, "station_moved", f"{series.where} ({series.parameter})")
 
@@ -56,15 +57,15 @@ def _moved(audit: Audit, series: StationSeries, change: ChangePoint, kind: str, 
     end = float(series.day[later[0]]) if later else np.inf
     units, runs = _measured(audit, series, low, end)
     remedy = (
-        "look how its fixture sits; what units say of their seat there is off by this"
+        "check its fixture; rotations of units measured there are wrong by this amount"
         if kind == "slot_moved"
-        else "level it and measure them again, or run them again with this effect in the model"
+        else "level it and measure them again, or re-analyse the runs with this effect in the model"
     )
     until = f" until {date_of(end)}" if np.isfinite(end) else ""
     message = (
         f"{series.station}: {what} moved by {change.shift:+.0f} ± {2 * change.error:.0f} {series.unit_text} on "
-        f"{date_of(first)} (between {date_of(low)} and {date_of(high)}, 95 %); {len(units)} units in {runs} runs were "
-        f"measured there since{until}: {remedy}"
+        f"{date_of(first)} (between {date_of(low)} and {date_of(high)}, 95 %); {number_of(len(units), 'unit')} in "
+        f"{number_of(runs, 'run')} measured there since{until}: {remedy}"
     )
     evidence = {
         "station": series.station, "where": series.where, "parameter": series.parameter, "date": date_of(first),
@@ -75,12 +76,14 @@ def _moved(audit: Audit, series: StationSeries, change: ChangePoint, kind: str, 
 
 
 def _measured(audit: Audit, series: StationSeries, start: float, end: float) -> tuple[tuple[str, ...], int]:
-    """Units measured on a series' station, or in its slot, after the last moment that was surely good."""
-    all_ = audit.all
-    rows = (all_.station == series.station) & (all_.day > start) & (all_.day < end) & audit.product
+    """Units measured on a series' station, or in its slot, after the last measurement before the change."""
+    calibrations = audit.all
+    rows = (
+        (calibrations.station == series.station) & (calibrations.day > start) & (calibrations.day < end) & audit.product
+    )
     if series.where.startswith("slot "):
-        rows &= all_.slot == int(series.where.removeprefix("slot "))
-    return tuple(sorted({str(u) for u in all_.unit[rows]})), len({str(r) for r in all_.run[rows]})
+        rows &= calibrations.slot == int(series.where.removeprefix("slot "))
+    return tuple(sorted({str(u) for u in calibrations.unit[rows]})), len({str(r) for r in calibrations.run[rows]})
 
 
 def _standards(audit: Audit) -> Iterator[AuditFinding]:
@@ -88,9 +91,10 @@ def _standards(audit: Audit) -> Iterator[AuditFinding]:
         if not chart.in_control:
             first = int(np.argmax(chart.rules.any(axis=0) | chart.outside))
             message = (
-                f"{chart.station}: check standard {chart.standard}, {chart.parameter}: {chart.alarms} alarms on the control "
-                f"chart since {date_of(chart.day[first])}, {chart.expected:.1f} are expected by chance "
-                f"(p = {chart.p_value:.1g}); measure the standard on another station to see which of the two has moved"
+                f"{chart.station}: check standard {chart.standard}, {chart.parameter}: "
+                f"{number_of(chart.alarms, 'alarm')} on the control chart "
+                f"since {date_of(chart.day[first])}, {chart.expected:.1f} expected by chance "
+                f"(p = {chart.p_value:.1g}); measure the standard on another station to find which of the two has changed"
             )
             evidence = {"station": chart.station, "standard": chart.standard, "parameter": chart.parameter,
                         "first": date_of(chart.day[first]), "alarms": chart.alarms, "expected": chart.expected,
@@ -99,15 +103,15 @@ def _standards(audit: Audit) -> Iterator[AuditFinding]:
 
 
 def _gauges(audit: Audit) -> Iterator[AuditFinding]:
-    """Gauge studies that take too much of the tolerance, one finding a study."""
+    """Gauge studies with too large a share of the tolerance, one finding for each study."""
     most = audit.rules.gauge_most_percent
     bad = [s for s in audit.studies if np.isfinite(s.of_tolerance) and s.of_tolerance > most]
     for runs in dict.fromkeys(study.runs for study in bad):
         own = sorted((study for study in bad if study.runs == runs), key=lambda study: -study.of_tolerance)
         shares = ", ".join(f"{study.parameter} {study.of_tolerance:.0f} %" for study in own)
         message = (
-            f"{own[0].device}: seating a unit again takes more of the tolerance than the {most:g} % allowed: {shares} "
-            f"(study of {date_of(own[0].first_day)}, {len(runs)} runs); measure longer, or widen the tolerance"
+            f"{own[0].device}: repeated seating takes more than the allowed {most:g} % of the tolerance: {shares} "
+            f"(study of {date_of(own[0].first_day)}, {number_of(len(runs), 'run')}); measure longer, or widen the tolerance"
         )
         evidence = {"runs": list(runs), "percent_of_tolerance": {study.parameter: study.of_tolerance for study in own}}
         yield AuditFinding("station", "gauge", own[0].device, message, (), evidence)

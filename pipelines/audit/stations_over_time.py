@@ -1,4 +1,4 @@
-"""The stations watched over the weeks: their own effects run by run, their slots, and their check standards."""
+"""The stations over time: their effects run by run, their slots, and their check standards."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ CHART_LEVEL = 0.01  # p-value of the number of alarms, shared by all charts
 class StationSeries:
     """One quantity of one station in order of time, (n,) each, and where its level changed.
 
-    where : of what: the station's effect, or a slot; unit_text : of the values
+    where : the effect of the station, or a slot; unit_text : of the values
     """
 
     station: str
@@ -50,7 +50,7 @@ class StationSeries:
 
 
 def station_series(station: pd.DataFrame, runs: pd.DataFrame) -> list[StationSeries]:
-    """The station's effects, station by station: what the residuals of its runs had in common.
+    """The effects of each station, from the common part of the residuals of its runs.
 
     Parameters
     ----------
@@ -67,35 +67,40 @@ def station_series(station: pd.DataFrame, runs: pd.DataFrame) -> list[StationSer
     ]  # fmt: skip
 
 
-def slot_series(all_: Calibrations, good: Flags) -> tuple[list[StationSeries], list[dict[str, object]]]:
-    """The rotation of every slot as its units show it, and its mean over all time: only units that sat elsewhere too tell it.
+def slot_series(calibrations: Calibrations, good: Flags) -> tuple[list[StationSeries], list[dict[str, object]]]:
+    """The rotation of every slot from its units, and its mean over all time; only units with several slots identify it.
 
-    A unit's rotation is its own and its seat's. Over units that come back in other slots the two are taken apart; what is
-    left, slot by slot in order of time, is the seat's change.
+    The rotation of a unit is the sum of its own and its seat's. Units that return in other slots separate the two; the
+    remainder, slot by slot in order of time, is the change of the seat.
     """
-    several = np.bincount(all_.histories, minlength=1)[all_.histories] > 1
-    rows = np.flatnonzero(good & several & np.isfinite(all_.column(TURNS[0])))
+    several = np.bincount(calibrations.histories, minlength=1)[calibrations.histories] > 1
+    rows = np.flatnonzero(good & several & np.isfinite(calibrations.column(TURNS[0])))
     if rows.size < FEWEST:
         return [], []
-    units = codes(all_.histories[rows].astype(str))
-    seats = np.array([f"{s} slot {n}" for s, n in zip(all_.station[rows], all_.slot[rows], strict=True)], dtype=object)
+    units = codes(calibrations.histories[rows].astype(str))
+    seats = np.array(
+        [f"{s} slot {n}" for s, n in zip(calibrations.station[rows], calibrations.slot[rows], strict=True)],
+        dtype=object,
+    )
     names, place = np.unique(seats.astype(str), return_inverse=True)
     out: list[StationSeries] = []
     means: dict[str, dict[str, object]] = {str(name): {"where": str(name)} for name in names}
     for turn in TURNS:
-        values = 1e3 * all_.column(turn)[rows]
+        values = 1e3 * calibrations.column(turn)[rows]
         unit, seat = unit_and_place(values, units, place)
         left = values - unit[units]
         for number, name in enumerate(names):
             means[str(name)][f"{turn}_urad"] = float(seat[number])
             own = rows[place == number]
-            order = np.lexsort((all_.run[own].astype(str), all_.day[own]))
+            order = np.lexsort((calibrations.run[own].astype(str), calibrations.day[own]))
             if own.size >= FEWEST:
                 station, _, slot = str(name).rpartition(" slot ")
                 key = (station, f"slot {slot}", turn)
                 rest = left[place == number][order]
                 level = LEVEL / (names.size * len(TURNS))
-                out.append(_series(key, "µrad", all_.day[own][order], rest, all_.run[own][order], level))
+                out.append(
+                    _series(key, "µrad", calibrations.day[own][order], rest, calibrations.run[own][order], level)
+                )
     return out, list(means.values())
 
 
@@ -109,9 +114,9 @@ def _series(key: tuple[str, str, str], text: str, day: Array, value: Array, run:
 class Chart:
     """A control chart of one parameter of one check standard on one station, in order of time, (n,) each.
 
-    rules : (4, n), by Western Electric rule; outside : where the EWMA is beyond its limits
-    alarms : number of signals of the rules and of averages outside; expected : of a station in control
-    p_value : of as many alarms by chance
+    rules : (4, n), by Western Electric rule; outside : points with the EWMA outside its limits
+    alarms : number of signals of the rules and of averages outside; expected : number for a station in control
+    p_value : probability of as many alarms by chance
     """
 
     station: str
@@ -132,36 +137,41 @@ class Chart:
     in_control: bool
 
 
-def charts(all_: Calibrations, rules: Rules, since: float) -> list[Chart]:
+def charts(calibrations: Calibrations, rules: Rules, since: float) -> list[Chart]:
     """The charts of all check standards; signals count from ``since`` on, and after the points that make the baseline."""
-    standard = np.array([rules.is_standard(unit) for unit in all_.unit], dtype=bool)
+    standard = np.array([rules.is_standard(unit) for unit in calibrations.unit], dtype=bool)
     rows = np.flatnonzero(standard)
-    keys = np.array([f"{all_.station[k]}\t{all_.unit[k]}" for k in rows], dtype=object)
+    keys = np.array([f"{calibrations.station[k]}\t{calibrations.unit[k]}" for k in rows], dtype=object)
     out: list[Chart] = []
     for key in np.unique(keys.astype(str)) if rows.size else ():
         own = rows[keys == key]
-        own = own[np.lexsort((all_.run[own].astype(str), all_.day[own]))]
+        own = own[np.lexsort((calibrations.run[own].astype(str), calibrations.day[own]))]
         station, unit = str(key).split("\t")
         for name in OWN:
-            values = all_.column(name)[own]
+            values = calibrations.column(name)[own]
             kept = np.isfinite(values)
             if kept.sum() > rules.baseline_points:
                 chosen = own[kept]
-                out.append(_chart(all_, chosen, (station, unit, name), values[kept], rules, since))
+                out.append(_chart(calibrations, chosen, (station, unit, name), values[kept], rules, since))
     level = CHART_LEVEL / max(len(out), 1)
     return [replace(chart, in_control=chart.p_value >= level) for chart in out]
 
 
 def _chart(
-    all_: Calibrations, own: NDArray[np.int64], key: tuple[str, str, str], values: Array, rules: Rules, since: float
+    calibrations: Calibrations,
+    own: NDArray[np.int64],
+    key: tuple[str, str, str],
+    values: Array,
+    rules: Rules,
+    since: float,
 ) -> Chart:
     chart = baseline(values, rules.baseline_points)
-    found, moving = signals(values, chart)
-    day = all_.day[own]
+    by_rule, moving = signals(values, chart)
+    day = calibrations.day[own]
     counted = (np.arange(values.size) >= rules.baseline_points) & (day >= since)
-    number = alarms(found, moving.outside, counted)
+    number = alarms(by_rule, moving.outside, counted)
     chance = chance_of_alarms(values, rules.baseline_points, int(counted.sum()))
     return Chart(
-        *key, unit_text(key[2]), day, values, all_.run[own], chart, found & counted, moving.average, moving.half_width,
+        *key, unit_text(key[2]), day, values, calibrations.run[own], chart, by_rule & counted, moving.average, moving.half_width,
         moving.outside & counted, number, chance.mean, chance.p_value(number), in_control=True,
     )  # fmt: skip

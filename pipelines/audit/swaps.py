@@ -1,4 +1,4 @@
-"""Serials that belong to another unit: calibrations that do not fit their unit's past, and whom they fit instead."""
+"""Exchanged serials: calibrations that do not fit the history of their unit, and the unit whose history they fit."""
 
 from __future__ import annotations
 
@@ -23,18 +23,18 @@ if TYPE_CHECKING:
     Index = NDArray[np.int64]
 
 YEAR_D = 365.25
-FEWEST_PAIRS = 20  # of calibrations of one kind, below which its usual change is not known
+FEWEST_PAIRS = 20  # with fewer calibrations of a kind its usual change is unknown
 TURNS = [k for k, name in enumerate(PARAMETERS) if FAMILY_OF[name] == "rotation"]
 ROUNDS = 4
 
 
 @dataclass(frozen=True)
 class Stranger:
-    """A calibration that is not of the unit that its serial names.
+    """A calibration that does not belong to the unit of its serial.
 
-    row : its place among the calibrations; distance : from the unit's calibration before, in usual changes (rms)
-    looks_like : serial whose past it fits, empty where it fits none
-    exchanged : whether that serial's calibration of the same day fits this unit's past in turn
+    row : its index among the calibrations; distance : to the unit's previous calibration, in usual changes (rms)
+    looks_like : serial whose history it fits, empty without one
+    exchanged : whether that serial's calibration of the same day fits the history of this unit
     """
 
     row: int
@@ -43,37 +43,40 @@ class Stranger:
     exchanged: bool
 
 
-def strangers(all_: Calibrations, rules: Rules | None = None) -> list[Stranger]:
-    """The calibrations that are not of their unit, in order; each kind of device is judged by itself.
+def strangers(calibrations: Calibrations, rules: Rules | None = None) -> list[Stranger]:
+    """The calibrations that do not belong to their unit, in order; each kind of device separately.
 
-    A stranger is no part of its unit's past: the next calibration is compared with the one before the stranger.
+    Such a calibration is not part of the history: the next calibration is compared with the one before it.
 
     Parameters
     ----------
-    rules : whose tolerances judge a kind of which there are too few calibrations to know its usual change
+    rules : their tolerances apply to a kind with too few calibrations for its usual change
     """
     out: list[Stranger] = []
-    for device in np.unique(all_.device.astype(str)):
-        own = np.flatnonzero(all_.device == device)
-        values = _fingerprints(all_, own)
-        before = _before(all_.histories[own], np.ones(own.size, dtype=bool))
+    for device in np.unique(calibrations.device.astype(str)):
+        own = np.flatnonzero(calibrations.device == device)
+        values = _fingerprints(calibrations, own)
+        before = _before(calibrations.histories[own], np.ones(own.size, dtype=bool))
         pairs = np.flatnonzero(before >= 0)
         if pairs.size < FEWEST_PAIRS:
-            found = exchanged_pairs(all_, own, before, rules) if rules is not None else []
-            out += [Stranger(int(own[k]), far, str(all_.unit[own[other]]), exchanged=True) for k, other, far in found]
+            found = exchanged_pairs(calibrations, own, before, rules) if rules is not None else []
+            out += [
+                Stranger(int(own[k]), far, str(calibrations.unit[own[other]]), exchanged=True)
+                for k, other, far in found
+            ]
             continue
-        years = (all_.day[own] - all_.day[own][before]) / YEAR_D
+        years = (calibrations.day[own] - calibrations.day[own][before]) / YEAR_D
         scale = change_scale(values[pairs], values[before[pairs]], years[pairs], values[before < 0])
         if scale.count == 0:
             continue
-        foreign = _foreign(values, all_.histories[own], all_.day[own], scale)
-        out += _described(all_, own, values, foreign, scale)
+        foreign = _foreign(values, calibrations.histories[own], calibrations.day[own], scale)
+        out += _described(calibrations, own, values, foreign, scale)
     return sorted(out, key=lambda stranger: stranger.row)
 
 
-def _fingerprints(all_: Calibrations, own: Index) -> Array:
+def _fingerprints(calibrations: Calibrations, own: Index) -> Array:
     """Parameters that belong to the unit and that all calibrations of the kind have, (n, p); the others are set to zero."""
-    values = all_.values[own].copy()
+    values = calibrations.values[own].copy()
     values[:, TURNS] = 0.0
     values[:, ~np.isfinite(values).all(axis=0)] = 0.0
     return values
@@ -92,7 +95,7 @@ def _before(histories: Index, good: Flags) -> Index:
 
 
 def _foreign(values: Array, histories: Index, days: Array, scale: ChangeScale) -> Flags:
-    """Which calibrations do not fit the last one before them that does."""
+    """Which calibrations do not fit the last fitting calibration before them."""
     foreign = np.zeros(len(values), dtype=bool)
     for _ in range(ROUNDS):
         before = _before(histories, ~foreign)
@@ -102,27 +105,29 @@ def _foreign(values: Array, histories: Index, days: Array, scale: ChangeScale) -
         far[pairs] = distance(values[pairs], values[before[pairs]], scale, years) > foreign_above(scale)
         if np.array_equal(far, foreign):
             break
-        # of neighbours that are both far the earlier one is judged first: the later may fit once it is left out
+        # of two neighbours that are both far the earlier one is tested first: the later one may fit without it
         first = far & ~np.concatenate([[False], far[:-1] & (histories[1:] == histories[:-1])])
         foreign = np.where(foreign.any(), far, first)
     return foreign
 
 
-def _described(all_: Calibrations, own: Index, values: Array, foreign: Flags, scale: ChangeScale) -> list[Stranger]:
-    before = _before(all_.histories[own], ~foreign)
-    histories, days = all_.histories[own], all_.day[own]
+def _described(
+    calibrations: Calibrations, own: Index, values: Array, foreign: Flags, scale: ChangeScale
+) -> list[Stranger]:
+    before = _before(calibrations.histories[own], ~foreign)
+    histories, days = calibrations.histories[own], calibrations.day[own]
     out: list[Stranger] = []
     for k in map(int, np.flatnonzero(foreign)):
         other, unit = _fits(k, values, foreign, histories, days, scale)
         back = _exchanged(k, unit, values, foreign, histories, days, before, scale) if other >= 0 else False
         years = float(days[k] - days[before[k]]) / YEAR_D
         usual = float(np.sqrt(distance(values[k], values[before[k]], scale, years) / scale.count))
-        out.append(Stranger(int(own[k]), usual, str(all_.unit[own[other]]) if other >= 0 else "", back))
+        out.append(Stranger(int(own[k]), usual, str(calibrations.unit[own[other]]) if other >= 0 else "", back))
     return out
 
 
 def _fits(k: int, values: Array, foreign: Flags, histories: Index, days: Array, scale: ChangeScale) -> tuple[int, int]:
-    """The good earlier calibration of the one other unit that a stranger fits, and that unit; (−1, −1) for none or several."""
+    """The good earlier calibration of the one other unit whose history it fits, and that unit; (−1, −1) for none or several."""
     candidates = np.flatnonzero((days < days[k]) & ~foreign & (histories != histories[k]))
     if not candidates.size:
         return -1, -1
@@ -137,7 +142,7 @@ def _fits(k: int, values: Array, foreign: Flags, histories: Index, days: Array, 
 def _exchanged(
     k: int, unit: int, values: Array, foreign: Flags, histories: Index, days: Array, before: Index, scale: ChangeScale
 ) -> bool:
-    """Whether the other unit has a stranger of the same days that fits the past of this one."""
+    """Whether the other unit has a foreign calibration of the same days that fits the history of this one."""
     near = np.flatnonzero(foreign & (histories == unit) & (np.abs(days - days[k]) <= 1.0))
     years = np.abs(days[near] - days[before[k]]) / YEAR_D
     return bool(np.any(distance(values[near], values[before[k]], scale, years) <= foreign_above(scale)))

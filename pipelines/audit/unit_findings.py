@@ -1,4 +1,4 @@
-"""Findings about units: exchanged, found outside, leaving their limits, unlike their kind."""
+"""Findings about units: exchanged serials, out of tolerance, leaving their limits, drift outliers."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 
 def of_units(audit: Audit) -> Iterator[AuditFinding]:
-    """All of them, the weightiest kind first."""
+    """All findings about units, the most serious kind first."""
     yield from _two_units(audit)
     yield from _exchanged(audit)
     yield from _out_of_tolerance(audit)
@@ -35,15 +35,16 @@ def _two_units(audit: Audit) -> Iterator[AuditFinding]:
             continue
         first, second = (_where(audit.all, row) for row in (one.first, one.second))
         message = (
-            f"{one.serial}: measured as {first} and as {second}, one unit cannot be both: two units have one serial; find "
-            "out which is which, give one another, and revoke what was certified under the wrong one"
+            f"{one.serial}: measured as {first} and as {second}, which is impossible for one unit: two units have one serial; "
+            "identify both, give one a new serial, and revoke the certificates of the wrong one"
         )
         evidence = {"runs": [str(audit.all.run[row]) for row in (one.first, one.second)]}
         yield AuditFinding("quality", "two_units", one.serial, message, (one.serial,), evidence)
 
 
-def _where(all_: Calibrations, row: int) -> str:
-    return f"{all_.device[row]} on {all_.station[row]}, {date_of(float(all_.day[row]))} (run {all_.run[row]})"
+def _where(calibrations: Calibrations, row: int) -> str:
+    day = date_of(float(calibrations.day[row]))
+    return f"{calibrations.device[row]} on {calibrations.station[row]}, {day} (run {calibrations.run[row]})"
 
 
 def _exchanged(audit: Audit) -> Iterator[AuditFinding]:
@@ -51,22 +52,22 @@ def _exchanged(audit: Audit) -> Iterator[AuditFinding]:
         unit, run, day = (str(getattr(audit.all, n)[one.row]) for n in ("unit", "run", "day"))
         evidence = {"run": run, "date": date_of(float(day)), "distance": one.distance, "looks_like": one.looks_like}
         if one.looks_like:
-            how = "and the other way round" if one.exchanged else "whose own calibration of that day is another"
+            how = "and vice versa" if one.exchanged else "whose own calibration of that day differs"
             message = (
-                f"{unit} of {date_of(float(day))} (run {run}) does not fit its past, it fits {one.looks_like}, {how}: "
-                "serials were exchanged; read both labels, revoke the certificates and certify anew"
+                f"{unit} of {date_of(float(day))} (run {run}) does not fit its history, it fits that of {one.looks_like}, {how}: "
+                "serials were exchanged; read both labels, revoke the certificates and certify again"
             )
             yield AuditFinding("quality", "exchanged", unit, message, (unit, one.looks_like), evidence)
         else:
             message = (
-                f"{unit} of {date_of(float(day))} (run {run}) does not fit its past, nor that of any other unit: it was "
+                f"{unit} of {date_of(float(day))} (run {run}) fits neither its own history nor that of any other unit: it was "
                 "damaged, or its serial is wrong; measure it again"
             )
             yield AuditFinding("quality", "foreign", unit, message, (unit,), evidence)
 
 
 def _out_of_tolerance(audit: Audit) -> Iterator[AuditFinding]:
-    """Units found outside at their re-calibration, by more than the uncertainty of both: what they measured is in doubt."""
+    """Units out of tolerance at their re-calibration by more than the uncertainty: their measurements are doubtful."""
     for drifts in audit.units.values():
         outside = [d for d in drifts if d.day >= audit.scope.since and abs(d.change) - _expanded(d) > d.tolerance]
         if not outside:
@@ -74,32 +75,32 @@ def _out_of_tolerance(audit: Audit) -> Iterator[AuditFinding]:
         drift = max(outside, key=lambda d: (abs(d.change) - _expanded(d)) / d.tolerance)
         text = unit_text(drift.parameter)
         message = (
-            f"{drift.unit}: {drift.parameter} was {drift.change:+.4g} {text} off after {_after(drift)}, "
-            f"tolerance {drift.tolerance:g} {text}, U {_expanded(drift):.3g}, E_n {drift.e_n:+.1f}{_besides(outside)}; what it "
-            f"measured since {_before(drift)} is in doubt: tell whoever used it"
+            f"{drift.unit}: {drift.parameter} changed by {drift.change:+.4g} {text} in {_after(drift)}, "
+            f"tolerance {drift.tolerance:g} {text}, U {_expanded(drift):.3g}, E_n {drift.e_n:+.1f}{_besides(outside)}; its "
+            f"measurements since {_before(drift)} are doubtful: inform its users"
         )
         evidence = {**_numbers(drift), "parameters": [d.parameter for d in outside]}
         yield AuditFinding("quality", "found_outside", drift.unit, message, (drift.unit,), evidence)
 
 
 def _leaving(audit: Audit) -> Iterator[AuditFinding]:
-    """Units that are expected to leave their tolerance or limit before they are due: each by what it leaves first."""
+    """Units that are expected to leave their tolerance or limit before they are due: each by the first of them."""
     due_day = {
         f"{audit.all.device[row]} {audit.all.unit[row]}": float(day)
         for row, day in zip(audit.due.row, audit.due.day, strict=True)
     }
     for unit, drifts in audit.units.items():
         due = due_day.get(unit, np.inf)
-        found = [one for drift in drifts for one in _leavings(drift) if drift.day < one[0][0] < due]
-        if not found:
+        leavings = [one for drift in drifts for one in _leavings(drift) if drift.day < one[0][0] < due]
+        if not leavings:
             continue
-        days, what, bound, drift = min(found, key=lambda one: one[0][0])
-        text, others = unit_text(drift.parameter), list(dict.fromkeys(one[3].parameter for one in found))
-        moves = f"moves {drift.slope:+.3g} {text} a year" if np.isfinite(drift.slope) else "moves as its kind does"
+        days, what, bound, drift = min(leavings, key=lambda one: one[0][0])
+        text, others = unit_text(drift.parameter), list(dict.fromkeys(one[3].parameter for one in leavings))
+        moves = f"drifts {drift.slope:+.3g} {text} a year" if np.isfinite(drift.slope) else "drifts like its kind"
         message = (
             f"{drift.unit}: {drift.parameter} {moves} and leaves its {what} of {bound:g} {text} "
             f"about {date_or_never(days[0])} ({date_or_never(days[1])} to {date_or_never(days[2])})"
-            f"{_besides(others)}, before it is due on {date_of(due)}; call it in"
+            f"{_besides(others)}, before it is due on {date_of(due)}; recall it"
         )
         yield AuditFinding(
             "quality", "leaves", drift.unit, message, (drift.unit,), {**_numbers(drift), "parameters": others}
@@ -113,7 +114,7 @@ def _leavings(drift: UnitDrift) -> list[tuple[tuple[float, float, float], str, f
 
 
 def _when(drift: UnitDrift) -> str:
-    """When a parameter leaves its tolerance, as a sentence goes on."""
+    """When a parameter leaves its tolerance, as the end of a sentence."""
     if not np.isfinite(drift.tolerance):
         return "has no tolerance"
     bound = f"its tolerance of {drift.tolerance:g} {unit_text(drift.parameter)}"
@@ -130,24 +131,26 @@ def _expanded(drift: UnitDrift) -> float:
     return abs(drift.change / drift.e_n) if drift.e_n else np.inf
 
 
-def _besides(found: Sequence[object]) -> str:
-    """How many other parameters of a unit do the same."""
-    more = len(found) - 1
+def _besides(leavings: Sequence[object]) -> str:
+    """The number of further parameters of a unit, as text."""
+    more = len(leavings) - 1
     return f", and {more} more parameter{'s' if more > 1 else ''}" if more else ""
 
 
 def _unlike_their_kind(audit: Audit) -> Iterator[AuditFinding]:
-    """Units whose slope none of their kind has: each by its plainest parameter."""
+    """Units whose slope is an outlier of their kind: each by its most significant parameter."""
     count = sum(len(drifts) for drifts in audit.units.values())
     for drifts in audit.units.values():
-        told = [drift for drift in drifts if np.isfinite(drift.odd)]  # of calibrations within days no drift is stated
-        worst = max(told, key=lambda drift: abs(drift.odd), default=None)
+        stated = [
+            drift for drift in drifts if np.isfinite(drift.odd)
+        ]  # calibrations within a few days have no stated drift
+        worst = max(stated, key=lambda drift: abs(drift.odd), default=None)
         if worst is not None and abs(worst.odd) > outlier_limit(count) and worst.day >= audit.scope.since:
             text = unit_text(worst.parameter)
             when = f"{_when(worst)}: give it a shorter interval, or take it out of use"
             message = (
-                f"{worst.unit}: {worst.parameter} moves {worst.slope:+.3g} {text} a year over {worst.calibrations} calibrations, "
-                f"{abs(worst.odd):.1f} σ from its kind, and {when}"
+                f"{worst.unit}: {worst.parameter} drifts {worst.slope:+.3g} {text} a year over "
+                f"{worst.calibrations} calibrations, {abs(worst.odd):.1f} σ from its kind, and {when}"
             )
             yield AuditFinding("quality", "drifts", worst.unit, message, (worst.unit,), _numbers(worst))
 

@@ -1,1 +1,1 @@
-"""Capture: what the station measures, kept as it comes."""
+"""Capture: the measurement at the station, with each record stored as soon as it is measured."""

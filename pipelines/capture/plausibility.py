@@ -57,7 +57,7 @@ class Plausibility:
                 )
 
     def refuse_outliers(self, record: Record, units: Sequence[Unit]) -> None:
-        """Suspends a record with a sample that cannot be the unit's."""
+        """Suspends a record with an implausible sample."""
         outliers: dict[int, str] = {}
         for unit in units:
             identity = self.identities[unit.serial]
@@ -76,7 +76,7 @@ class Plausibility:
                 raise OperatorNeeded(event.reason)
 
     def refuse_contradiction(self, soak: int, samples: pd.DataFrame, readings: pd.DataFrame) -> None:
-        """Ends the run where all units say that the table does not stand where its encoders say.
+        """Ends the run where all units contradict the encoders of the table.
 
         Parameters
         ----------

@@ -163,7 +163,7 @@ def _numbers(parts: Sequence[Samples]) -> NDArray[np.float64]:
 
 
 def readings_row(record: Record, unit: Unit, identity: Identity, status: str) -> dict[str, object]:
-    """A row of the readings: what the station measured for a unit, as means over the observations of a record."""
+    """A row of the readings: measurements of the station for a unit, as means over the observations of a record."""
     observed = record.observed(unit.slot)
     return {
         "unit": unit.serial,

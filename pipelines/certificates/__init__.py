@@ -1,4 +1,4 @@
-"""Trace: which calibration of a unit held on a date, from what it came, and whether all of it is unchanged."""
+"""Certificates: which calibration of a unit was valid on a date, its origin, and whether its files are unchanged."""
 
 from pipelines.certificates.entries import LedgerEntry
 from pipelines.certificates.ledger import Ledger

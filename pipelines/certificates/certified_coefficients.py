@@ -1,4 +1,4 @@
-"""The coefficients of one calibration, read without a table library: an auditor waits for them."""
+"""The coefficients of one calibration, read without a table library, for a short answering time."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 
 def coefficients_of(run: Run, calibration: Calibration) -> list[dict[str, Any]]:
-    """Rows of the unit in the run's table of coefficients, which is the one that was certified."""
+    """Rows of the unit in the certified table of coefficients of the run."""
     import pyarrow as pa
     import pyarrow.parquet as pq
 
@@ -23,10 +23,10 @@ def coefficients_of(run: Run, calibration: Calibration) -> list[dict[str, Any]]:
         data = place.read_bytes()
         if hashlib.sha256(data).hexdigest() != calibration.event.coefficients:
             raise ArchiveUnusable(
-                f"calibrations: {place} is not the table that certificate {calibration.certificate} was given for (its hash is "
-                "another); restore it from a copy"
+                f"calibrations: {place} is not the table of certificate {calibration.certificate} (its hash "
+                "differs); restore it from a copy"
             )
-        # read_table imports pandas; and a pool of threads that is still starting when so short a process ends aborts it
+        # read_table imports pandas; and a thread pool that is still starting aborts so short a process at its end
         table = pq.ParquetFile(pa.BufferReader(data), pre_buffer=False).read(use_threads=False)
     except (OSError, pa.ArrowInvalid) as problem:
         raise ArchiveUnusable(

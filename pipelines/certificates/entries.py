@@ -1,4 +1,4 @@
-"""What is written about a unit's calibrations: one event per file, never changed afterwards."""
+"""Entries of the ledger of a unit's calibrations: one event per file, never changed."""
 
 from __future__ import annotations
 
@@ -17,18 +17,18 @@ Action = Literal["certify", "supersede", "revoke"]
 
 @dataclass(frozen=True)
 class LedgerEntry:
-    """One thing that happened to a unit's calibrations.
+    """One event of a unit's calibrations.
 
-    ``certify`` begins the validity of a calibration, ``supersede`` does the same and ends others, ``revoke`` only ends some.
+    ``certify`` begins the validity of a calibration, ``supersede`` also ends others, ``revoke`` only ends calibrations.
 
     Parameters
     ----------
-    sequence : counts the unit's events from 1; a calibration is known by the sequence of the event that began it.
+    sequence : number of the event of the unit, from 1; a calibration has the sequence of the event that began it.
     start, until : validity, first day and the day after the last; a revocation ends validity with ``start``.
     ends : sequences of the calibrations that end with ``start``.
     coefficients : hash of the table of coefficients.
-    evidence : hashes of the manifests of the run that the decision rests on, by table.
-    previous : hash of the file of the unit's event before; empty for the first.
+    evidence : hashes of the manifests of the run that support the decision, by table.
+    previous : hash of the file of the unit's previous event; empty for the first.
     """
 
     serial: str
@@ -52,11 +52,11 @@ class LedgerEntry:
 
     @property
     def certificate(self) -> str:
-        """Number of the certificate that this event began: serial and sequence."""
+        """Number of the certificate of this event: serial and sequence."""
         return f"{self.serial}/{self.sequence}"
 
     def document(self) -> dict[str, Any]:
-        """The event as it is written."""
+        """The event as it is written to the file."""
         content = asdict(self)
         content["from"] = content.pop("start")
         return {**content, "ends": list(self.ends), "evidence": dict(self.evidence), "schema": SCHEMA}
@@ -66,7 +66,7 @@ _NAMES = {field.name for field in fields(LedgerEntry)}
 
 
 def event_of(content: Mapping[str, Any], where: str) -> LedgerEntry:
-    """The event that a file holds; refused where it is none, or of a schema that is not known yet.
+    """The event of a file; refused where the content is no event or has a newer schema.
 
     Parameters
     ----------
@@ -80,8 +80,8 @@ def event_of(content: Mapping[str, Any], where: str) -> LedgerEntry:
     known = {("start" if name == "from" else name): value for name, value in content.items()}
     missing = sorted(_NAMES - known.keys())
     if missing or known["action"] not in get_args(Action):
-        found = f"no {missing[0]}" if missing else f"action {known['action']!r}"
-        raise ArchiveUnusable(f"calibrations: {where} is no event of this ledger ({found}); restore it from a copy")
+        fault = f"no {missing[0]}" if missing else f"action {known['action']!r}"
+        raise ArchiveUnusable(f"calibrations: {where} is no event of this ledger ({fault}); restore it from a copy")
     known["ends"] = tuple(known["ends"])
     known["evidence"] = tuple(sorted(known["evidence"].items()))
     return LedgerEntry(**{name: known[name] for name in _NAMES})

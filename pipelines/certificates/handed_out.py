@@ -1,4 +1,4 @@
-"""What whoever is shown or given coefficients must know of their files: who did not sign, which libraries differ."""
+"""Remarks for readers of coefficients: missing or foreign signatures, and differing versions of libraries."""
 
 from __future__ import annotations
 
@@ -21,21 +21,21 @@ TABLES = ("coefficients", "covariance", "grades")
 
 
 def signature_remarks(run: Run, serials: Iterable[str] = ()) -> list[str]:
-    """Files of a run, and certificates of its units, that the own key did not sign; nothing where no own key is configured.
+    """Files of a run, and certificates of its units, without a signature of the own key; empty without an own key.
 
     Parameters
     ----------
-    serials : units whose certificates for the run are looked at.
+    serials : units whose certificates for the run are checked.
 
     Raises
     ------
     ArchiveUnusable
-        One was edited after it was signed.
+        A file was edited after it was signed.
     """
     keys = public_keys()
     if not keys:
         return []
-    found: dict[str, list[str]] = {}
+    by_state: dict[str, list[str]] = {}
     for place in (*_manifests(run), *_certificates(run, serials)):
         state = check(files.read_json(place), keys)
         name = str(place)[len(str(run.archive.root)) :].lstrip("/\\")
@@ -44,15 +44,15 @@ def signature_remarks(run: Run, serials: Iterable[str] = ()) -> list[str]:
                 f"archive: {name} was edited after it was signed; restore it from a copy, see 'tumbleline verify {run.id}'"
             )
         if state != GOOD:
-            found.setdefault(state, []).append(name)
+            by_state.setdefault(state, []).append(name)
     return [
         f"{'not signed' if state == UNSIGNED else 'signed with a key that is not the own'}: {', '.join(names)}"
-        for state, names in sorted(found.items())
+        for state, names in sorted(by_state.items())
     ]
 
 
 def library_remarks(run: Run) -> list[str]:
-    """Libraries of which the run's tables were made with more than one version."""
+    """Libraries with more than one version among the tables of the run."""
     there = [name for name in run.tables() if (run.path / f"{name}.json").is_file()]
     return differing_libraries(run.id, {name: run.manifest(name) for name in there})
 

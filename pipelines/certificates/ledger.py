@@ -1,8 +1,8 @@
-"""The ledger of calibrations: by unit, the events that began and ended their validity.
+"""The ledger of calibrations: for each unit the events that begin and end their validity.
 
-``calibrations/<aa>/<hash of the serial>/<sequence>.json``: a unit is found by one look into one folder, however many there are,
-and no serial can name a place outside. Each event is a file that is created once. Of two processes that write a unit's next
-event one is told that it is there, reads it and decides anew; so an event was always decided knowing all before it.
+``calibrations/<aa>/<hash of the serial>/<sequence>.json``: a unit is found by reading one folder, for any number of units,
+and no serial can name a place outside. Each event is a file that is created once. Of two processes that write the next event of
+a unit one fails, reads the other's event and decides again; so every event was decided with all earlier events known.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 
     from pipelines.archive.store import Place
 
-CLOCK_SLACK = timedelta(minutes=5)  # clocks of hosts that write into one archive differ by less
+CLOCK_SLACK = timedelta(minutes=5)  # largest difference of the clocks of hosts that write into one archive
 
 
 class Ledger:
@@ -44,7 +44,7 @@ class Ledger:
         self.root = archive.root if isinstance(archive, Archive) else place_of(archive)
 
     def events(self, serial: str) -> list[LedgerEntry]:
-        """What happened to a unit's calibrations, in order; empty for a unit that is not known."""
+        """The events of a unit's calibrations, in order; empty for an unknown unit."""
         return [event for event, _ in self._read(serial)]
 
     def calibrations(self, serial: str, known: str = "") -> list[Calibration]:
@@ -52,12 +52,12 @@ class Ledger:
 
         Parameters
         ----------
-        known : only what was written up to this day; all of it where empty.
+        known : only events up to this day; all where empty.
         """
         return calibrations_of(e for e in self.events(serial) if not known or e.when[:10] <= known)
 
     def valid_at(self, serial: str, day: str, known: str = "") -> Calibration | None:
-        """The calibration that holds for a unit on a day; None where none does."""
+        """The valid calibration of a unit on a day; None without one."""
         return next((one for one in self.calibrations(serial, known) if one.holds(day)), None)
 
     def all(self) -> Iterator[Calibration]:
@@ -66,9 +66,9 @@ class Ledger:
             yield from calibrations_of(events)
 
     def histories(self) -> list[list[LedgerEntry]]:
-        """The events of every unit, unit by unit, in no order that means anything; few files are read where they were before."""
+        """The events of every unit, unit by unit in no particular order; files that were read before come from an index."""
         from pipelines.certificates.ledger_index import (
-            histories_of,  # needs a table library, which looking up one unit does not
+            histories_of,  # needs a table library; the look-up of one unit does not
         )
 
         found = histories_of(self.root)
@@ -77,12 +77,12 @@ class Ledger:
         return found.units
 
     def add(self, event: LedgerEntry, *, supersede: bool = False) -> tuple[LedgerEntry, bool]:
-        """The event that certifies a calibration, as it was written, and whether it was there already.
+        """The event that certifies a calibration, and whether it existed before.
 
         Parameters
         ----------
-        event : with serial, run, validity and what it rests on; the ledger fills in the rest.
-        supersede : end calibrations that begin later and overlap, too.
+        event : with serial, run, validity and evidence; the ledger adds the other values.
+        supersede : also end calibrations that begin later and overlap.
         """
         refuse_serial(event.serial, "certify")
 
@@ -104,11 +104,11 @@ class Ledger:
 
         Parameters
         ----------
-        day : from when they do not hold; empty: from their first day, as if they had never been.
-        certificate : sequence of the one that is meant; 0 for all that hold today or later.
+        day : first day without validity; empty: the first day of the calibrations, so that they were never valid.
+        certificate : sequence of the certificate; 0 for all that are valid today or later.
         """
         if not reason.strip():
-            raise WrongUse("revoke: no reason is given, one is needed for those who relied on it; add --reason")
+            raise WrongUse("revoke: no reason is given, one is needed for the users of the calibration; add --reason")
 
         def decided(events: Sequence[LedgerEntry]) -> LedgerEntry:
             known = [one for one in calibrations_of(events) if one.start < one.until]
@@ -124,20 +124,20 @@ class Ledger:
             )
 
         written = self._append(serial, decided)
-        if written is None:  # revoking always has something to write, or raises
+        if written is None:  # a revocation always writes an event, or raises
             raise WrongUse(nothing_to_revoke(serial, [], certificate, day))
         self.anchor([written])
         return written
 
     def anchor(self, events: Sequence[LedgerEntry]) -> None:
-        """Name events in the archive's chain, so that one that is taken away is missed."""
+        """Add events to the chain of the archive, so that the removal of one is detected."""
         if events:
             places = {self._place(one.serial, one.sequence): one for one in events}
             sealed = {place: files.sha256(self.root / place) for place in sorted(places)}
             hash_chain.append(self.root, "calibrations", sealed, {**provenance(), "run": events[0].run})
 
     def write_bulk(self, events: Iterable[LedgerEntry]) -> int:
-        """Write events of a new archive at once, without a look at what is there nor a sync per file; how many there were.
+        """Write the events of a new archive together, without reading old events or a sync for each file; return their number.
 
         Parameters
         ----------
@@ -154,7 +154,7 @@ class Ledger:
         return count
 
     def _append(self, serial: str, decide: Callable[[Sequence[LedgerEntry]], LedgerEntry | None]) -> LedgerEntry | None:
-        """Write what is decided on a unit's events as its next one; None where nothing is to be written."""
+        """Decide on the events of a unit and write the result as its next event; None where nothing is written."""
         folder = self._folder(serial)
         with alone(folder, wait=True) if isinstance(folder, ObjectPath) else nullcontext():
             while True:
@@ -186,7 +186,7 @@ class Ledger:
 
 
 def _events(folder: Place) -> list[tuple[LedgerEntry, str]]:
-    """Events of a unit's folder with the hashes of their files; refused where one is missing among them."""
+    """Events of a unit's folder with the hashes of their files; refused where one between them is missing."""
     if isinstance(folder, Path):
         names = sorted(path.name for path in folder.iterdir()) if folder.is_dir() else []
     else:
@@ -199,14 +199,14 @@ def _events(folder: Place) -> list[tuple[LedgerEntry, str]]:
         event = event_of(files.parsed(data, place), str(place))
         if event.sequence != count or name != f"{count:06d}.json":
             raise ArchiveUnusable(
-                f"calibrations: {folder} has event {name} where number {count} is due; restore what is missing from a copy"
+                f"calibrations: {folder} has event {name} where number {count} is needed; restore the missing file from a copy"
             )
         found.append((event, hashlib.sha256(data).hexdigest()))
     return found
 
 
 def _stamped(event: LedgerEntry, known: Sequence[tuple[LedgerEntry, str]]) -> LedgerEntry:
-    """The event with its number, what it follows, and who writes it where and when."""
+    """The event with its number, the hash of the previous event, and author, host and time."""
     by = provenance()
     if known:
         last = known[-1][0]
@@ -220,6 +220,6 @@ def _stamped(event: LedgerEntry, known: Sequence[tuple[LedgerEntry, str]]) -> Le
 
 
 def _same(one: Calibration, event: LedgerEntry) -> bool:
-    """Whether a calibration that holds is what an event would certify again."""
+    """Whether an event would certify a valid calibration again."""
     old = (one.run, one.event.coefficients, one.start, one.until)
     return old == (event.run, event.coefficients, event.start, event.until)

@@ -1,8 +1,8 @@
-"""The events of all units, as they were read before: a hundred thousand small files need not be read again.
+"""The index of the events of all units, so that a hundred thousand small files are read only once.
 
-``index/ledger/<digit>.noted`` holds the events of the units whose folder's name begins so, behind a line that seals them. It is
-made from the ledger's files
-and from nothing else and can be removed at any time; an event is believed while its file has the size and the time that it had.
+``index/ledger/<digit>.noted`` has the events of units whose folder name begins with this digit, after a line with their seal.
+It is made only from the files of the ledger and can be removed at any time; an event is used while its file has the same size and
+time.
 """
 
 from __future__ import annotations
@@ -30,14 +30,14 @@ if TYPE_CHECKING:
 NOTED = "index/ledger"
 VERSION = b"tumbleline.ledger 1"
 DIGITS = "0123456789abcdef"
-FEWEST_NEW = 8  # of one file; fewer are read again sooner than they are written
+FEWEST_NEW = 8  # reading fewer files again is faster than writing the index
 READERS = 8
-AT_ONCE = 64  # files that one thread reads in one go
+AT_ONCE = 64  # files for one task of a thread
 NAMES = tuple(field.name for field in fields(LedgerEntry))
 
 
 class Noted(NamedTuple):
-    """An event, and what its file looked like."""
+    """An event, with size and time of its file."""
 
     stamp: str
     event: LedgerEntry
@@ -45,9 +45,9 @@ class Noted(NamedTuple):
 
 @dataclass
 class Histories:
-    """The events of every unit, in order; and why a unit's cannot be told, by its folder.
+    """The events of every unit, in order; and the faults of the others, by folder.
 
-    read : how many files had to be read
+    read : number of files that were read
     """
 
     units: list[list[LedgerEntry]] = field(default_factory=list[list[LedgerEntry]])
@@ -56,7 +56,7 @@ class Histories:
 
 
 def histories_of(root: Place) -> Histories:
-    """The events of all units of an archive, from what was noted where it still holds."""
+    """The events of all units of an archive, from the index where it is up to date."""
     found = Histories()
     stamps = stamps_of(root / FOLDER)
     for digit in DIGITS:
@@ -67,7 +67,7 @@ def histories_of(root: Place) -> Histories:
 
 
 def _events(found: Histories, root: Place, digit: str, stamps: Mapping[str, str]) -> dict[str, LedgerEntry | str]:
-    """Events by the places of their files, or what is wrong with a file; what is new is noted."""
+    """Events by the places of their files, or the fault of a file; new events are added to the index."""
     place = root / NOTED / f"{digit}.noted"
     before, state = noted_events(place)
     if state == derived.EDITED:
@@ -78,13 +78,13 @@ def _events(found: Histories, root: Place, digit: str, stamps: Mapping[str, str]
     found.read += len(read)
     new = {name: Noted(stamps[name], event) for name, event in read.items() if isinstance(event, LedgerEntry)}
     if len(new) + len(before) - len(known) >= FEWEST_NEW or state == derived.EDITED:
-        with suppress(ArchiveUnusable):  # who may only read the archive reads it without
+        with suppress(ArchiveUnusable):  # a reader without write permission does without the index
             files.publish(place, derived.framed(_encoded(known | new)))
     return {name: known[name].event if name in known else read[name] for name in stamps}
 
 
 def _gather(found: Histories, root: Place, events: Mapping[str, LedgerEntry | str]) -> None:
-    """Put the events of every unit together; a unit of which one is missing, strange or unreadable is a problem."""
+    """Collect the events of every unit; a unit with a missing, foreign or unreadable event is a problem."""
     by_unit: dict[str, list[str]] = {}
     for name in sorted(events):
         by_unit.setdefault(name.rpartition("/")[0], []).append(name)
@@ -103,14 +103,16 @@ def _gather(found: Histories, root: Place, events: Mapping[str, LedgerEntry | st
 
 def _wrong(event: LedgerEntry, folder: str, count: int, name: str) -> str:
     if event.sequence != count or not name.endswith(f"/{count:06d}.json"):
-        return f"has event {name.rpartition('/')[2]} where number {count} is due; restore what is missing from a copy"
+        return (
+            f"has event {name.rpartition('/')[2]} where number {count} is needed; restore the missing file from a copy"
+        )
     if folder_of(event.serial) != f"{FOLDER}/{folder}":
-        return f"holds unit {event.serial!r}, whose folder is another; restore it from a copy"
+        return f"has unit {event.serial!r}, which belongs into another folder; restore it from a copy"
     return ""
 
 
 def all_read(top: Place, names: Sequence[str]) -> dict[str, LedgerEntry | str]:
-    """The events of files below a folder, read by several threads: a cold disk answers many questions as fast as one."""
+    """The events of files below a folder, read by several threads, because a disk serves many requests in the time of one."""
     groups = [names[k : k + AT_ONCE] for k in range(0, len(names), AT_ONCE)]
     out: dict[str, LedgerEntry | str] = {}
     with ThreadPoolExecutor(READERS) as pool:
@@ -120,7 +122,7 @@ def all_read(top: Place, names: Sequence[str]) -> dict[str, LedgerEntry | str]:
 
 
 def _read(top: Place, name: str) -> LedgerEntry | str:
-    """The event that a file holds, or why there is none."""
+    """The event of a file, or the fault of the file."""
     try:
         if isinstance(top, ObjectPath):
             data = (top / name).read_bytes()
@@ -135,13 +137,13 @@ def _read(top: Place, name: str) -> LedgerEntry | str:
 
 
 def noted_events(place: Place) -> tuple[dict[str, Noted], str]:
-    """What was noted, by the place of the event's file, and how its seal stands; nothing of what is not sound."""
+    """The index by the place of the event's file, and the state of its seal; empty where the seal is not sound."""
     import pyarrow as pa
     import pyarrow.parquet as pq
 
     try:
         data, state = derived.unframed(place)
-    except (OSError, ArchiveUnusable):  # nothing was noted yet, or it cannot be read
+    except (OSError, ArchiveUnusable):  # the index does not exist, or cannot be read
         return {}, derived.SOUND
     if state != derived.SOUND:
         return {}, state
@@ -152,7 +154,7 @@ def noted_events(place: Place) -> tuple[dict[str, Noted], str]:
         columns = {name: table.column(name).to_pylist() for name in ("place", "stamp", *NAMES)}
     except (pa.ArrowInvalid, KeyError):  # of another version
         return {}, state
-    for name in ("ends", "evidence"):  # of which many are the same
+    for name in ("ends", "evidence"):  # many are equal
         known = {text: _tuples(json.loads(text)) for text in set(columns[name])}
         columns[name] = [known[text] for text in columns[name]]
     events = (LedgerEntry(*row) for row in zip(*(columns[name] for name in NAMES), strict=True))

@@ -1,4 +1,4 @@
-"""Versions of libraries that can move a number: which ones a run's tables were made with."""
+"""Versions of the numerical libraries of the tables of a run."""
 
 from __future__ import annotations
 
@@ -7,14 +7,14 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-REPORT = "report"  # shows numbers and makes none
+REPORT = "report"  # only for display
 
 
 def differing_libraries(run: str, manifests: Mapping[str, Mapping[str, Any]]) -> list[str]:
-    """A line for each library of which a run's tables were made with more than one version.
+    """A line for each library with more than one version among the tables of a run.
 
-    Versions are not in the keys of stages (docs/decisions/re-runs.md), so a stage that is run again after an update stands beside
-    stages of the version before.
+    Versions are not in the keys of stages (docs/decisions/re-runs.md), so after an update a run can have stages with
+    different versions.
 
     Parameters
     ----------
@@ -27,11 +27,11 @@ def differing_libraries(run: str, manifests: Mapping[str, Mapping[str, Any]]) ->
             for library, number in libraries.items():
                 versions.setdefault(str(library), {}).setdefault(str(number), []).append(name)
     return [
-        f"run {run}: tables made with {library} {_told(by)}; 'tumbleline rerun {run} --check' tells whether a number moved"
+        f"run {run}: tables made with {library} {_versions_text(by)}; check the numbers with 'tumbleline rerun {run} --check'"
         for library, by in sorted(versions.items())
         if len(by) > 1
     ]
 
 
-def _told(by: Mapping[str, list[str]]) -> str:
+def _versions_text(by: Mapping[str, list[str]]) -> str:
     return " and ".join(f"{number} ({', '.join(names)})" for number, names in sorted(by.items()))

@@ -1,4 +1,4 @@
-"""When the measurement of a run began and was over."""
+"""Start and end of the measurement of a run."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ START, END = "run.json", "readings.json"
 
 
 def measured_span(run: Run) -> tuple[str, str] | None:
-    """When a run began and its capture ended; None where that is not known, or not of its own."""
+    """Start of a run and end of its capture; None where unknown, or where the capture belongs to another run."""
     about = run.about
     if about.get("rerun_of") or not about.get("capture") or not (run.path / END).is_file():
         return None
@@ -17,6 +17,6 @@ def measured_span(run: Run) -> tuple[str, str] | None:
 
 
 def measured_on(run: Run) -> str:
-    """The day on which a run's measurement was over, UTC; of a run again, and of data of others, the one that it tells."""
+    """The day on which the measurement of a run ended, UTC; for a re-run and for imported data the stated day."""
     own, about = measured_span(run), run.about
     return day_of(own[1] if own else str(about.get("measured") or about["when"]), f"run {run.id}")

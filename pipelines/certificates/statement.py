@@ -1,4 +1,4 @@
-"""What a document that is handed out says of a unit's certificate: export and report."""
+"""The statement on a unit's certificate in exports and reports."""
 
 from __future__ import annotations
 
@@ -16,10 +16,10 @@ if TYPE_CHECKING:
 
 
 class Stated(NamedTuple):
-    """The certificate that a unit has for a run.
+    """The certificate of a unit for a run.
 
     start, until : first day, and the day after the last
-    state : ``valid``, ``superseded`` or ``revoked``, whatever the date; reason : why it was ended
+    state : ``valid``, ``superseded`` or ``revoked``, independent of the date; reason : reason of its end
     """
 
     certificate: str
@@ -33,14 +33,14 @@ class Stated(NamedTuple):
         return self.start <= day < self.until
 
     def words(self) -> str:
-        """In a line, with nothing in it that changes by itself."""
+        """The statement in one line, independent of the present date."""
         if self.state == "revoked":
             return f"certificate {self.certificate} REVOKED ({self.reason})"
         ended = "" if self.state == "valid" else f", {self.state} {self.reason}"
         return f"certificate {self.certificate}, valid from {self.start} until {self.until}{ended}"
 
     def document(self) -> dict[str, Any]:
-        """For JSON, with whether it holds today."""
+        """The statement for JSON, with its validity today."""
         return {
             "certificate": self.certificate,
             "from": self.start,
@@ -52,12 +52,12 @@ class Stated(NamedTuple):
 
 
 def stated(run: Run, serials: Iterable[str]) -> dict[str, Stated]:
-    """The certificates of a run's units by serial: of each the one that was not ended, else the last; none of other runs.
+    """The certificates of the units of a run by serial: for each unit the one that is not ended, else the last.
 
     Raises
     ------
     ArchiveUnusable
-        One was given for other coefficients than the run has.
+        A certificate is for other coefficients than those of the run.
     """
     ledger, out = Ledger(run.archive.root), dict[str, Stated]()
     for serial in serials:
@@ -70,13 +70,13 @@ def stated(run: Run, serials: Iterable[str]) -> dict[str, Stated]:
 
 
 def _refuse_other_coefficients(run: Run, one: Calibration) -> None:
-    """Refuse to name a certificate beside coefficients that it was not given for; one that was revoked vouches for nothing."""
-    there = run.manifest("coefficients")["sha256"]
-    if one.state != "revoked" and there != one.event.coefficients:
+    """Refuse a certificate for other coefficients; a revoked one is not checked."""
+    present = run.manifest("coefficients")["sha256"]
+    if one.state != "revoked" and present != one.event.coefficients:
         raise ArchiveUnusable(
-            f"certificate {one.certificate} was given for other coefficients than run {run.id} has: their hash is "
-            f"{there[:12]}…, that in the certificate {one.event.coefficients[:12]}…; restore the table from a copy, or find out "
-            f"what moved with 'tumbleline rerun {run.id} --check' and certify the run again"
+            f"certificate {one.certificate} is for other coefficients than those of run {run.id}: their hash is "
+            f"{present[:12]}…, that in the certificate {one.event.coefficients[:12]}…; restore the table from a copy, or "
+            f"find the changes with 'tumbleline rerun {run.id} --check' and certify the run again"
         )
 
 

@@ -1,6 +1,6 @@
-"""Which calibrations of a unit hold when: a pure function of its events, in the order in which they were written.
+"""Periods of validity of the calibrations of a unit: a pure function of its events in the order of writing.
 
-A new calibration ends those that hold on its first day; so no two of a unit hold on one day, whatever is written.
+A new calibration ends those that are valid on its first day, so that a unit never has two valid calibrations on one day.
 """
 
 from __future__ import annotations
@@ -18,13 +18,13 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Calibration:
-    """A unit's calibration with the days on which it holds.
+    """A calibration of a unit with its period of validity.
 
     Parameters
     ----------
-    start, until : first day, and the day after the last; the same where it holds on none any more.
-    stated_until : as it was when it was certified.
-    ended_by : the event that ended it earlier; None where nothing did.
+    start, until : first day, and the day after the last; equal where no day is left.
+    stated_until : the end as certified.
+    ended_by : the event that ended it earlier; None without one.
     """
 
     event: LedgerEntry
@@ -43,7 +43,7 @@ class Calibration:
 
     @property
     def run(self) -> str:
-        """The run that it came from."""
+        """The run of the calibration."""
         return self.event.run
 
     @property
@@ -58,7 +58,7 @@ class Calibration:
 
     @property
     def state(self) -> str:
-        """``valid``, ``superseded`` or ``revoked``: what became of it, whatever the date."""
+        """``valid``, ``superseded`` or ``revoked``: its state, independent of the date."""
         if self.ended_by is None:
             return "valid"
         return "revoked" if self.ended_by.action == "revoke" else "superseded"
@@ -93,23 +93,23 @@ class Calibration:
 
 
 def calibrations_of(events: Iterable[LedgerEntry]) -> list[Calibration]:
-    """The calibrations that a unit's events make, in the order in which they were certified."""
-    found: dict[int, Calibration] = {}
+    """The calibrations of a unit from its events, in the order of certification."""
+    by_sequence: dict[int, Calibration] = {}
     for event in events:
         for sequence in event.ends:
-            old = found[sequence]
+            old = by_sequence[sequence]
             if event.start < old.until:
-                found[sequence] = replace(old, until=max(old.start, event.start), ended_by=event)
+                by_sequence[sequence] = replace(old, until=max(old.start, event.start), ended_by=event)
         if event.action != "revoke":
-            found[event.sequence] = Calibration(event, event.until)
-    return list(found.values())
+            by_sequence[event.sequence] = Calibration(event, event.until)
+    return list(by_sequence.values())
 
 
 def overlapped(known: Sequence[Calibration], start: str, until: str, *, supersede: bool) -> tuple[int, ...]:
     """Sequences of the calibrations that one from ``start`` to ``until`` ends.
 
-    What began earlier ends by itself where the new one begins. What begins later is ended only where ``supersede`` says so,
-    for a calibration that is written afterwards would otherwise silently take the place of a newer one.
+    Earlier calibrations end where the new one begins. Later ones are ended only with ``supersede``, because otherwise a
+    calibration that is written afterwards would silently replace a newer one.
     """
     clash = [one for one in known if one.start < one.until and one.start < until and start < one.until]
     later = [one for one in clash if one.start > start]
@@ -117,6 +117,6 @@ def overlapped(known: Sequence[Calibration], start: str, until: str, *, supersed
         one = later[0]
         raise WrongUse(
             f"certify: unit {one.serial}: {start} to {until} overlaps calibration {one.certificate} of run {one.run}, valid "
-            f"from {one.start} to {one.until}, and begins before it; choose other dates, or end that one with --supersede"
+            f"from {one.start} to {one.until}, and begins before it; choose other dates, or end that calibration with --supersede"
         )
     return tuple(one.event.sequence for one in clash)

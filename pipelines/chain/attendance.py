@@ -1,4 +1,4 @@
-"""The person at the station: what is asked of them, and when. Who carries the question is another module's business."""
+"""Questions to the operator at the station, and when they are asked. Other modules transmit them."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any, Literal, Protocol
 
 from pipelines.jobs.seating import disagreements
 from pipelines.tables.frames import rows_of
+from schemas.counts import number_of
 from schemas.errors import OperatorNeeded
 
 if TYPE_CHECKING:
@@ -18,16 +19,16 @@ if TYPE_CHECKING:
 
 Kind = Literal["load", "confirm", "trouble", "unload", "approve"]
 Answer = Literal["go", "stop"]
-JUDGED = "grade"  # the stage after which each unit has its result: the operator unloads then, and the report is made after it
+JUDGED = "grade"  # after this stage each unit has its result: the operator unloads, then the report is made
 
 
 @dataclass(frozen=True)
 class Prompt:
-    """Something that a person has to do before the run goes on.
+    """An action of the operator that the run needs to continue.
 
-    ``load``: seat the units. ``confirm``: the slots say something else than the slot map. ``trouble``: the station needs a hand;
-    the run goes on after its last record. ``unload``: take the units out, each slot with its result. ``approve``: station time
-    beyond what was asked for.
+    ``load``: seat the units. ``confirm``: the slots contradict the slot map. ``trouble``: correct a fault of the station;
+    the run continues after its last record. ``unload``: remove the units, each slot with its result. ``approve``: additional
+    station time.
     """
 
     kind: Kind
@@ -37,22 +38,22 @@ class Prompt:
 
 
 class Operator(Protocol):
-    """Whoever can be asked."""
+    """An operator who answers questions."""
 
     def ask(self, prompt: Prompt) -> Answer:
-        """``go`` when it is done, ``stop`` to leave it."""
+        """``go`` when the action is done, ``stop`` to stop the run."""
         ...
 
 
 class Attendance:
-    """A run with somebody beside it: asked before the lot is measured, when the station needs a hand, and when it is judged."""
+    """A run with an operator, who is asked before the measurement, at a fault of the station, and after grading."""
 
     def __init__(self, operator: Operator, job: Job, run: str) -> None:
         self.operator, self.job, self.run = operator, job, run
         self._seated = False  # the units were measured here and are still in their slots
 
     def capture(self, runner: Runner, stage: Callable[[], Done]) -> Done:
-        """The capture done, with everything asked that it takes."""
+        """Run the capture with the necessary questions."""
         records = runner.archive.capture(self.job.capture_id)
         if records.is_complete():
             return stage()
@@ -69,20 +70,20 @@ class Attendance:
             return done
 
     def unload(self, run: Run) -> None:
-        """Shows what each slot came to, and asks for the units to be taken out; nothing where they were not measured here."""
+        """Shows the result of each slot and asks to remove the units; nothing where they were not measured here."""
         if not self._seated:
             return
         self._seated = False
         results = {str(row["unit"]): _result(row) for row in rows_of(run.table("grades"))}
         passed = sum(text.startswith("pass") for text in results.values())
-        text = f"{passed} of {len(results)} passed; take the units out and sort them as listed"
+        text = f"{passed} of {number_of(len(results), 'unit')} passed; remove the units and sort them as listed"
         slots = tuple((u.slot, f"{u.serial}  {results.get(u.serial, 'no result')}") for u in self.job.lot.units)
         self._ask(Prompt("unload", self.run, text, slots))
 
     def _confirm(self) -> None:
-        """Asks until the slots say what the slot map says."""
+        """Repeats the question until the slots agree with the slot map."""
         while wrong := seated_otherwise(self.job):
-            self._need("confirm", "; ".join(wrong) + "; seat them as the slot map says")
+            self._need("confirm", "; ".join(wrong) + "; seat the units as in the slot map")
 
     def _need(self, kind: Kind, text: str, *, lot: bool = False) -> None:
         slots = tuple((unit.slot, unit.serial) for unit in self.job.lot.units) if lot else ()
@@ -91,18 +92,18 @@ class Attendance:
     def _ask(self, prompt: Prompt) -> None:
         if self.operator.ask(prompt) == "stop":
             message = f"run {self.run}: stopped at '{prompt.kind}' by the operator ({prompt.text})"
-            raise OperatorNeeded(f"{message}; give the command again to go on")
+            raise OperatorNeeded(f"{message}; give the command again to continue")
 
 
 def _result(row: dict[str, Any]) -> str:
-    """What a unit came to: passed with its grade, or what it failed or was refused for."""
+    """The result of a unit: pass with its grade, or the reasons of fail or refusal."""
     grade = f", grade {row['grade']}" if row["outcome"] == "pass" and row["grade"] else ""
     why = f": {row['reasons']}" if row["outcome"] != "pass" and row["reasons"] else ""
     return f"{row['outcome']}{grade}{why}"
 
 
 def seated_otherwise(job: Job) -> list[str]:
-    """What the slots of a job's station say against its lot."""
+    """Differences between the slots of a job's station and its lot."""
     from stations import open_station
 
     with open_station(job.station, job.lot) as station:

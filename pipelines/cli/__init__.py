@@ -1,4 +1,4 @@
-"""The command line. A command's module is imported when the command is used, so that help answers at once."""
+"""The command line. The module of a command is imported when the command is used, so that help starts quickly."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ COMMANDS = find_commands(Path(__file__).parent)
 
 
 class _OnDemand(TyperCommand):
-    """A command known by name and one line of help; the rest is in its module."""
+    """A command with its name and one line of help; its module is imported at its first use."""
 
     def __init__(self, name: str) -> None:
         stated = COMMANDS[name]
@@ -48,15 +48,15 @@ class _OnDemand(TyperCommand):
 
 
 class _Commands(TyperGroup):
-    """The commands by what they are for."""
+    """The commands in the parts of the help."""
 
     def list_commands(self, ctx: Context) -> list[str]:
         """Names of the commands."""
         del ctx
-        return [*COMMANDS]  # the module cli.list hides the built-in of that name here once it is imported
+        return [*COMMANDS]  # after its import the module cli.list hides the built-in ``list`` here
 
     def resolve_command(self, ctx: Context, args: list[str]) -> tuple[str | None, Command | None, list[str]]:
-        """The command that the arguments begin with; an unknown one is refused with close matches."""
+        """The command that the first argument names; an unknown name is refused with similar names."""
         if args and args[0] not in COMMANDS and not args[0].startswith("-"):
             raise WrongUse(f"no command is called '{shown(args[0])}'; {did_you_mean(args[0], COMMANDS)}")
         return super().resolve_command(ctx, args)
@@ -91,11 +91,11 @@ def _product(
         bool, typer.Option("--version", callback=_print_version, is_eager=True, help="Show the version and exit.")
     ] = False,
 ) -> None:
-    """Calibrate accelerometers in production: measure, fit, judge the model, grade, and keep it all traceable."""
+    """Calibrate accelerometers in production: measure, fit, judge the model, grade, with traceable results."""
 
 
 def main() -> None:
-    """Run the command line; an error that a person can correct is one message on standard error and an exit status."""
+    """Run the command line; an error that the user can correct is one message on standard error and an exit status."""
     try:
         app()
     except TumblelineError as problem:
@@ -104,16 +104,19 @@ def main() -> None:
         _leave(str(problem), UNUSABLE)
     except SystemExit as left:
         if left.code == INTERRUPTED:
-            _leave("stopped; a run continues where it was when its command is given again", INTERRUPTED)
+            _leave("stopped; give the command again to continue the run", INTERRUPTED)
         if left.code == 1 and isinstance(left.__context__, OSError) and left.__context__.errno == errno.EPIPE:
-            sys.exit(PIPE_CLOSED)  # 1 would be a verdict
+            sys.exit(PIPE_CLOSED)  # status 1 is a verdict
         raise
     except Exception as problem:  # noqa: BLE001 - a defect: one line, details in a file, never exit status 1
         if isinstance(problem, OSError) and problem.errno == errno.ENAMETOOLONG:
-            _leave(f"'{shown(str(problem.filename))}': no file can have so long a name; give a shorter one", UNUSABLE)
-        from pipelines.cli.unexpected import told
+            _leave(
+                f"'{shown(str(problem.filename))}': the file name is too long for this system; give a shorter one",
+                UNUSABLE,
+            )
+        from pipelines.cli.unexpected import write_report
 
-        _leave(told(problem), UNEXPECTED)
+        _leave(write_report(problem), UNEXPECTED)
 
 
 def _leave(message: str, status: int) -> None:

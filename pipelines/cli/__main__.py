@@ -1,4 +1,4 @@
-"""``python -m pipelines.cli``: the command line where the package is not installed."""
+"""``python -m pipelines.cli``: the command line without an installed package."""
 
 from pipelines.cli import main
 

@@ -1,4 +1,4 @@
-"""``tumbleline archive``: the key that signs, and what killed writers left."""
+"""``tumbleline archive``: the signing key, and the temporary files of killed writers."""
 
 from __future__ import annotations
 
@@ -9,13 +9,14 @@ from typing import Annotated
 import typer
 
 from pipelines.cli.options import ArchiveOption, JsonOption, console, print_json
+from schemas.counts import number_of
 
 PART = "Certificates, trace, audit"
 ORDER = 460
-SUMMARY = "Maintain the archive: the signing key, and what interrupted writers left."
+SUMMARY = "Maintain the archive: the signing key, and leftovers of interrupted commands."
 
 app = typer.Typer(
-    help="Look after the archive.", no_args_is_help=True, add_completion=False, pretty_exceptions_enable=False
+    help="Maintain the archive.", no_args_is_help=True, add_completion=False, pretty_exceptions_enable=False
 )
 
 
@@ -24,11 +25,11 @@ def clean(
     archive: ArchiveOption = None,
     *,
     only_look: Annotated[
-        bool, typer.Option("--dry-run", help="Say what would be taken away, and take nothing.")
+        bool, typer.Option("--dry-run", help="Show what would be removed, and change nothing.")
     ] = False,
     as_json: JsonOption = False,
 ) -> None:
-    """Take away what killed writers left, and name in the chain what they left out; never what is being written now."""
+    """Remove temporary files of killed writers and add finished runs to the chain; files in use are not touched."""
     from pipelines.archive import Archive
     from pipelines.archive.cleaning import clean as cleaned
 
@@ -40,15 +41,15 @@ def clean(
         return
     out = console()
     for place in done.removed:
-        out.print(f"{'left' if only_look else 'removed'}  {place}", markup=False, soft_wrap=True)
+        out.print(f"{'found' if only_look else 'removed'}  {place}", markup=False, soft_wrap=True)
     for place in dict.fromkeys(done.busy):
         out.print(f"in use   {place}", markup=False, soft_wrap=True)
     for run in done.sealed:
         out.print(f"sealed   {run}", markup=False, soft_wrap=True)
     word = "found" if only_look else "removed"
-    out.print(f"{len(done.removed)} left by killed writers {word} ({done.bytes} bytes)")
+    out.print(f"{number_of(len(done.removed), 'leftover')} of killed writers {word} ({number_of(done.bytes, 'byte')})")
     if done.anchored:
-        out.print(f"{done.anchored} calibrations put into the chain")
+        out.print(f"{number_of(done.anchored, 'calibration')} added to the chain")
 
 
 @app.command()
@@ -56,16 +57,16 @@ def key(
     output: Annotated[
         Path | None,
         typer.Option(
-            "--output", metavar="FILE", help="The private key's file; in the user's configuration by default."
+            "--output", metavar="FILE", help="File of the private key; default: in the user's configuration folder."
         ),
     ] = None,
     *,
     public: Annotated[
-        bool, typer.Option("--public", help="Show the public key of the one that is there; make none.")
+        bool, typer.Option("--public", help="Show the public key of the existing key; make no key.")
     ] = False,
     as_json: JsonOption = False,
 ) -> None:
-    """Make the key that signs manifests, and show its public half; it lies outside the archive."""
+    """Make the key that signs manifests, outside the archive, and show its public key."""
     from pipelines.archive import signatures
     from schemas.errors import WrongUse
 
@@ -73,13 +74,13 @@ def key(
     if public:
         place = output or signatures.key_place()
         if place is None:
-            raise WrongUse("archive key: there is no key yet, one is needed; make it with 'tumbleline archive key'")
+            raise WrongUse("archive key: no key exists, one is needed; make it with 'tumbleline archive key'")
         made = signatures.private_key(place).public_key()
     else:
         within = next((one for one in place.resolve().parents if (one / "archive.json").is_file()), None)
         if within is not None:
             raise WrongUse(
-                f"archive key: {place} lies in archive {within}, a place outside is needed; name another with --output"
+                f"archive key: {place} lies in archive {within}, a place outside it is needed; give another with --output"
             )
         made = signatures.make_key(place)
     hexadecimal = made.public_bytes_raw().hex()
@@ -91,4 +92,4 @@ def key(
     out.print(f"public   {hexadecimal}", markup=False, soft_wrap=True)
     out.print(f"private  {place}", markup=False, soft_wrap=True)
     if output is not None and not public:
-        out.print(f"sign with it by TUMBLELINE_SIGNING_KEY={place}", markup=False, soft_wrap=True)
+        out.print(f"to sign with this key, set TUMBLELINE_SIGNING_KEY={place}", markup=False, soft_wrap=True)

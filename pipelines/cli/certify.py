@@ -1,4 +1,4 @@
-"""``tumbleline certify``: a run's units that passed get a validity."""
+"""``tumbleline certify``: certificates with a period of validity for the units of a run that passed."""
 
 from __future__ import annotations
 
@@ -15,6 +15,7 @@ from pipelines.cli.options import (
     print_json,
     print_table,
 )
+from schemas.counts import number_of
 
 if TYPE_CHECKING:
     from pipelines.archive import Run
@@ -22,37 +23,45 @@ if TYPE_CHECKING:
 
 PART = "Certificates, trace, audit"
 ORDER = 410
-SUMMARY = "Certify the units of a run that passed, from a first to a last day of validity."
+SUMMARY = "Certify the units of a run that passed, for a period of validity."
 
 
 def command(
     run: RunArgument = "latest",
-    units: Annotated[str, typer.Option("--units", metavar="SN,…", help="Only these; all that passed by default.")] = "",
-    start: Annotated[str, typer.Option("--from", metavar="DATE", help="First day of validity, UTC; today.")] = "",
-    until: Annotated[str, typer.Option("--until", metavar="DATE", help="The day after the last.")] = "",
+    units: Annotated[
+        str, typer.Option("--units", metavar="SN,…", help="Certify only these units; default: all that passed.")
+    ] = "",
+    start: Annotated[
+        str, typer.Option("--from", metavar="DATE", help="First day of validity, UTC; default: today.")
+    ] = "",
+    until: Annotated[str, typer.Option("--until", metavar="DATE", help="The day after the last day of validity.")] = "",
     months: Annotated[
         int,
         typer.Option(
-            "--months", min=0, max=120, help="Validity where no --until is given; 0: as long as the limits allow."
+            "--months", min=0, max=120, help="Validity without --until, months; 0: as long as the limits allow."
         ),
     ] = 0,
-    reason: Annotated[str, typer.Option("--reason", help="Kept with the event.")] = "",
+    reason: Annotated[
+        str, typer.Option("--reason", help="Reason, written into the certificate's entry of the ledger.")
+    ] = "",
     key: Annotated[
         list[str] | None,
-        typer.Option("--key", metavar="FILE|HEX", help="A public key that may have signed the run, beside the own."),
+        typer.Option(
+            "--key", metavar="FILE|HEX", help="Another public key that is accepted for the signatures of the run."
+        ),
     ] = None,
     archive: ArchiveOption = None,
     *,
     supersede: Annotated[
-        bool, typer.Option("--supersede", help="End calibrations that begin later and overlap, too.")
+        bool, typer.Option("--supersede", help="Also end calibrations that begin later and overlap.")
     ] = False,
     as_json: JsonOption = False,
 ) -> None:
-    """Certify the units of a run that passed: from when until when their calibration holds.
+    """Certify the units of a run that passed, with first and last day of validity.
 
-    The run is verified first; what is not as it was written is not certified. A calibration that began earlier ends where the new
-    one begins; of one unit no two hold on one day. The run's report is made again and names the certificates. Exit status 1: some
-    units of the run did not pass and got no certificate.
+    The run is verified first; a run with changed files is not certified. An earlier calibration of a unit ends on the day on
+    which the new one begins, so that a unit has one valid calibration on each day. The report of the run is made again and names
+    the certificates. Exit status 1: some units of the run did not pass and have no certificate.
     """
     from pipelines.archive import Archive
     from pipelines.archive.signatures import public_keys
@@ -63,30 +72,33 @@ def command(
 
     store = Archive(archive)
     serials = tuple(serial.strip() for serial in units.split(",")) if units else ()
-    found = store.run(run)
-    _tell_which(found)
-    done = certify(Ledger(store), found, serials, start, until, months=months, reason=reason, supersede=supersede,
+    source = store.run(run)
+    _print_run(source)
+    done = certify(Ledger(store), source, serials, start, until, months=months, reason=reason, supersede=supersede,
         keys=public_keys() | (public_keys(key) if key else {}),
     )  # fmt: skip
     try:
-        renew_report(found)
-    except ArchiveUnusable as problem:  # the certificates are written; an older one may be of other coefficients
+        renew_report(source)
+    except ArchiveUnusable as problem:  # the certificates are written; the old report may show other coefficients
         error_console().print(f"certify: the report was not made again: {problem}", markup=False, soft_wrap=True)
     if as_json:
-        print_json(_document(found.id, done))
+        print_json(_document(source.id, done))
     else:
-        _print(found.id, done)
+        _print(source.id, done)
     raise typer.Exit(PART_FAILED if done.left_out else DONE)
 
 
-def _tell_which(run: Run) -> None:
-    """Say which run is about to be signed, on the error stream, before it is."""
+def _print_run(run: Run) -> None:
+    """Print on standard error which run will be certified."""
     from pipelines.certificates.handed_out import library_remarks
     from pipelines.certificates.measured import measured_on
 
     units = [str(unit["serial"]) for unit in run.about.get("lot", {}).get("units", [])]
     named = ", ".join(units) if len(units) <= 6 else f"{units[0]} … {units[-1]}"
-    lines = [f"run {run.id}, measured on {measured_on(run)}, {len(units)} units: {named}", *library_remarks(run)]
+    lines = [
+        f"run {run.id}, measured on {measured_on(run)}, {number_of(len(units), 'unit')}: {named}",
+        *library_remarks(run),
+    ]
     for line in lines:
         error_console().print(f"certify: {line}", markup=False, soft_wrap=True)
 

@@ -1,4 +1,4 @@
-"""Lines over time, drawn in a terminal with braille dots: two by four to a character."""
+"""Line charts over time in a terminal, drawn with braille dots (2 × 4 dots in each character)."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ if TYPE_CHECKING:
 
 DOTS = ((0x01, 0x08), (0x02, 0x10), (0x04, 0x20), (0x40, 0x80))
 BLANK = 0x2800
-MARGIN = 9  # characters of the labels at the left
+MARGIN = 9  # characters for the labels on the left
 
 
 @dataclass(frozen=True)
 class Line:
-    """One line: its name, its colour, and its points (time in s, value); a value that is not finite leaves a gap."""
+    """One line: name, colour and points (time in s, value); a value that is not finite makes a gap."""
 
     name: str
     style: str
@@ -27,11 +27,11 @@ class Line:
 
 
 def chart(title: str, lines: Sequence[Line], width: int, height: int, span: tuple[float, float]) -> Text:
-    """The lines as a text of ``height`` rows and about ``width`` columns, with values at the left and times below.
+    """The chart as text of ``height`` rows and about ``width`` columns, with values on the left and times below.
 
     Parameters
     ----------
-    span : first and last time that are shown, s
+    span : first and last time of the chart, s
     """
     from rich.text import Text
 
@@ -83,15 +83,15 @@ def _drawn(
 
 def _joined(dots: Sequence[tuple[int, int]]) -> list[tuple[int, int]]:
     """The dots with straight lines between them."""
-    found = list(dots[:1])
+    joined = list(dots[:1])
     for (x, y), (u, v) in itertools.pairwise(dots):
         steps = max(abs(u - x), abs(v - y))
-        found += [(round(x + (u - x) * k / steps), round(y + (v - y) * k / steps)) for k in range(1, steps + 1)]
-    return found
+        joined += [(round(x + (u - x) * k / steps), round(y + (v - y) * k / steps)) for k in range(1, steps + 1)]
+    return joined
 
 
 def _round(low: float, high: float) -> tuple[float, float]:
-    """Bounds that leave a little room, and are never the same."""
+    """Limits of the value axis with a margin; they always differ."""
     room = 0.05 * (high - low) or 0.5
     return low - room, high + room
 

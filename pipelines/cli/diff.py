@@ -1,4 +1,4 @@
-"""``tumbleline diff``: what differs between two runs, by how much, and because of what."""
+"""``tumbleline diff``: differences between two runs, their size and their causes."""
 
 from __future__ import annotations
 
@@ -8,26 +8,27 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from pipelines.cli.options import STYLES, ArchiveOption, JsonOption, console, print_json, print_table, short
+from schemas.counts import number_of
 
 if TYPE_CHECKING:
     from rich.text import Text
 
 PART = "Old data, new models"
 ORDER = 530
-SUMMARY = "Show what differs between two runs, by how much, and the cause."
+SUMMARY = "Show the differences between two runs, their size and their causes."
 
 SHOWN = 12
 
 
 def command(
-    run_a: Annotated[str, typer.Argument(metavar="RUN_A", help="A run's name, its beginning, or 'latest'.")],
-    run_b: Annotated[str, typer.Argument(metavar="RUN_B", help="The run that it is compared with.")],
+    run_a: Annotated[str, typer.Argument(metavar="RUN_A", help="Name of a run, the beginning of it, or 'latest'.")],
+    run_b: Annotated[str, typer.Argument(metavar="RUN_B", help="The run to compare with.")],
     archive: ArchiveOption = None,
     *,
-    everything: Annotated[bool, typer.Option("--all", help="Show every change, not only the largest.")] = False,
+    everything: Annotated[bool, typer.Option("--all", help="Show all changes; default: only the largest.")] = False,
     as_json: JsonOption = False,
 ) -> None:
-    """Tell which grades, coefficients and figures differ between two runs, by how much against their uncertainty, and why."""
+    """Show which grades, coefficients and figures differ between two runs, relative to their uncertainty, and the causes."""
     from pipelines.archive import Archive
     from pipelines.rerun.diff import diff
 
@@ -56,13 +57,17 @@ def _print(document: dict[str, Any], most: int | None) -> None:
 def _print_flips(document: dict[str, Any]) -> None:
     flips = [row for row in document["units"] if row["flipped"]]
     if not flips:
-        console().print(f"no grade flips among {len(document['units'])} units")
+        console().print(f"no grade differs ({number_of(len(document['units']), 'unit')})")
         return
     lines = [
         [row["unit"], *(_styled(o, g) for o, g in zip(row["outcome"], row["grade"], strict=True)), _reason(row)]
         for row in flips
     ]
-    print_table(["unit", "a", "b", "because"], lines, title=f"{len(flips)} of {len(document['units'])} units flip")
+    print_table(
+        ["unit", "a", "b", "reason"],
+        lines,
+        title=f"grade differs for {len(flips)} of {number_of(len(document['units']), 'unit')}",
+    )
 
 
 def _styled(outcome: str, grade: str) -> Text:
@@ -72,11 +77,11 @@ def _styled(outcome: str, grade: str) -> Text:
 
 
 def _reason(row: dict[str, Any]) -> str:
-    """The reasons that the one has and the other has not."""
+    """The reasons that only one of the runs gives."""
     before, after = (set(filter(None, text.split("; "))) for text in row["reasons"])
     gone, new = (sorted(one.split(":")[0] for one in part) for part in (before - after, after - before))
-    said = [f"now {name}" for name in new] + [f"no longer {name}" for name in gone if name not in new]
-    return "; ".join(said)
+    changes = [f"now {name}" for name in new] + [f"no longer {name}" for name in gone if name not in new]
+    return "; ".join(changes)
 
 
 def _print_changes(rows: list[dict[str, Any]], key: tuple[str, ...], what: str, most: int | None) -> None:
@@ -87,12 +92,12 @@ def _print_changes(rows: list[dict[str, Any]], key: tuple[str, ...], what: str, 
     lines = [_change_line(row, key) for row in both[:most]]
     if lines:
         heads = ["unit", what, "a", "b", "change", "over\nu(a)", "over\nu(b)"]
-        title = f"{what}: {len(both)} differ, the largest against their uncertainty first"
+        title = f"{what}: {len(both)} differ, largest change relative to the uncertainty first"
         print_table(heads, lines, title=title, whole=2)
     new, gone = _apart(rows, "b"), _apart(rows, "a")
-    for words, names in (("only in b", new), ("only in a", gone)):
+    for side, names in (("only in b", new), ("only in a", gone)):
         if names:
-            out.print(f"{what} {words}: {', '.join(names)}", markup=False, soft_wrap=True)
+            out.print(f"{what} {side}: {', '.join(names)}", markup=False, soft_wrap=True)
 
 
 def _change_line(row: dict[str, Any], key: tuple[str, ...]) -> list[str]:
@@ -102,7 +107,7 @@ def _change_line(row: dict[str, Any], key: tuple[str, ...]) -> list[str]:
 
 
 def _apart(rows: list[dict[str, Any]], side: str) -> list[str]:
-    """Names of what only one of the runs has, each once."""
+    """Names that only one of the runs has, each once."""
     other = "a" if side == "b" else "b"
     names = [row.get("effect") or row["figure"] for row in rows if math.isnan(row[other])]
     return sorted(set(names))
@@ -111,7 +116,7 @@ def _apart(rows: list[dict[str, Any]], side: str) -> list[str]:
 def _print_causes(rows: list[dict[str, Any]]) -> None:
     out = console()
     if not rows:
-        out.print("because: data, code, model, limits and libraries are the same")
+        out.print("causes: none found; data, code, model, limits and libraries are the same")
         return
     out.print("because of")
     code = [row["stage"] for row in rows if row["what"] == "code"]

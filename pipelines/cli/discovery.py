@@ -1,6 +1,6 @@
-"""The commands: each is one module of this package that states PART, ORDER and SUMMARY as constants.
+"""The commands: each is one module of this package with the constants PART, ORDER and SUMMARY.
 
-The constants are read from the source, and no module is imported, so that help answers at once.
+The constants are read from the source, and no module is imported, so that help starts quickly.
 """
 
 from __future__ import annotations
@@ -15,11 +15,11 @@ COMMAND = re.compile(r"^(?:def command\(|app = typer\.Typer\()", re.MULTILINE)
 
 
 class IncompleteCommand(Exception):
-    """A module that is a command in part only: a defect of that module, which its author repairs."""
+    """A module with an incomplete command: a defect that its author must correct."""
 
 
 class Command(NamedTuple):
-    """A command as help lists it.
+    """A command in the help.
 
     module : name inside this package · part : heading of the help · order : place in the help · summary : one sentence
     """
@@ -33,7 +33,7 @@ class Command(NamedTuple):
 def find_commands(folder: Path) -> dict[str, Command]:
     """The commands of a folder by name, in the order of the help.
 
-    The name is the module's; a module whose name Python reserves ends in an underscore (``import_``).
+    The name is the name of the module; a module with a reserved name of Python ends in an underscore (``import_``).
 
     Raises
     ------
@@ -55,7 +55,7 @@ def find_commands(folder: Path) -> dict[str, Command]:
 
 
 def _read(path: Path) -> Command | None:
-    """The command that a module states; None for a module that is none."""
+    """The command of a module; None for a module without a command."""
     text = path.read_text(encoding="utf-8")
     values = {name: string or number for name, string, number in CONSTANT.findall(text)}
     callable_ = COMMAND.search(text) is not None

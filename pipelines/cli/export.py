@@ -27,18 +27,20 @@ if TYPE_CHECKING:
 def command(
     run: RunArgument = "latest",
     form: Annotated[str, typer.Option("--format", help=f"{_NAMES}.")] = "json",
-    units: Annotated[str, typer.Option("--units", metavar="SN,…", help="Only these; all that passed by default.")] = "",
+    units: Annotated[
+        str, typer.Option("--units", metavar="SN,…", help="Export only these units; default: all that passed.")
+    ] = "",
     output: Annotated[
-        Path | None, typer.Option("--output", "-o", metavar="FILE", help="Standard output by default.")
+        Path | None, typer.Option("--output", "-o", metavar="FILE", help="Output file; default: standard output.")
     ] = None,
     nominal: Annotated[
-        float | None, typer.Option("--nominal", help="Output per g that the autopilot's driver assumes.")
+        float | None, typer.Option("--nominal", help="Output per g that the driver of the autopilot assumes.")
     ] = None,
     archive: ArchiveOption = None,
     *,
-    failed: Annotated[bool, typer.Option("--failed", help="Hand out units that failed their limits, too.")] = False,
+    failed: Annotated[bool, typer.Option("--failed", help="Also export units that failed their limits.")] = False,
     revoked: Annotated[
-        bool, typer.Option("--revoked", help="Hand out units whose calibration was revoked, too.")
+        bool, typer.Option("--revoked", help="Also export units whose calibration was revoked.")
     ] = False,
     as_json: JsonOption = False,
 ) -> None:
@@ -52,12 +54,12 @@ def command(
     form = "json" if as_json else form
     if form not in FORMATS:
         raise WrongUse(f"export: no format is called '{form}'; {did_you_mean(form, FORMATS)}")
-    found = Archive(archive).run(run)
-    use_formulas_of(found)
+    source = Archive(archive).run(run)
+    use_formulas_of(source)
     serials = tuple(serial.strip() for serial in units.split(",")) if units else ()
-    chosen = unit_calibrations(found, serials, failed=failed, revoked=revoked)
-    text = export_text(form, chosen, found.id, nominal)
-    _tell_certificates(found, chosen, signature_remarks(found, [c.unit for c in chosen]))
+    chosen = unit_calibrations(source, serials, failed=failed, revoked=revoked)
+    text = export_text(form, chosen, source.id, nominal)
+    _tell_certificates(source, chosen, signature_remarks(source, [c.unit for c in chosen]))
     if output is None:
         typer.echo(text, nl=False)
         return
@@ -70,7 +72,7 @@ def command(
 
 
 def _tell_certificates(run: Run, chosen: Sequence[UnitCalibration], signers: Sequence[str]) -> None:
-    """Say on the error stream what whoever loads these coefficients must know of their certificates."""
+    """Print the state of the certificates of these coefficients on standard error."""
     from pipelines.certificates.days import today
     from pipelines.certificates.handed_out import library_remarks
     from pipelines.export import revoked_units
@@ -80,9 +82,7 @@ def _tell_certificates(run: Run, chosen: Sequence[UnitCalibration], signers: Seq
     lines += [f"{c.unit}: {c.certified}" for c in chosen if c.certificate is not None and not c.certificate.holds(day)]
     bare = [c.unit for c in chosen if c.certificate is None]
     if bare:
-        lines.append(
-            f"not certified: {', '.join(bare)}; 'tumbleline certify {run.id}' says from when until when they hold"
-        )
+        lines.append(f"not certified: {', '.join(bare)}; 'tumbleline certify {run.id}' gives them a period of validity")
     lines += [*library_remarks(run), *signers]
     for line in lines:
         error_console().print(f"export: {line}", markup=False, soft_wrap=True)

@@ -1,4 +1,4 @@
-"""``tumbleline extend``: the next version of a model, with one more effect, and who added it, when and why."""
+"""``tumbleline extend``: the next version of a model, with one more effect; it records who added it, when and why."""
 
 from __future__ import annotations
 
@@ -17,32 +17,35 @@ SUMMARY = "Write the next version of a model with one more effect."
 
 def command(
     model: Annotated[
-        Path, typer.Argument(metavar="MODEL", help="A model file; begun with a starting model where there is none.")
+        Path, typer.Argument(metavar="MODEL", help="A model file; a new file starts with a starting model.")
     ],
     effect: Annotated[
         str,
-        typer.Argument(metavar="EFFECT", help="An id of the catalogue, covariate:<column>, or a formula of the file."),
+        typer.Argument(
+            metavar="EFFECT",
+            help="Id of an effect in the catalogue, covariate:<column>, or a formula in an effect file.",
+        ),
     ],
-    why: Annotated[str, typer.Option("--why", metavar="TEXT", help="What speaks for it.")] = "",
-    by: Annotated[str, typer.Option("--by", metavar="NAME", help="Who adds it; the user's name by default.")] = "",
-    run: Annotated[str, typer.Option("--run", metavar="RUN", help="The run or file that showed it.")] = "",
+    why: Annotated[str, typer.Option("--why", metavar="TEXT", help="Reason for the effect.")] = "",
+    by: Annotated[str, typer.Option("--by", metavar="NAME", help="Name of the author; default: the user's name.")] = "",
+    run: Annotated[str, typer.Option("--run", metavar="RUN", help="The run or file that shows the effect.")] = "",
     output: Annotated[
         Path | None,
-        typer.Option("--out", "-o", metavar="FILE", help="Write the new version here, leave MODEL as it is."),
+        typer.Option("--out", "-o", metavar="FILE", help="Write the new version to this file; MODEL is not changed."),
     ] = None,
     effects: Annotated[
         str,
         typer.Option(
-            "--effects", metavar="a,b,c", help="The starting model of a new file; bias to scale_temperature by default."
+            "--effects", metavar="a,b,c", help="The starting model of a new file; default: bias to scale_temperature."
         ),
     ] = "",
     effect_file: EffectFileOption = None,
     *,
     as_json: JsonOption = False,
 ) -> None:
-    """Write the next version of a model with one more effect, and who added it, when and why.
+    """Write the next version of a model with one more effect; it records who added it, when and why.
 
-    MODEL that is not there yet is begun: version 1 holds the starting model, version 2 the effect.
+    Where MODEL does not exist, it is created: version 1 has the starting model, version 2 the effect as well.
     """
     from pipelines.cli.inputs import add_effect_files
     from pipelines.jobs.model_files import extended, publish_model
@@ -75,25 +78,25 @@ def command(
 
 
 def _step(effect: str, why: str, by: str, run: str) -> Any:
-    """The change to make, its blanks filled with what is known."""
+    """The change to make; missing values are filled in from the run."""
     import getpass
     from datetime import UTC, datetime
 
     from pipelines.jobs.model_files import ModelStep
 
-    reason = why.strip() or (f"a diagnosis of {run} names it" if run else "no reason was given")
+    reason = why.strip() or (f"the diagnosis of {run} names the effect" if run else "no reason given")
     at = datetime.now(UTC).replace(microsecond=0)
     return ModelStep(effect.strip(), by.strip() or getpass.getuser(), at, reason, run)
 
 
 def _start(model: Path, effects: str, step: Any) -> tuple[str, bool]:
-    """The text to extend, and whether it was begun just now."""
+    """The text to extend, and whether the file is new."""
     from pipelines.jobs.model_files import STARTING_MODEL, model_text, new_model
 
     if model.exists():
         if effects:
             raise WrongUse(
-                f"extend: {model} is there, --effects is for a new file; leave --effects out, or name another file"
+                f"extend: {model} exists, --effects is for a new file; leave --effects out, or name another file"
             )
         return model_text(model), False
     names = [part.strip() for part in effects.split(",") if part.strip()] or list(STARTING_MODEL)

@@ -8,30 +8,35 @@ from typing import Annotated
 import typer
 
 from pipelines.cli.options import ArchiveOption, JsonOption, console, print_json
+from schemas.counts import number_of
 
 PART = "Certificates, trace, audit"
 ORDER = 430
-SUMMARY = "Show the origin of certificates, tables and samples, and what was made of them."
+SUMMARY = "Show the origin of certificates, tables and samples, and the results made from them."
 
 
 def command(
     target: Annotated[
         str,
         typer.Argument(
-            metavar="UNIT|RUN|FILE", help="A serial number, a run, or a file of the archive or copied out of it."
+            metavar="UNIT|RUN|FILE", help="A serial number, a run, a file of the archive, or a copy of such a file."
         ),
     ] = "latest",
     prov: Annotated[
-        Path | None, typer.Option("--prov", metavar="FILE", help="Write W3C PROV as JSON-LD; - for standard output.")
+        Path | None,
+        typer.Option("--prov", metavar="FILE", help="Write the lineage as W3C PROV in JSON-LD; - for standard output."),
     ] = None,
     crate: Annotated[
-        Path | None, typer.Option("--crate", metavar="DIR", help="Write an RO-Crate with every file of the lineage.")
+        Path | None,
+        typer.Option(
+            "--crate", metavar="DIR", help="Write an RO-Crate with every file of the lineage into this folder."
+        ),
     ] = None,
     archive: ArchiveOption = None,
     *,
     as_json: JsonOption = False,
 ) -> None:
-    """Tell where certificates, tables and samples came from and what was made of them: who, when, with what code."""
+    """Show the origin of certificates, tables and samples, and the results made from them: by whom, when, with which code."""
     from pipelines.archive import Archive, files
     from pipelines.lineage import lineage
     from pipelines.lineage.prov import prov_of
@@ -40,17 +45,19 @@ def command(
 
     store = Archive(archive)
     store.refuse_none()
-    found = lineage(store, target)
+    traced = lineage(store, target)
     if prov is not None and str(prov) == "-":
-        print_json(prov_of(found))
+        print_json(prov_of(traced))
         return
     if prov is not None:
-        files.publish(prov, files.json_bytes(prov_of(found)), "lineage", "name another file with --prov")
-    copied = write_crate(store, found, crate) if crate is not None else 0
+        files.publish(prov, files.json_bytes(prov_of(traced)), "lineage", "give another file with --prov")
+    copied = write_crate(store, traced, crate) if crate is not None else 0
     if as_json:
-        print_json({**found.document(), "prov": str(prov) if prov else None, "crate": str(crate) if crate else None})
+        print_json({**traced.document(), "prov": str(prov) if prov else None, "crate": str(crate) if crate else None})
         return
     if prov is None and crate is None:
-        console().print(tree_of(found), soft_wrap=True)
-    for what in ([f"PROV in {prov}"] if prov else []) + ([f"RO-Crate with {copied} files in {crate}"] if crate else []):
+        console().print(tree_of(traced), soft_wrap=True)
+    for what in ([f"PROV in {prov}"] if prov else []) + (
+        [f"RO-Crate with {number_of(copied, 'file')} in {crate}"] if crate else []
+    ):
         console().print(what, markup=False, soft_wrap=True)

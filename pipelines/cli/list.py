@@ -12,7 +12,7 @@ SUMMARY = "List the runs of the archive."
 
 
 def command(archive: ArchiveOption = None, *, as_json: JsonOption = False) -> None:
-    """List the runs of the archive, the one started first first."""
+    """List the runs of the archive in the order of their start."""
     from pipelines.archive import Archive
 
     store = Archive(archive)

@@ -1,4 +1,4 @@
-"""``tumbleline operator``: answers runs that wait for somebody, at any terminal that reaches their orchestrator."""
+"""``tumbleline operator``: answers the questions of waiting runs, at any terminal that reaches their orchestrator."""
 
 from __future__ import annotations
 
@@ -19,37 +19,37 @@ SUMMARY = "Answer the questions of runs that wait for an operator."
 
 def command(
     run: Annotated[
-        str, typer.Argument(metavar="[FLOW-RUN]", help="Which one is answered, by the beginning of its name or id.")
+        str, typer.Argument(metavar="[FLOW-RUN]", help="The run to answer: the beginning of its name or id.")
     ] = "",
     archive: ArchiveOption = None,
     *,
-    go: Annotated[bool, typer.Option("--go", help="It is done: the run goes on.")] = False,
+    go: Annotated[bool, typer.Option("--go", help="Confirm: the run continues.")] = False,
     stop: Annotated[
-        bool, typer.Option("--stop", help="Leave it: the run stops, and goes on when it is started again.")
+        bool, typer.Option("--stop", help="Stop the run; the same 'tumbleline run' continues it later.")
     ] = False,
     as_json: JsonOption = False,
 ) -> None:
-    """Show which runs wait for the operator and what they ask, and answer them with --go or --stop."""
+    """Show the runs that wait for the operator and their questions; answer with --go or --stop."""
     from schemas.errors import WrongUse
 
     if go and stop:
-        raise WrongUse("operator: --go and --stop, one answer is needed; leave one out")
+        raise WrongUse("operator: --go and --stop are both given, one is needed; leave one out")
     _reach(archive)
     from pipelines.flows.operator import answer, waiting
 
-    found = [one for one in waiting() if one.name.startswith(run) or one.id.startswith(run)]
+    matches = [one for one in waiting() if one.name.startswith(run) or one.id.startswith(run)]
     if go or stop:
-        chosen, reply = _one(found, run), _answer(go=go)
+        chosen, reply = _one(matches, run), _answer(go=go)
         answer(chosen.id, reply)
-        found = [chosen]
+        matches = [chosen]
     if as_json:
-        print_json({"waiting": [vars(one) for one in found], "answered": "go" if go else "stop" if stop else None})
+        print_json({"waiting": [vars(one) for one in matches], "answered": "go" if go else "stop" if stop else None})
     elif go or stop:
-        console().print(f"{found[0].name}: {'goes on' if go else 'stops'}", markup=False)
-    elif found:
-        print_table(["run", "asks"], [[one.name, one.question] for one in found])
+        console().print(f"{matches[0].name}: {'continues' if go else 'stops'}", markup=False)
+    elif matches:
+        print_table(["run", "asks"], [[one.name, one.question] for one in matches])
     else:
-        console().print("no run waits for anybody", markup=False)
+        console().print("no run waits for the operator", markup=False)
 
 
 def _answer(*, go: bool) -> Answer:
@@ -57,7 +57,7 @@ def _answer(*, go: bool) -> Answer:
 
 
 def _reach(archive: str | None) -> None:
-    """Points the client at the server in the environment, or at the one beside the archive."""
+    """Connect the client to the server of the environment, or to the server of the archive."""
     import os
 
     from pipelines.archive import Archive
@@ -67,20 +67,20 @@ def _reach(archive: str | None) -> None:
     if os.environ.get("PREFECT_API_URL"):
         reach_named()
         return
-    found = environment_of(Archive(archive))
-    if not found:
+    matches = environment_of(Archive(archive))
+    if not matches:
         raise WrongUse(
-            "operator: no orchestrator answers beside this archive, so that nothing waits there; name its --archive"
+            "operator: no orchestrator of this archive answers, so that no run waits; give the archive of the run with --archive"
         )
-    os.environ.update(found)
+    os.environ.update(matches)
 
 
-def _one(found: list[Waiting], run: str) -> Waiting:
+def _one(matches: list[Waiting], run: str) -> Waiting:
     from schemas.errors import WrongUse
 
-    if len(found) != 1:
-        names = ", ".join(one.name for one in found) or "none"
+    if len(matches) != 1:
+        names = ", ".join(one.name for one in matches) or "none"
         raise WrongUse(
-            f"operator: {len(found)} waiting runs begin with '{run}' ({names}), one is needed; write more of its name"
+            f"operator: {len(matches)} waiting runs begin with '{run}' ({names}), one is needed; give more of its name"
         )
-    return found[0]
+    return matches[0]

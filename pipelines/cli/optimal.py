@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from schemas.station import StationConfig
 
 TOLERANCE = 1.1
-"""Ratio to the textbook plan's errors up to which the nearest recipe is written, where no errors are required by options."""
+"""Largest ratio to the textbook plan's errors for which the nearest recipe is written, without required errors in the options."""
 
 
 @dataclass(frozen=True)
@@ -210,9 +210,7 @@ def print_optimum(document: dict[str, Any]) -> None:
         heads = ["coefficient", "axis", "error, 1σ", "required", "ratio", f"{document['from']}, 1σ", "unit"]
         print_table(heads, _error_lines(document["coefficients"]))
     if document["seen_besides"]:
-        out.print(
-            f"Also visible, unlike under the textbook plan: {', '.join(document['seen_besides'])}", soft_wrap=True
-        )
+        out.print(f"Also visible, unlike with the textbook plan: {', '.join(document['seen_besides'])}", soft_wrap=True)
     out.print(f"Recipe file: {document['file']}; measure with 'tumbleline run {document['file']}'", soft_wrap=True)
     if document["limits_missing"]:
         error_console().print(f"warning: {document['limits_missing']}", markup=False, soft_wrap=True, style="yellow")
@@ -300,7 +298,9 @@ def levels_of(base: Recipe, temperatures: str) -> tuple[float, ...]:
     try:
         given = [float(part) for part in temperatures.split(",")] if temperatures else base.temperatures_C
     except ValueError:
-        raise WrongUse(f"plan: --temperatures '{temperatures}' is no list of numbers; write -10,25,60") from None
+        raise WrongUse(
+            f"plan: --temperatures '{temperatures}' is no list of numbers, one is needed; write -10,25,60"
+        ) from None
     outside = [level for level in given if not COLDEST_C <= level <= HOTTEST_C]
     if outside:
         found, needed = f"found {outside[0]:g} °C", f"{COLDEST_C:g} to {HOTTEST_C:g} °C is needed"

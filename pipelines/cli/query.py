@@ -1,4 +1,4 @@
-"""``tumbleline query``: the archive asked in SQL."""
+"""``tumbleline query``: SQL queries on the archive."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from typing import Annotated
 import typer
 
 from pipelines.cli.options import ArchiveOption, JsonOption, console, print_json, print_table, short
+from schemas.counts import number_of
 from schemas.errors import WrongUse
 
 PART = "Results"
@@ -27,14 +28,14 @@ def command(
     compact: Annotated[
         bool,
         typer.Option(
-            "--index/--no-index", help="Read coefficients and figures from the index, or from every run's own file."
+            "--index/--no-index", help="Read coefficients and figures from the index, or from the files of every run."
         ),
     ] = True,
 ) -> None:
-    """Ask the archive in SQL: DuckDB over its Parquet files, read only.
+    """Query the archive in SQL: DuckDB on its Parquet files, read only.
 
     Views: runs, units, parameters, station, coefficients, figures, calibrations, and every table of the runs (dwells, residuals,
-    grades, verification, noise, …) with the column run in front.
+    grades, verification, noise, …) with the run in the first column.
     """
     from pipelines.archive import Archive
     from pipelines.audit.sql import ask
@@ -57,7 +58,9 @@ def command(
         return
     print_table(list(answer.columns), [[_cell(value) for value in row] for row in answer.rows[:MANY]])
     if len(answer.rows) > MANY:
-        console().print(f"{len(answer.rows) - MANY} more rows; --json or --csv prints all of them", markup=False)
+        console().print(
+            f"{number_of(len(answer.rows) - MANY, 'more row')}; print all rows with --json or --csv", markup=False
+        )
 
 
 def _cell(value: object) -> str:

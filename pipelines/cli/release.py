@@ -1,4 +1,4 @@
-"""``tumbleline release``: make a model the line's, from a date; or list which model is the line's, and since when."""
+"""``tumbleline release``: release a model to the line from a date, or list the releases."""
 
 from __future__ import annotations
 
@@ -21,21 +21,23 @@ SUMMARY = "Release a model to the line from a date, or list the releases."
 
 def command(
     model: Annotated[Path | None, typer.Argument(metavar="[MODEL]", help="A model file.")] = None,
-    since: Annotated[str, typer.Option("--from", metavar="DATE", help="Use it from this date on (UTC).")] = "",
+    since: Annotated[str, typer.Option("--from", metavar="DATE", help="First day of use (UTC).")] = "",
     device: Annotated[str, typer.Option("--device", metavar="KIND", help="For this kind of device only.")] = "",
     station: Annotated[str, typer.Option("--station", metavar="NAME", help="For this station only.")] = "",
-    reason: Annotated[str, typer.Option("--reason", metavar="TEXT", help="Why it is released.")] = "",
+    reason: Annotated[str, typer.Option("--reason", metavar="TEXT", help="Reason for the release.")] = "",
     effect_file: EffectFileOption = None,
     archive: ArchiveOption = None,
     *,
-    force: Annotated[bool, typer.Option("--force", help="Release it without a what-if that says better.")] = False,
+    force: Annotated[
+        bool, typer.Option("--force", help="Release the model without a what-if with the verdict 'better'.")
+    ] = False,
     listed: Annotated[bool, typer.Option("--list", help="List the releases.")] = False,
     as_json: JsonOption = False,
 ) -> None:
-    """Make a model the line's from a date, or list the releases.
+    """Release a model to the line from a date, or list the releases.
 
-    Recipes with model = "line" use it from then on. The model needs a what-if in the archive that says it is better (see
-    'tumbleline whatif'), or --force and a reason. A record is never changed: the next release comes after it.
+    Recipes with model = "line" use the model from this date on. It needs a what-if in the archive with the verdict 'better' (see
+    'tumbleline whatif'), or --force and a reason. Releases are never changed; a later release replaces an earlier one.
     """
     from pipelines.archive import Archive
 
@@ -68,7 +70,7 @@ def _released(
 
     if model is None or not since:
         missing = "a model file" if model is None else "--from DATE"
-        raise WrongUse(f"release: {missing} is missing, both are needed; name the model and from when, or give --list")
+        raise WrongUse(f"release: {missing} is missing, both are needed; give a model file and a date, or --list")
     return release(store, wanted("", model, "", effect_file, where="release"), moment(since, "--from"), **how)
 
 
@@ -90,9 +92,7 @@ def _list(store: Archive, *, as_json: bool) -> None:
         print_json({"archive": str(store.root), "releases": rows})
         return
     if not records:
-        console().print(
-            f"no model is released in {store.root}; make one the line's with 'tumbleline release'", markup=False
-        )
+        console().print(f"no model is released in {store.root}; release one with 'tumbleline release'", markup=False)
         return
     lines = [
         [

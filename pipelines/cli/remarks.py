@@ -1,4 +1,4 @@
-"""Remarks on the error stream beside what is shown of a run."""
+"""Remarks about a run on standard error."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
 
 def tell_of(run: Run, serials: Sequence[str]) -> None:
-    """Print missing or foreign signatures, and differing library versions, on the error stream."""
+    """Print missing or foreign signatures and differing library versions on standard error."""
     from pipelines.certificates.handed_out import library_remarks, signature_remarks
 
     for line in (*signature_remarks(run, serials), *library_remarks(run)):

@@ -1,4 +1,4 @@
-"""``tumbleline rerun``: archived runs through today's code, another model or other limits."""
+"""``tumbleline rerun``: re-analysis of archived runs with the present code, another model or other limits."""
 
 from __future__ import annotations
 
@@ -22,6 +22,7 @@ from pipelines.cli.options import (
     print_json,
     print_table,
 )
+from schemas.counts import number_of
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -33,7 +34,7 @@ if TYPE_CHECKING:
 
 PART = "Old data, new models"
 ORDER = 520
-SUMMARY = "Run archived runs through today's code, another model or other limits."
+SUMMARY = "Re-analyse archived runs with the present code, another model or other limits."
 
 SHOWN = 40
 
@@ -49,15 +50,15 @@ def command(
     workers: WorkersOption = None,
     *,
     check: Annotated[
-        bool, typer.Option("--check", help="Write nothing: prove that every table comes out again, byte for byte.")
+        bool, typer.Option("--check", help="Write nothing; check that every table is reproduced byte for byte.")
     ] = False,
-    report: Annotated[bool, typer.Option("--report", help="Draw the report of every re-run, too.")] = False,
+    report: Annotated[bool, typer.Option("--report", help="Also make the report of every re-run.")] = False,
     as_json: JsonOption = False,
 ) -> None:
-    """Run archived runs through today's code, another model or other limits: only the stages whose key changed.
+    """Re-analyse archived runs with the present code, another model or other limits; only stages with a changed key are computed.
 
-    Nothing old is overwritten: where anything changed the result is a new run. What was interrupted goes on. Exit status 1: a run
-    could not be run again, or with --check came out otherwise.
+    Old runs are never overwritten: a changed result is a new run. After an interruption, give the same command again to continue.
+    Exit status 1: a run could not be re-analysed, or with --check was not reproduced.
     """
     from pipelines.archive import Archive
     from pipelines.jobs.model_change import wanted
@@ -84,7 +85,7 @@ def command(
 
 
 def _workers(given: int | None, there: int, runs: list[str]) -> int:
-    """Processes to work with: a single run is not worth starting one."""
+    """Number of processes, at most one for each run."""
     return max(1, min(given or there, len(runs)))
 
 
@@ -93,8 +94,8 @@ def _refuse_check_of_another(refused: bool) -> None:
 
     if refused:
         raise WrongUse(
-            "rerun: --check with another model or limits has nothing to compare with; leave --effects, --model and --limits "
-            "out, or leave --check out and compare with 'tumbleline diff'"
+            "rerun: --check with another model or limits has no stored result to compare with; leave --effects, --model and "
+            "--limits out, or leave --check out and compare with 'tumbleline diff'"
         )
 
 
@@ -106,7 +107,7 @@ def _mapped(
     *,
     report: bool = False,
 ) -> list[Any]:
-    """What a function makes of the runs, in their order, wherever it is done."""
+    """Results of a function for the runs, in their order, computed here or on a cluster."""
     from pathlib import Path as LocalPath
 
     from pipelines.flows.spread import on_dask
@@ -115,10 +116,14 @@ def _mapped(
 
     change, dask, count = how
     home = store.root.resolve() / "orchestrator" if isinstance(store.root, LocalPath) else None
-    with error_console().status(f"running {len(runs)} runs again, {count} at a time"):
+    with error_console().status(f"re-analysing {number_of(len(runs), 'run')}, {count} at a time"):
         portions = parts(store, runs, change, count, report=report)
         done = map_partitions(
-            function, portions, on_dask(dask, count, home), workers=count, name=f"rerun of {len(runs)} runs"
+            function,
+            portions,
+            on_dask(dask, count, home),
+            workers=count,
+            name=f"rerun of {number_of(len(runs), 'run')}",
         )
     return [one for portion in done for one in portion]
 
@@ -132,19 +137,19 @@ def _counts(outcomes: list[Outcome]) -> dict[str, int]:
 def _print(outcomes: list[Outcome], document: dict[str, Any]) -> None:
     lines = [_line(one) for one in outcomes[:SHOWN] if not one.error]
     if lines:
-        print_table(["run", "re-run", "changed", "stages worked out"], lines, whole=2)
+        print_table(["run", "re-run", "changed", "stages computed"], lines, whole=2)
     out = console()
     if len(outcomes) > SHOWN:
-        out.print(f"… and {len(outcomes) - SHOWN} more; --json names them all", style="dim")
+        out.print(f"… and {len(outcomes) - SHOWN} more; --json lists all", style="dim")
     for one in outcomes:
         if one.error:
             out.print(f"  {one.run}: {one.error}", style="bold red", markup=False, soft_wrap=True)
     out.print(
-        f"{document['selected']} selected: {document['rerun']} run again, {document['unchanged']} unchanged, "
-        f"{document['failed']} could not be run again"
+        f"{document['selected']} selected: {document['rerun']} re-analysed, {document['unchanged']} unchanged, "
+        f"{document['failed']} failed"
     )
     if document["rerun"]:
-        out.print("what moved: tumbleline diff RUN RE-RUN", style="dim", markup=False)
+        out.print("compare the results with 'tumbleline diff RUN RE-RUN'", style="dim", markup=False)
 
 
 def _line(one: Outcome) -> list[str]:
@@ -156,38 +161,49 @@ def _line(one: Outcome) -> list[str]:
 def _check(store: Archive, runs: list[str], change: ModelChange, how: tuple[str, int], *, as_json: bool) -> None:
     from pipelines.rerun.partition import checked
 
-    found: list[Reproduction] = _mapped(checked, store, runs, (change, *how))
-    differ = [one for one in found if not one.same]
+    results: list[Reproduction] = _mapped(checked, store, runs, (change, *how))
+    differ = [one for one in results if not one.same]
     document = {
         "archive": str(store.root),
-        "selected": len(found),
-        "same": len(found) - len(differ),
-        "runs": [{**asdict(one), "same": one.same} for one in found],
+        "selected": len(results),
+        "same": len(results) - len(differ),
+        "runs": [{**asdict(one), "same": one.same} for one in results],
     }
     if as_json:
         print_json(document)
     else:
-        _print_check(found)
+        _print_check(results)
     raise typer.Exit(1 if differ else 0)
 
 
-def _print_check(found: list[Reproduction]) -> None:
+def _print_check(results: list[Reproduction]) -> None:
     out = console()
     tables = 0
-    for one in found:
+    for one in results:
         tables += sum(how == "same bytes" for how in one.tables.values())
         for line in [one.error] if one.error else one.differences:
             out.print(f"  {one.run}: {line}", style="bold red", markup=False, soft_wrap=True)
         if one.differences:
-            why = ", ".join(one.changed) or "neither the code nor a library: the machine, or the stored file"
+            why = (
+                ", ".join(one.changed)
+                or "neither code nor libraries; the computer differs or the stored file is damaged"
+            )
             out.print(f"    changed since: {why}", markup=False, soft_wrap=True)
-    left = sum(how == "not checked" for one in found for how in one.tables.values())
-    same = sum(one.same for one in found)
-    out.print(f"{same} of {len(found)} runs come out again: {tables} tables with the same bytes", style="bold")
+    left = sum(how == "not checked" for one in results for how in one.tables.values())
+    same = sum(one.same for one in results)
+    out.print(
+        f"{same} of {number_of(len(results), 'run')} reproduced: {number_of(tables, 'table')} with the same bytes",
+        style="bold",
+    )
     if left:
         out.print(
-            f"{left} tables not checked: the raw samples that they were made from are not in the archive", style="dim"
+            f"{number_of(left, 'table')} not checked: the raw samples for them are not in the archive", style="dim"
         )
-    told = sorted({change for one in found if one.same for change in one.changed})
-    if told:
-        out.print(f"changed since, without moving a byte: {', '.join(told)}", style="dim", markup=False, soft_wrap=True)
+    changes = sorted({change for one in results if one.same for change in one.changed})
+    if changes:
+        out.print(
+            f"changed since, without effect on the tables: {', '.join(changes)}",
+            style="dim",
+            markup=False,
+            soft_wrap=True,
+        )

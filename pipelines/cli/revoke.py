@@ -1,4 +1,4 @@
-"""``tumbleline revoke``: a unit's calibration does not hold any more, and why."""
+"""``tumbleline revoke``: end the validity of a unit's calibration, with the reason."""
 
 from __future__ import annotations
 
@@ -15,22 +15,24 @@ SUMMARY = "Revoke the calibration of a unit, with the reason."
 
 def command(
     serial: Annotated[str, typer.Argument(metavar="SERIAL", help="The unit.")],
-    reason: Annotated[str, typer.Option("--reason", help="Why; those who relied on it will read it.")] = "",
+    reason: Annotated[str, typer.Option("--reason", help="Reason, for the users of the calibration.")] = "",
     day: Annotated[
         str,
         typer.Option(
-            "--from", metavar="DATE", help="First day on which it does not hold; none of its days holds by default."
+            "--from", metavar="DATE", help="First day without validity; default: the first day of the calibration."
         ),
     ] = "",
     certificate: Annotated[
         int,
-        typer.Option("--certificate", min=0, help="Number after the serial; by default all that hold today or later."),
+        typer.Option(
+            "--certificate", min=0, help="Number after the serial; default: all that are valid today or later."
+        ),
     ] = 0,
     archive: ArchiveOption = None,
     *,
     as_json: JsonOption = False,
 ) -> None:
-    """Revoke a unit's calibration, with the reason. Nothing is erased: the event is added to the unit's."""
+    """Revoke a unit's calibration, with the reason. Nothing is deleted: the revocation is added to the ledger of the unit."""
     from pipelines.archive import Archive, Run
     from pipelines.certificates import Ledger
     from pipelines.certificates.days import day_of

@@ -40,7 +40,7 @@ def command(
         typer.Option(
             "--units",
             metavar="SN,…|FILE|scan",
-            help="Serial numbers slot by slot, a slot map (CSV or TOML), or 'scan' to scan them in.",
+            help="Serial numbers in the order of the slots, a slot map (CSV or TOML), or 'scan' to scan them.",
         ),
     ] = "",
     archive: ArchiveOption = None,
@@ -48,13 +48,13 @@ def command(
     repeat: RepeatOption = 0,
     fault: Annotated[
         list[str] | None,
-        typer.Option("--fault", metavar="KIND[:KEY=VALUE…]", help="Trouble for a simulated station; may be repeated."),
+        typer.Option("--fault", metavar="KIND[:KEY=VALUE…]", help="Fault of the simulated station; may be repeated."),
     ] = None,
     *,
     prompts: Annotated[
         bool | None,
         typer.Option(
-            "--prompts/--no-prompts", help="Ask the operator to load and unload; asked on hardware at a terminal."
+            "--prompts/--no-prompts", help="Ask the operator to load and unload; default: on hardware, at a terminal."
         ),
     ] = None,
     direct: Annotated[bool, typer.Option("--direct", help="Run the same chain without the orchestrator.")] = False,
@@ -62,9 +62,8 @@ def command(
 ) -> None:
     """Measure and calibrate a lot, from recipe to report: the main job.
 
-    The same command, given again after it was stopped, goes on where it was; given again after it was finished, it
-    measures nothing and shows the result. A lot that is larger than the fixture is measured filling by filling where somebody is
-    there to seat the units.
+    Given again after a stop, the same command continues the run; given again after the end, it measures nothing and shows the
+    result. A lot that is larger than the fixture is measured in several fillings, if an operator at the terminal seats the units.
     """
     from pipelines.archive import Archive
     from pipelines.certificates.handed_out import library_remarks
@@ -77,7 +76,7 @@ def command(
     config = load_station(station)
     slots = config.devices.slots.count
     seating = scanned(slots) if units == SCAN else read_seating(units)
-    wanted = Request(
+    request_of_lot = Request(
         recipe=recipe,
         station=station,
         units=seating.units,
@@ -87,7 +86,7 @@ def command(
         faults=tuple(fault or ()),
     )
     asks = prompts if prompts is not None else attended() and not as_json
-    requests = wanted.fillings(slots) if asks else [wanted]
+    requests = request_of_lot.fillings(slots) if asks else [request_of_lot]
     asks = asks and (bool(prompts) or len(requests) > 1 or config.kind == "modbus")
     jobs = [request.job(Archive(archive)) for request in requests]
     runs = [
@@ -111,18 +110,18 @@ def _measured(request: Request, job: Job, store: Archive, *, direct: bool, asks:
     from pipelines.chain.runner import Runner
     from pipelines.cli.terminal import Terminal
 
-    with shown() as (progress, told, quiet):
+    with shown() as (progress, report_stage, quiet):
         operator = Terminal(quiet) if asks else None
         if not direct:
             from pipelines.flows.local import run_locally
 
-            return run_locally(request, job, store, progress, told, operator)
+            return run_locally(request, job, store, progress, report_stage, operator)
         runner = Runner(job, store, progress)
         beside = None if operator is None else Attendance(operator, job, runner.run.id)
         if beside is not None:
-            told(beside.capture(runner, lambda: runner.stage("capture")))
+            report_stage(beside.capture(runner, lambda: runner.stage("capture")))
         for done in runner.all():
-            told(done)
+            report_stage(done)
             if beside is not None and done.stage == JUDGED:
                 beside.unload(runner.run)
         return runner.run
@@ -130,7 +129,7 @@ def _measured(request: Request, job: Job, store: Archive, *, direct: bool, asks:
 
 @contextmanager
 def shown() -> Generator[tuple[Progress, Callable[[Done], None], Callable[[], AbstractContextManager[None]]]]:
-    """A progress bar for the capture and a line per stage, on standard error; and a block in which both keep still."""
+    """A progress bar for the capture and a line for each stage, on standard error; and a context that pauses both."""
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 
     out = error_console()
@@ -141,8 +140,8 @@ def shown() -> Generator[tuple[Progress, Callable[[Done], None], Callable[[], Ab
         def progress(done: int, total: int, note: str) -> None:
             bars.update(bar, completed=done, total=total, description=f"capture  {note}")
 
-        def told(done: Done) -> None:
-            how = "was there" if done.reused else f"{done.seconds:.1f} s"
+        def report_stage(done: Done) -> None:
+            how = "reused" if done.reused else f"{done.seconds:.1f} s"
             bars.console.print(f"{done.stage:<9} {how}", markup=False)
             bars.update(bar, description="computing", completed=0, total=None)
 
@@ -154,4 +153,4 @@ def shown() -> Generator[tuple[Progress, Callable[[Done], None], Callable[[], Ab
             finally:
                 bars.start()
 
-        yield progress, told, quiet
+        yield progress, report_stage, quiet

@@ -16,6 +16,7 @@ from pipelines.cli.options import (
     short,
 )
 from pipelines.cli.remarks import tell_of
+from schemas.counts import number_of
 from schemas.errors import DONE, PART_FAILED
 
 if TYPE_CHECKING:
@@ -30,22 +31,25 @@ MANY = 40
 
 def command(
     run: Annotated[
-        str, typer.Argument(metavar="RUN|UNIT", help="A run's name, its beginning, 'latest'; or a serial number.")
+        str,
+        typer.Argument(metavar="RUN|UNIT", help="Name of a run, the beginning of it, or 'latest'; or a serial number."),
     ] = "latest",
     table: Annotated[
         str, typer.Argument(metavar="[TABLE]", help="A table of the run, for instance coefficients.")
     ] = "",
-    at: Annotated[str, typer.Option("--at", metavar="DATE", help="Which calibration of UNIT holds on this day.")] = "",
+    at: Annotated[
+        str, typer.Option("--at", metavar="DATE", help="Show the calibration of UNIT that is valid on this day.")
+    ] = "",
     known: Annotated[
-        str, typer.Option("--known", metavar="DATE", help="With --at: by what had been written up to this day.")
+        str, typer.Option("--known", metavar="DATE", help="With --at: as the archive was on this day.")
     ] = "",
     archive: ArchiveOption = None,
     *,
     as_json: JsonOption = False,
 ) -> None:
-    """Show what a run came to, one of its tables, or which calibration of a unit holds on a date; today's where none is named.
+    """Show the result of a run, one of its tables, or the calibration of a unit that is valid on a date (default: today).
 
-    Exit status 1: no calibration of the unit holds on that date.
+    Exit status 1: no calibration of the unit is valid on that date.
     """
     from pipelines.archive import Archive
 
@@ -54,15 +58,15 @@ def command(
         from pipelines.cli.validity import show_validity
 
         raise typer.Exit(DONE if show_validity(store, run, at, known, as_json=as_json) else PART_FAILED)
-    found = store.run(run)
+    shown_run = store.run(run)
     if table:
-        _show_table(found, table, as_json=as_json)
+        _show_table(shown_run, table, as_json=as_json)
     else:
-        _show_run(found, as_json=as_json)
+        _show_run(shown_run, as_json=as_json)
 
 
 def _is_unit(archive: Archive, name: str) -> bool:
-    """Whether no run begins so, and a unit with calibrations is called so."""
+    """Whether no run name begins so, and a unit with calibrations has this serial number."""
     from pipelines.certificates import Ledger
 
     if name == "latest" or any(run.startswith(name) for run in archive.run_ids()):
@@ -95,7 +99,7 @@ def _unfinished(run: Run) -> str:
     if run.records is None:
         return f"run {run.id} was imported: it has no grades"
     done = len(run.records.finished())
-    return f"run {run.id} is not finished ({done} records are stored); give its 'tumbleline run' again and it goes on"
+    return f"run {run.id} is not finished ({number_of(done, 'record')} stored); give its 'tumbleline run' again to continue"
 
 
 def _show_table(run: Run, name: str, *, as_json: bool) -> None:
@@ -107,7 +111,7 @@ def _show_table(run: Run, name: str, *, as_json: bool) -> None:
     lines = [[_cell(value) for value in row] for row in shown.itertuples(index=False)]
     print_table([str(column) for column in frame.columns], lines, title=f"{run.id}: {name}")
     if len(frame) > MANY:
-        console().print(f"{len(frame) - MANY} more rows; --json prints all of them", markup=False)
+        console().print(f"{number_of(len(frame) - MANY, 'more row')}; print all rows with --json", markup=False)
 
 
 def _cell(value: object) -> str:

@@ -1,4 +1,4 @@
-"""``tumbleline station``: its state, its self-test, its log, its temperatures; profiles, and the simulated station served."""
+"""``tumbleline station``: state, self-test, log and charts of a station, profiles, and the server of a simulated station."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ SUMMARY = "Show, check, serve and describe stations."
 SHORT = {"read": "r", "write": "w", "read_write": "rw"}
 
 app = typer.Typer(
-    help="See, check, serve and describe stations.",
+    help="Show, check, serve and describe stations.",
     no_args_is_help=True,
     add_completion=False,
     pretty_exceptions_enable=False,
@@ -41,21 +41,23 @@ app.command()(watch)
 def serve(
     station: StationOption = None,
     host: Annotated[str, typer.Option("--host", help="Interface to listen on.")] = "127.0.0.1",
-    port: Annotated[int, typer.Option("--port", min=0, max=65535, help="TCP port; 0 takes a free one.")] = 5020,
+    port: Annotated[int, typer.Option("--port", min=0, max=65535, help="TCP port; 0: any free port.")] = 5020,
     speed: Annotated[
-        float, typer.Option("--speed", min=0.001, max=1000.0, help="Seconds of the station per second.")
+        float, typer.Option("--speed", min=0.001, max=1000.0, help="Simulated seconds per second of real time.")
     ] = 1.0,
     device: DeviceOption = "ADXL355",
     units: UnitsOption = 8,
-    seed: Annotated[int, typer.Option("--seed", min=0, help="Seed of the devices.")] = 1,
+    seed: Annotated[int, typer.Option("--seed", min=0, help="Random seed of the simulated units.")] = 1,
     silence: Annotated[
         float,
-        typer.Option("--silence", min=0.0, help="Seconds unasked after which drives and reader stop; 0 for never."),
+        typer.Option(
+            "--silence", min=0.0, help="Seconds without a request after which drives and reader stop; 0: never."
+        ),
     ] = 30.0,
     *,
     as_json: JsonOption = False,
 ) -> None:
-    """Serve the simulated station over Modbus TCP until interrupted, so that any Modbus client can read it."""
+    """Serve the simulated station over Modbus TCP until interrupted, for any Modbus client."""
     import signal
     import threading
 
@@ -92,11 +94,11 @@ def serve(
 
 @app.command()
 def profiles(
-    name: Annotated[str, typer.Argument(metavar="[PROFILE]", help="One profile, register by register.")] = "",
+    name: Annotated[str, typer.Argument(metavar="[PROFILE]", help="Show the registers of this profile.")] = "",
     *,
     as_json: JsonOption = False,
 ) -> None:
-    """List the register-map profiles, or one of them register by register."""
+    """List the register-map profiles, or the registers of one profile."""
     from stations.profile_files import load_profile, profile_names
 
     if name:
@@ -106,7 +108,7 @@ def profiles(
             return
         if profile.commands:
             lines = [[c.name, c.ask, c.tell, c.unit, c.disputed] for c in profile.commands]
-            print_table(["value", "asked by", "set by", "unit", "disputed"], lines, title=profile.model)
+            print_table(["value", "read command", "write command", "unit", "disputed"], lines, title=profile.model)
             return
         lines = [
             [r.name, r.space, str(r.address), r.type, SHORT[r.access], r.unit, r.manual] for r in profile.registers
@@ -114,30 +116,30 @@ def profiles(
         print_table(["register", "space", "address", "type", "access", "unit", "manual"], lines, title=profile.model)
         _print_disputed(profile)
         return
-    found = [load_profile(one) for one in profile_names()]
+    loaded = [load_profile(one) for one in profile_names()]
     if as_json:
         print_json(
             {
                 "profiles": [
-                    p.model_dump(mode="json", exclude={"registers", "commands", "groups", "fifo"}) for p in found
+                    p.model_dump(mode="json", exclude={"registers", "commands", "groups", "fifo"}) for p in loaded
                 ]
             }
         )
         return
     lines = [
         [p.name, p.kind, f"{p.maker} {_first_words(p.model)}", " ".join(p.links), "yes" if p.verified else "no"]
-        for p in found
+        for p in loaded
     ]
     print_table(["profile", "kind", "device", "links", "verified"], lines)
 
 
 def _first_words(model: str) -> str:
-    """What a model is, without how it must be set up."""
+    """The name of a model without the required settings of the device."""
     return re.split(r"[,:;(]| with | behind ", model)[0].strip()
 
 
 def _print_disputed(profile: Profile) -> None:
-    """What sources disagree about, a line each."""
+    """Registers on which sources disagree, one line each."""
     for register in profile.registers:
         if register.disputed:
             typer.echo(f"disputed  {register.name}: {register.disputed}")

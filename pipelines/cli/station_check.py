@@ -8,6 +8,7 @@ import typer
 
 from pipelines.cli.options import JsonOption, StationOption, error_console, print_json, print_table
 from pipelines.cli.station_lot import DeviceOption, UnitsOption, made_up
+from schemas.counts import number_of
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -23,14 +24,12 @@ def check(
     device: DeviceOption = "ADXL355",
     units: UnitsOption = 8,
     *,
-    registers: Annotated[
-        bool, typer.Option("--registers", help="Only read every register once; move nothing.")
-    ] = False,
+    registers: Annotated[bool, typer.Option("--registers", help="Only read every register once; no motion.")] = False,
     as_json: JsonOption = False,
 ) -> None:
     """Test a station before a shift: registers, instruments, moves, noise of every slot, a check standard.
 
-    It leases the station as a run does and leaves it safe. Exit 3 names what failed.
+    It leases the station as a run does and leaves it in the safe state. Exit status 3: a test failed.
     """
     from dataclasses import asdict
 
@@ -54,7 +53,7 @@ def check(
 
 
 def _tested(config: StationConfig, device: str, units: int) -> list[CheckResult]:
-    """The findings of the self-test; a standard within its limits goes into its history."""
+    """The findings of the self-test; results of a check standard within its limits are added to its history."""
     from stations.opening import open_station
     from stations.safety.folder import state_folder
     from stations.self_test import Bench, CheckResult, keep, read_history
@@ -65,7 +64,10 @@ def _tested(config: StationConfig, device: str, units: int) -> list[CheckResult]
     if lot is None:
         return [
             CheckResult(
-                "slots", "reader", ok=False, message="reader: no slot is occupied, one unit is needed; seat one"
+                "slots",
+                "reader",
+                ok=False,
+                message="reader: no slot is occupied, at least one unit is needed; seat a unit",
             )
         ]
     with open_station(config, lot, run="station check") as opened:
@@ -82,7 +84,7 @@ def _keep(path: Path, bench: Bench, keep: Any) -> None:
 
 
 def _seated(config: StationConfig) -> Lot | None:
-    """Who sits in the slots of hardware, as they say themselves; None where nobody does."""
+    """The units in the slots of hardware, by the serial numbers that they report; None for an empty fixture."""
     from schemas.recipe import Lot, Unit
     from stations.overview import looked_at
 
@@ -98,10 +100,10 @@ def _print(readings: list[Reading], findings: list[CheckResult], *, registers: b
         return
     devices = len({reading.device for reading in readings})
     print_table(
-        ["", "part", "test", "found", "allowed", "unit"],
-        [["✓", f"{devices} devices", "registers", f"{len(readings)} read", "", ""], *map(_line, findings)]
+        ["", "part", "test", "measured", "limits", "unit"],
+        [["✓", number_of(devices, "device"), "registers", f"{len(readings)} read", "", ""], *map(_line, findings)]
         if findings
-        else [["✗", f"{devices} devices", "registers", "not all answer", "all", ""]],
+        else [["✗", number_of(devices, "device"), "registers", "some did not answer", "all", ""]],
     )
 
 

@@ -1,4 +1,4 @@
-"""``tumbleline station log``: what paused or ended runs, and what became of the stations, in order of time."""
+"""``tumbleline station log``: events that paused or ended runs, and events of stations, in order of time."""
 
 from __future__ import annotations
 
@@ -25,35 +25,35 @@ STYLES = {
     "watchdog_lost": "yellow",
     "lease_lost": "bold red",
 }
-QUIET = {"reference", "soak"}  # told with --all only: they happen in every run
+QUIET = {"reference", "soak"}  # shown only with --all, because they occur in every run
 
 
 def log(
-    run: Annotated[str, typer.Argument(metavar="[RUN]", help="Only this run of the archive.")] = "",
+    run: Annotated[str, typer.Argument(metavar="[RUN]", help="Show only this run of the archive.")] = "",
     archive: ArchiveOption = None,
-    limit: Annotated[int, typer.Option("--limit", min=1, help="How many of the newest.")] = 50,
+    limit: Annotated[int, typer.Option("--limit", min=1, help="Number of events, newest last.")] = 50,
     *,
-    everything: Annotated[bool, typer.Option("--all", help="Soaks and references too.")] = False,
+    everything: Annotated[bool, typer.Option("--all", help="Also show soaks and reference readings.")] = False,
     as_json: JsonOption = False,
 ) -> None:
-    """Tell what paused or ended runs, from the archive, and what became of stations, from this machine's log."""
+    """Show events that paused or ended runs (from the archive) and events of stations (from the log of this computer)."""
     from pipelines.archive import Archive
 
-    found = [*_of_runs(Archive(archive), run), *([] if run else _of_machine())]
-    wanted = [event for event in found if everything or event["kind"] not in QUIET]
-    wanted = sorted(wanted, key=lambda event: event["when"])[-limit:]
+    recorded = [*_of_runs(Archive(archive), run), *([] if run else _of_machine())]
+    events = [event for event in recorded if everything or event["kind"] not in QUIET]
+    events = sorted(events, key=lambda event: event["when"])[-limit:]
     if as_json:
-        print_json({"events": wanted})
+        print_json({"events": events})
         return
-    if not wanted:
-        console().print("nothing has happened", markup=False)
+    if not events:
+        console().print("no events", markup=False)
         return
-    for event in wanted:
+    for event in events:
         _print(event)
 
 
 def _print(event: dict[str, Any]) -> None:
-    """One event for people: when, where and what; below it why, and what was done."""
+    """One event as text: time, place and kind; below it the cause and the action."""
     from rich.padding import Padding
     from rich.text import Text
 
@@ -64,9 +64,9 @@ def _print(event: dict[str, Any]) -> None:
         (event["kind"].replace("_", " "), STYLES.get(event["kind"], "")),
     )
     console().print(head)
-    words = " → ".join(part for part in (event["reason"], event["action"]) if part)
-    if words:
-        console().print(Padding(Text(words), (0, 0, 0, 4)))
+    cause_and_action = " → ".join(part for part in (event["reason"], event["action"]) if part)
+    if cause_and_action:
+        console().print(Padding(Text(cause_and_action), (0, 0, 0, 4)))
 
 
 def _of_runs(store: Archive, run: str) -> list[dict[str, Any]]:
@@ -84,7 +84,7 @@ def _of_runs(store: Archive, run: str) -> list[dict[str, Any]]:
 
 
 def _of_machine() -> list[dict[str, Any]]:
-    """What happened to stations on this machine: driven, left safe, made safe by a watchdog."""
+    """Events of stations on this computer: motion, safe state after a run, safe state by a watchdog."""
     from stations.safety.folder import read_log as machine_log
     from stations.safety.folder import state_folder
 

@@ -1,4 +1,4 @@
-"""Options that commands of simulated stations share, and the made-up lot that sits in a simulated one."""
+"""Shared options for simulated stations, and the lot in a simulated station."""
 
 from __future__ import annotations
 
@@ -10,13 +10,11 @@ if TYPE_CHECKING:
     from schemas.recipe import Lot
 
 DeviceOption = Annotated[str, typer.Option("--device", help="Preset of the simulated devices under test.")]
-UnitsOption = Annotated[
-    int, typer.Option("--units", min=1, max=32, help="How many simulated devices sit in the slots.")
-]
+UnitsOption = Annotated[int, typer.Option("--units", min=1, max=32, help="Number of simulated devices in the slots.")]
 
 
 def made_up(device: str, units: int, seed: int, repeat: int = 0) -> Lot:
-    """A lot of made-up serial numbers, one per slot."""
+    """A lot with generated serial numbers, one per slot."""
     from schemas.recipe import Lot, Unit
 
     sitting = [Unit(serial=f"SIM{i:04d}", slot=i) for i in range(units)]

@@ -22,16 +22,16 @@ def status(
     station: StationOption = None,
     device: DeviceOption = "ADXL355",
     units: UnitsOption = 8,
-    every: Annotated[float, typer.Option("--every", min=0.1, help="Seconds between two looks of --watch.")] = 1.0,
+    every: Annotated[float, typer.Option("--every", min=0.1, help="Seconds between two readings with --watch.")] = 1.0,
     *,
-    watch: Annotated[bool, typer.Option("--watch", help="Look again and again, until Ctrl-C.")] = False,
+    watch: Annotated[bool, typer.Option("--watch", help="Repeat until Ctrl-C.")] = False,
     as_json: JsonOption = False,
 ) -> None:
-    """Show angles, temperatures, states, slots and who drives the station.
+    """Show angles, temperatures, states, slots and the run that drives the station.
 
-    Exit 3: a part does not answer, or a run has left the station without making it safe.
+    Exit status 3: a part does not answer, or a run ended without the safe state.
 
-    Nothing is moved and no lease is needed: a run that is under way is not disturbed.
+    Nothing is moved and no lease is needed: a run in progress is not disturbed.
     """
     from schemas.errors import STATION
     from schemas.station import load_station
@@ -53,7 +53,7 @@ def status(
 
 
 def _live(look: object, every: float) -> Overview:
-    """The picture renewed until Ctrl-C; the last look."""
+    """Show new readings until Ctrl-C; return the last one."""
     import time
 
     from rich.live import Live
@@ -70,7 +70,7 @@ def _live(look: object, every: float) -> Overview:
 
 
 def picture(now: Overview) -> Group:
-    """A station for people."""
+    """The readings of a station as a table for the terminal."""
     from rich.console import Group
     from rich.table import Table
 
@@ -96,17 +96,18 @@ def picture(now: Overview) -> Group:
 
 
 def driven_by(now: Overview) -> str:
-    """Who drives a station, in words."""
+    """The run that drives a station, as text."""
     if now.kind == "simulated":
-        return "every run has a simulated station of its own"
+        return "no shared station: every run simulates its own"
     if now.lease is None:
-        return "nobody"
+        return "no run"
     lease = now.lease
-    who = f"{lease['run']}, process {lease['pid']} on {lease['host']} since {lease['since']}, heard of {lease['heard_s']:g} s ago"
+    process = f"{lease['run']}, process {lease['pid']} on {lease['host']} since {lease['since']}"
+    who = f"{process}, last sign of life {lease['heard_s']:g} s ago"
     return f"the watchdog of {who}" if lease["role"] == "watchdog" else who
 
 
-def _word(found: str, good: str) -> Text:
+def _word(state: str, good: str) -> Text:
     from rich.text import Text
 
-    return Text(found or "—", style=GOOD if found == good else BAD)
+    return Text(state or "—", style=GOOD if state == good else BAD)

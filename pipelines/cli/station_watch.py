@@ -24,14 +24,14 @@ if TYPE_CHECKING:
     from pipelines.archive import Records
     from stations.overview import Overview
 
-MOVE_S = 5.0  # a table stands where it stood until shortly before the next record
+MOVE_S = 5.0  # the table keeps its position until shortly before the next record
 Points = list[tuple[float, float]]
 Look = Callable[[], "ChartData"]
 
 
 @dataclass
 class ChartData:
-    """What there is to draw: temperatures in °C and angles in degrees against the station's time, s."""
+    """Data of the charts: temperatures in °C and angles in degrees against the time of the station, s."""
 
     title: str
     chamber: Points = field(default_factory=list[tuple[float, float]])
@@ -43,7 +43,7 @@ class ChartData:
 
     @property
     def last(self) -> float:
-        """The newest time that is known."""
+        """The newest time of the data."""
         return max((points[-1][0] for points in (self.chamber, self.outer) if points), default=0.0)
 
     def document(self) -> dict[str, Any]:
@@ -53,20 +53,18 @@ class ChartData:
 
 
 def watch(
-    run: Annotated[
-        str, typer.Argument(metavar="[RUN]", help="A run of the archive; the newest by default.")
-    ] = "latest",
+    run: Annotated[str, typer.Argument(metavar="[RUN]", help="A run of the archive; default: the newest.")] = "latest",
     station: StationOption = None,
     archive: ArchiveOption = None,
     minutes: Annotated[
-        float, typer.Option("--minutes", min=0.1, help="How far back is shown; all by default.")
+        float, typer.Option("--minutes", min=0.1, help="Time span, minutes before now; default: the whole run.")
     ] = math.inf,
-    every: Annotated[float, typer.Option("--every", min=0.1, help="Seconds between two looks.")] = 1.0,
+    every: Annotated[float, typer.Option("--every", min=0.1, help="Seconds between two readings.")] = 1.0,
     *,
-    once: Annotated[bool, typer.Option("--once", help="Draw once and leave.")] = False,
+    once: Annotated[bool, typer.Option("--once", help="Draw once and exit.")] = False,
     as_json: JsonOption = False,
 ) -> None:
-    """Draw temperatures and angles over time, live: of a run in the archive, or with --station of a station itself."""
+    """Draw temperatures and angles over time, live: of a run in the archive, or with --station of a station."""
     with _source(run, station, archive) as look:
         if as_json:
             print_json(look().document())
@@ -82,11 +80,11 @@ def _source(run: str, station: Path | None, archive: str | None) -> Generator[Lo
         from pipelines.archive import Archive
         from schemas.errors import WrongUse
 
-        found = Archive(archive).run(run)
-        records = found.records
+        source = Archive(archive).run(run)
+        records = source.records
         if records is None:
-            raise WrongUse(f"run {found.id}: its data were imported, there is no station to watch; name a captured run")
-        yield lambda: of_records(found.id, records)
+            raise WrongUse(f"run {source.id}: its data were imported, a captured run is needed; name a captured run")
+        yield lambda: of_records(source.id, records)
         return
     from schemas.station import load_station
     from stations.overview import looked_at
@@ -98,7 +96,7 @@ def _source(run: str, station: Path | None, archive: str | None) -> Generator[Lo
 
 
 def of_records(title: str, records: Records) -> ChartData:
-    """What the records of a capture tell so far."""
+    """Data of the charts from the records of a capture so far."""
     if not records.finished():
         return ChartData(title)
     history, readings = records.gathered("history"), records.gathered("readings")
@@ -126,7 +124,7 @@ def of_records(title: str, records: Records) -> ChartData:
 
 
 def _added(seen: ChartData, now: Overview) -> ChartData:
-    """The picture with one more look at the station."""
+    """The data with one more reading of the station."""
     time = now.time_s
     if now.chamber_C is not None:
         seen.chamber.append((time, now.chamber_C))
@@ -155,7 +153,7 @@ def picture(seen: ChartData, minutes: float) -> Group:
         Line("warmest unit", "red", seen.warmest),
     ]
     angles = [Line("outer", "green", seen.outer), Line("inner", "magenta", seen.inner)]
-    state = "over" if seen.over else f"at {clock(last)}"
+    state = "finished" if seen.over else f"at {clock(last)}"
     return Group(
         f"{seen.title}, {state}",
         chart("°C", temperatures, width, height, span),
@@ -164,7 +162,7 @@ def picture(seen: ChartData, minutes: float) -> Group:
 
 
 def _live(look: Look, minutes: float, every: float) -> None:
-    """The picture renewed until the run is over, or Ctrl-C."""
+    """Redraw the charts until the end of the run, or Ctrl-C."""
     import time
 
     from rich.live import Live

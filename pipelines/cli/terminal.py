@@ -1,4 +1,4 @@
-"""The operator at a terminal: questions on standard error, answers from standard input, a line each, typed or scanned."""
+"""The operator at a terminal: questions on standard error, answers from standard input, one line each, typed or scanned."""
 
 from __future__ import annotations
 
@@ -17,61 +17,63 @@ if TYPE_CHECKING:
 
 YES = frozenset({"", "y", "yes", "go", "ok"})
 STOP = frozenset({"stop", "s", "q", "quit", "no", "n"})
-TITLES = {"load": "Load", "confirm": "Seats", "trouble": "Trouble", "unload": "Unload", "approve": "Approve"}
+TITLES = {"load": "Load", "confirm": "Seats", "trouble": "Fault", "unload": "Unload", "approve": "Approve"}
 
 
 class Terminal:
-    """Whoever sits at the terminal; ``quiet`` keeps progress bars still while somebody is asked."""
+    """The operator at the terminal; ``quiet`` pauses progress bars during a question."""
 
     def __init__(self, quiet: Callable[[], AbstractContextManager[None]]) -> None:
         self._quiet = quiet
 
     def ask(self, prompt: Prompt) -> Answer:
-        """Enter goes on, ``stop`` stops."""
+        """Enter continues the run, ``stop`` stops it."""
         with self._quiet():
             out = error_console()
             out.print(f"\n{TITLES[prompt.kind]}  ", style="bold", end="")
             out.print(f"{prompt.text}.", markup=False, soft_wrap=True)
             for slot, serial in prompt.slots:
                 out.print(f"  slot {slot:>2}  {serial}", markup=False)
-            return "stop" if _line("Enter when done, 'stop' to leave it: ").lower() in STOP else "go"
+            return "stop" if _line("Enter when done, 'stop' to stop the run: ").lower() in STOP else "go"
 
 
 def scanned(slots: int) -> Seating:
-    """The seating as it is scanned at the terminal, slot by slot."""
+    """The seating, scanned at the terminal slot by slot."""
     out = error_console()
     out.print(f"Scan the units, slot by slot (0 to {slots - 1}); Enter alone leaves a slot empty.", markup=False)
-    found = scan(
-        slots, lambda slot: _line(f"slot {slot:>2}: "), lambda words: out.print(words, style="yellow", markup=False)
+    seating = scan(
+        slots, lambda slot: _line(f"slot {slot:>2}: "), lambda message: out.print(message, style="yellow", markup=False)
     )
-    if not found.units:
-        raise WrongUse("scan: no unit was scanned, one is needed at least; give the command again")
-    return found
+    if not seating.units:
+        raise WrongUse("scan: no unit was scanned, at least one is needed; give the command again")
+    return seating
 
 
 def agreed(question: str) -> bool:
-    """Whether whoever sits at the terminal says yes; Enter alone is yes, anything that is neither is asked again."""
+    """Whether the operator at the terminal answers yes; Enter alone is yes, after any other answer the question is repeated."""
     while True:
         answer = _line(f"{question} [Y/n] ").lower()
         if answer in YES:
             return True
         if answer in STOP:
             return False
-        words = f"'{answer}' is neither: y or Enter measures it, n leaves it; Ctrl-C stops, and the same command goes on later"
-        error_console().print(words, style="yellow", markup=False, soft_wrap=True)
+        message = (
+            f"'{answer}' is neither yes nor no: y or Enter measures it, n does not; Ctrl-C stops, the command continues"
+        )
+        error_console().print(message, style="yellow", markup=False, soft_wrap=True)
 
 
 def attended() -> bool:
-    """Whether somebody sits at the terminal."""
+    """Whether standard input and standard error are a terminal."""
     return sys.stdin.isatty() and sys.stderr.isatty()
 
 
 def _line(question: str) -> str:
-    """A line of standard input; its end is nobody to ask."""
+    """A line of standard input; its end is an error."""
     error_console().print(question, end="", markup=False)
     line = sys.stdin.readline()
     if not line:
         raise WrongUse(
-            "operator: standard input ended before an answer, a line is needed; run with --no-prompts where nobody is"
+            "operator: standard input ended before an answer, a line is needed; run without an operator with --no-prompts"
         )
     return line.strip()

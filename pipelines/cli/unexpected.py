@@ -1,4 +1,4 @@
-"""An exception that nobody foresaw: one line for whoever sits there, the whole of it in a file for whoever mends it."""
+"""Unexpected exceptions: one line for the user, and a file with the details for the developers."""
 
 from __future__ import annotations
 
@@ -19,8 +19,8 @@ KEPT = 20
 _SECRET = re.compile(r"//[^/@\s]+@")
 
 
-def told(problem: Exception) -> str:
-    """One line that says what happened and where its report lies; the report is written."""
+def write_report(problem: Exception) -> str:
+    """Write the report; return one line with the kind of the exception and the place of the report."""
     place = _place(problem)
     what = f"unexpected {type(problem).__name__} in {place} ({reason(problem)})"
     report = _written(_report(problem))
@@ -30,11 +30,11 @@ def told(problem: Exception) -> str:
         where = f"no report could be written; {VARIABLE}=1 shows it on the screen"
     else:
         where = f"send the report {report}; {VARIABLE}=1 shows it on the screen"
-    return f"{what}: a defect of the program, not of what it was given; {where}"
+    return f"{what}: a defect of the program, not of its input; {where}"
 
 
 def _place(problem: Exception) -> str:
-    """File and line of our own code that the exception came through last."""
+    """File and line of this program that the exception passed last."""
     root = Path(__file__).resolve().parents[2]
     frames = traceback.extract_tb(problem.__traceback__)
     own = [f for f in frames if Path(f.filename).is_relative_to(root) and "site-packages" not in f.filename]
@@ -46,7 +46,7 @@ def _place(problem: Exception) -> str:
 
 
 def _report(problem: Exception) -> str:
-    """Command, versions and traceback; no values of variables, and no secrets of addresses."""
+    """Command, versions and traceback, without values of variables and without passwords in addresses."""
     from importlib.metadata import version
 
     command = " ".join(_SECRET.sub("//…@", word) for word in sys.argv)
@@ -60,7 +60,7 @@ def _report(problem: Exception) -> str:
 
 
 def _written(text: str) -> Path | None:
-    """The report's file: in the folder of states, or else the one of temporary files; None where neither takes it."""
+    """File of the report: in the state folder, else in the folder of temporary files; None where neither can be written."""
     from schemas.errors import TumblelineError
     from stations.safety.folder import state_folder
 
@@ -80,7 +80,7 @@ def _written(text: str) -> Path | None:
 
 
 def _forget_old(folder: Path) -> None:
-    """Keep the newest reports only; their names sort by time."""
+    """Delete old reports; their names sort by time."""
     for old in sorted(folder.glob(f"{PREFIX}*.txt"))[:-KEPT]:
         try:
             old.unlink(missing_ok=True)

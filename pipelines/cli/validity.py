@@ -1,4 +1,4 @@
-"""Which calibration of a unit holds on a date, for people and as JSON; reads a few small files and no table library."""
+"""The calibration of a unit that is valid on a date, as text and as JSON; it reads a few small files and no table library."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ MADE = ("stage", "code", "key", "libraries", "schema", "inputs", "parameters", "
 
 
 def show_validity(archive: Archive, serial: str, at: str, known: str, *, as_json: bool) -> bool:
-    """Print it; whether a calibration holds."""
+    """Print the calibration that is valid on a day; return whether there is one."""
     from pipelines.certificates import Ledger
     from pipelines.certificates.days import day_of, today
     from schemas.errors import WrongUse
@@ -38,7 +38,7 @@ def show_validity(archive: Archive, serial: str, at: str, known: str, *, as_json
 
 
 def _made(archive: Archive, valid: Calibration) -> dict[str, Any]:
-    """The coefficients of a calibration, and from which code, libraries and data they were made."""
+    """The coefficients of a calibration, with the code, libraries and data that made them."""
     from pipelines.archive import Run
     from pipelines.certificates.certified_coefficients import coefficients_of
     from pipelines.cli.remarks import tell_of
@@ -69,7 +69,7 @@ def _print(serial: str, day: str, valid: Calibration | None, history: list[Calib
             libraries = ", ".join(f"{name} {number}" for name, number in made["made"]["libraries"].items())
             out.print(f"  code     {made['made']['code'][:16]}… with {libraries}", markup=False, soft_wrap=True)
     lines = [[one.certificate, one.start, one.until, one.state, one.run, _why(one)] for one in history]
-    print_table(["certificate", "from", "until", "state", "run", "why"], lines)
+    print_table(["certificate", "from", "until", "state", "run", "reason"], lines)
     rows = made.get("coefficients") or []
     if rows:
         cells = [

@@ -1,4 +1,4 @@
-"""``tumbleline verify``: whether the archive is as it was written."""
+"""``tumbleline verify``: check the archive for changed, missing and foreign files."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from pipelines.cli.options import ArchiveOption, JsonOption, console, error_console, print_json
+from schemas.counts import number_of
 from schemas.errors import DONE, PART_FAILED
 
 SHOWN = 8  # consequences of one finding
@@ -16,35 +17,33 @@ if TYPE_CHECKING:
 
 PART = "Certificates, trace, audit"
 ORDER = 440
-SUMMARY = "Recompute every hash of the archive: find files that were changed, edited or lost."
+SUMMARY = "Check every hash of the archive: find changed, edited or missing files."
 
 
 def command(
     runs: Annotated[
         list[str] | None,
-        typer.Argument(metavar="[RUN…]", help="Only these and their captures; the whole archive by default."),
+        typer.Argument(metavar="[RUN…]", help="Verify only these runs and their captures; default: the whole archive."),
     ] = None,
     key: Annotated[
         list[str] | None,
         typer.Option(
             "--key",
             metavar="FILE|HEX",
-            help="A public key; each manifest must be signed by one of those given, else by the own.",
+            help="A public key; each manifest must have a signature of one of these keys. Default: the own key.",
         ),
     ] = None,
     head: Annotated[
         str,
-        typer.Option(
-            "--head", metavar="HASH", help="Hash of an entry of the chain, as an earlier verification told it."
-        ),
+        typer.Option("--head", metavar="HASH", help="Hash of an entry of the chain from an earlier verification."),
     ] = "",
     archive: ArchiveOption = None,
     *,
     as_json: JsonOption = False,
 ) -> None:
-    """Compute every hash anew: find changed bytes, missing files, edited manifests, foreign tables, false signatures.
+    """Compute every hash again: find changed bytes, missing files, edited manifests, foreign tables, false signatures.
 
-    Exit status 1: something is wrong.
+    Exit status 1: there are findings.
     """
     from pipelines.archive import Archive
     from pipelines.archive.signatures import public_keys
@@ -79,18 +78,18 @@ def _print(report: Report) -> None:
             out.print(f"            {line}", markup=False, style="dim", soft_wrap=True)
         if len(finding.consequences) > SHOWN:
             left = len(finding.consequences) - SHOWN
-            out.print(f"            and {left} more of this; --json names them", markup=False, style="dim")
+            out.print(f"            and {left} more; --json lists all", markup=False, style="dim")
     for remark in checked.remarks:
         out.print(f"  {remark}", markup=False, style="dim", soft_wrap=True)
     rate = f"{checked.rows / report.seconds:.3g} rows/s, {checked.bytes / report.seconds / 1e6:.3g} MB/s"
     out.print(
-        f"{report.runs} runs, {report.captures} captures: {checked.tables} tables, {checked.manifests} manifests, "
-        f"{checked.rows} rows in {report.seconds:.2f} s ({rate})",
+        f"{number_of(report.runs, 'run')}, {number_of(report.captures, 'capture')}: {number_of(checked.tables, 'table')}, "
+        f"{number_of(checked.manifests, 'manifest')}, {number_of(checked.rows, 'row')} in {report.seconds:.2f} s ({rate})",
         markup=False,
         soft_wrap=True,
     )
     out.print(f"signatures  {report.trust}", markup=False, soft_wrap=True)
     if report.head:
         out.print(f"chain       ends with {report.head}", markup=False, soft_wrap=True)
-    verdict = f"{len(checked.findings)} findings" if checked.findings else "nothing is wrong"
+    verdict = number_of(len(checked.findings), "finding") if checked.findings else "nothing is wrong"
     out.print(verdict, style="bold green" if report.whole else "bold red")

@@ -1,4 +1,4 @@
-"""``tumbleline whatif``: what a model would make of the archive's lots, before it is released to the line."""
+"""``tumbleline whatif``: the effect of a model on the lots of the archive, before its release to the line."""
 
 from __future__ import annotations
 
@@ -20,6 +20,7 @@ from pipelines.cli.options import (
     print_table,
     short,
 )
+from schemas.counts import number_of
 
 if TYPE_CHECKING:
     from pipelines.archive import Archive
@@ -37,7 +38,7 @@ def command(
     model: Annotated[Path, typer.Argument(metavar="MODEL", help="A model file.")],
     selection: Annotated[
         list[str] | None,
-        typer.Argument(metavar="[SELECTION…]", help="Runs as for 'tumbleline rerun'; all by default."),
+        typer.Argument(metavar="[SELECTION…]", help="Runs as for 'tumbleline rerun'; default: all."),
     ] = None,
     limits: OtherLimitsOption = "",
     effect_file: EffectFileOption = None,
@@ -47,10 +48,10 @@ def command(
     *,
     as_json: JsonOption = False,
 ) -> None:
-    """Tell what a model would make of the archive's lots: yield, error and error on fresh runs, old model against new.
+    """Show the effect of a model on the lots of the archive: yield, errors, and errors on later runs, with old and new model.
 
-    The lots are fitted, verified and graded in memory; kept is only the result, as evidence for 'tumbleline release'. Exit
-    status 1: the model is no better.
+    The lots are fitted, verified and graded in memory; only the result is stored, as evidence for 'tumbleline release'. Exit
+    status 1: the model is not better.
     """
     from pipelines.archive import Archive
     from pipelines.jobs.model_change import wanted
@@ -80,7 +81,7 @@ def command(
 def _judged(
     store: Archive, runs: list[str], change: ModelChange, dask: str, workers: int | None
 ) -> tuple[list[LotComparison], list[Fresh]]:
-    """Every lot under both models, and the fresh errors of those whose units were measured before."""
+    """Every lot with both models, and the errors on later runs of units that were measured before."""
     from pathlib import Path as LocalPath
 
     from pipelines.flows.spread import on_dask
@@ -92,27 +93,27 @@ def _judged(
     count = max(1, min(workers or processors(), len(runs)))
     home = store.root.resolve() / "orchestrator" if isinstance(store.root, LocalPath) else None
     spread = on_dask(dask, count, home)
-    with error_console().status(f"judging {len(runs)} lots, {count} at a time"):
+    with error_console().status(f"evaluating {number_of(len(runs), 'lot')}, {count} at a time"):
         portions = map_partitions(judged, parts(store, runs, change, count), spread, workers=count, name="what if")
-        found = [one for portion in portions for one in portion]
-        tasks = fresh_tasks(found, store.address, change)
+        lots = [one for portion in portions for one in portion]
+        tasks = fresh_tasks(lots, store.address, change)
         size = max(1, -(-len(tasks) // (4 * count)))
         chunks = [tasks[start : start + size] for start in range(0, len(tasks), size)]
         done = map_partitions(fresh, chunks, spread, workers=count, name="what if, fresh runs")
-    return found, [one for chunk in done for one in chunk]
+    return lots, [one for chunk in done for one in chunk]
 
 
 def _print(document: dict[str, Any]) -> None:
     out = console()
-    title = f"{document['name']} version {document['version']} on {document['lots']} lots"
+    title = f"{document['name']} version {document['version']} on {number_of(document['lots'], 'lot')}"
     rows = [(f"{row['device']} on {row['station']}", row) for row in document["groups"]]
     lines = [line for name, row in [*rows, ("all", document["total"])] for line in _lines(name, row)]
-    heads = ["device", "model", "units", "yield", "fit\nµg", "not\nfitted\nµg", "fresh\nrun\nµg"]
+    heads = ["device", "model", "units", "yield", "fit\nµg", "not\nfitted\nµg", "later\nrun\nµg"]
     print_table(heads, lines, title=title, whole=2)
-    for key, words in (("to_fail", "would no longer pass"), ("to_pass", "would pass")):
+    for key, outcome in (("to_fail", "fail with the new model only"), ("to_pass", "pass with the new model only")):
         rows = document["flips"][key]
         if rows:
-            out.print(f"{len(rows)} units {words}")
+            out.print(f"{number_of(len(rows), 'unit')}: {outcome}")
             for row in rows[:SHOWN]:
                 out.print(
                     f"  {row['unit']} in {row['run']}: {row['reasons']}", markup=False, soft_wrap=True, style="dim"
@@ -125,10 +126,10 @@ def _print(document: dict[str, Any]) -> None:
 
 
 def _lines(name: str, row: dict[str, Any]) -> list[list[str]]:
-    """A group under the old and the new model."""
-    said = [[name, "old", str(row["units"])], ["", "new", ""]]
-    for number, line in enumerate(said):
+    """A group with the old and the new model."""
+    lines = [[name, "old", str(row["units"])], ["", "new", ""]]
+    for number, line in enumerate(lines):
         rate = row["yield"][number]
         errors = [short(row[key][number]) for key in ("fit_rms_ug", "verification_rms_ug", "fresh_rms_ug")]
         line += ["" if rate is None else f"{rate:.1%}", *errors]
-    return said
+    return lines

@@ -1,1 +1,1 @@
-"""The demonstration: a hidden effect in the simulated station, found from the measurements, added to the model, and shown."""
+"""The demonstration: a hidden effect in the simulated station is found from the measurements and added to the model."""

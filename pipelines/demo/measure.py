@@ -1,7 +1,6 @@
-"""A lot measured twice on the simulated station, with an effect hidden in it.
+"""Measure a lot twice on a simulated station with a hidden effect.
 
-The station is the production one down to its registers; only what nature does in it is made up. The diagnosis is given the
-dwells and nothing else.
+Drivers and registers are those of a production station; only the physics is simulated. The diagnosis gets only the dwells.
 """
 
 from __future__ import annotations
@@ -35,12 +34,12 @@ QUIET = {
     "rate_random_walk_ug": 0.003,
     "linearity_pct_fs": 0.0,
 }
-"""A good part of its kind: with the noise of the data sheet most effects would take days to show."""
+"""A unit with low noise: with the noise of the data sheet most effects would need days of measurement."""
 
 
 @dataclass(frozen=True)
 class DemoLot:
-    """A lot measured twice: dwells and temperatures of the run, and of the fresh one."""
+    """A lot measured twice: dwells and temperatures of the first and of the second run."""
 
     dwells: pd.DataFrame
     history: pd.DataFrame
@@ -54,7 +53,7 @@ class DemoLot:
 
 
 def measure(chosen: Scene, seed: int, progress: Progress = silent) -> DemoLot:
-    """The lot measured on the simulated station with the effect in it, and once more with fresh noise."""
+    """Measure the lot on the simulated station with the hidden effect, twice with independent noise."""
     recipe = _recipe(chosen)
     tables = [*_once(recipe, chosen, seed, 0, progress), *_once(recipe, chosen, seed, 1, progress)]
     return DemoLot(*tables)
@@ -62,18 +61,18 @@ def measure(chosen: Scene, seed: int, progress: Progress = silent) -> DemoLot:
 
 @dataclass
 class _Kept:
-    """What a capture delivers, in memory: a demonstration has nothing to resume."""
+    """The results of a capture in memory, because a demonstration is never resumed."""
 
     samples: list[pd.DataFrame] = field(default_factory=list)
     readings: list[pd.DataFrame] = field(default_factory=list)
     history: list[pd.DataFrame] = field(default_factory=list)
 
     def finished(self) -> set[int]:
-        """Nothing was there before."""
+        """No records exist before the start."""
         return set()
 
     def part(self, record: int, number: int, samples: pd.DataFrame) -> None:
-        """Keep a part of a record."""
+        """Store a part of a record."""
         del record, number
         self.samples.append(samples)
 
@@ -86,14 +85,14 @@ class _Kept:
         station_state: bytes,
         parts: int = 0,
     ) -> None:
-        """Keep one record."""
+        """Store one record."""
         del record, station_state, parts
         self.samples.append(samples)
         self.readings.append(readings)
         self.history.append(history)
 
     def last_state(self) -> bytes | None:
-        """No state of an earlier capture."""
+        """No state of an earlier capture exists."""
         return None
 
 
@@ -113,7 +112,7 @@ def _once(recipe: Recipe, chosen: Scene, seed: int, repeat: int, progress: Progr
 def _recipe(chosen: Scene) -> Recipe:
     rng = np.random.default_rng(20)
     angles = np.concatenate([rng.permutation(poses.plan(chosen.plan)) for _ in range(chosen.repeats)])
-    wanted: dict[str, Any] = {
+    changes: dict[str, Any] = {
         "name": f"demo-{chosen.kind.replace('_', '-')}",
         "description": "a small plan of the demonstration",
         "poses": [Pose(name=f"p{k + 1:03d}", outer_deg=o, inner_deg=i) for k, (o, i) in enumerate(angles.tolist())],
@@ -127,7 +126,7 @@ def _recipe(chosen: Scene) -> Recipe:
         "static_record_s": 0.0,
         "effects": list(chosen.model),
     }
-    return load_recipe().model_copy(update=wanted)
+    return load_recipe().model_copy(update=changes)
 
 
 def _station(chosen: Scene, seed: int) -> StationConfig:
@@ -135,7 +134,9 @@ def _station(chosen: Scene, seed: int) -> StationConfig:
     simulation = plain.simulation
     steady = {} if len(chosen.temperatures) > 1 else {"bias_tempco_ug_per_K": 2.0, "scale_tempco_ppm_per_K": 4.0}
     if simulation is None:
-        raise WrongUse("demo: the built-in station is not a simulated one; restore stations/simulated.toml")
+        raise WrongUse(
+            "demo: the built-in station is not simulated, a simulated one is needed; restore stations/simulated.toml"
+        )
     hidden = [Hidden(kind=chosen.kind, figures=chosen.figures)]
     changed = simulation.model_copy(update={"seed": seed, "hidden": hidden, "preset_overrides": QUIET | steady})
     return plain.model_copy(update={"simulation": changed, "soak": chosen.soak})

@@ -1,4 +1,4 @@
-"""What the demonstration may hide, each with a plan that lets it show."""
+"""Hidden effects of the demonstration, each with a measurement plan that can detect it."""
 
 from __future__ import annotations
 
@@ -19,19 +19,19 @@ THERMAL = (
     "misalignment_temperature",
 )
 LOOP = (25.0, 55.0, 70.0, 54.0, 24.0, -4.0, -20.0, -5.0, 26.0)
-"""Soaks up and down; the way back passes near the temperatures of the way out."""
+"""Soaks with rising and falling temperature; the falling ones are near the rising ones."""
 
 SWINGS = (25.0, 45.0, 24.0, 5.0, 26.0)
 HURRIED = Soak(band_K=60.0, rate_K_per_min=30.0, window_s=10.0)
-"""Dwells begin while the temperature still changes."""
+"""Settling time so short that dwells begin while the temperature still changes."""
 
 
 @dataclass(frozen=True)
 class Scene:
-    """How an effect is hidden, and a plan that lets it show.
+    """A hidden effect, and a measurement plan that can detect it.
 
     effect : its id in the catalogue
-    figures : of the hidden physics
+    figures : parameters of the hidden physics
     plan, repeats, temperatures, settle_s : of the recipe
     """
 
@@ -47,7 +47,7 @@ class Scene:
 
     @property
     def model(self) -> tuple[str, ...]:
-        """The model to begin with."""
+        """The starting model."""
         return THERMAL if len(self.temperatures) > 1 else PLAIN
 
 
@@ -112,16 +112,16 @@ SCENES: tuple[Scene, ...] = (
     Scene("slot_rotation", "slot_rotation", "a fixture that was knocked, every slot by a little", {"size": 1e-3}),
 )
 HIDDEN_FROM_ONE_RUN = ("slot_rotation",)
-"""Never drawn at random: for one unit in one slot it is the misalignment, exactly."""
+"""Never drawn at random: for one unit in one slot it is identical to the misalignment."""
 
 
 def scene(name: str, seed: int) -> Scene:
-    """The scene of a kind of hidden physics or of an effect's id; ``random`` draws one."""
+    """The scene of a kind of hidden physics or of an effect's id; ``random``: a random scene."""
     if name == "random":
         able = [s for s in SCENES if s.kind not in HIDDEN_FROM_ONE_RUN]
         return able[int(np.random.default_rng([seed, 1293]).integers(len(able)))]
-    for found in SCENES:
-        if name in {found.kind, found.effect}:
-            return found
+    for candidate in SCENES:
+        if name in {candidate.kind, candidate.effect}:
+            return candidate
     known = {s.kind for s in SCENES} | {s.effect for s in SCENES}
-    raise WrongUse(f"demo: nothing to hide is called '{name}'; {did_you_mean(name, [*known, 'random'])}")
+    raise WrongUse(f"demo: no hidden effect is called '{name}'; {did_you_mean(name, [*known, 'random'])}")

@@ -2,5 +2,5 @@
 
 
 def comment(text: str) -> str:
-    """Text that ends no comment of C and no line."""
+    """Text that cannot end a C comment or a line."""
     return " ".join(text.replace("*/", "* /").split())

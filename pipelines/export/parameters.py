@@ -19,18 +19,18 @@ if TYPE_CHECKING:
 def parameters(
     units: Sequence[UnitCalibration], run: str, nominal: float | None, names: tuple[str, str], between: str
 ) -> str:
-    """Lines of parameters for every unit, with comments that say what the format leaves out.
+    """Lines of parameters for every unit, with comments on the terms that the format omits.
 
     Parameters
     ----------
-    nominal : output per g that the autopilot's driver assumes
-    names : of the offset and of the scale, with a place for the axis
-    between : name and value
+    nominal : output per g that the driver of the autopilot assumes
+    names : of the offset and of the scale, with a placeholder for the axis
+    between : text between name and value
 
     Raises
     ------
     WrongUse
-        There is no positive nominal output.
+        The nominal output is not positive.
     """
     if nominal is None or nominal <= 0.0:
         raise WrongUse(
@@ -43,10 +43,10 @@ def parameters(
         coupling = 1e3 * float(np.max(np.abs(across))) / nominal
         low, high = c.temperatures
         lines += [
-            f"# unit {c.unit}, run {run}, at 25 °C; the driver is assumed to give {nominal:g} {c.out_unit} as 1 g",
+            f"# unit {c.unit}, run {run}, at 25 °C; assumed output of the driver for 1 g: {nominal:g} {c.out_unit}",
             f"# {comment(c.certified)}",
             (
-                f"# left out, as these parameters have no place for it: misalignment to {coupling:.2g} mrad, "
+                f"# not in these parameters: misalignment up to {coupling:.2g} mrad, "
                 f"temperature terms from {low:.0f} to {high:.0f} °C"
             ),
         ]

@@ -1,1 +1,1 @@
-"""Flows: the chain as Prefect sees it. The only place that imports Prefect."""
+"""Flows of Prefect: order, retries and schedules of the chain. Only this package imports Prefect."""

@@ -1,7 +1,7 @@
-"""Prefect's server application behind checks of its own: the name it is called by, the page that calls, what is stored.
+"""Prefect's server application with additional checks: host name, origin of the page, and stored parameters.
 
-Prefect checks the key. It has no setting for trusted host names (a page whose name is pointed at this machine passes), its CORS
-only hides answers from pages of other origins, and its WebSockets look at neither.
+Prefect checks the key. It has no setting for trusted host names (DNS rebinding passes), its CORS only hides answers from pages
+of other origins, and its WebSockets check neither.
 """
 
 from __future__ import annotations
@@ -21,17 +21,17 @@ if TYPE_CHECKING:
     from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 STORED = ("/api/flow_runs/", "/api/deployments/")
-"""Where parameters of flows come in."""
+"""Addresses that receive parameters of flows."""
 
 
 def application(names: Sequence[str], origins: Sequence[str]) -> ASGIApp:
-    """The server's application for these names of its host and these origins of its page."""
+    """The application of the server for these host names and page origins."""
     inner = NoCredentials(OwnOrigins(create_app(), origins))
     return ClosedWebSockets(TrustedHostMiddleware(inner, allowed_hosts=[*names], www_redirect=False))
 
 
 class ClosedWebSockets:
-    """Refuses WebSockets by closing them (403), whatever answer the checks give: uvicorn logs other answers as errors."""
+    """Refuses WebSockets by closing them (403) for every refusal, because uvicorn logs other answers as errors."""
 
     def __init__(self, app: ASGIApp) -> None:
         self.app = app
@@ -49,7 +49,7 @@ class ClosedWebSockets:
 
 
 class OwnOrigins:
-    """Refuses requests and WebSockets of pages from other origins with 403; programs name no origin and pass."""
+    """Refuses requests and WebSockets of pages from other origins with 403; programs send no origin and pass."""
 
     def __init__(self, app: ASGIApp, origins: Sequence[str]) -> None:
         self.app, self.origins = app, frozenset(origins)
@@ -65,7 +65,7 @@ class OwnOrigins:
 
 
 class NoCredentials:
-    """Refuses parameters of flows that hold credentials with 422, before they are stored: the database keeps them in clear."""
+    """Refuses parameters of flows with credentials (422) before they are stored, because the database is not encrypted."""
 
     def __init__(self, app: ASGIApp) -> None:
         self.app = app

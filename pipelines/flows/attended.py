@@ -1,7 +1,7 @@
-"""A program run as a child, whose orphans are waited for: the watchdog that a killed flow leaves behind ends its work.
+"""Run a program as a child and wait for its orphans, so that the watchdog of a killed flow can finish its work.
 
-A service manager that stops a unit, and a container whose first process ends, kill whatever is left. So the process that they
-look at must not end before the watchdog has: it adopts what its descendants leave behind (Linux, ``PR_SET_CHILD_SUBREAPER``).
+A service manager that stops a unit, and a container whose first process ends, kill the remaining processes. The main process
+must therefore end after the watchdog: it adopts the orphans of its descendants (Linux, ``PR_SET_CHILD_SUBREAPER``).
 """
 
 from __future__ import annotations
@@ -21,10 +21,10 @@ STOPS = (signal.SIGTERM, signal.SIGINT)
 
 
 def attend(command: Sequence[str]) -> int:
-    """Exit status of a command, once it and everything that it has left running have ended.
+    """Run a command, wait for it and its orphans, and return its exit status.
 
-    The command gets a SIGTERM that this process gets; what it has left running does not. A child that a
-    signal ended counts as 128 and the signal's number, as shells have it.
+    A SIGTERM to this process is passed to the command, not to its orphans. The exit status of a child that a
+    signal ended is 128 plus the signal's number, as in shells.
     """
     _adopt_orphans()
     stopped = False
@@ -38,7 +38,7 @@ def attend(command: Sequence[str]) -> int:
     child: subprocess.Popen[bytes] | None = None
     for number in STOPS:
         signal.signal(number, pass_on)
-    child = subprocess.Popen(command, start_new_session=True)  # noqa: S603 - Ctrl-C reaches it once, through this process
+    child = subprocess.Popen(command, start_new_session=True)  # noqa: S603 - this process passes Ctrl-C on once
     if stopped:
         child.terminate()
     status = 0

@@ -22,6 +22,7 @@ from pipelines.certificates.days import today
 from pipelines.flows.places import archive_of
 from pipelines.flows.spread import on_dask
 from pipelines.tables.json_values import json_value
+from schemas.counts import number_of
 
 if TYPE_CHECKING:
     from pipelines.archive import Archive
@@ -29,25 +30,25 @@ if TYPE_CHECKING:
     from pipelines.audit.finding import AuditFinding
 
 KEY = "tumbleline-audit"
-MOST_ROWS = 500  # of the table of findings; the page and the document have all
+MOST_ROWS = 500  # rows of the table of findings; page and document have all findings
 
 
 @task(task_run_name="audit until {until}", cache_policy=NO_CACHE, persist_result=False)
 def look(archive: Archive, rules: Path | None, since: str, until: str, dask: str | None, workers: int) -> Audit:
-    """What the archive tells, up to the end of a day."""
+    """The flow: audit of an archive up to the end of a day."""
     scope = Scope(day_of(since or "0001-01-01"), day_of(until) + 1.0, tomorrow=day_of(today()) + 1.0)
     return audit(archive, load_rules(rules), scope, spread=on_dask(dask or "", workers), workers=workers)
 
 
 @task(task_run_name="tell", cache_policy=NO_CACHE, persist_result=False)
-def tell(found: Audit, told: list[AuditFinding], root: str, folder: Path) -> Path:
-    """The page that was written, with the document beside it; the findings are artifacts as well."""
-    day = date_of(found.scope.until - 1.0)
+def publish_audit(audit_result: Audit, listed: list[AuditFinding], root: str, folder: Path) -> Path:
+    """Write page and document of an audit and make artifacts of the findings; return the path of the page."""
+    day = date_of(audit_result.scope.until - 1.0)
     page = folder / f"audit-{day}.html"
-    publish(page, render(found, told, root).encode(), "audit", ELSEWHERE)
-    publish(page.with_suffix(".json"), json_bytes(json_value(document(found, told, root))), "audit", ELSEWHERE)
-    create_table_artifact(key=KEY, table=_table(told), description=f"{len(told)} findings until {day}")
-    create_markdown_artifact(key=f"{KEY}-summary", markdown=_summary(found, told, page))
+    publish(page, render(audit_result, listed, root).encode(), "audit", ELSEWHERE)
+    publish(page.with_suffix(".json"), json_bytes(json_value(document(audit_result, listed, root))), "audit", ELSEWHERE)
+    create_table_artifact(key=KEY, table=_table(listed), description=f"{number_of(len(listed), 'finding')} until {day}")
+    create_markdown_artifact(key=f"{KEY}-summary", markdown=_summary(audit_result, listed, page))
     return page
 
 
@@ -61,7 +62,7 @@ def audit_archive(
     dask: str | None = None,
     workers: int = 1,
 ) -> int:
-    """Audit an archive; how many findings there are.
+    """Audit an archive; return the number of findings.
 
     Parameters
     ----------
@@ -71,32 +72,35 @@ def audit_archive(
     dask, workers : where runs are read, see :func:`pipelines.flows.spread.on_dask`
     """
     store = archive_of(archive)
-    found = look(store, Path(rules) if rules else None, since, until or today(), dask, workers)
-    told = findings(found)
-    tell(found, told, str(store.root), Path(pages))
-    return len(told)
+    audit_result = look(store, Path(rules) if rules else None, since, until or today(), dask, workers)
+    listed = findings(audit_result)
+    publish_audit(audit_result, listed, str(store.root), Path(pages))
+    return len(listed)
 
 
-def _table(told: list[AuditFinding]) -> list[dict[str, Any]]:
+def _table(listed: list[AuditFinding]) -> list[dict[str, Any]]:
     return [
         {"who": WHO[finding.who], "kind": finding.kind, "subject": finding.subject, "finding": finding.message}
-        for finding in told[:MOST_ROWS]
-    ] or [{"who": "", "kind": "none", "subject": "", "finding": "nothing needs doing"}]
+        for finding in listed[:MOST_ROWS]
+    ] or [{"who": "", "kind": "none", "subject": "", "finding": "no action is needed"}]
 
 
-def _summary(found: Audit, told: list[AuditFinding], page: Path) -> str:
-    number = counts(found)
+def _summary(audit_result: Audit, listed: list[AuditFinding], page: Path) -> str:
+    number = counts(audit_result)
     lines = [
-        f"# Audit until {date_of(found.scope.until - 1.0)}",
-        f"{number['calibrations']} calibrations of {number['units']} units in {number['runs']} runs. Report: `{page.resolve()}`",
+        f"# Audit until {date_of(audit_result.scope.until - 1.0)}",
+        (
+            f"{number_of(number['calibrations'], 'calibration')} of {number_of(number['units'], 'unit')} "
+            f"in {number_of(number['runs'], 'run')}. Report: `{page.resolve()}`"
+        ),
     ]
-    for who, words in WHO.items():
-        own = [finding for finding in told if finding.who == who]
+    for who, role in WHO.items():
+        own = [finding for finding in listed if finding.who == who]
         if own:
-            lines += ["", f"## {words}", *(f"- {_escaped(finding.message)}" for finding in own[:MOST_ROWS])]
-    return "\n".join(lines if told else [*lines, "", "Nothing needs doing."])
+            lines += ["", f"## {role}", *(f"- {_escaped(finding.message)}" for finding in own[:MOST_ROWS])]
+    return "\n".join(lines if listed else [*lines, "", "No action is needed."])
 
 
 def _escaped(text: str) -> str:
-    """Text that Markdown does not read as anything else."""
+    """Text with the special characters of Markdown escaped."""
     return re.sub(r"([*_`<>\[\]|])", r"\\\1", text)

@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     from schemas.progress import Progress
 
 HISTORY_S = 20.0
-MANY = 200  # the server's own largest page
+MANY = 200  # largest page of the server
 FINAL = {StateType.COMPLETED, StateType.FAILED, StateType.CRASHED, StateType.CANCELLED}
 
 Listener = tuple["Progress", "Callable[[Done], None]", "Operator | None"]
@@ -41,10 +41,10 @@ _listeners: list[Listener] = []
 
 @contextmanager
 def listening(
-    progress: Progress, told: Callable[[Done], None], operator: Operator | None = None
+    progress: Progress, report_stage: Callable[[Done], None], operator: Operator | None = None
 ) -> Generator[None, None, None]:
-    """A block in which flows of this process tell how far they are, and ask ``operator`` where there is one."""
-    _listeners.append((progress, told, operator))
+    """A context in which flows of this process report their progress, and ask ``operator`` where one is given."""
+    _listeners.append((progress, report_stage, operator))
     try:
         yield
     finally:
@@ -52,22 +52,22 @@ def listening(
 
 
 def _worth_repeating(task_: Any, task_run: Any, state: Any) -> bool:
-    """Whether a stage failed for a link or a device that may come back; a finished record is not measured again."""
+    """Whether a stage failed because of a link or device that may recover; finished records are not measured again."""
     del task_, task_run
     try:
         state.result()
-    except NotReached:  # hours have gone by already
+    except NotReached:  # the stage has already run for hours
         return False
     except (LinkLost, StationTimeout):
         return True
-    except Exception:  # noqa: BLE001 - whatever else went wrong would go wrong again
+    except Exception:  # noqa: BLE001 - all other errors would occur again
         return False
     return False
 
 
 @task(
     task_run_name="{name}",
-    cache_policy=NO_CACHE,  # the archive's keys decide what is done again, not the orchestrator
+    cache_policy=NO_CACHE,  # the keys of the archive decide which stages are repeated, not the orchestrator
     persist_result=False,
     retries=2,
     retry_delay_seconds=10,
@@ -79,7 +79,7 @@ def stage(name: str, runner: Runner) -> Done:
 
 
 @flow(name="calibrate_lot", persist_result=False, log_prints=False)
-def calibrate_lot(  # noqa: PLR0913 - a flow's parameters are its form on the server's page
+def calibrate_lot(  # noqa: PLR0913 - the parameters of a flow are the form on the server's page
     recipe: str = "production",
     station: str | None = None,
     units: list[str] | None = None,
@@ -91,21 +91,21 @@ def calibrate_lot(  # noqa: PLR0913 - a flow's parameters are its form on the se
     *,
     prompts: bool = False,
 ) -> str:
-    """Measure and calibrate a lot; the id of its run in the archive.
+    """Measure and calibrate a lot; return the id of its run in the archive.
 
-    Without ``repeat`` every flow run measures the lot anew, and a retry of the same flow run goes on where it was. With
-    ``prompts`` the flow run pauses for the operator: to load, to put right what is wrong, to unload. ``archive`` holds no
+    Without ``repeat`` every flow run measures the lot again, and a retry of the same flow run continues it. With
+    ``prompts`` the flow run pauses for the operator: to load, to correct a fault, to unload. ``archive`` has no
     credentials, see :func:`pipelines.flows.places.archive_of`.
     """
-    progress, told, operator = _listeners[-1] if _listeners else (silent, lambda _done: None, None)
+    progress, report_stage, operator = _listeners[-1] if _listeners else (silent, lambda _done: None, None)
     store = archive_of(archive)
     job = requested(recipe, station, units, slots, seed, repeat, faults).job(store)
     runner = Runner(job, store, progress)
     person = operator or (Paused() if prompts else None)
     beside = None if person is None else Attendance(person, job, runner.run.id)
-    told(_capture(runner, beside))
+    report_stage(_capture(runner, beside))
     for name in ORDER[1:]:
-        told(stage(name, runner))
+        report_stage(stage(name, runner))
         if beside is not None and name == JUDGED:
             beside.unload(runner.run)
     return runner.run.id
@@ -120,14 +120,14 @@ def requested(
     repeat: int | None,
     faults: list[str] | None,
 ) -> Request:
-    """What a flow run's parameters ask for; without ``repeat`` a count of its own, the same when it is tried again."""
+    """The request of the parameters of a flow run; without ``repeat`` the flow run has its own number, the same for a retry."""
     anew = int(str(flow_run.id).replace("-", "")[:7], 16) if repeat is None else repeat
     where = Path(station) if station else None
     return Request(recipe, where, tuple(units or ()), tuple(slots or ()), seed, anew, tuple(faults or ()))
 
 
 def _capture(runner: Runner, beside: Attendance | None) -> Done:
-    """The capture, with somebody beside it or not."""
+    """The capture, with or without an operator."""
     if beside is None:
         return stage("capture", runner)
     return beside.capture(runner, lambda: stage("capture", runner))
@@ -139,8 +139,10 @@ def settle_history(name: str, stages: int) -> None:
     with get_client(sync_client=True) as client:
         runs = _flow_runs(client, name)[:1]
         while runs and time.monotonic() < end:
-            wanted = FlowRunFilter(id=FlowRunFilterId(any_=[runs[0].id]))
-            tasks = client.read_task_runs(flow_run_filter=wanted, sort=TaskRunSort.EXPECTED_START_TIME_ASC, limit=MANY)
+            flow_filter = FlowRunFilter(id=FlowRunFilterId(any_=[runs[0].id]))
+            tasks = client.read_task_runs(
+                flow_run_filter=flow_filter, sort=TaskRunSort.EXPECTED_START_TIME_ASC, limit=MANY
+            )
             if len(tasks) >= stages and all(one.state_type in FINAL for one in tasks):
                 return
             time.sleep(0.1)
@@ -148,5 +150,5 @@ def settle_history(name: str, stages: int) -> None:
 
 def _flow_runs(client: SyncPrefectClient, name: str) -> list[FlowRun]:
     """Flow runs of a name, the newest first."""
-    wanted = FlowRunFilter(name=FlowRunFilterName(any_=[name]))
-    return client.read_flow_runs(flow_run_filter=wanted, sort=FlowRunSort.START_TIME_DESC, limit=MANY)
+    flow_filter = FlowRunFilter(name=FlowRunFilterName(any_=[name]))
+    return client.read_flow_runs(flow_run_filter=flow_filter, sort=FlowRunSort.START_TIME_DESC, limit=MANY)

@@ -1,4 +1,4 @@
-"""Credentials in an address: found, taken out, refused."""
+"""Credentials in an address: detect, remove, refuse."""
 
 from __future__ import annotations
 
@@ -10,20 +10,20 @@ from schemas.errors import WrongUse
 VARIABLE = "TUMBLELINE_ARCHIVE"
 BLOCK = "block:"
 REFUSED = (
-    "archive: an address with credentials was given as a parameter of a flow, one without is needed, because parameters are "
+    "archive: a parameter of a flow is an address with credentials, one without is needed, because parameters are "
     f"stored and shown; give the worker the whole address in {VARIABLE}, or save it in a Secret block and give '{BLOCK}NAME'"
 )
-HARMLESS = {"anonymous"}  # how Google's store is asked without credentials
+HARMLESS = {"anonymous"}  # option of Google's store for access without credentials
 SECRET = re.compile(
     r"secret|passw|token|credential|signature|account_key|access_key|shared_key|sas\b|^sig$", re.IGNORECASE
 )
-NO_SECRET = {"credentials_kind", "credential_kind"}  # which kind, not which one
+NO_SECRET = {"credentials_kind", "credential_kind"}  # the kind of the credentials, not the credentials
 ADDRESS = re.compile(r"[A-Za-z][A-Za-z0-9+.-]*://[^\s\"'<>\\]+")
 
 
 def credentials_in(text: str) -> bool:
-    """Whether any address within a text holds credentials."""
-    return any(without_credentials(found) != found for found in ADDRESS.findall(text))
+    """Whether an address in a text has credentials."""
+    return any(without_credentials(candidate) != candidate for candidate in ADDRESS.findall(text))
 
 
 def without_credentials(address: str) -> str:
@@ -45,6 +45,6 @@ def without_credentials(address: str) -> str:
 
 
 def refuse_credentials(address: str | None) -> None:
-    """Refuse an address that holds credentials."""
+    """Refuse an address with credentials."""
     if address is not None and without_credentials(address) != address:
         raise WrongUse(REFUSED)

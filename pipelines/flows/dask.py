@@ -19,19 +19,19 @@ if TYPE_CHECKING:
 CONNECT_S = 10
 
 _work: list[tuple[Callable[[Any], Any], Sequence[Any]]] = []
-"""The function and the partitions of the flow of this process: no parameters, which are stored, as they name archives."""
+"""The function and the partitions of the flow of this process. No parameters: these are stored, and archives have names."""
 
 
 @task(task_run_name="{label}", cache_policy=NO_CACHE, persist_result=False)
 def partition(label: str, function: Callable[[Any], Any], part: Any) -> Any:
-    """What the function makes of one partition, wherever this runs."""
+    """The result of the function for one partition, on any worker."""
     del label
     return in_one_thread(function, part)
 
 
 @flow(name="map_partitions", persist_result=False, log_prints=False)
 def mapped() -> list[Any]:
-    """What the function at work makes of every partition, in order."""
+    """The results of the function for all partitions, in order."""
     function, partitions = _work[-1]
     width = len(str(len(partitions)))
     futures = [
@@ -44,7 +44,7 @@ def mapped() -> list[Any]:
 def run_on_dask(
     function: Callable[[Any], Any], partitions: Sequence[Any], address: str, workers: int, name: str
 ) -> list[Any]:
-    """Results of all partitions, in order, from a cluster at an address, or from one of processes on this machine."""
+    """Results of all partitions, in order, from a cluster at an address, or from a cluster of processes on this computer."""
     if address != LOCAL:
         _refuse_silent(address)
         return _run(DaskTaskRunner(address=address), function, partitions, name)
@@ -68,18 +68,18 @@ def _run(runner: Any, function: Callable[[Any], Any], partitions: Sequence[Any],
 
 
 def _refuse_silent(address: str) -> None:
-    """Refuse an address where no scheduler answers, or one without workers, before the flow waits for ever."""
+    """Refuse an address without a scheduler, or a scheduler without workers, for which the flow would wait forever."""
     from distributed import Client
 
     try:
         with Client(address, timeout=CONNECT_S, set_as_default=False) as client:
-            found = len(client.scheduler_info()["workers"])
+            worker_count = len(client.scheduler_info()["workers"])
     except (OSError, TimeoutError, ValueError) as problem:
         raise LinkLost(
             f"--dask {address}: no Dask scheduler answers within {CONNECT_S} s ({type(problem).__name__}); start it with "
             "'dask scheduler', or correct the address"
         ) from None
-    if not found:
+    if not worker_count:
         raise LinkLost(
-            f"--dask {address}: the scheduler has no worker, one at least is needed; start it with 'dask worker {address}'"
+            f"--dask {address}: the scheduler has no worker, at least one is needed; start one with 'dask worker {address}'"
         )

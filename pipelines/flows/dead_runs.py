@@ -1,4 +1,4 @@
-"""Flow runs that the orchestrator believes to be alive though nobody works on them any more."""
+"""Flow runs that the orchestrator lists as running although their process has ended."""
 
 from __future__ import annotations
 
@@ -27,27 +27,27 @@ if TYPE_CHECKING:
 
     from prefect.client.schemas.objects import FlowRun
 
-MANY = 200  # the server's own largest page
+MANY = 200  # largest page of the server
 WORKING = (StateType.PENDING, StateType.RUNNING, StateType.CANCELLING)
-SUSPENDED = "Suspended"  # such a run has given up its process, and gets another when it is resumed
+SUSPENDED = "Suspended"  # such a run has no process and gets a new one when it is resumed
 LATE = timedelta(minutes=15)
-GONE = "its process is gone: it was killed, or its worker ended; give the same order again, and it goes on where it was"
-MISSED = "it was to begin at {when}, when no worker was there; a station does not catch up on runs that were missed"
+GONE = "its process has ended: it was killed, or its worker ended; give the same order again to continue"
+MISSED = "its start was at {when}, when no worker ran; a station does not make up for missed runs"
 
 
 def close_dead_runs(name: str) -> None:
-    """Mark flow runs of a name whose process was killed, which the orchestrator still believes to be running, as crashed."""
-    message = "its process was killed; another flow run of this name goes on in its stead"
-    wanted = FlowRunFilter(name=FlowRunFilterName(any_=[name]))
+    """Mark flow runs of a name as crashed whose process was killed and which the orchestrator still lists as running."""
+    message = "its process was killed; another flow run of this name continues its work"
+    flow_filter = FlowRunFilter(name=FlowRunFilterName(any_=[name]))
     with get_client(sync_client=True) as client:
-        found = client.read_flow_runs(flow_run_filter=wanted, sort=FlowRunSort.START_TIME_DESC, limit=MANY)
-        for run in found:
+        flow_runs = client.read_flow_runs(flow_run_filter=flow_filter, sort=FlowRunSort.START_TIME_DESC, limit=MANY)
+        for run in flow_runs:
             if run.state_type == StateType.RUNNING:
                 client.set_flow_run_state(run.id, Crashed(message=message), force=True)
 
 
 def close_dead_runs_of_queue(pool: str, queue: str) -> list[str]:
-    """Names of the runs of a station's queue that were marked as crashed: they began, and their process is gone."""
+    """Mark the runs of a station's queue as crashed that began and have no process; return their names."""
     closed: list[str] = []
     with get_client(sync_client=True) as client:
         for run in runs_of_queue(client, pool, queue, (*WORKING, StateType.PAUSED)):
@@ -59,7 +59,7 @@ def close_dead_runs_of_queue(pool: str, queue: str) -> list[str]:
 
 
 def cancel_missed_runs(pool: str, queue: str) -> list[str]:
-    """Names of the scheduled runs of a station's queue that were cancelled, as their time passed while no worker was there."""
+    """Cancel the scheduled runs of a station's queue that were missed without a worker; return their names."""
     cancelled: list[str] = []
     now = datetime.now(UTC)
     with get_client(sync_client=True) as client:
@@ -73,7 +73,7 @@ def cancel_missed_runs(pool: str, queue: str) -> list[str]:
 
 
 def runs_of_queue(client: SyncPrefectClient, pool: str, queue: str, states: Sequence[StateType]) -> list[FlowRun]:
-    """Flow runs of a work queue in one of the states, the first to begin first."""
+    """Flow runs of a work queue in one of the states, in the order of their start."""
     return client.read_flow_runs(
         flow_run_filter=FlowRunFilter(state=FlowRunFilterState(type=FlowRunFilterStateType(any_=list(states)))),
         work_pool_filter=WorkPoolFilter(name=WorkPoolFilterName(any_=[pool])),
@@ -84,7 +84,7 @@ def runs_of_queue(client: SyncPrefectClient, pool: str, queue: str, states: Sequ
 
 
 def _lives(run: FlowRun) -> bool:
-    """Whether a process of this machine still works on a run; its number alone may belong to another by now."""
+    """Whether a process of this computer still works on a run; its number alone may belong to a newer process."""
     pid = run.infrastructure_pid
     if not pid or not pid.isdecimal():
         return False

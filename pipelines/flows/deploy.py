@@ -1,10 +1,10 @@
-"""Registers the deployments of a ``prefect.yaml`` with their pools and queues: ``prefect deploy --all``, and what that leaves.
+"""Register the deployments of a ``prefect.yaml`` with their pools and queues: ``prefect deploy --all``, and the steps it omits.
 
-A work queue is a station (or something else that does one thing at a time): its limit of one run is set here, as ``prefect.yaml``
-has no place for it. A deployment's own limit does not keep two deployments of one station apart.
+A work queue is a station (or another resource with one run at a time): its limit of one run is set here, as ``prefect.yaml``
+has no key for it. The limit of a deployment does not separate two deployments of one station.
 
-Prefect 3.8's own command ends in an error 422 from FastAPI 0.151 on: after each deployment it asks for the pool's workers with
-null for two numbers, and since then FastAPI takes null for a value and no longer for one that is missing.
+The command of Prefect 3.8 ends with error 422 with FastAPI 0.151 and later: after each deployment it requests the workers of
+the pool with null for two numbers, and FastAPI now reads null as a value and not as a missing one.
 """
 
 from __future__ import annotations
@@ -27,12 +27,12 @@ ONE_AT_A_TIME = 1
 
 
 def register(path: Path) -> list[str]:
-    """Names of the deployments of a file, registered with the server that PREFECT_API_URL names.
+    """Register the deployments of a file with the server of PREFECT_API_URL; return their names.
 
     Raises
     ------
     WrongUse
-        There is no key or a wrong one, or a parameter holds credentials.
+        The key is missing or wrong, or a parameter has credentials.
     """
     use_key(CLIENT_KEY)
     knock()
@@ -47,7 +47,7 @@ def register(path: Path) -> list[str]:
 
 
 def _have_pool(name: str) -> None:
-    """Makes a pool of processes where there is none of the name."""
+    """Make a pool of processes unless it exists."""
     from prefect.client.orchestration import get_client
     from prefect.client.schemas.actions import WorkPoolCreate
     from prefect.exceptions import ObjectNotFound
@@ -62,7 +62,7 @@ def _have_pool(name: str) -> None:
 
 
 def _have_queue(pool: str, name: str) -> None:
-    """Makes a queue that gives out one run at a time; one that is there is changed."""
+    """Make a queue with one run at a time; an existing queue is changed."""
     from prefect.client.orchestration import get_client
     from prefect.exceptions import ObjectNotFound
 
@@ -90,10 +90,10 @@ def _register(item: dict[str, Any]) -> str:
         schedules=[CronSchedule(cron=s["cron"], timezone=s["timezone"]) for s in item["schedules"]],
         work_pool_name=item["work_pool"]["name"],
         work_queue_name=item["work_pool"]["work_queue_name"],
-        # by its module: by its file Prefect would put the file's folder first on sys.path, where our operator.py hides
-        # Python's own, and no process that a flow starts (a station's watchdog) would come up
+        # by module: for a file Prefect would put its folder first on sys.path, where operator.py of this package hides
+        # Python's own, and processes of a flow (a station's watchdog) could not start
         entrypoint_type=EntrypointType.MODULE_PATH,
-        job_variables={"working_dir": str(ROOT)},  # where recipes and stations of deploy/ are found
+        job_variables={"working_dir": str(ROOT)},  # folder of recipes and stations of deploy/
     )
     if not isinstance(deployment, RunnerDeployment):
         raise TypeError(NOT_HERE)

@@ -1,6 +1,6 @@
 """The flow ``investigate``: run, diagnose, propose, measure only that, diagnose again; a task per stage of every run.
 
-Where a person has to approve the extra minutes the flow run pauses with the question and waits for the answer, as it does for the
+Where a person must approve extra station time the flow run pauses with the question and waits for the answer, as for the
 operator: from the server's page, from ``tumbleline operator``, or from any client of the server.
 """
 
@@ -33,17 +33,15 @@ _participants: list[Participants] = []
 
 @dataclass(frozen=True)
 class PausedApproval:
-    """Approval by whoever answers the paused flow run."""
+    """Approval by the person who answers the paused flow run."""
 
     paused: Paused
 
     def __call__(self, inquiry: Inquiry, joint: JointDiagnosis, follow_up: FollowUp) -> Consent:
-        """The answer, however long it takes."""
+        """Wait for the answer, without a limit of time."""
         del joint
         why = "; ".join(follow_up.why)
-        text = (
-            f"measure for {follow_up.minutes:.1f} min more ({inquiry.budget - inquiry.spent:.1f} min are left): {why}"
-        )
+        text = f"measure {follow_up.minutes:.1f} min more ({inquiry.budget - inquiry.spent:.1f} min are left): {why}"
         return self.paused.ask(Prompt("approve", inquiry.lineage.ids[0], text))
 
 
@@ -54,7 +52,7 @@ def _stage(name: str, runner: Runner) -> Done:
 
 @contextmanager
 def seated(participants: Participants) -> Generator[None]:
-    """A block in which inquiries of this process tell, and ask, those at the table."""
+    """A context in which inquiries of this process report to, and ask, the participants."""
     _participants.append(participants)
     try:
         yield
@@ -63,7 +61,7 @@ def seated(participants: Participants) -> Generator[None]:
 
 
 @flow(name="investigate", persist_result=False, log_prints=False)
-def investigate(  # noqa: PLR0913 - a flow's parameters are its form on the server's page
+def investigate(  # noqa: PLR0913 - the parameters of a flow are the form on the server's page
     recipe: str = "production",
     station: str | None = None,
     units: list[str] | None = None,
@@ -78,10 +76,10 @@ def investigate(  # noqa: PLR0913 - a flow's parameters are its form on the serv
     unseen: bool = False,
     ask: bool = False,
 ) -> dict[str, Any]:
-    """Measure a lot, and then only what tells apart what may be missing in its model; the document of the inquiry.
+    """Measure a lot, then only what separates the possible missing effects; return the document of the inquiry.
 
-    Without ``repeat`` every flow run measures the lot anew, and a retry of the same flow run goes on where it was. With ``ask``
-    the flow run pauses before every follow-up until somebody approves its minutes.
+    Without ``repeat`` every flow run measures the lot again, and a retry of the same flow run continues it. With ``ask``
+    the flow run pauses before every follow-up until its station time is approved.
     """
     store = archive_of(archive)
     job = requested(recipe, station, units, slots, seed, repeat, faults).job(store)
@@ -94,7 +92,7 @@ def investigate(  # noqa: PLR0913 - a flow's parameters are its form on the serv
 def investigate_locally(
     request: Request, archive: Archive, settings: Settings, participants: Participants, *, ask: bool
 ) -> dict[str, Any]:
-    """The document of the inquiry that the flow makes, on the server named by PREFECT_API_URL or on one of our own."""
+    """Run the flow on the server of PREFECT_API_URL or on a temporary one; return the document of the inquiry."""
     archive.prepare()
     job = request.job(archive)
     name = f"investigate {job.recipe.name} {job.capture_id}"
@@ -106,7 +104,7 @@ def investigate_locally(
         close_dead_runs(name)
         with seated(participants), named(archive) as address:
             flow = investigate.with_options(flow_run_name=name)
-            found: Any = flow(
+            document: Any = flow(
                 **request.parameters(),
                 archive=address,
                 effects=list(settings.effects),
@@ -115,4 +113,4 @@ def investigate_locally(
                 ask=ask,
             )
         settle_history(name, len(ORDER))
-    return found
+    return document

@@ -1,4 +1,4 @@
-"""Whether an orchestrator answers, and takes the key of this process: asked before Prefect is, whose refusals are tracebacks."""
+"""Check that an orchestrator answers and accepts the key of this process, before Prefect, whose errors are tracebacks."""
 
 from __future__ import annotations
 
@@ -17,14 +17,14 @@ TIMEOUT_S = 5.0
 
 
 def knock(patience_s: float = 0.0) -> None:
-    """Wait until the orchestrator that PREFECT_API_URL names answers, and make sure that it takes PREFECT_API_AUTH_STRING.
+    """Wait until the orchestrator of PREFECT_API_URL answers, and check that it accepts PREFECT_API_AUTH_STRING.
 
     Raises
     ------
     WrongUse
-        The address is none, or the key is missing or wrong.
+        The address is invalid, or the key is missing or wrong.
     LinkLost
-        It does not answer within the patience, s.
+        It does not answer in time.
     """
     address = os.environ.get("PREFECT_API_URL", "")
     if not address.startswith(("http://", "https://")):
@@ -38,22 +38,22 @@ def knock(patience_s: float = 0.0) -> None:
         except urllib.error.HTTPError as problem:
             problem.close()
             if problem.code != HTTPStatus.UNAUTHORIZED:
-                return  # a server of another kind: Prefect says what it lacks
-            found = "refuses the key of PREFECT_API_AUTH_STRING" if os.environ.get(CLIENT_KEY) else "wants a key"
+                return  # another kind of server: Prefect reports the error
+            fault = "refuses the key of PREFECT_API_AUTH_STRING" if os.environ.get(CLIENT_KEY) else "requires a key"
             raise WrongUse(
-                f"orchestrator: {address} {found}; give that of its server there, or its file in {KEY_FILE}"
+                f"orchestrator: {address} {fault}; give the key of its server in {CLIENT_KEY}, or the key file in {KEY_FILE}"
             ) from None
         except (urllib.error.URLError, TimeoutError, ConnectionError) as problem:
             if time.monotonic() >= end:
-                found = f"{address} does not answer ({problem}), a server that runs is needed"
-                raise LinkLost(f"orchestrator: {found}; start it, or correct PREFECT_API_URL") from None
+                fault = f"{address} does not answer ({problem}), a running server is needed"
+                raise LinkLost(f"orchestrator: {fault}; start it, or correct PREFECT_API_URL") from None
             time.sleep(POLL_S)
         else:
             return
 
 
 def _ask(address: str) -> None:
-    request = urllib.request.Request(address)  # noqa: S310 - looked at above
+    request = urllib.request.Request(address)  # noqa: S310 - checked above
     key = os.environ.get(CLIENT_KEY)
     if key:
         request.add_header("Authorization", "Basic " + base64.b64encode(key.encode()).decode())

@@ -1,4 +1,4 @@
-"""The operator behind the orchestrator: the flow run pauses with the question, and goes on with the answer.
+"""The operator behind the orchestrator: the flow run pauses with the question and continues with the answer.
 
 The answer comes from the server's page, from ``tumbleline operator`` at any terminal, or from any client of the server.
 """
@@ -25,14 +25,14 @@ POLL_S = 1
 
 
 class Reply(RunInput):
-    """What the operator answers."""
+    """The answer of the operator."""
 
     answer: Literal["go", "stop"] = "go"
 
 
 @dataclass(frozen=True)
 class Waiting:
-    """A flow run that waits for somebody."""
+    """A flow run that waits for an answer."""
 
     id: str
     name: str
@@ -40,10 +40,10 @@ class Waiting:
 
 
 class Paused:
-    """Whoever answers the paused flow run."""
+    """The operator who answers the paused flow run."""
 
     def ask(self, prompt: Prompt) -> Answer:
-        """The answer, however long it takes."""
+        """Wait for the answer, without a limit of time."""
         seats = "".join(f"\n- slot {slot}: {serial}" for slot, serial in prompt.slots)
         question = f"{prompt.kind}: {prompt.text}.{seats}"
         form: type[Reply] = Reply.with_initial_data(description=question)
@@ -52,18 +52,18 @@ class Paused:
 
 
 def waiting() -> list[Waiting]:
-    """Flow runs that wait for somebody, the first to wait first."""
-    wanted = FlowRunFilter(state=FlowRunFilterState(type=FlowRunFilterStateType(any_=[StateType.PAUSED])))
+    """Flow runs that wait for an answer, in the order of their start."""
+    flow_filter = FlowRunFilter(state=FlowRunFilterState(type=FlowRunFilterStateType(any_=[StateType.PAUSED])))
     with get_client(sync_client=True) as client:
-        found = [
+        waiting_runs = [
             Waiting(str(run.id), run.name, _question(client, run))
-            for run in client.read_flow_runs(flow_run_filter=wanted)
+            for run in client.read_flow_runs(flow_run_filter=flow_filter)
         ]
-    return [one for one in found if one.question]
+    return [one for one in waiting_runs if one.question]
 
 
 def answer(flow_run: str, reply: Answer) -> None:
-    """Lets a flow run go on with an answer."""
+    """Resume a flow run with an answer."""
     with get_client(sync_client=True) as client:
         client.resume_flow_run(UUID(flow_run), run_input={"answer": reply})
 
@@ -74,5 +74,5 @@ def _question(client: SyncPrefectClient, run: FlowRun) -> str:
         return ""
     try:
         return str(json.loads(client.read_flow_run_input(run.id, keys["description"])))
-    except (HTTPStatusError, ValueError):  # paused by something else than a question of ours
+    except (HTTPStatusError, ValueError):  # paused without a question of this program
         return ""

@@ -1,7 +1,7 @@
-"""The archive that a flow works on: its address is a parameter, which is stored and shown; its credentials never are.
+"""The archive of a flow: its address is a parameter, which is stored and shown; its credentials are never stored.
 
-A flow's process finds the credentials in its own environment (``TUMBLELINE_ARCHIVE``, or the variables of the object store), or
-in a Secret block of the orchestrator, which stores it encrypted.
+A flow takes the credentials from its environment (``TUMBLELINE_ARCHIVE``, or the variables of the object store), or
+from a Secret block of the orchestrator, which is encrypted.
 """
 
 from __future__ import annotations
@@ -19,17 +19,17 @@ if TYPE_CHECKING:
 
 
 def archive_of(parameter: str | None) -> Archive:
-    """The archive that a flow's parameter names, with the credentials of this process.
+    """The archive of a flow's parameter, with the credentials of this process.
 
     Parameters
     ----------
-    parameter : an address without credentials; ``block:NAME`` for the one in a Secret block; where None, the environment's
-        TUMBLELINE_ARCHIVE. The environment's whole address is used where it is the same but for its credentials.
+    parameter : an address without credentials; ``block:NAME`` for the address in a Secret block; None: TUMBLELINE_ARCHIVE of
+        the environment. The address of the environment is used where it differs only by its credentials.
 
     Raises
     ------
     WrongUse
-        The parameter holds credentials, or there is no block of the name.
+        The parameter has credentials, or the block does not exist.
     """
     refuse_credentials(parameter)
     if parameter is None:
@@ -42,7 +42,7 @@ def archive_of(parameter: str | None) -> Archive:
 
 @contextmanager
 def named(archive: Archive) -> Generator[str]:
-    """A block in which flows of this process find an archive by its address without credentials, which it gives."""
+    """A context in which flows of this process find an archive by its address without credentials; it gives this address."""
     whole = archive.address
     shown = without_credentials(whole)
     if shown == whole:
@@ -63,11 +63,11 @@ def _of_block(name: str) -> str:
     from prefect.blocks.system import Secret
 
     try:
-        block: Any = Secret  # its load is of both kinds, and its types say the other
-        found = block.load(name, _sync=True)
+        block: Any = Secret  # load can be synchronous or not; its types name only the other kind
+        secret = block.load(name, _sync=True)
     except ValueError:
         raise WrongUse(
             f"archive: the orchestrator has no Secret block '{name}', one with the archive's address is needed; save it on the "
             "server's page under Blocks"
         ) from None
-    return str(found.get())
+    return str(secret.get())

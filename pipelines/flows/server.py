@@ -1,10 +1,10 @@
-"""The orchestrator's server process: Prefect's server with a key, for its own host names and the pages of its own origin only.
+"""The server process of the orchestrator: Prefect's server with a key, only for its own host names and pages of its own origin.
 
     python -m pipelines.flows.server --host 127.0.0.1 --port 4200
 
-With ``--until-unused FOLDER`` it is the server of a command: it lives as long as somebody uses it. A client holds a locked file
-in ``clients/``; the system frees the lock when the client dies, however it dies. The server looks every second and leaves when no
-lock is held.
+With ``--until-unused FOLDER`` it is the server of a command and runs as long as a client uses it. A client holds a locked file
+in ``clients/``; the system releases the lock when the client ends, also when it is killed. The server checks every second and
+ends when no lock is held.
 """
 
 from __future__ import annotations
@@ -30,19 +30,17 @@ LOOK_S = 1.0
 CLIENTS = "clients"
 START_LOCK = "start.lock"
 ADDRESS = "server.json"
-PRIVATE = (
-    0o077  # taken from the modes of all files that the server makes: its database has parameters and logs in clear
-)
+PRIVATE = 0o077  # removed from the modes of all files of the server: its database has unencrypted parameters and logs
 
 
 def serve(host: str, port: int, names: Sequence[str], home: Path | None = None) -> None:
-    """Serve until the process is told to end, or, with a ``home``, until no client is left there.
+    """Serve until the process is stopped, or, with a ``home``, until no client is left there.
 
     Parameters
     ----------
     host, port : where to listen
-    names : further names by which this host is called; a request by any other is refused
-    home : folder of the clients' locks
+    names : further names of this host; requests with other names are refused
+    home : folder of the locks of the clients
     """
     known = [*LOOPBACK, *names]
     os.umask(PRIVATE)
@@ -59,7 +57,7 @@ def serve(host: str, port: int, names: Sequence[str], home: Path | None = None) 
         application(known, origins(known, port)),
         host=host,
         port=port,
-        log_config=None,  # as Prefect has set up logging, in its form
+        log_config=None,  # in the format of Prefect's logging
         log_level="warning",
         timeout_graceful_shutdown=5,
     )
@@ -70,7 +68,7 @@ def serve(host: str, port: int, names: Sequence[str], home: Path | None = None) 
 
 
 def private_folder(path: Path) -> None:
-    """Makes a folder that nobody else may look into."""
+    """Make a folder that only this user can read."""
     path.mkdir(mode=0o700, parents=True, exist_ok=True)
     path.chmod(0o700)
 
@@ -80,9 +78,7 @@ def _leave_when_alone(home: Path, server: uvicorn.Server) -> None:
         time.sleep(LOOK_S)
         try:
             left = _left(home)
-        except (
-            FileNotFoundError
-        ):  # its folder is gone, as that of a server for one command is: nobody finds it any more
+        except FileNotFoundError:  # the folder was removed with the command of this server: no client can find it
             left = True
         if left:
             server.should_exit = True
@@ -90,12 +86,12 @@ def _leave_when_alone(home: Path, server: uvicorn.Server) -> None:
 
 
 def _left(home: Path) -> bool:
-    """Whether no client is left, and none can come any more."""
+    """Whether no client is left; no new client can register then."""
     if any_client(home):
         return False
     with (home / START_LOCK).open("w") as lock:
         fcntl.flock(lock, fcntl.LOCK_EX)
-        if any_client(home):  # it came meanwhile
+        if any_client(home):  # registered in the meantime
             return False
         (home / ADDRESS).unlink(missing_ok=True)
         return True
@@ -120,16 +116,16 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--host", default=LOOPBACK[0], help="Address to listen on.")
     parser.add_argument("--port", type=int, default=4200, help="Port to listen on.")
     parser.add_argument(
-        "--name", action="append", default=[], help="A further name by which clients call this host; may be repeated."
+        "--name", action="append", default=[], help="A further host name that clients use; may be repeated."
     )
     parser.add_argument(
-        "--until-unused", type=Path, metavar="FOLDER", help="Leave when no client holds a lock in this folder."
+        "--until-unused", type=Path, metavar="FOLDER", help="End when no client holds a lock in this folder."
     )
     return parser
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
-    """Serve as the command line says."""
+    """Serve with the options of the command line."""
     given = _parser().parse_args(arguments)
     try:
         serve(given.host, given.port, given.name, given.until_unused)

@@ -1,4 +1,4 @@
-"""Work of an archive spread over Dask workers by Prefect's task runner; nothing of Prefect is imported before there is work."""
+"""Distribution of work on an archive over Dask workers by Prefect's task runner; Prefect is imported only for work."""
 
 from __future__ import annotations
 
@@ -21,18 +21,18 @@ SCHEMES = ("tcp://", "tls://", "ucx://", "ws://", "wss://")
 
 
 def on_dask(address: str, workers: int = 1, home: Path | None = None) -> Spread | None:
-    """A spread over the workers of a Dask cluster; None where no address is given.
+    """The distribution over the workers of a Dask cluster; None without an address.
 
     Parameters
     ----------
     address : of a Dask scheduler, or ``local`` for a cluster of processes on this machine
     workers : processes of the local cluster
-    home : folder of the orchestrator that is started where PREFECT_API_URL names none; a temporary one where None
+    home : folder of the orchestrator that is started without PREFECT_API_URL; None: a temporary folder
 
     Raises
     ------
     WrongUse
-        The address is not one of a scheduler.
+        The address is not the address of a scheduler.
     """
     if not address:
         return None
@@ -51,13 +51,13 @@ def _refuse_address(dask: str) -> None:
     if dask != LOCAL and not dask.startswith(SCHEMES):
         raise WrongUse(
             f"--dask: '{dask}' is no address of a scheduler, tcp://HOST:PORT is needed, or '{LOCAL}' for a cluster on this "
-            "machine; start one with 'dask scheduler' and 'dask worker'"
+            "computer; start one with 'dask scheduler' and 'dask worker'"
         )
 
 
 @contextmanager
 def _orchestrator(home: Path | None) -> Generator[None, None, None]:
-    """A block with an orchestrator: the one that PREFECT_API_URL names, or one of our own for as long as it lasts."""
+    """A context with an orchestrator: the one of PREFECT_API_URL, or a temporary one."""
     if os.environ.get("PREFECT_API_URL"):
         reach_named()
         yield

@@ -1,12 +1,12 @@
-"""The worker beside a station: what must be so before and after Prefect's own worker works.
+"""The worker of a station: preparation before and clean-up after Prefect's worker.
 
     python -m pipelines.flows.worker start --station line-1
     python -m pipelines.flows.worker stop --station line-1 --wait 60
 
-``start`` lets one worker at a time work for a station on this machine, closes runs that died with the last one, and cancels
-scheduled runs that were missed. It ends when the worker has ended and with it whatever a killed flow left running: the
-station's watchdog.
-``stop`` pauses the station's queue and waits for the run that goes on; the next ``start`` resumes it.
+``start`` allows one worker at a time for a station on this computer, closes runs that died with the previous worker, and cancels
+scheduled runs that were missed. It ends when the worker has ended and the processes that a killed flow left (the watchdog of the
+station) have ended.
+``stop`` pauses the station's queue and waits for the run in progress; the next ``start`` resumes the queue.
 """
 
 from __future__ import annotations
@@ -33,14 +33,14 @@ NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]*")
 
 
 def start(pool: str, station: str, queues: Sequence[str], *, once: bool = False, healthcheck: bool = False) -> int:
-    """Exit status of a worker for a station's queue and further ones, one run at a time; when everything it left has ended.
+    """Run a worker for a station's queue and further queues, one run at a time; its exit status when all its processes ended.
 
     Raises
     ------
     OperatorNeeded
-        Another worker of this machine works for the station.
+        Another worker of this computer works for the station.
     WrongUse, LinkLost
-        The orchestrator does not take the key, or does not answer.
+        The orchestrator does not accept the key, or does not answer.
     """
     from pipelines.flows.dead_runs import cancel_missed_runs, close_dead_runs_of_queue
 
@@ -48,7 +48,7 @@ def start(pool: str, station: str, queues: Sequence[str], *, once: bool = False,
         knock(STARTUP_S)
         for queue in (station, *queues):
             for name in close_dead_runs_of_queue(pool, queue):
-                _tell(f"{queue}: run {name} is closed as crashed: its process is gone")
+                _tell(f"{queue}: run {name} is closed as crashed: its process has ended")
             for name in cancel_missed_runs(pool, queue):
                 _tell(f"{queue}: run {name} is cancelled: it was missed")
         if _marker(station).exists():
@@ -75,7 +75,7 @@ def start(pool: str, station: str, queues: Sequence[str], *, once: bool = False,
 
 
 def stop(pool: str, station: str, wait_s: float) -> list[str]:
-    """Names of the runs that still go on after the wait; no further one begins until the station's worker is started again."""
+    """Pause the queue and wait; names of the runs still in progress. No new run begins until the worker is started again."""
     from prefect.client.orchestration import get_client
 
     from pipelines.flows.dead_runs import WORKING, runs_of_queue
@@ -93,39 +93,39 @@ def stop(pool: str, station: str, wait_s: float) -> list[str]:
 
 
 def _pause(pool: str, queue: str, *, paused: bool) -> bool:
-    """Pauses or resumes a queue; whether it was otherwise before."""
+    """Pause or resume a queue; return whether its state changed."""
     from prefect.client.orchestration import get_client
     from prefect.exceptions import ObjectNotFound
 
     with get_client(sync_client=True) as client:
         try:
-            found = client.read_work_queue_by_name(queue, work_pool_name=pool)
+            work_queue = client.read_work_queue_by_name(queue, work_pool_name=pool)
         except ObjectNotFound:
             raise WrongUse(
-                f"worker: pool '{pool}' has no queue '{queue}', that of a station is needed; register it with "
+                f"worker: pool '{pool}' has no queue '{queue}', the queue of a station is needed; register it with "
                 "'python -m pipelines.flows.deploy deploy/prefect.yaml'"
             ) from None
-        if found.is_paused == paused:
+        if work_queue.is_paused == paused:
             return False
-        client.update_work_queue(found.id, is_paused=paused)
+        client.update_work_queue(work_queue.id, is_paused=paused)
         return True
 
 
 @contextmanager
 def _alone(station: str) -> Generator[None]:
-    """A block in which no other worker of this machine works for the station."""
+    """A context in which no other worker of this computer works for the station."""
     with (state_folder() / f"worker-{station}.lock").open("a") as lock:
         try:
             fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except BlockingIOError:
             raise OperatorNeeded(
-                f"worker: another one works for station {station} on this machine, one is needed; stop that one first"
+                f"worker: another worker works for station {station} on this computer, one is needed; stop it first"
             ) from None
         yield
 
 
 def _marker(station: str) -> Path:
-    """File that says that the station's queue was paused by ``stop``, and not by somebody who has a reason."""
+    """File that shows that ``stop`` paused the queue of the station, and not a person."""
     return state_folder() / f"worker-{station}.paused"
 
 
@@ -139,24 +139,24 @@ def _parser() -> argparse.ArgumentParser:
         prog="python -m pipelines.flows.worker", description="The worker beside a station."
     )
     commands = parser.add_subparsers(dest="command", required=True)
-    begin = commands.add_parser("start", help="Work for a station until told to end.")
-    end = commands.add_parser("stop", help="Let the station's run end and no other begin.")
+    begin = commands.add_parser("start", help="Work for a station until stopped.")
+    end = commands.add_parser("stop", help="Wait for the end of the station's run and start no other.")
     for one in (begin, end):
-        one.add_argument("--pool", default="line", help="The work pool of the line.")
-        one.add_argument("--station", required=True, help="The station's name, which is that of its work queue.")
+        one.add_argument("--pool", default="line", help="Work pool of the line.")
+        one.add_argument("--station", required=True, help="Name of the station and of its work queue.")
     begin.add_argument(
         "--queue", action="append", default=[], help="A further queue of the same pool; may be repeated."
     )
-    begin.add_argument("--once", action="store_true", help="Do what is due, and end.")
+    begin.add_argument("--once", action="store_true", help="Run what is due, then end.")
     begin.add_argument(
         "--with-healthcheck", action="store_true", help="Answer at /health of PREFECT_WORKER_WEBSERVER_HOST and _PORT."
     )
-    end.add_argument("--wait", type=float, default=0.0, metavar="SECONDS", help="How long to wait for the run.")
+    end.add_argument("--wait", type=float, default=0.0, metavar="SECONDS", help="Time to wait for the run, s.")
     return parser
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Exit status of what the command line asks for."""
+    """Run the command line; return the exit status."""
     given = _parser().parse_args(arguments)
     try:
         if not NAME.fullmatch(given.station):
@@ -170,7 +170,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         _tell(str(problem))
         return problem.exit_status
     _tell(
-        f"{given.station}: {'no run goes on' if not going else 'still going on: ' + ', '.join(going)}; its queue is paused"
+        f"{given.station}: {'no run in progress' if not going else 'still in progress: ' + ', '.join(going)}; its queue is paused"
     )
     return 1 if going else 0
 

@@ -1,1 +1,1 @@
-"""Jobs: recipe, limits, station and lot of one run, and the files that say so."""
+"""Jobs: recipe, limits, station and lot of one run, and their files."""

@@ -1,4 +1,4 @@
-"""What a re-run is to change: model, limits or nothing. Plain values, so that workers elsewhere are given the same."""
+"""The change for a re-run: model, limits or nothing. Plain values, so that they can be sent to workers."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class ModelChange:
-    """The model and limits for a re-run; each as the run had it where it is None."""
+    """The model and limits for a re-run; None: as in the run."""
 
     effects: tuple[str, ...] | None = None
     formulas: tuple[FormulaSpec, ...] = ()
@@ -29,7 +29,7 @@ class ModelChange:
     effect_files: tuple[str, ...] = ()
 
     def of_model(self) -> dict[str, Any]:
-        """The keys of a recipe that say its model, as they are to be; none where the model stays."""
+        """The keys of the recipe for the new model; empty where the model stays."""
         if self.effects is None:
             return {}
         return {
@@ -40,7 +40,7 @@ class ModelChange:
         }
 
     def use(self) -> None:
-        """Make the model's formulas, and effects of files outside the tree, effects of the catalogue of this process."""
+        """Add the formulas of the model and the effects of effect files to the catalogue of this process."""
         for path in self.effect_files:
             if path not in _added:
                 add_file(path)
@@ -59,12 +59,12 @@ def wanted(
     *,
     where: str = "rerun",
 ) -> ModelChange:
-    """What a command was given as effects, model file, limits and effects of its own.
+    """The change from the options of a command: effects, model file, limits and effect files.
 
     Raises
     ------
     WrongUse, RecipeInvalid
-        Effects and a model are both given; an effect, the file or the limits are not known.
+        Effects and a model are both given; an effect, the file or the limits are unknown.
     """
     outside = tuple(str(path.resolve()) for path in effect_files or ())
     ModelChange(effect_files=outside).use()

@@ -1,4 +1,4 @@
-"""Model files in use: their formulas become effects, their versions a history, and one more effect the next version."""
+"""Model files: formulas as effects, versions as a history, and the next version with one more effect."""
 
 from __future__ import annotations
 
@@ -28,12 +28,12 @@ if TYPE_CHECKING:
     from schemas.model import ModelChange, ModelFile
 
 STARTING_MODEL = ("bias", "scale", "misalignment", "bias_temperature", "scale_temperature")
-"""What a new model file begins with: the standard thermal model."""
+"""The effects of a new model file: the standard thermal model."""
 
 
 @dataclass(frozen=True)
 class ModelStep:
-    """One effect more: who adds it, when, why, and the run or file that showed it."""
+    """One more effect: author, time, reason, and the run or file that shows it."""
 
     effect: str
     by: str
@@ -44,7 +44,7 @@ class ModelStep:
 
 @dataclass(frozen=True)
 class Version:
-    """A version of a model: its effects, what was added to and removed from the one before, and the change that says why."""
+    """A version of a model: its effects, the added and removed effects, and the change with its reason."""
 
     number: int
     effects: tuple[str, ...]
@@ -54,24 +54,24 @@ class Version:
 
 
 def read_model(path: Path) -> ModelFile:
-    """The model of a file, its formulas known as effects, every effect of it in the catalogue."""
+    """The model of a file; its formulas become effects, and all its effects are checked against the catalogue."""
     model = load_model(path)
     _use(model, f"model {path.name}")
     return model
 
 
 def use_formulas(formulas: Iterable[FormulaSpec], where: str) -> None:
-    """Make the formulas of a file effects of the catalogue.
+    """Add the formulas of a file to the catalogue of effects.
 
     Raises
     ------
     RecipeInvalid
-        A formula is no formula, or its id belongs to an effect of the catalogue.
+        A formula is invalid, or its id belongs to an effect of the catalogue.
     """
     for spec in formulas:
         if spec.id in effects.built_in():
             raise RecipeInvalid(
-                f"{where}: formula '{spec.id}': the catalogue has an effect of that id; choose another id",
+                f"{where}: formula '{spec.id}': the catalogue has an effect with this id; choose another id",
                 key="formula.id",
             )
         try:
@@ -82,13 +82,13 @@ def use_formulas(formulas: Iterable[FormulaSpec], where: str) -> None:
 
 
 def use_formulas_of(run: Run) -> None:
-    """Make the formulas that an archived run was fitted with effects of the catalogue."""
+    """Add the formulas of the model of an archived run to the catalogue of effects."""
     kept = run.about.get("recipe", {}).get("formulas", [])
     use_formulas([FormulaSpec.model_validate(spec) for spec in kept], f"run {run.id}")
 
 
 def refuse_unknown_effects(names: Sequence[str], where: str) -> None:
-    """Refuse names that are no effect, with the close matches."""
+    """Refuse unknown effects, with similar names."""
     for name in names:
         try:
             effects.get(name)
@@ -101,7 +101,7 @@ def refuse_unknown_effects(names: Sequence[str], where: str) -> None:
 
 
 def chosen_effects(listed: str, model: Path | None, where: str) -> list[str] | None:
-    """The model that a command was given, as a list of effects or as a file; None where it was given neither."""
+    """The model of a command's options, from a list of effects or a file; None without either."""
     if listed and model is not None:
         raise WrongUse(f"{where}: --effects and --model are both given, one is needed; leave one out")
     if model is not None:
@@ -109,26 +109,26 @@ def chosen_effects(listed: str, model: Path | None, where: str) -> list[str] | N
     names = list(dict.fromkeys(part.strip() for part in listed.split(",") if part.strip()))
     if listed and not names:
         raise WrongUse(
-            f"{where}: --effects '{listed}' names no effect; list some (bias,scale,misalignment), or leave it out"
+            f"{where}: --effects '{listed}' names no effect, one is needed; list some (bias,scale,misalignment), or leave it out"
         )
     refuse_unknown_effects(names, where)
     return names or None
 
 
 def versions(model: ModelFile) -> list[Version]:
-    """Every version of a model, oldest first, by walking back from the last over the changes."""
+    """Every version of a model, oldest first, reconstructed from the last version and the changes."""
     now = list(model.model.effects)
-    found: list[Version] = []
+    versions: list[Version] = []
     for change in reversed(model.change):
         effect = change.effect
         before = [e for e in now if e != effect] if effect in now else [*now, *([effect] if effect else [])]
         added, removed = tuple(e for e in now if e not in before), tuple(e for e in before if e not in now)
-        found.append(Version(change.version, tuple(now), added, removed, change))
+        versions.append(Version(change.version, tuple(now), added, removed, change))
         now = before
-    if not found or found[-1].added or found[-1].removed:  # the changes do not tell of the model that it began with
-        number = found[-1].number - 1 if found else model.model.version
-        found.append(Version(number, tuple(now), (), (), None))
-    return found[::-1]
+    if not versions or versions[-1].added or versions[-1].removed:  # the changes do not include the starting model
+        number = versions[-1].number - 1 if versions else model.model.version
+        versions.append(Version(number, tuple(now), (), (), None))
+    return versions[::-1]
 
 
 def new_model(path: Path, names: Sequence[str], by: str, at: datetime) -> str:
@@ -137,7 +137,7 @@ def new_model(path: Path, names: Sequence[str], by: str, at: datetime) -> str:
     document = tomlkit.document()
     document.add(
         tomlkit.comment(
-            "A model: the effects that are fitted. 'tumbleline extend' adds one and says who, when and why."
+            "A model: the effects that are fitted. 'tumbleline extend' adds one and records author, time and reason."
         )
     )
     head = tomlkit.table()
@@ -146,18 +146,18 @@ def new_model(path: Path, names: Sequence[str], by: str, at: datetime) -> str:
     head.add("effects", _listed(names))
     document.add("model", head)
     document.add("change", tomlkit.aot())
-    first = {"version": 1, "by": by, "at": at, "why": "the model to begin with"}
+    first = {"version": 1, "by": by, "at": at, "why": "starting model"}
     document["change"].append(_table(first))  # pyright: ignore[reportArgumentType, reportAttributeAccessIssue, reportUnknownMemberType]
     return tomlkit.dumps(document)
 
 
 def extended(text: str, step: ModelStep, source: str) -> tuple[str, ModelFile]:
-    """The text of the next version of a model, its comments kept, and the model as it then is.
+    """The text of the next version of a model, with its comments, and the model of this version.
 
     Raises
     ------
     RecipeInvalid
-        The text is no model, the effect is in it already, or nothing is called so.
+        The text is no model, the effect is already in it, or its name is unknown.
     """
     model = parse_model(text, source)
     _use(model, source)
@@ -180,17 +180,17 @@ def extended(text: str, step: ModelStep, source: str) -> tuple[str, ModelFile]:
             "version": model.model.version,
             "by": step.by,
             "at": step.at,
-            "why": "as it was found, without a history",
+            "why": "file without a history",
         }
         changes.append(_table(known))
-    told = {"version": version, "effect": step.effect, "by": step.by, "at": step.at, "why": step.why}
-    changes.append(_table(told | ({"run": step.run} if step.run else {})))
+    change = {"version": version, "effect": step.effect, "by": step.by, "at": step.at, "why": step.why}
+    changes.append(_table(change | ({"run": step.run} if step.run else {})))
     new = tomlkit.dumps(document)
     return new, parse_model(new, source)
 
 
 def publish_model(path: Path, text: str) -> None:
-    """Write a model file so that it is there whole or as it was before."""
+    """Write a model file atomically."""
     files.publish(path, text.encode(), "model", files.ELSEWHERE)
 
 

@@ -1,8 +1,8 @@
-"""Which model is the line's, and from when: release records in the archive that are never changed, and the evidence for them.
+"""Releases of models to the line: records in the archive that are never changed, and the evidence for them.
 
-As with the reference files of an observatory every record says for what it holds and after which date it is to be used: the
-one for the same device and station comes before one for the same device, that before one for all; among equals the one with the
-latest date that has been reached, and of two with the same date the one that was written last.
+Every record has its scope (device, station) and its first day of use. A record for the same device and station has priority over
+one for the device only, and this over one for all; among records of equal scope the one with the latest date that is not in the
+future applies, and of two with the same date the one that was written last.
 """
 
 from __future__ import annotations
@@ -15,7 +15,6 @@ from pipelines.archive import files, hash_chain
 from pipelines.archive.keys import digest
 from pipelines.archive.locks import alone
 from pipelines.archive.provenance import provenance
-from pipelines.jobs.recipes import LINE
 from schemas.errors import RecipeInvalid, WrongUse
 from schemas.recipe import FormulaSpec
 
@@ -31,7 +30,7 @@ SCHEMA = 1
 
 @dataclass(frozen=True)
 class Release:
-    """One record: a model, from when, for which device and station (all where empty), why, and on what evidence."""
+    """One record: model, first day of use, device and station (empty: all), reason, and evidence."""
 
     number: int
     effects: tuple[str, ...]
@@ -48,16 +47,16 @@ class Release:
     when: str
 
     def holds_for(self, device: str, station: str) -> bool:
-        """Whether the record is for this device and station."""
+        """Whether the record applies to this device and station."""
         return _matches(self.device, device) and _matches(self.station, station)
 
     @property
     def rank(self) -> tuple[bool, bool, datetime, int]:
-        """By what one record comes before another."""
+        """The order of priority of the records."""
         return bool(self.station), bool(self.device), self.since, self.number
 
     def of_model(self) -> dict[str, Any]:
-        """The keys of a recipe that say the model."""
+        """The keys of a recipe for the model."""
         return {
             "effects": list(self.effects),
             "formulas": list(self.formulas),
@@ -66,18 +65,18 @@ class Release:
         }
 
 
-def _matches(wanted: str, found: str) -> bool:
-    return not wanted or wanted.lower() == found.lower()
+def _matches(scope: str, name: str) -> bool:
+    return not scope or scope.lower() == name.lower()
 
 
-def model_digest(wanted: ModelChange) -> str:
-    """Hash of what a model fits: its effects and formulas, not its name."""
-    formulas = [formula.model_dump(mode="json") for formula in wanted.formulas]
-    return digest({"effects": sorted(wanted.effects or ()), "formulas": formulas})
+def model_digest(change: ModelChange) -> str:
+    """Hash of the effects and formulas of a model, without its name."""
+    formulas = [formula.model_dump(mode="json") for formula in change.formulas]
+    return digest({"effects": sorted(change.effects or ()), "formulas": formulas})
 
 
 def keep_evidence(archive: Archive, wanted: ModelChange, document: Mapping[str, Any], runs: list[str]) -> str:
-    """The name under which a what-if is kept in the archive."""
+    """Store a what-if in the archive; return its name."""
     model = model_digest(wanted)
     content = {"schema": SCHEMA, "model": model, "runs": sorted(runs), **document}
     name = f"{model[:10]}-{digest(content)[:10]}"
@@ -89,17 +88,17 @@ def keep_evidence(archive: Archive, wanted: ModelChange, document: Mapping[str, 
 
 
 def evidence_for(archive: Archive, wanted: ModelChange, device: str, station: str) -> dict[str, Any] | None:
-    """The newest what-if of a model whose lots are of this device and station; None where there is none."""
+    """The newest what-if of a model with lots of this device and station; None without one."""
     model = model_digest(wanted)
-    found: list[dict[str, Any]] = []
+    matches: list[dict[str, Any]] = []
     for place in (archive.root / EVIDENCE).glob(f"{model[:10]}-*.json"):
         content = files.read_json(place)
         groups = content.get("groups", [])
         if content.get("model") == model and any(
             _matches(device, row["device"]) and _matches(station, row["station"]) for row in groups
         ):
-            found.append({**content, "name": place.stem})
-    return max(found, key=lambda one: str(one["when"]), default=None)
+            matches.append({**content, "name": place.stem})
+    return max(matches, key=lambda one: str(one["when"]), default=None)
 
 
 def release(
@@ -112,16 +111,16 @@ def release(
     reason: str,
     force: bool = False,
 ) -> Release:
-    """The new record that makes a model the line's.
+    """Write a new release of a model to the line; return the record.
 
     Raises
     ------
     WrongUse
-        There is no what-if of the model for this device and station, or it says that the model is no better, and the release is
-        not forced; or no reason is given.
+        The release is not forced and there is no what-if of the model for this device and station, or its verdict is not
+        'better'; or no reason is given.
     """
     if not reason.strip():
-        raise WrongUse("release: no reason, one is needed; give --reason TEXT")
+        raise WrongUse("release: no reason is given, one is needed; give --reason TEXT")
     evidence = evidence_for(archive, wanted, device, station)
     if not force:
         _refuse_without(evidence, wanted, device, station)
@@ -140,9 +139,9 @@ def release(
 
 
 def _published(archive: Archive, content: dict[str, Any]) -> int:
-    """The number under which a record is written, and sealed in the archive's chain."""
+    """Write a record and add it to the chain of the archive; return its number."""
     with alone(archive.root / FOLDER, wait=True):
-        number = max((one.number for one in releases(archive)), default=0) + 1  # one may have been taken away
+        number = max((one.number for one in releases(archive)), default=0) + 1  # a record may have been removed
         place = _place(archive, number)
         files.publish_first(place, files.manifest_bytes({**provenance(), **content, "number": number}))
         sealed = {f"{FOLDER}/{place.name}": files.sha256(place)}
@@ -155,7 +154,7 @@ def _refuse_without(evidence: dict[str, Any] | None, wanted: ModelChange, device
     name = wanted.model_name or "the model"
     if evidence is None:
         raise WrongUse(
-            f"release: nothing in the archive shows what {name} makes of lots{where}, a what-if is needed; run "
+            f"release: nothing in the archive shows the effect of {name} on lots{where}, a what-if is needed; run "
             "'tumbleline whatif', or give --force with a reason that says why not"
         )
     if evidence["verdict"] != "better":
@@ -166,24 +165,24 @@ def _refuse_without(evidence: dict[str, Any] | None, wanted: ModelChange, device
 
 
 def releases(archive: Archive) -> list[Release]:
-    """Every record, the one written first first."""
+    """Every record, in the order of writing."""
     numbers = sorted(int(place.stem) for place in (archive.root / FOLDER).glob("*.json") if place.stem.isdigit())
     return [_read(archive, number) for number in numbers]
 
 
 def released(archive: Archive, device: str, station: str, when: datetime) -> Release | None:
-    """The record that says the line's model for a device and station at a time; None where none does yet."""
+    """The record of the line's model for a device and station at a time; None without one."""
     holding = [one for one in releases(archive) if one.holds_for(device, station) and one.since <= when]
     return max(holding, key=lambda one: one.rank, default=None)
 
 
 def line_model(archive: Archive, device: str, station: str, when: datetime | None = None) -> dict[str, Any]:
-    """The keys of a recipe that say the line's model, now or at a time.
+    """The keys of a recipe for the line's model, now or at a time.
 
     Raises
     ------
     RecipeInvalid
-        None is released for the device and station.
+        No model is released for the device and station.
     """
     at = when or datetime.now(UTC)
     found = released(archive, device, station, at)
@@ -191,7 +190,7 @@ def line_model(archive: Archive, device: str, station: str, when: datetime | Non
         there = releases(archive)
         known = ", ".join(f"{one.device or 'every device'} from {one.since:%Y-%m-%d}" for one in there) or "none"
         raise RecipeInvalid(
-            f"recipe: key 'model': '{LINE}' is asked for, and for {device} on {station} no model is released at {at:%Y-%m-%d} "
+            f"recipe: key 'model': for {device} on {station} no model is released at {at:%Y-%m-%d} "
             f"(released: {known}); release one with 'tumbleline release', or name effects in the recipe",
             key="model",
         )

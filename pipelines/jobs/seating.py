@@ -1,4 +1,4 @@
-"""Which unit sits in which slot: a list, a slot map in a file, or a scan, slot by slot."""
+"""Seating of the units in the slots: a list, a slot map in a file, or a scan, slot by slot."""
 
 from __future__ import annotations
 
@@ -22,20 +22,20 @@ if TYPE_CHECKING:
 SCAN = "scan"
 COLUMNS = ["slot", "serial"]
 DIVIDERS = (",", ";", "\t")
-"""Of the cells of a slot map: Excel writes the second where the comma is the decimal sign."""
+"""Separators of the cells of a slot map; Excel writes the second where the comma is the decimal sign."""
 LONGEST_SLOT = 4
 
 
 @dataclass(frozen=True)
 class Seating:
-    """Serial numbers, and the slot of each where a slot map says; without, they sit slot by slot from 0."""
+    """Serial numbers, and the slot of each from a slot map; without one the units sit in the slots from 0 on."""
 
     units: tuple[str, ...] = ()
     slots: tuple[int, ...] = ()
 
 
 def read_seating(text: str) -> Seating:
-    """The seating in a slot map's file, or in a comma-separated list of serial numbers; empty where the text is."""
+    """The seating from a slot map file, or from a comma-separated list of serial numbers; empty for an empty text."""
     path = Path(text)
     if text and path.suffix.lower() in {".csv", ".toml"}:
         content = read_text(path, "slot map", "CSV or TOML")
@@ -45,50 +45,48 @@ def read_seating(text: str) -> Seating:
 
 
 def scan(slots: int, read: Callable[[int], str], refuse: Callable[[str], None]) -> Seating:
-    """The seating as scanned at the station, slot by slot; an empty line leaves a slot empty.
+    """The seating, scanned at the station slot by slot; an empty line leaves a slot empty.
 
     Parameters
     ----------
-    slots : how many there are.
-    read : gives the line for a slot.
-    refuse : is told what is wrong with a line, before the slot is asked for again.
+    slots : number of slots.
+    read : returns the line for a slot.
+    refuse : called with the fault of a line, before the slot is scanned again.
     """
-    found: list[tuple[int, str]] = []
+    entries: list[tuple[int, str]] = []
     for slot in range(slots):
         while serial := read(slot).strip():
             if fault := serial_fault(serial):
                 refuse(f"slot {slot}: {fault}; scan it again, or clean the label")
                 continue
-            twice = [where for where, other in found if other == serial]
+            twice = [where for where, other in entries if other == serial]
             if not twice:
-                found.append((slot, serial))
+                entries.append((slot, serial))
                 break
-            refuse(
-                f"slot {slot}: {serial} was scanned for slot {twice[0]} already; scan the unit that sits in slot {slot}"
-            )
-    return Seating(tuple(serial for _, serial in found), tuple(slot for slot, _ in found))
+            refuse(f"slot {slot}: {serial} was scanned for slot {twice[0]} already; scan the unit in slot {slot}")
+    return Seating(tuple(serial for _, serial in entries), tuple(slot for slot, _ in entries))
 
 
 def disagreements(station: Station, lot: Lot) -> list[str]:
-    """What the slots say against the lot's slot map, one sentence per slot; empty where they agree.
+    """Differences between the slots and the lot's slot map, one sentence for each slot; empty where they agree.
 
-    A slot that does not answer says nothing against it: its unit is refused later, and the others go on.
+    A slot that does not answer is no difference: its unit is refused later, and the others continue.
     """
     from schemas.errors import StationError
 
-    found: list[str] = []
+    entries: list[str] = []
     for unit in lot.units:
         try:
             serial = station.reader.slots[unit.slot].identity().serial
         except StationError:
             continue
         if serial != unit.serial:
-            found.append(f"slot {unit.slot}: '{serial}' sits there, '{unit.serial}' is needed")
-    return found
+            entries.append(f"slot {unit.slot}: '{serial}' sits there, '{unit.serial}' is needed")
+    return entries
 
 
 def _csv_rows(content: str, path: Path) -> list[tuple[str, str]]:
-    """Slot and serial number of every line but blank ones; cells are divided as in the first line."""
+    """Slot and serial number of every line that is not blank; cells are separated as in the first line."""
     where = f"slot map {path.name}"
     lines = content.splitlines()
     first = lines[0] if lines else ""
@@ -98,7 +96,7 @@ def _csv_rows(content: str, path: Path) -> list[tuple[str, str]]:
     head = [cell.strip().lower() for cell in rows[0]] if rows else []
     if head[:2] != COLUMNS:
         raise WrongUse(f"{where}: begins with '{shown(','.join(head))}', a first line 'slot,serial' is needed; add it")
-    found: list[tuple[str, str]] = []
+    entries: list[tuple[str, str]] = []
     for number, row in enumerate(rows[1:], start=1):
         if not any(cell.strip() for cell in row):
             continue
@@ -107,8 +105,8 @@ def _csv_rows(content: str, path: Path) -> list[tuple[str, str]]:
                 f"{where}: row {number}: {len(row)} cells ({shown(divider.join(row))}), the {len(head)} of the first line are "
                 "needed; correct the row"
             )
-        found.append((row[0], row[1]))
-    return found
+        entries.append((row[0], row[1]))
+    return entries
 
 
 def _toml_rows(content: str, path: Path) -> list[tuple[str, str]]:
@@ -118,8 +116,8 @@ def _toml_rows(content: str, path: Path) -> list[tuple[str, str]]:
         raise WrongUse(f'{where}: no table [slots], one with lines like 0 = "SN1" is needed; add it')
     for slot, serial in table.items():
         if not isinstance(serial, str):
-            found, written = f"slot {shown(slot)}: found {shown(serial)}", f'"{shown(serial)}"'
-            raise WrongUse(f"{where}: {found}, a serial number in quotes is needed; write {written}")
+            entries, written = f"slot {shown(slot)}: entries {shown(serial)}", f'"{shown(serial)}"'
+            raise WrongUse(f"{where}: {entries}, a serial number in quotes is needed; write {written}")
     return list(table.items())
 
 

@@ -1,4 +1,4 @@
-"""Lineage: from a certificate to the raw samples and back, with who, where, when, code, libraries, station and standards."""
+"""Lineage: from a certificate to the raw samples and back, with author, place, time, code, libraries, station and standards."""
 
 from pipelines.lineage.graph import Activity, Graph, Node
 from pipelines.lineage.targets import Lineage, lineage

@@ -1,4 +1,4 @@
-"""Gathering the graph: what an archive's manifests, captures and calibrations tell of runs."""
+"""Build the lineage graph from the manifests, captures and calibrations of an archive."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ RAW = "records"
 
 
 class Gatherer:
-    """The graph of an archive's runs, as far as they were asked for."""
+    """The lineage graph of selected runs of an archive."""
 
     def __init__(self, archive: Archive) -> None:
         self.archive, self.graph = archive, Graph()
@@ -30,7 +30,7 @@ class Gatherer:
         self._captures: dict[str, list[str]] = {}
 
     def run(self, run: Run) -> None:
-        """Take in a run, its capture, and the runs that it goes back to."""
+        """Add a run, its capture, and the earlier runs that it is based on."""
         if run.id in self._runs:
             return
         self._runs.add(run.id)
@@ -56,17 +56,17 @@ class Gatherer:
         self._tables(run, raw, start)
 
     def calibrations(self, serial: str) -> list[str]:
-        """Take in a unit's certificates with the runs that they rest on; their ids."""
-        found: list[str] = []
+        """Add the certificates of a unit with their runs; return the ids of the certificates."""
+        ids: list[str] = []
         for calibration in Ledger(self.archive).calibrations(serial):
             run = self._other(calibration.run)
             if run is not None:
                 self.run(run)
-            found.append(self._certificate(calibration))
-        return found
+            ids.append(self._certificate(calibration))
+        return ids
 
     def certificates_of(self, run: Run) -> list[str]:
-        """Take in the certificates of a run's units; their ids."""
+        """Add the certificates of the units of a run; return their ids."""
         serials = [unit["serial"] for unit in run.about.get("lot", {}).get("units", [])]
         return [
             self._certificate(one)
@@ -79,24 +79,24 @@ class Gatherer:
         return self.archive.run(name) if name in self.archive.run_ids() else None
 
     def _settings(self, about: dict[str, Any]) -> list[str]:
-        """Recipe, limits, station and its reference standards of a run, as things of their own."""
-        found: list[str] = []
+        """Add recipe, limits, station and reference standards of a run as nodes; return their ids."""
+        ids: list[str] = []
         for kind in ("recipe", "limits", "station"):
             content = about.get(kind)
             if isinstance(content, dict):
                 name = f"{kind}:{content.get('name', '')}@{digest(content)[:12]}"
-                found.append(self.graph.add(Node(name, kind, str(content.get("name", kind)), about=content)))
+                ids.append(self.graph.add(Node(name, kind, str(content.get("name", kind)), about=content)))
         for standard in (about.get("station") or {}).get("reference", []):
             name = f"reference:{standard['id']}@{digest(standard)[:12]}"
-            found.append(self.graph.add(Node(name, "reference", standard["id"], about=standard)))
-        return found
+            ids.append(self.graph.add(Node(name, "reference", standard["id"], about=standard)))
+        return ids
 
     def _capture(self, capture: str, about: dict[str, Any], settings: list[str]) -> list[str]:
-        """The files of raw samples of a capture, and the step that measured them; their ids."""
+        """Add the files of raw samples of a capture and the step that measured them; return the ids of the files."""
         if not capture or capture in self._captures:
             return self._captures.get(capture, [])
         top = self.archive.root / "captures" / capture
-        found: list[str] = []
+        ids: list[str] = []
         for folder in sorted(top.iterdir(), key=lambda place: place.name) if top.is_dir() else []:
             if not folder.name.isdigit() or not (folder / "record.json").is_file():
                 continue
@@ -104,16 +104,16 @@ class Gatherer:
             for name, value in sorted(content.items()):
                 place = f"captures/{capture}/{folder.name}/{name}"
                 kind = "samples" if name.startswith("samples") else "table"
-                found.append(self.graph.add(Node(place, kind, f"record {int(folder.name)} {name}", place, str(value))))
-        self._captures[capture] = found
+                ids.append(self.graph.add(Node(place, kind, f"record {int(folder.name)} {name}", place, str(value))))
+        self._captures[capture] = ids
         step = {key: about[key] for key in ("who", "where", "when") if key in about} | {"capture": capture}
         if (top / COMPLETE).is_file():
             step["complete"] = files.sha256(top / COMPLETE)
-        self.graph.put(Activity(f"capture {capture}", "capture", tuple(settings), tuple(found), step))
-        return found
+        self.graph.put(Activity(f"capture {capture}", "capture", tuple(settings), tuple(ids), step))
+        return ids
 
     def _tables(self, run: Run, raw: list[str], start: str) -> None:
-        """The tables of a run, stage by stage."""
+        """Add the tables of a run, stage by stage."""
         manifests = {
             place.stem: files.read_json(place)
             for place in sorted(run.path.glob("*.json"), key=lambda one: one.name)
@@ -156,11 +156,17 @@ class Gatherer:
         self.graph.put(Activity(f"{event.action} {event.certificate}", event.action, used, (name,), _by(event)))
         if one.ended_by is not None and one.ended_by.action == "revoke":
             ended = one.ended_by
-            gone = f"{folder_of(ended.serial)}/{ended.sequence:06d}.json"
+            revocation = f"{folder_of(ended.serial)}/{ended.sequence:06d}.json"
             self.graph.add(
-                Node(gone, "revocation", f"revocation {ended.certificate}", gone, about={"reason": ended.reason})
+                Node(
+                    revocation,
+                    "revocation",
+                    f"revocation {ended.certificate}",
+                    revocation,
+                    about={"reason": ended.reason},
+                )
             )
-            self.graph.put(Activity(f"revoke {ended.certificate}", "revoke", (name,), (gone,), _by(ended)))
+            self.graph.put(Activity(f"revoke {ended.certificate}", "revoke", (name,), (revocation,), _by(ended)))
         return name
 
 
@@ -169,5 +175,5 @@ def _by(event: LedgerEntry) -> dict[str, Any]:
 
 
 def _short(about: dict[str, Any]) -> dict[str, Any]:
-    """What a run tells of itself, without what has things of its own."""
+    """The content of ``run.json`` without the parts that have their own nodes."""
     return {key: value for key, value in about.items() if key not in {"recipe", "limits", "station", "signature"}}

@@ -1,4 +1,4 @@
-"""The graph of what was made from what: things, and the steps that made them from others."""
+"""The lineage graph: nodes (files, runs, settings) and the steps that made nodes from other nodes."""
 
 from __future__ import annotations
 
@@ -11,17 +11,17 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Node:
-    """A thing.
+    """A node of the graph.
 
     Parameters
     ----------
     id : unique; for a file of the archive its place below the root.
     kind : ``certificate``, ``table``, ``report``, ``samples``, ``source``, ``run``, ``recipe``, ``limits``, ``station`` or
         ``reference``.
-    label : the name for people.
-    file : place of its file below the archive's root; empty where it has none of its own.
+    label : the name in trees and pages.
+    file : place of its file below the archive's root; empty for a node without a file.
     sha256 : hash of the file.
-    about : whatever else is known.
+    about : further properties.
     """
 
     id: str
@@ -34,13 +34,13 @@ class Node:
 
 @dataclass(frozen=True)
 class Activity:
-    """What made things from others.
+    """A step that made nodes from other nodes.
 
     Parameters
     ----------
     id : unique.
     name : the stage, or ``certify``, ``revoke``.
-    used, made : ids of things.
+    used, made : ids of nodes.
     about : who, where and when, code, libraries, parameters: the manifest without hashes of inputs.
     """
 
@@ -53,38 +53,38 @@ class Activity:
 
 @dataclass
 class Graph:
-    """Things and steps by id."""
+    """Nodes and steps by id."""
 
     nodes: dict[str, Node] = field(default_factory=dict[str, Node])
     steps: dict[str, Activity] = field(default_factory=dict[str, Activity])
 
     def add(self, node: Node) -> str:
-        """Put a thing in, unless it is there; its id."""
+        """Add a node unless it exists; return its id."""
         self.nodes.setdefault(node.id, node)
         return node.id
 
     def put(self, step: Activity) -> None:
-        """Put a step in."""
+        """Add a step."""
         self.steps[step.id] = step
 
     def made_by(self) -> dict[str, list[Activity]]:
-        """The steps that made a thing, by its id; several where a calibration was ended by another step."""
-        found: dict[str, list[Activity]] = {}
+        """The steps that made a node, by its id; a calibration that another step ended has several."""
+        steps_of: dict[str, list[Activity]] = {}
         for step in self.steps.values():
             for node in step.made:
-                found.setdefault(node, []).append(step)
-        return found
+                steps_of.setdefault(node, []).append(step)
+        return steps_of
 
     def used_by(self) -> dict[str, list[Activity]]:
-        """The steps that used a thing, by its id."""
-        found: dict[str, list[Activity]] = {}
+        """The steps that used a node, by its id."""
+        steps_of: dict[str, list[Activity]] = {}
         for step in self.steps.values():
             for node in step.used:
-                found.setdefault(node, []).append(step)
-        return found
+                steps_of.setdefault(node, []).append(step)
+        return steps_of
 
     def around(self, start: Iterable[str]) -> Graph:
-        """Only what the things named came from, and what came from them."""
+        """The part of the graph with the origin of these nodes and the results made from them."""
         start = list(start)
         made, used = self.made_by(), self.used_by()
         up, steps_up = self._reached(start, made, forward=False)
@@ -98,21 +98,21 @@ class Graph:
         )
 
     def results(self, start: Iterable[str]) -> set[str]:
-        """Ids of all that came from the things named, without these."""
+        """Ids of all nodes made from these nodes, without these nodes themselves."""
         start = list(start)
         return self._reached(start, self.used_by(), forward=True)[0] - set(start)
 
     def _reached(
         self, start: list[str], links: dict[str, list[Activity]], *, forward: bool
     ) -> tuple[set[str], set[str]]:
-        nodes, steps, left = set(start), set[str](), list(start)
-        while left:
-            for step in links.get(left.pop(), []):
+        nodes, steps, open_ids = set(start), set[str](), list(start)
+        while open_ids:
+            for step in links.get(open_ids.pop(), []):
                 steps.add(step.id)
                 for other in step.made if forward else step.used:
                     if other not in nodes and other in self.nodes:
                         nodes.add(other)
-                        left.append(other)
+                        open_ids.append(other)
         return nodes, steps
 
 

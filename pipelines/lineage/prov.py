@@ -1,4 +1,4 @@
-"""A lineage as W3C PROV-O (Recommendation of 30 April 2013) in JSON-LD; the context is inside, nothing is fetched."""
+"""A lineage as W3C PROV-O (Recommendation of 30 April 2013) in JSON-LD; the context is included, so that no network is needed."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ if TYPE_CHECKING:
     from pipelines.lineage.targets import Lineage
 
 BASE = "urn:x-tumbleline:"
-SETTINGS = {"run", "recipe", "limits", "station", "reference"}  # used, but nothing is derived from them
+SETTINGS = {"run", "recipe", "limits", "station", "reference"}  # used, but no result is derived from them
 LINKS = (
     "used", "wasGeneratedBy", "wasDerivedFrom", "wasRevisionOf", "wasAssociatedWith", "wasInvalidatedBy", "agent", "hadPlan",
     "wasAttributedTo",
@@ -28,9 +28,9 @@ CONTEXT: dict[str, Any] = {
 }
 
 
-def prov_of(found: Lineage) -> dict[str, Any]:
+def prov_of(traced: Lineage) -> dict[str, Any]:
     """The document: entities, activities and agents of a lineage."""
-    graph = found.graph
+    graph = traced.graph
     agents: dict[str, dict[str, Any]] = {}
     activities = [_activity(step, graph, agents) for step in graph.steps.values()]
     entities = [_entity(node, graph) for node in graph.nodes.values()]
@@ -38,7 +38,7 @@ def prov_of(found: Lineage) -> dict[str, Any]:
 
 
 def iri(kind: str, name: str) -> str:
-    """An identifier that every part of a document uses for the same thing."""
+    """The identifier of a node or agent, the same in every part of a document."""
     return f"{BASE}{kind}/{quote(name, safe='/:@._-~')}"
 
 
@@ -54,7 +54,7 @@ def _entity(node: Node, graph: Graph) -> dict[str, Any]:
         entity["tl:sha256"] = node.sha256
     if node.file:
         entity["tl:file"] = node.file
-    entity |= {f"tl:{key}": str(value) for key, value in _told(node).items() if value not in {None, ""}}
+    entity |= {f"tl:{key}": str(value) for key, value in _properties(node).items() if value not in {None, ""}}
     if made:
         entity["wasGeneratedBy"] = [iri("step", step.id) for step in made]
         sources = [name for step in made for name in step.used]
@@ -70,8 +70,8 @@ def _entity(node: Node, graph: Graph) -> dict[str, Any]:
     return {key: value for key, value in entity.items() if value != []}
 
 
-def _told(node: Node) -> dict[str, Any]:
-    """What is worth telling of a thing beyond its name, flat."""
+def _properties(node: Node) -> dict[str, Any]:
+    """Properties of a node beside its name, without nesting."""
     keys = {
         "certificate": ("serial", "device", "from", "until", "state", "grade", "station"),
         "reference": ("what", "certificate", "laboratory", "due"),
@@ -107,7 +107,7 @@ def _activity(step: Activity, graph: Graph, agents: dict[str, dict[str, Any]]) -
 
 
 def _agents(step: Activity, agents: dict[str, dict[str, Any]]) -> list[str]:
-    """The person and the program that did a step."""
+    """The person and the program of a step."""
     found: list[str] = []
     if step.about.get("who"):
         name = iri("agent", _person(step))

@@ -1,4 +1,4 @@
-"""A lineage as an RO-Crate 1.1: a folder with every file of it, and a description that other tools read."""
+"""A lineage as an RO-Crate 1.1: a folder with all its files, and a description for other tools."""
 
 from __future__ import annotations
 
@@ -24,41 +24,41 @@ ENCODINGS = {".parquet": "application/vnd.apache.parquet", ".json": "application
 SETTINGS = ("recipe", "limits", "station")
 
 
-def write_crate(archive: Archive, found: Lineage, folder: Path) -> int:
-    """How many files were copied into a new folder beside the crate's description."""
+def write_crate(archive: Archive, traced: Lineage, folder: Path) -> int:
+    """Write a crate into a new folder; return the number of copied files."""
     if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
         raise WrongUse(
-            f"lineage: {folder} is there and not empty, a new folder is needed for the crate; name another with --crate"
+            f"lineage: {folder} exists and is not empty, a new or empty folder is needed for the crate; give another with --crate"
         )
-    contents = _contents(archive, found.graph)
+    contents = _contents(archive, traced.graph)
     for name in contents:
-        if not is_below(name):  # no manifest that can be read names such a place
+        if not is_below(name):  # readable manifests never name such a place
             raise ArchiveUnusable(
-                f"lineage: {name!r} is no place in a folder, the crate would be written elsewhere; do not use this archive"
+                f"lineage: {name!r} is a path outside the crate's folder, a path inside it is needed; do not use this archive"
             )
     for name, data in contents.items():
-        files.publish(folder / name, data, "lineage", "name another folder with --crate")
-    document = json.dumps(crate_of(found, contents), indent=1, ensure_ascii=False, sort_keys=True) + "\n"
-    files.publish(folder / METADATA, document.encode(), "lineage", "name another folder with --crate")
+        files.publish(folder / name, data, "lineage", "give another folder with --crate")
+    document = json.dumps(crate_of(traced, contents), indent=1, ensure_ascii=False, sort_keys=True) + "\n"
+    files.publish(folder / METADATA, document.encode(), "lineage", "give another folder with --crate")
     return len(contents)
 
 
-def crate_of(found: Lineage, contents: dict[str, bytes]) -> dict[str, Any]:
-    """The crate's description.
+def crate_of(traced: Lineage, contents: dict[str, bytes]) -> dict[str, Any]:
+    """The description of the crate.
 
     Parameters
     ----------
-    contents : the files beside it, by name.
+    contents : the other files of the crate, by name.
     """
-    graph = found.graph
+    graph = traced.graph
     described = {_id(node): node for node in graph.nodes.values()}
     parts = [_file(name, data, described) for name, data in sorted(contents.items())]
     actions = [_action(step, graph) for step in graph.steps.values()]
     people, programs = _agents(graph)
     published = max((str(step.about.get("when", "")) for step in graph.steps.values()), default="")[:10] or "1970-01-01"
     root = {
-        "@id": "./", "@type": "Dataset", "name": f"Lineage of {found.kind} {found.target}",
-        "description": f"From certificate to raw samples: every file that {found.kind} {found.target} came from and went into.",
+        "@id": "./", "@type": "Dataset", "name": f"Lineage of {traced.kind} {traced.target}",
+        "description": f"From certificate to raw samples: all sources and all results of {traced.kind} {traced.target}.",
         "datePublished": published, "license": {"@id": "#license"}, "publisher": {"@id": "#owner"},
         "author": _one_or_all([{"@id": person["@id"]} for person in people]),
         "hasPart": _one_or_all([{"@id": one["@id"]} for one in parts]),
@@ -66,7 +66,7 @@ def crate_of(found: Lineage, contents: dict[str, bytes]) -> dict[str, Any]:
     }  # fmt: skip
     licence = {
         "@id": "#license", "@type": "CreativeWork", "name": "Not licensed",
-        "description": "No licence was given with these data; ask the owner of the archive before passing them on.",
+        "description": "No licence is stated for these data; ask the owner of the archive before you pass them on.",
     }  # fmt: skip
     owner = {"@id": "#owner", "@type": "Organization", "name": "Owner of the archive"}
     descriptor = {"@id": METADATA, "@type": "CreativeWork", "about": {"@id": "./"}, "conformsTo": {"@id": VERSION}}
@@ -85,11 +85,11 @@ def _contents(archive: Archive, graph: Graph) -> dict[str, bytes]:
         if node.file.startswith("captures/"):
             capture, record = node.file.split("/")[1:3]
             names |= {f"captures/{capture}/{record}/record.json", f"captures/{capture}/complete.json"}
-    found = {name: (archive.root / name).read_bytes() for name in sorted(names) if (archive.root / name).is_file()}
+    traced = {name: (archive.root / name).read_bytes() for name in sorted(names) if (archive.root / name).is_file()}
     for node in graph.nodes.values():
         if node.kind in SETTINGS:
-            found[_place(node)] = files.json_bytes(node.about)
-    return found
+            traced[_place(node)] = files.json_bytes(node.about)
+    return traced
 
 
 def _file(name: str, data: bytes, described: dict[str, Node]) -> dict[str, Any]:
@@ -99,7 +99,7 @@ def _file(name: str, data: bytes, described: dict[str, Node]) -> dict[str, Any]:
         "@id": quote(name),
         "@type": "File",
         "name": f"{node.kind} {node.label}" if node is not None else f"manifest {name}",
-        "description": _described(node) if node is not None else "What was made, from what, by whom, with what.",
+        "description": _described(node) if node is not None else "Manifest: inputs, author, time and program.",
         "encodingFormat": ENCODINGS.get(suffix, "application/octet-stream"),
         "contentSize": str(len(data)),
         "sha256": sha256(data).hexdigest(),
@@ -115,13 +115,13 @@ def _described(node: Node) -> str:
         )
     if node.kind == "revocation":
         return f"Revoked: {about['reason']}"
-    return {"samples": "Raw samples of one record.", "report": "The page for people."}.get(
+    return {"samples": "Raw samples of one record.", "report": "The report as a page."}.get(
         node.kind, f"A {node.kind} of the archive."
     )
 
 
 def _other(node: Node) -> dict[str, Any]:
-    """A thing without a file in the crate: a reference standard, or the source of an import."""
+    """A node without a file in the crate: a reference standard, or the source of an import."""
     if node.kind == "reference":
         about = node.about
         text = f"{about.get('what', '')}: certificate {about['certificate']} of {about.get('laboratory', '')}, due {about['due']}"
@@ -157,7 +157,7 @@ def _action(step: Activity, graph: Graph) -> dict[str, Any]:
 
 
 def _one_or_all(values: list[dict[str, str]]) -> Any:
-    """The only value by itself, as RO-Crate 1.1 recommends for JSON-LD; else all of them."""
+    """A single value alone, as RO-Crate 1.1 recommends for JSON-LD; several values as a list."""
     return values[0] if len(values) == 1 else values
 
 
@@ -188,9 +188,9 @@ def _program(software: dict[str, Any]) -> str:
 
 
 def _place(node: Node) -> str:
-    """Where a thing lies in the crate; empty for what has no file there."""
+    """Path of a node in the crate; empty for a node without a file there."""
     if node.kind in SETTINGS:
-        return f"settings/{quote(node.id.replace(':', '-', 1), safe=' @')}.json"  # a setting's name may hold anything
+        return f"settings/{quote(node.id.replace(':', '-', 1), safe=' @')}.json"  # names of settings may have any character
     return node.file
 
 

@@ -1,4 +1,4 @@
-"""What a lineage is asked of: a unit, a run, or a file in the archive or copied out of it."""
+"""The target of a lineage: a unit, a run, a file of the archive, or a copy of such a file."""
 
 from __future__ import annotations
 
@@ -20,12 +20,12 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Lineage:
-    """A graph, and what it was asked of.
+    """A lineage graph and its target.
 
     Parameters
     ----------
     kind : ``unit``, ``run`` or ``file``.
-    focus : ids of the things that were asked for.
+    focus : ids of the nodes of the target.
     """
 
     target: str
@@ -45,11 +45,11 @@ class Lineage:
 
 
 def lineage(archive: Archive, target: str) -> Lineage:
-    """Where a unit's certificates, a run or a file came from, and what came from them.
+    """Origin of the certificates of a unit, of a run or of a file, and the results made from them.
 
     Parameters
     ----------
-    target : a serial number, a run's name or its beginning, or a file.
+    target : a serial number, the name of a run or the beginning of it, or a file.
     """
     if Path(target).is_file() or (archive.root / target).is_file():
         return _of_file(archive, target)
@@ -69,7 +69,7 @@ def lineage(archive: Archive, target: str) -> Lineage:
         found = found or [f"runs/{run}" for run in runs]
         return Lineage(target, "unit", tuple(found), gatherer.graph.around(found))
     message = f"lineage: '{target}' is neither a unit, a run nor a file of archive {archive.root}; {did_you_mean(target, ids)}"
-    raise WrongUse(message if ids else f"archive {archive.root}: there is no run yet; make one with 'tumbleline run'")
+    raise WrongUse(message if ids else f"archive {archive.root}: no run exists; make one with 'tumbleline run'")
 
 
 def _of_run(archive: Archive, run: Run) -> Lineage:
@@ -83,7 +83,7 @@ def _of_run(archive: Archive, run: Run) -> Lineage:
 
 
 def _of_file(archive: Archive, target: str) -> Lineage:
-    """A file by its place in the archive, else by what is in it."""
+    """A file by its place in the archive, else by its content."""
     gatherer = Gatherer(archive)
     place = _below(archive, target)
     for name in _runs_of(archive, place):
@@ -99,13 +99,13 @@ def _of_file(archive: Archive, target: str) -> Lineage:
         focus = [node.id for node in gatherer.graph.nodes.values() if node.sha256 == wanted]
     if not focus:
         raise ArchiveUnusable(
-            f"lineage: the content of {target} is of no table and no source of archive {archive.root}; name another file"
+            f"lineage: the content of {target} is no table and no source of archive {archive.root}; name another file"
         )
     return Lineage(target, "file", tuple(focus), gatherer.graph.around(focus))
 
 
 def _below(archive: Archive, target: str) -> str:
-    """The file's place below the archive's root; empty where it lies elsewhere."""
+    """Place of the file below the archive's root; empty for a file outside the archive."""
     if not Path(target).is_file():
         return target
     if not isinstance(archive.root, Path):
@@ -115,7 +115,7 @@ def _below(archive: Archive, target: str) -> str:
 
 
 def _runs_of(archive: Archive, place: str) -> list[str]:
-    """The runs that a file of the archive belongs to, or whose capture it does."""
+    """The runs of a file of the archive: its own run, or all runs of its capture."""
     parts = place.split("/")
     if len(parts) < 3:
         return []

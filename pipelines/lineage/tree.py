@@ -1,4 +1,4 @@
-"""A lineage as a tree for people: every thing with the step that made it, and below what that step used."""
+"""A lineage as a tree for the terminal: every node with the step that made it, and below the nodes that this step used."""
 
 from __future__ import annotations
 
@@ -23,27 +23,27 @@ STYLES = {
 }
 
 
-def tree_of(found: Lineage) -> Tree:
-    """The tree: what the things asked for came from, and what came from them."""
-    top = Tree(Text(f"{found.kind} {found.target}", style="bold"))
-    drawer = _Drawer(found.graph)
-    came = top.add(Text("came from", style="dim")) if found.kind != "unit" else top
-    for name in _ends(found):
+def tree_of(traced: Lineage) -> Tree:
+    """The tree: origin of the target, and the results made from it."""
+    top = Tree(Text(f"{traced.kind} {traced.target}", style="bold"))
+    drawer = _Drawer(traced.graph)
+    came = top.add(Text("made from", style="dim")) if traced.kind != "unit" else top
+    for name in _ends(traced):
         drawer.up(came, name)
-    results = sorted(name for name in found.graph.results(found.focus) if found.graph.nodes[name].kind in RESULTS)
+    results = sorted(name for name in traced.graph.results(traced.focus) if traced.graph.nodes[name].kind in RESULTS)
     if results:
-        went = top.add(Text("went into", style="dim"))
+        went = top.add(Text("used for", style="dim"))
         for name in results:
-            went.add(_thing(found.graph.nodes[name]))
+            went.add(_thing(traced.graph.nodes[name]))
     return top
 
 
-def _ends(found: Lineage) -> list[str]:
-    """What was asked for, without what other things asked for were made from: those appear below them."""
-    used = found.graph.used_by()
-    asked = set(found.focus)
-    within = {n for n in found.focus for step in used.get(n, []) if asked & set(step.made)}
-    return [name for name in found.focus if name not in within] or list(found.focus)
+def _ends(traced: Lineage) -> list[str]:
+    """The nodes of the target, without those that other nodes of the target were made from: these appear below them."""
+    used = traced.graph.used_by()
+    target = set(traced.focus)
+    within = {n for n in traced.focus for step in used.get(n, []) if target & set(step.made)}
+    return [name for name in traced.focus if name not in within] or list(traced.focus)
 
 
 class _Drawer:
@@ -53,7 +53,7 @@ class _Drawer:
         self.versions = ""
 
     def up(self, branch: Tree, name: str) -> None:
-        """A thing, the step that made it, and what that used; each step in full once."""
+        """A node, the step that made it, and the nodes that the step used; each step appears once in full."""
         steps = self.made.get(name, [])
         if steps and all(step.id in self.shown for step in steps):
             branch.add(_thing(self.graph.nodes[name]).append(ABOVE, style="dim"))
@@ -63,13 +63,13 @@ class _Drawer:
             self._step(own, step)
 
     def _step(self, branch: Tree, step: Activity) -> None:
-        """A step that was not shown yet, with what it used."""
+        """A step that was not shown before, with the nodes that it used."""
         if step.id not in self.shown:
             self.shown.add(step.id)
             self._used(branch.add(_step(step, self._versions(step))), step)
 
     def _versions(self, step: Activity) -> str:
-        """Versions of program and libraries; empty where they are those shown last."""
+        """Versions of program and libraries; empty where they are the same as those shown last."""
         known = {**step.about.get("software", {}), **step.about.get("libraries", {})}
         text = " ".join(f"{name} {number}" for name, number in known.items())
         before, self.versions = self.versions, text or self.versions
@@ -78,14 +78,16 @@ class _Drawer:
     def _used(self, branch: Tree, step: Activity) -> None:
         raw = [name for name in step.used if name.startswith("captures/")]
         for name in step.used:
-            told = self.graph.nodes[name].kind == "run" and all(one.id in self.shown for one in self.made.get(name, []))
-            if name not in raw and not told:
+            known_run = self.graph.nodes[name].kind == "run" and all(
+                one.id in self.shown for one in self.made.get(name, [])
+            )
+            if name not in raw and not known_run:
                 self.up(branch, name)
         if raw:
             self._raw(branch, raw)
 
     def _raw(self, branch: Tree, names: list[str]) -> None:
-        """The records of a capture in one line: there may be thousands."""
+        """The records of a capture in one line, as there may be thousands."""
         steps, first = self.made.get(names[0], []), self.graph.nodes[names[0]]
         records = {name.split("/")[2] for name in names}
         words = f"raw samples  {len(records)} records of capture {names[0].split('/')[1]}, {len(names)} files"

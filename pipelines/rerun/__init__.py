@@ -1,1 +1,1 @@
-"""The archive again: runs through today's code or another model, what differs between two, and models for the line."""
+"""Re-analysis of the archive: runs with the present code or another model, and differences between runs."""

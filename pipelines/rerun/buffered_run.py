@@ -1,4 +1,4 @@
-"""A run whose tables are read once and written together: the stages of a re-run ask for the same ones, and make many."""
+"""A run whose tables are read once and written together, because the stages of a re-run share tables and make many."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 
 class BufferedRun(Run):
-    """A run that keeps its tables in memory, as they are in its files, and its new files until they are flushed."""
+    """A run that keeps its tables in memory as they are in its files, and its new files until they are written."""
 
     def __init__(self, archive: Archive, run_id: str) -> None:
         super().__init__(archive, run_id)
@@ -27,21 +27,21 @@ class BufferedRun(Run):
         self._made: dict[str, pa.Table] = {}
 
     def begin(self, about: dict[str, Any]) -> None:
-        """What a new run is started with; it is written with the rest."""
+        """Set the start of a new run; it is written with the tables."""
         data = files.manifest_bytes(about)
         self._put(START, data)
         self.__dict__["about"] = files.parsed(data, self.path / START)
 
     @cached_property
     def about(self) -> dict[str, Any]:  # pyright: ignore[reportIncompatibleMethodOverride]  # it does not change
-        """What the run was started with."""
+        """The content of ``run.json``."""
         return files.read_json(self.path / "run.json")
 
     def table(self, name: str) -> pd.DataFrame:
-        """A table of the run; whoever is given it may change it.
+        """A table of the run; the caller may change it.
 
-        What was made here goes through the columns that its bytes are encoded from, too: a stage's table may lie in memory
-        otherwise than one from a file, and sums over it end in other last digits.
+        A new table also passes through its encoded columns: the memory layout of a stage's table may differ from that of a table
+        from a file, and sums over it would differ in their last digits.
         """
         if name not in self._known:
             made = self._made.pop(name, None) or self._adopted(name)
@@ -49,16 +49,16 @@ class BufferedRun(Run):
         return self._known[name].copy(deep=False)
 
     def manifest(self, name: str) -> dict[str, Any]:
-        """The manifest of a table, flushed or not."""
+        """The manifest of a table, written or not."""
         waiting = self._waiting.get(f"{name}.json")
         return super().manifest(name) if waiting is None else json.loads(waiting)
 
     def flush(self, *, last: str = "") -> None:
-        """Publish all that waits, tables and manifests in the order in which they were made.
+        """Publish all waiting files, tables and manifests in the order in which they were made.
 
         Parameters
         ----------
-        last : a file that is published behind all others, by which readers know that they are there.
+        last : a file that is published after all others; it shows readers that the others exist.
         """
         if self._waiting:
             if last in self._waiting:
@@ -67,11 +67,11 @@ class BufferedRun(Run):
             self._waiting = {}
 
     def forget(self) -> None:
-        """Drop all that waits."""
+        """Discard all waiting files."""
         self._waiting = {}
 
     def _adopted(self, name: str) -> pa.Table | None:
-        """A table that was taken over and is not flushed."""
+        """A reused table that is not written yet."""
         waiting = self._waiting.get(f"{name}.parquet")
         return None if waiting is None else decoded(waiting)
 

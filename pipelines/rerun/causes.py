@@ -1,4 +1,4 @@
-"""Why two runs differ: data, code, model, limits, library versions, from the manifests of their stages."""
+"""Causes of differences between two runs: data, code, model, limits and library versions, from the manifests of their stages."""
 
 from __future__ import annotations
 
@@ -15,9 +15,9 @@ MODEL = ("effects", "formulas")
 
 
 def causes(a: Run, b: Run) -> list[dict[str, Any]]:
-    """What differs by itself between two runs, and not only because something before it did.
+    """The causes of differences between two runs, without differences that only follow from an earlier cause.
 
-    Every row says ``what`` (data, model, limits, code, library, another parameter), of which ``stage``, and how it is in either.
+    Every row has ``what`` (data, model, limits, code, library, another parameter), its ``stage``, and the values in both runs.
     """
     found = _data(a, b) + _chosen(a, b)
     seen: set[tuple[str, str]] = {("model", ""), ("limits", "")}
@@ -32,13 +32,13 @@ def _row(what: str, name: str, before: Any, after: Any, stage: str = "") -> dict
 
 
 def _data(a: Run, b: Run) -> list[dict[str, Any]]:
-    """Whether the runs were measured apart."""
+    """Whether the runs have different measurements."""
     before, after = (_measured(run) for run in (a, b))
     return [] if before == after else [_row("data", "", before, after)]
 
 
 def _measured(run: Run) -> str:
-    """By what a run's data are named: its capture, the imported file, or the dwells that it began with."""
+    """The identity of the data of a run: its capture, the imported file, or its first dwells."""
     about = run.about
     if about.get("capture"):
         return str(about["capture"])
@@ -48,7 +48,7 @@ def _measured(run: Run) -> str:
 
 
 def _chosen(a: Run, b: Run) -> list[dict[str, Any]]:
-    """Model and limits, as people know them."""
+    """Differences of model and limits, by their names."""
     rows: list[dict[str, Any]] = []
     before, after = (_model(run) for run in (a, b))
     if before != after:
@@ -68,7 +68,7 @@ def _model(run: Run) -> dict[str, Any]:
 
 
 def _said_model(own: dict[str, Any], other: dict[str, Any]) -> str:
-    """A model in short: what it has beyond the other, or its effects where neither holds the other."""
+    """A short text for a model: its effects beyond the other model, or all its effects where neither contains the other."""
     more = [effect for effect in own["effects"] if effect not in other["effects"]]
     if more or len(own["effects"]) < len(other["effects"]):
         kept = len(own["effects"]) - len(more)

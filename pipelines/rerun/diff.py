@@ -1,4 +1,4 @@
-"""What differs between two runs: grades, coefficients and figures, by how much against their uncertainty, and because of what."""
+"""Differences between two runs: grades, coefficients and figures relative to their uncertainty, and the causes."""
 
 from __future__ import annotations
 
@@ -20,11 +20,11 @@ PLAIN_FACTOR = 2.0
 
 
 def diff(a: Run, b: Run) -> dict[str, Any]:
-    """The differences of two runs as a document: units whose grade flips first, then by the largest change against uncertainty.
+    """The differences of two runs as a document: units with a changed grade first, then by change relative to uncertainty.
 
     ``over_a`` and ``over_b`` are a change over the standard uncertainty of either, ``over_both`` over that of their difference if
     the two were independent, √(u_a² + u_b²): two analyses of one measurement are not, so there a change of one standard
-    uncertainty is a large one.
+    uncertainty is large.
 
     Raises
     ------
@@ -54,13 +54,13 @@ def _table(run: Run, name: str) -> pd.DataFrame:
         return run.table(name)
     if name == "coefficients":
         raise DataRejected(
-            f"run {run.id}: it has no coefficients, a comparison needs them; finish it, or run it again first"
+            f"run {run.id}: it has no coefficients, they are needed for a comparison; finish the run, or re-run it first"
         )
     return pd.DataFrame({"unit": [], "figure": [], "value": [], "uncertainty": [], "limit": [], "unit_text": []})
 
 
 def _standard(run: Run) -> pd.DataFrame:
-    """Figures with their standard uncertainty: the table holds the expanded one, by the limits' factor where there is a limit."""
+    """Figures with their standard uncertainty; the table has the expanded one (factor of the limits, if any)."""
     figures = _table(run, "figures")
     factor = (run.about.get("limits") or {}).get("coverage_factor", PLAIN_FACTOR)
     limited = figures["limit"].notna()
@@ -70,7 +70,7 @@ def _standard(run: Run) -> pd.DataFrame:
 
 
 def _changed(a: pd.DataFrame, b: pd.DataFrame, key: list[str], error: str) -> pd.DataFrame:
-    """Rows of both tables whose value or uncertainty differs, and those that only one of them has."""
+    """Rows whose value or uncertainty differs, and rows that only one of the tables has."""
     keep = [*key, "value", error, "unit_text"]
     both = a[keep].merge(b[keep], on=key, how="outer", suffixes=("_a", "_b"))
     u_a, u_b = both[f"{error}_a"], both[f"{error}_b"]
@@ -95,12 +95,12 @@ def _changed(a: pd.DataFrame, b: pd.DataFrame, key: list[str], error: str) -> pd
 
 
 def _over(change: pd.Series, size: pd.Series) -> pd.Series:
-    """A change over an uncertainty; missing where there is none."""
+    """A change over an uncertainty; None without an uncertainty."""
     return change / size.where(size > 0.0)
 
 
 def _units(a: Run, b: Run, coefficients: pd.DataFrame) -> list[dict[str, Any]]:
-    """One row for every unit of both runs, flips first."""
+    """One row for every unit of both runs, changed grades first."""
     before, after = _grades(a), _grades(b)
     common = [unit for unit in before if unit in after]
     if not common:
@@ -136,7 +136,7 @@ def _unit_row(
 
 
 def _grades(run: Run) -> dict[str, dict[str, Any]]:
-    """Grade of every unit; units of a run that was not graded have none."""
+    """Grade of every unit; empty for a run without grades."""
     if "grades" in run.tables():
         return {row["unit"]: row for row in rows_of(run.table("grades"))}
     units = dict.fromkeys(run.table("coefficients")["unit"].astype(str))

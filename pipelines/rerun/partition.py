@@ -1,4 +1,4 @@
-"""Portions of an archive's runs for workers: what each is given, does, and gives back are plain values."""
+"""Batches of the runs of an archive for workers; their arguments and results are plain values."""
 
 from __future__ import annotations
 
@@ -16,12 +16,12 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
 MOST = 32
-"""Runs in a portion: a worker that dies loses the time of no more."""
+"""Runs in a batch; the work of one batch is lost when a worker dies."""
 
 
 @dataclass(frozen=True)
 class Batch:
-    """Some runs of an archive, and what is to be done to them."""
+    """Some runs of an archive, and the change for their re-run."""
 
     archive: str
     runs: tuple[str, ...]
@@ -32,14 +32,14 @@ class Batch:
 def parts(
     archive: Archive, runs: Sequence[str], wanted: ModelChange, workers: int, *, report: bool = False
 ) -> list[Batch]:
-    """The runs in portions, several for each worker, the same for the same runs."""
+    """The runs in batches, several for each worker; the same runs give the same batches."""
     size = min(MOST, max(1, -(-len(runs) // (4 * max(workers, 1)))))
-    portions = [tuple(runs[start : start + size]) for start in range(0, len(runs), size)]
-    return [Batch(archive.address, portion, wanted, report) for portion in portions]
+    batches = [tuple(runs[start : start + size]) for start in range(0, len(runs), size)]
+    return [Batch(archive.address, batch, wanted, report) for batch in batches]
 
 
 def run_again(part: Batch) -> list[Outcome]:
-    """What became of every run of a portion; what cannot be run again says why, and the others go on."""
+    """The outcome of every run of a batch; a run that fails has an error, the others continue."""
     archive = Archive(part.archive)
     return [_one(archive, run_id, part) for run_id in part.runs]
 
@@ -52,7 +52,7 @@ def _one(archive: Archive, run_id: str, part: Batch) -> Outcome:
 
 
 def checked(part: Batch) -> list[Reproduction]:
-    """Whether every run of a portion comes out the same again."""
+    """Whether every run of a batch is reproduced."""
     archive = Archive(part.archive)
     return [_check(archive, run_id) for run_id in part.runs]
 

@@ -1,4 +1,4 @@
-"""Whether the archive comes out the same again: every stage worked out anew from its stored inputs, byte against byte."""
+"""Reproduction of archived runs: every stage is computed again from its stored inputs and compared byte by byte."""
 
 from __future__ import annotations
 
@@ -25,11 +25,11 @@ SAME, OTHER, LEFT_OUT = "same bytes", "other bytes", "not checked"
 
 @dataclass(frozen=True)
 class Reproduction:
-    """What a check of one run found.
+    """The result of the check of one run.
 
-    tables : by name, whether its bytes came out again
-    differences : what differs and by how much, one sentence per table
-    changed : what is not as it was when the run was made: code of stages, versions of libraries
+    tables : by name, whether the bytes are reproduced
+    differences : what differs and by how much, one sentence for each table
+    changed : changes since the run was made: code of stages, versions of libraries
     """
 
     run: str
@@ -40,71 +40,70 @@ class Reproduction:
 
     @property
     def same(self) -> bool:
-        """Whether every table that could be checked came out again."""
+        """Whether every table that could be checked is reproduced."""
         return not self.error and not self.differences
 
 
 def check(archive: Archive, run_id: str) -> Reproduction:
-    """Every stage of a run worked out anew from the inputs that are stored, compared byte for byte; nothing is written.
+    """Compute every stage of a run again from its stored inputs and compare byte by byte; nothing is written.
 
-    A stage whose inputs are stored and whose outputs come out again proves itself; all stages together prove the run from
-    the raw samples on.
+    Each stage is checked on its own inputs; all stages together check the run from the raw samples on.
     """
     run = Run(archive, run_id)
     plan, raw = plan_of(run, ModelChange()), raw_samples(run)
     there = set(run.tables())
-    found = Reproduction(run_id)
+    result = Reproduction(run_id)
     with threadpool_limits(1):
         for step in plan.steps:
             if step.name == "import" or not there.issuperset(step.outputs):
                 continue
             if not raw and (step.name in {"capture", *RAW[:2]} or (step.name == "noise" and _static(run))):
-                found.tables.update(dict.fromkeys(step.outputs, LEFT_OUT))
+                result.tables.update(dict.fromkeys(step.outputs, LEFT_OUT))
                 continue
-            _changed(run, step, found.changed)
-            _compare(run, step, found)
-    if not set(found.tables.values()) - {LEFT_OUT}:
+            _changed(run, step, result.changed)
+            _compare(run, step, result)
+    if not set(result.tables.values()) - {LEFT_OUT}:
         raise DataRejected(
-            f"run {run_id}: none of its tables can be worked out anew, one at least is needed; run it again first"
+            f"run {run_id}: none of its tables can be computed again, at least one is needed; re-run it first"
         )
-    return found
+    return result
 
 
 def _static(run: Run) -> bool:
     return bool((run.table("readings")["kind"] == "allan").any())
 
 
-def _compare(run: Run, step: StageCall, found: Reproduction) -> None:
+def _compare(run: Run, step: StageCall, result: Reproduction) -> None:
     for name, frame in step.call(run).items():
         made = parquet.table_bytes(name, tables.check(name, frame, where=f"{step.name} → {name}"), tables.VERSION)
         stored = run.manifest(name)["sha256"]
         same = files.hash_of(made) == stored
-        found.tables[name] = SAME if same else OTHER
+        result.tables[name] = SAME if same else OTHER
         if not same:
-            found.differences.append(f"{name}: {_difference(run.table(name), frame)}")
+            result.differences.append(f"{name}: {_difference(run.table(name), frame)}")
 
 
 def _changed(run: Run, step: StageCall, changed: list[str]) -> None:
-    """What is not as it was when the stage was run, each said once."""
+    """Changes since the stage was run, each listed once."""
     manifest = run.manifest(step.outputs[0])
     if manifest.get("code", "") != step.code:
         changed.append(f"code of {step.name}")
     before, now = manifest.get("libraries", {}), libraries()
-    said = [f"{name} {before.get(name, '?')} → {now[name]}" for name in now if before.get(name) != now[name]]
-    changed += [one for one in said if one not in changed]
+    texts = [f"{name} {before.get(name, '?')} → {now[name]}" for name in now if before.get(name) != now[name]]
+    changed += [one for one in texts if one not in changed]
 
 
 def _difference(before: pd.DataFrame, after: pd.DataFrame) -> str:
-    """In words, how two tables differ."""
+    """The difference between two tables, as text."""
     if list(before.columns) != list(after.columns):
         other = sorted(set(before.columns) ^ set(after.columns))
         return f"other columns ({', '.join(other) or 'in another order'})"
     if len(before) != len(after):
-        return f"{len(before)} rows were stored, {len(after)} come out"
-    said = [_of_column(name, before[name], after[name].reset_index(drop=True)) for name in before.columns]
+        return f"{len(before)} rows are stored, {len(after)} are computed"
+    texts = [_of_column(name, before[name], after[name].reset_index(drop=True)) for name in before.columns]
     return (
-        "; ".join(one for one in said if one)
-        or "the same values in other bytes (another version of the Parquet writer)"
+        "; ".join(one for one in texts if one)
+        or "the same values in different bytes (another version of the Parquet writer)"
     )
 
 

@@ -1,4 +1,4 @@
-"""Runs of an archive by name or by what they are: ``all``, beginnings of names, ``device:…``, ``since:DATE``."""
+"""Selection of runs of an archive by name or property: ``all``, beginnings of names, ``device:…``, ``since:DATE``."""
 
 from __future__ import annotations
 
@@ -20,10 +20,10 @@ ALL, LATEST = "all", "latest"
 
 @dataclass(frozen=True)
 class Entry:
-    """One run of an archive as its ``run.json`` tells.
+    """One run of an archive, from its ``run.json``.
 
-    measured : when its data were measured, which for a re-run is when the first run of them was
-    derived : whether the run is a re-run of another, or goes on with the measurements of one
+    measured : time of the measurement; for a re-run that of the first run of the data
+    derived : whether the run is a re-run of another, or continues with its measurements
     """
 
     id: str
@@ -36,26 +36,26 @@ class Entry:
 
 
 def entries(archive: Archive) -> list[Entry]:
-    """Every run, the one measured first first."""
+    """Every run, in the order of measurement."""
     found = [_entry(path.parent.name, files.read_json(path)) for path in (archive.root / "runs").glob("*/run.json")]
     return sorted(found, key=lambda entry: (entry.measured, entry.id))
 
 
 def entry_of(run_id: str, about: dict[str, Any]) -> Entry:
-    """One run as its ``run.json`` tells."""
+    """One run, from its ``run.json``."""
     return _entry(run_id, about)
 
 
 def selected(archive: Archive, words: Sequence[str]) -> list[Entry]:
-    """The runs that are meant, each once, the one measured first first.
+    """The selected runs, each once, in the order of measurement.
 
-    Words with a colon must all hold; names and their beginnings add up. Where runs are chosen by what they are, re-runs are
-    left out, for the run that they were made from stands for its data.
+    All conditions with a colon must hold; names and beginnings of names add runs. Conditions do not select re-runs, because
+    the original run has the same data.
 
     Raises
     ------
     WrongUse
-        A word names nothing, or no run is left.
+        A name or key is unknown, or no run matches.
     """
     known = entries(archive)
     parts = [part.strip() for word in words for part in word.split(",") if part.strip()]
@@ -63,7 +63,7 @@ def selected(archive: Archive, words: Sequence[str]) -> list[Entry]:
     names = [part for part in parts if not _key(part)]
     if not known:
         raise WrongUse(
-            f"archive {archive.root}: there is no run yet; make one with 'tumbleline run', or name another archive"
+            f"archive {archive.root}: no run exists; make one with 'tumbleline run', or name another archive"
         )
     by_name = [name for name in names if name != ALL]
     chosen = _named(known, by_name, archive) if by_name else [entry for entry in known if not entry.derived]
@@ -77,7 +77,7 @@ def selected(archive: Archive, words: Sequence[str]) -> list[Entry]:
 
 
 def _key(part: str) -> str:
-    """The key of a word such as ``device:ADXL355``; empty for a name."""
+    """The key of a condition such as ``device:ADXL355``; empty for a name."""
     key, colon, _ = part.partition(":")
     if not colon:
         return ""
@@ -96,7 +96,7 @@ def _filter(part: str) -> tuple[str, Any]:
 
 
 def moment(text: str, where: str, *, end: bool = False) -> datetime:
-    """A date or time as UTC; a date alone is its beginning, or its end where that is asked for."""
+    """A date or time as UTC; a date alone is the beginning of the day, or its end on request."""
     try:
         found = datetime.fromisoformat(text)
         if len(text) <= len("2026-01-31"):
@@ -128,15 +128,15 @@ def _holds(entry: Entry, key: str, value: Any) -> bool:
 
 
 def _there_is(chosen: list[Entry], filters: list[tuple[str, Any]]) -> str:
-    """What the runs do have where a filter left none, for the keys that were asked for."""
-    said: list[str] = []
+    """The values of the runs for the keys of a filter that no run matches."""
+    texts: list[str] = []
     for key, _ in filters:
         if key in {"since", "until"}:
-            said.append(f"measured {chosen[0].measured:%Y-%m-%d} to {chosen[-1].measured:%Y-%m-%d};")
+            texts.append(f"measured {chosen[0].measured:%Y-%m-%d} to {chosen[-1].measured:%Y-%m-%d};")
         elif key != "unit":
             names = sorted({str(getattr(entry, key)) for entry in chosen})
-            said.append(f"{key}: {', '.join(names[:5])}{' …' if len(names) > 5 else ''};")
-    return " ".join(dict.fromkeys(said))
+            texts.append(f"{key}: {', '.join(names[:5])}{' …' if len(names) > 5 else ''};")
+    return " ".join(dict.fromkeys(texts))
 
 
 def _entry(run_id: str, about: dict[str, Any]) -> Entry:

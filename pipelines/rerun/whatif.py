@@ -1,4 +1,4 @@
-"""What a model would make of the archive: yield and errors of all lots, old model against new, by station and kind of device."""
+"""The effect of a model on the archive: yield and errors of all lots with old and new model, by station and kind of device."""
 
 from __future__ import annotations
 
@@ -14,15 +14,15 @@ if TYPE_CHECKING:
     from pipelines.rerun.lot_comparison import Fresh, Side, Sums
 
 FALLS = 0.005
-"""Share by which an error must change to count."""
+"""Smallest relative change of an error that counts."""
 BETTER, WORSE, EQUAL, NOTHING = "better", "worse", "no better", "nothing to judge"
 
 
-def fresh_tasks(found: Sequence[LotComparison], archive: str, wanted: ModelChange) -> list[FreshTask]:
-    """For every run, the calibrations of the run before in which each of its units was measured."""
+def fresh_tasks(lots: Sequence[LotComparison], archive: str, wanted: ModelChange) -> list[FreshTask]:
+    """For every run, the calibrations from the previous run of each of its units."""
     last: dict[str, LotComparison] = {}
     tasks: list[FreshTask] = []
-    for judged in found:
+    for judged in lots:
         if judged.old is None or judged.new is None:
             continue
         earlier: dict[str, list[str]] = defaultdict(list)
@@ -41,10 +41,10 @@ def _calibrations(judged: LotComparison) -> tuple[Any, Any]:
     return (judged.old.calibration if judged.old else None, judged.new.calibration if judged.new else None)
 
 
-def summary(found: Sequence[LotComparison], fresh: Sequence[Fresh]) -> dict[str, Any]:
-    """The what-if as a document: total, by station and device, units that flip, lots that could not be judged, and a verdict."""
+def summary(lots: Sequence[LotComparison], fresh: Sequence[Fresh]) -> dict[str, Any]:
+    """The what-if as a document: total, by station and device, changed outcomes, failed lots, and a verdict."""
     by_run = {one.run: one for one in fresh}
-    whole = [judged for judged in found if judged.old is not None and judged.new is not None]
+    whole = [judged for judged in lots if judged.old is not None and judged.new is not None]
     groups: dict[tuple[str, str], list[LotComparison]] = defaultdict(list)
     for judged in whole:
         groups[judged.entry.station, judged.entry.device].append(judged)
@@ -53,26 +53,26 @@ def summary(found: Sequence[LotComparison], fresh: Sequence[Fresh]) -> dict[str,
         for (station, device), own in sorted(groups.items())
     ]
     total = _figures(whole, by_run)
-    verdict, words = _verdict(total, rows)
+    verdict, explanation = _verdict(total, rows)
     return {
         "lots": len(whole),
         "total": total,
         "groups": rows,
         "flips": _flips(whole),
-        "failed": [{"run": judged.entry.id, "error": judged.error} for judged in found if judged.error],
+        "failed": [{"run": judged.entry.id, "error": judged.error} for judged in lots if judged.error],
         "verdict": verdict,
-        "words": words,
+        "words": explanation,
     }
 
 
-def _figures(found: Sequence[LotComparison], fresh: dict[str, Fresh]) -> dict[str, Any]:
+def _figures(lots: Sequence[LotComparison], fresh: dict[str, Fresh]) -> dict[str, Any]:
     """Yield and root mean square errors of some lots, each [old, new]."""
-    sides = [[judged.old for judged in found], [judged.new for judged in found]]
-    again = [fresh[judged.entry.id] for judged in found if judged.entry.id in fresh]
+    sides = [[judged.old for judged in lots], [judged.new for judged in lots]]
+    again = [fresh[judged.entry.id] for judged in lots if judged.entry.id in fresh]
     on_fresh = [[one.old for one in again], [one.new for one in again]]
     units = sum(len(side.outcome) for side in sides[0] if side)
     return {
-        "lots": len(found),
+        "lots": len(lots),
         "units": units,
         "yield": [_passed(own) / units if units else None for own in sides],
         "fit_rms_ug": [_rms([side.fitted for side in own if side]) for own in sides],
@@ -92,10 +92,10 @@ def _rms(parts: Sequence[Sums]) -> float | None:
     return (squares / count) ** 0.5 if count else None
 
 
-def _flips(found: Sequence[LotComparison]) -> dict[str, list[dict[str, str]]]:
-    """Units that would no longer pass, and those that would."""
+def _flips(lots: Sequence[LotComparison]) -> dict[str, list[dict[str, str]]]:
+    """Units that pass with the old model only, and units that pass with the new model only."""
     flips: dict[str, list[dict[str, str]]] = {"to_fail": [], "to_pass": []}
-    for judged in found:
+    for judged in lots:
         if judged.old is None or judged.new is None:
             continue
         for unit, before in judged.old.outcome.items():
@@ -110,30 +110,30 @@ def _flips(found: Sequence[LotComparison]) -> dict[str, list[dict[str, str]]]:
 
 
 def _verdict(total: dict[str, Any], rows: Sequence[dict[str, Any]]) -> tuple[str, str]:
-    """Whether the new model is better, judged by data that no coefficient was fitted to."""
+    """Whether the new model is better, by the errors on data that were not fitted."""
     figure, where = _telling(total)
     if not figure:
-        return NOTHING, "no lot has dwells that were not fitted; nothing tells the models apart"
+        return NOTHING, "no lot has dwells that were not fitted; the models cannot be compared"
     share = _share(total[figure])
     hurt = [
         f"{row['device']} on {row['station']}" for row in rows if figure in _known(row) and _share(row[figure]) > FALLS
     ]
     before, after = total["yield"]
     old, new = total[figure]
-    said = f"the error {where} goes from {old:.3g} to {new:.3g} µg, the yield from {before:.1%} to {after:.1%}"
+    sentence = f"the error {where} changes from {old:.3g} to {new:.3g} µg, the yield from {before:.1%} to {after:.1%}"
     if share > FALLS:
-        return WORSE, f"{said}: it rises"
+        return WORSE, f"{sentence}: the error increases"
     if hurt:
-        return WORSE, f"{said}; it rises for {', '.join(hurt)}"
+        return WORSE, f"{sentence}; the error increases for {', '.join(hurt)}"
     if share < -FALLS:
-        return BETTER, f"{said}: it falls"
-    return EQUAL, f"{said}: it does not fall"
+        return BETTER, f"{sentence}: the error decreases"
+    return EQUAL, f"{sentence}: the error does not decrease"
 
 
 def _telling(total: dict[str, Any]) -> tuple[str, str]:
     known = _known(total)
     if "fresh_rms_ug" in known:
-        return "fresh_rms_ug", "on fresh runs"
+        return "fresh_rms_ug", "on later runs"
     return ("verification_rms_ug", "in poses that were not fitted") if "verification_rms_ug" in known else ("", "")
 
 

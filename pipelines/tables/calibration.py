@@ -1,4 +1,4 @@
-"""A fitted calibration as tables, and back: what fit writes and verify, noise, grade and export read."""
+"""Conversion of a fitted calibration to tables and back; fit writes the tables; verify, noise, grade and export read them."""
 
 from __future__ import annotations
 
@@ -69,7 +69,7 @@ class Calibration:
 
 
 def column_names(model: Sequence[str], values: Values | None = None) -> tuple[tuple[tuple[str, str], ...], ...]:
-    """Per axis, (effect id, coefficient) of a model's columns; all that there may be where no values are given."""
+    """Per axis, (effect id, coefficient) of a model's columns; all possible columns without values."""
     sensor, _ = design.split(model)
     return tuple(design.local_names(sensor, axis, values) for axis in range(3))
 
@@ -81,7 +81,7 @@ def coefficient_rows(
     out_unit: str,
     nonlinear_error: Mapping[str, Mapping[str, float]],
 ) -> pd.DataFrame:
-    """The long table of coefficients: one row per unit, axis and coefficient; what all axes share has axis ``*``."""
+    """The long table of coefficients: one row per unit, axis and coefficient; values for all axes have axis ``*``."""
     errors = np.sqrt(np.diagonal(covariance, axis1=-2, axis2=-1))
     common = _common_rows(fit, nonlinear_error)
     texts = {effect.id: unit_texts(effect, out_unit) for effect in design.split(fit.effects)[0]}
@@ -122,13 +122,13 @@ def _with_units(names: Sequence[tuple[str, str]], texts: Mapping[str, Sequence[s
 
 
 def _beside(own: NDArray[np.float64], common: Sequence[float]) -> NDArray[np.float64]:
-    """Values of every unit, (units, 3, p), and behind them those that all share, in one row."""
+    """Values of every unit, (units, 3, p), followed by the shared values, in one row."""
     flat = own.reshape(len(own), -1)
     return np.concatenate([flat, np.broadcast_to(np.array(common), (len(own), len(common)))], axis=1).ravel()
 
 
 def _common_rows(fit: LotFit, nonlinear_error: Mapping[str, Mapping[str, float]]) -> list[_Row]:
-    """Parameters of the station, and nonlinear parameters and constants: one for all axes, or one each."""
+    """Parameters of the station, nonlinear parameters and constants: one for all axes, or one for each axis."""
     errors = np.sqrt(np.diagonal(fit.shared_covariance)) if fit.shared.size else np.zeros(0)
     rows = [
         _Row(ALL_AXES, effect, name, float(fit.shared[q]), float(errors[q]), "rad")
@@ -181,7 +181,7 @@ def read_calibration(coefficients: pd.DataFrame, covariance: pd.DataFrame) -> Ca
 
 
 def _read_shared(common: pd.DataFrame, model: Sequence[str]) -> tuple[NDArray[np.float64], dict[str, dict[str, Any]]]:
-    """Parameters of the station, and nonlinear parameters: a tuple where they are one per axis."""
+    """Parameters of the station, and nonlinear parameters: a tuple where each axis has its own."""
     shared: list[float] = []
     nonlinear: dict[str, dict[str, Any]] = {}
     for name in model:
@@ -197,10 +197,10 @@ def _read_shared(common: pd.DataFrame, model: Sequence[str]) -> tuple[NDArray[np
 
 
 def unit_texts(effect: SensorEffect, out_unit: str) -> list[str]:
-    """Units of an effect's coefficients, found by how its columns grow with force and with temperature.
+    """Units of an effect's coefficients, derived from the scaling of its columns with force and temperature.
 
-    A column that doubles with the force is per g, one that doubles with θ is per K, and so on; a column that grows in
-    neither way has the output's unit per unit of the column.
+    A column that doubles with the force is per g, one that doubles with θ is per K, and so on; a column that scales
+    with neither has the output's unit per unit of the column.
     """
     force = np.array([[0.31, 0.52, 0.79], [0.44, -0.67, 0.59]])
     zeros = np.zeros(2)

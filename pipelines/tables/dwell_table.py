@@ -1,4 +1,4 @@
-"""The one way from a table of dwells to arrays: units side by side, every column taken out of the table once."""
+"""Conversion of a table of dwells to arrays, used by all readers: one row for each unit, every column read once."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ FEWEST_POINTS = 2
 
 
 def covariates(frame: pd.DataFrame) -> list[str]:
-    """Names of the columns of numbers without a meaning of their own: what a missing effect may depend on."""
+    """Names of the numeric columns without a fixed meaning: covariates that a missing effect may depend on."""
     numbers = (name for name in frame.columns if pd.api.types.is_numeric_dtype(frame[name]))
     return [str(name) for name in numbers if is_covariate(str(name)) and frame[name].dtype != np.bool_]
 
@@ -36,7 +36,7 @@ class DwellTable:
     Parameters
     ----------
     frame : in the exchange format
-    kinds : of the dwells that are wanted; all where None, and where the table does not say kinds
+    kinds : of the selected dwells; None: all; all as well where the table has no kinds
     """
 
     def __init__(self, frame: pd.DataFrame, kinds: Collection[str] | None = None) -> None:
@@ -78,7 +78,7 @@ class DwellTable:
         return out
 
     def filled(self, name: str) -> Array:
-        """A column of numbers, (units, n); where a unit lacks a dwell, the middle of the others' values."""
+        """A column of numbers, (units, n); where a unit lacks a dwell, the median of the other units' values."""
         values = self.grid(name)
         if self.whole or not np.isnan(values).any():
             return values
@@ -109,10 +109,10 @@ class DwellTable:
 
 
 def state_of_table(table: DwellTable, history: pd.DataFrame | None = None) -> tuple[str, State]:
-    """What effects may look at, for every reader of dwells alike; before it what is known of the force.
+    """The state for the effects, the same for every reader of dwells, preceded by the kind of knowledge of the force.
 
-    ``force``: it is there; ``angles``: it follows from the table's; ``norm``: its size alone is known, and it is zero here. A
-    quantity that lacks a value anywhere is not there at all; of a dwell that a unit lacks, it has the other units' middle value.
+    ``force``: from its columns; ``angles``: computed from the angles of the table; ``norm``: only its norm is known, it is zero.
+    A quantity with any missing value is omitted; for a dwell that a unit lacks it has the median of the other units.
     """
     known: dict[str, Any] = {}
     for row in RECORDED:
@@ -141,9 +141,9 @@ def _force(table: DwellTable, known: dict[str, Any]) -> tuple[str, Array]:
 
 
 def _power_off(table: DwellTable) -> Array | None:
-    """Seconds without power before each dwell; None where no run switched its devices, or since when they have it is not known.
+    """Seconds without power before each dwell; None where no run switched its devices, or where the time of power-on is unknown.
 
-    Runs that did not switch have no such column: beside one that did, their devices stayed on.
+    Runs without switching have no such column; together with a run with switching, their devices stayed on.
     """
     off, since = BY_ATTRIBUTE["power_off"].column, BY_ATTRIBUTE["since_power"].column
     if off not in table.frame.columns or not table.has(since):
@@ -153,11 +153,11 @@ def _power_off(table: DwellTable) -> Array | None:
 
 
 def history_of(history: pd.DataFrame, units: tuple[str, ...], time: Array) -> History | None:
-    """Temperatures of every unit on one time grid; None where a unit has none, or the history lies beside the dwells.
+    """Temperatures of every unit on one time grid; None where a unit has none, or the history does not cover the dwells.
 
     Parameters
     ----------
-    history : ``time_s`` and ``unit_C``, or ``chamber_C`` where there is none; one without units serves all of them
+    history : ``time_s`` and ``unit_C``, or ``chamber_C`` without it; a history without units applies to all of them
     time : (units, n), s, of the dwells
     """
     column = "unit_C" if "unit_C" in history.columns else "chamber_C"
@@ -182,7 +182,7 @@ def history_of(history: pd.DataFrame, units: tuple[str, ...], time: Array) -> Hi
 
 
 def _at(grid: Array, time: Array, values: Array) -> Array:
-    """Values on a grid; of several at one time, their mean."""
+    """Values on a grid; the mean of several values at one time."""
     if np.any(time[1:] == time[:-1]):
         time, which, count = np.unique(time, return_inverse=True, return_counts=True)
         values = np.bincount(which, weights=values) / count

@@ -1,4 +1,4 @@
-"""The rows of a table by unit, as arrays: every column is taken out of the table once, whatever the number of units."""
+"""The rows of a table by unit, as arrays: every column is read once, for any number of units."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 
 class ByUnit:
-    """A table whose rows are asked for unit by unit."""
+    """A table with access to the rows of each unit."""
 
     def __init__(self, table: pd.DataFrame) -> None:
         self._table, self._columns = table, dict[str, "NDArray[Any]"]()
@@ -29,7 +29,7 @@ class ByUnit:
 
     @property
     def units(self) -> list[str]:
-        """The units, in the order in which they come first."""
+        """The units, in the order of their first rows."""
         return list(self._places)
 
     def __contains__(self, name: str) -> bool:
@@ -38,11 +38,13 @@ class ByUnit:
     def column(self, name: str) -> NDArray[Any]:
         """A column of the table, (rows,)."""
         if name not in self._columns:
-            self._columns[name] = np.ascontiguousarray(self._table[name].to_numpy())  # a slice of it lies together
+            self._columns[name] = np.ascontiguousarray(
+                self._table[name].to_numpy()
+            )  # slices of a contiguous array are fast
         return self._columns[name]
 
     def of(self, unit: str) -> UnitRows:
-        """The rows of a unit, in their order; none for a unit that is not there."""
+        """The rows of a unit, in their order; empty for an unknown unit."""
         if self._together:
             return UnitRows(self, self._places.get(unit, slice(0, 0)))
         return UnitRows(self, np.flatnonzero(self._units == unit))
@@ -59,7 +61,7 @@ class UnitRows:
         return self._count
 
     def __contains__(self, column: str) -> bool:
-        """Whether the table has a column; runs of before lack some."""
+        """Whether the table has a column; older runs lack some."""
         return column in self._table
 
     def __getitem__(self, column: str) -> NDArray[Any]:
@@ -67,7 +69,7 @@ class UnitRows:
 
 
 def picked(texts: Sequence[str], places: NDArray[np.intp]) -> ExtensionArray:
-    """The texts at some places, (rows,), as a column."""
+    """The texts of some indices, (rows,), as a column."""
     return pd.array(np.asarray(texts, dtype=object), dtype="str").take(places)
 
 

@@ -1,4 +1,4 @@
-"""Values made of what JSON knows."""
+"""Values of the types of JSON."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import Any
 
 
 def json_value(value: Any) -> Any:
-    """A value made of what JSON knows; numbers that it does not know become null."""
+    """A value with the types of JSON; numbers that are not finite become null."""
     if isinstance(value, dict):
         return {str(key): json_value(item) for key, item in value.items()}
     if isinstance(value, list | tuple):

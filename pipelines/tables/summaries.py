@@ -1,4 +1,4 @@
-"""One pass over the samples of a run: a row for every unit and record, on which validation and reduction are arithmetic."""
+"""One pass over the samples of a run: a row for every unit and record, the input of validation and reduction."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ WHOLE = ("record", "n", "wild_count", "wild_axis", "wild_row", "clipped", "clipp
 
 
 def summarised(samples: Iterable[pd.DataFrame], readings: pd.DataFrame, zero_output: float = 0.0) -> pd.DataFrame:
-    """One row per record and unit that has samples, in the order in which they come.
+    """One row for each record and unit with samples, in the order of the samples.
 
     Columns: ``unit``, ``record``, ``kind``, ``n``; mean ``out_x`` …, standard deviation ``sd_x`` … (n − 1 in its divisor),
     smallest ``low_x`` … and largest ``high_x`` … sample, in the output's unit; ``wild_count`` values that are not finite, the
@@ -35,7 +35,7 @@ def summarised(samples: Iterable[pd.DataFrame], readings: pd.DataFrame, zero_out
 
     Parameters
     ----------
-    samples : one table per record, or several of a long one; each is looked at once
+    samples : one table per record, or several of a long one; each is read once
     readings : full scale of every unit in every record, where it answered
     zero_output : nominal output at 0 g, from which the full scale extends both ways; output unit
     """
@@ -68,7 +68,7 @@ def _of_record(
 def _parts(
     table: pd.DataFrame, record: int, full: pd.Series, zero_output: float
 ) -> Iterator[tuple[str, dict[str, Any]]]:
-    """What one table says of each of its units, in order of unit."""
+    """The rows of one table for each of its units, in order of unit."""
     groups = table.groupby("unit", sort=True)
     values = groups[list(AXES)]
     mean, sd, low, high = (
@@ -100,9 +100,9 @@ def _parts(
 
 
 def _joined(one: dict[str, Any], more: dict[str, Any]) -> dict[str, Any]:
-    """Two parts of a record as one: Chan, Golub & LeVeque, Amer. Statist. 37 (1983) 242, for mean and variance."""
+    """Merge two parts of a record: Chan, Golub & LeVeque, Amer. Statist. 37 (1983) 242, for mean and variance."""
     n = one["n"] + more["n"]
-    with np.errstate(all="ignore"):  # what is not finite stays so, and its unit is refused
+    with np.errstate(all="ignore"):  # values that are not finite stay so, and their unit is refused
         apart = more["mean"] - one["mean"]
         squares = apart**2 * (one["n"] * more["n"] / n)
         for part in (one, more):
@@ -124,7 +124,7 @@ def _joined(one: dict[str, Any], more: dict[str, Any]) -> dict[str, Any]:
 
 
 class Outlier(NamedTuple):
-    """A sample that cannot be the unit's: its row and axis, its value and the median of its record, the output's unit."""
+    """An implausible sample: its row and axis, its value and the median of its record, the output's unit."""
 
     row: int
     axis: int
@@ -154,6 +154,6 @@ def first_outlier(output: Array, lsb: float, full_scale: float) -> Outlier | Non
 
 
 def means(summaries: pd.DataFrame, kinds_but: Sequence[str] = ()) -> pd.DataFrame:
-    """Unit, record and mean samples x, y, z, of all kinds but some."""
+    """Unit, record and mean samples x, y, z, without some kinds."""
     kept = summaries[~summaries["kind"].isin(list(kinds_but))]
     return kept[["unit", "record", *MEANS]].rename(columns=dict(zip(MEANS, AXES, strict=True)))

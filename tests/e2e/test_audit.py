@@ -154,7 +154,7 @@ def test_questions_in_sql_see_the_same_from_index_and_files(made):
         ("SELECT * FROM grade", "did you mean grades?"),
         ("SELEC 1", "syntax error"),
         ("DROP TABLE runs", "found drop, one SELECT is needed"),
-        ("SELECT 1; SELECT 2", "one question at a time"),
+        ("SELECT 1; SELECT 2", "one query at a time"),
         ("COPY (SELECT 1) TO 'x.csv'", "found copy"),
         ("SELECT * FROM read_text('../secret')", "disabled by configuration"),
         ("SELECT nothing FROM runs", "nothing"),

@@ -68,7 +68,7 @@ def test_results_are_shown_slot_by_slot_before_the_units_are_taken_out(tmp_path:
     assert results[1].startswith("A2  refused: ")
     assert all(results[slot].split("  ")[1].split(",")[0].split(":")[0] in {"pass", "fail"} for slot in (0, 2))
     passed = sum("  pass" in text for text in results.values())
-    assert unload.text.startswith(f"{passed} of 3 passed")
+    assert unload.text.startswith(f"{passed} of 3 units passed")
 
 
 def test_a_run_that_lost_its_lease_ends_though_somebody_is_beside_it(tmp_path: Path) -> None:
@@ -162,7 +162,7 @@ def test_a_paused_flow_run_is_answered_from_another_terminal(tmp_path: Path) -> 
     assert questions[0].startswith("load: seat the units as listed")
     assert "slot 1: A2" in questions[0]
     assert questions[1].startswith("unload")
-    assert "passed; take the units out" in questions[1]
+    assert "passed; remove the units" in questions[1]
     [info] = Archive(archive).runs()
     assert info.finished
 

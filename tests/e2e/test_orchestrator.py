@@ -191,7 +191,7 @@ def test_credentials_are_refused_as_a_parameter_of_a_flow_and_not_stored(line: O
     assert [path.name for path in line.home.iterdir() if path.is_file() and secret.encode() in path.read_bytes()] == []
 
 
-@pytest.mark.parametrize(("key", "told"), [("", "wants a key"), ("tumbleline:" + "x" * 32, "refuses the key")])
+@pytest.mark.parametrize(("key", "told"), [("", "requires a key"), ("tumbleline:" + "x" * 32, "refuses the key")])
 def test_a_client_with_no_key_or_a_wrong_one_is_told(
     line: Orchestrator, key: str, told: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:

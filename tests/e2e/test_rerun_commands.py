@@ -55,12 +55,12 @@ def test_reruns_of_all_runs_leave_the_old_ones_as_they_were(own: Path) -> None:
     document = json.loads(tumbleline(*words, "--json"))
     assert (document["selected"], document["rerun"], document["failed"]) == (3, 3, 0)
     assert {name: content for name, content in tables(own).items() if name in before} == before
-    assert "3 selected: 3 run again" in tumbleline(*words)
+    assert "3 selected: 3 re-analysed" in tumbleline(*words)
 
 
 def test_check_proves_the_archive_and_names_a_value_that_was_exchanged_with_its_hash(own: Path) -> None:
     words = ("rerun", "all", "--check", "--archive", str(own), "--workers", "1")
-    assert "3 of 3 runs come out again: 51 tables" in tumbleline(*words)
+    assert "3 of 3 runs reproduced: 51 tables" in tumbleline(*words)
     run = Archive(own).runs()[0]
     place = own / "runs" / run.id
     figures = pd.read_parquet(place / "figures.parquet")
@@ -71,12 +71,12 @@ def test_check_proves_the_archive_and_names_a_value_that_was_exchanged_with_its_
     (place / "figures.json").write_text(json.dumps(manifest | {"sha256": sha256(data).hexdigest()}))
     out = tumbleline(*words, status=1)
     assert "figures: value in 1 of" in out
-    assert "2 of 3 runs come out again" in out
+    assert "2 of 3 runs reproduced" in out
 
 
 def test_says_that_check_has_nothing_to_compare_another_model_with(own: Path) -> None:
     message = tumbleline("rerun", "all", "--check", "--effects", LARGER, "--archive", str(own), status=2)
-    assert "--check with another model or limits has nothing to compare with" in message
+    assert "--check with another model or limits has no stored result" in message
 
 
 def test_whatif_release_and_list(own: Path, tmp_path: Path) -> None:

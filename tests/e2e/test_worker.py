@@ -139,8 +139,8 @@ def test_a_worker_that_is_told_to_end_leaves_its_station_safe_and_its_run_is_clo
             line.until(lambda: line.runs("on-demand", "CRASHED"), "the dead run is closed")
             line.until(lambda: not line.ask("/api/work_pools/line/queues/line-1")[1]["is_paused"], "the queue goes on")
             code, told = second_worker(line)
-            assert (code, "another one works for station line-1" in told) == (3, True)
-    assert "its process is gone" in line.runs("on-demand", "CRASHED")[0]["state"]["message"]
+            assert (code, "another worker works for station line-1" in told) == (3, True)
+    assert "its process has ended" in line.runs("on-demand", "CRASHED")[0]["state"]["message"]
 
 
 def refused_beside_it(line: Orchestrator, folder: Path, recipe: str, station: Path) -> None:

@@ -189,6 +189,6 @@ def test_a_foreign_table_a_newer_one_and_a_manifest_that_is_none_leave_out_their
     told = {line["run"]: line["problem"] for line in lines if line["problem"]}
     assert told[foreign.name] == "grades.parquet has no manifest"
     assert "has schema 99, this version knows up to" in told[newer.name]
-    assert told[broken.name] == "run.json holds no manifest"
+    assert told[broken.name] == "run.json is no manifest"
     assert told[cut.name] == "residuals.parquet has no manifest"
     assert set(told) == {foreign.name, newer.name, broken.name, cut.name}

@@ -119,7 +119,7 @@ def test_a_run_that_was_stopped_is_shown_as_such(
 ) -> None:
     status, out, _ = told(monkeypatch, capsys, "show", "latest", "--archive", str(stopped.root))
     assert status == 0
-    assert "is not finished (7 records are stored)" in out
+    assert "is not finished (7 records stored)" in out
 
 
 def test_what_lies_outside_the_archive_is_not_told_as_the_archive(tmp_path: Path) -> None:
@@ -148,6 +148,6 @@ def test_ctrl_c_in_a_capture_says_that_it_goes_on_and_it_does(tmp_path: Path) ->
     os.kill(process.pid, signal.SIGINT)
     out, message = process.communicate(timeout=60)
     assert (process.returncode, out) == (130, "")
-    assert "continues where it was when its command is given again" in message
+    assert "give the command again to continue the run" in message
     assert "Traceback" not in message
     assert list(archive.rglob(".tmp-*")) == []

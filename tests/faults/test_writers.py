@@ -199,9 +199,9 @@ def test_the_command_says_what_it_took_away(tmp_path: Path) -> None:
     Archive(tmp_path).prepare()
     (tmp_path / f"{files.TEMPORARY}dead").write_bytes(b"12345")
     told = CliRunner().invoke(app, ["archive", "clean", "--dry-run", "--archive", str(tmp_path)])
-    assert "1 left by killed writers found (5 bytes)" in told.stdout
+    assert "1 leftover of killed writers found (5 bytes)" in told.stdout
     told = CliRunner().invoke(app, ["archive", "clean", "--archive", str(tmp_path)])
-    assert "1 left by killed writers removed (5 bytes)" in told.stdout
+    assert "1 leftover of killed writers removed (5 bytes)" in told.stdout
     assert told.exit_code == 0
 
 

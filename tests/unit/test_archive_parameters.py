@@ -35,7 +35,7 @@ def test_an_address_without_credentials_stays_as_it_is(address: str) -> None:
 def test_credentials_are_taken_out_and_refused(address: str, left: str) -> None:
     assert without_credentials(address) == left
     assert credentials_in(f'{{"parameters": {{"archive": "{address}", "recipe": "x"}}}}')
-    with pytest.raises(WrongUse, match="an address with credentials was given") as told:
+    with pytest.raises(WrongUse, match="a parameter of a flow is an address with credentials") as told:
         archive_of(address)
     assert "secret" not in str(told.value).replace("Secret block", "")
 

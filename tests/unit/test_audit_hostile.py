@@ -104,8 +104,8 @@ def test_clocks_that_were_never_set_or_run_ahead_leave_out_their_runs_and_are_to
     found = audit(Archive(tmp_path / "archive"), RULES, Scope(day_of("2021-01-01"), until, tomorrow=until))
     told = {finding.subject: finding for finding in findings(found) if finding.who == "archive"}
     assert set(told) == {run.name for run in runs}
-    assert "which is yet to come" in told[runs[0].name].message
-    assert "its date 'yesterday' is none" in told[runs[1].name].message
+    assert "is in the future" in told[runs[0].name].message
+    assert "its date 'yesterday' is invalid" in told[runs[1].name].message
     assert "a clock that was never set" in told[runs[2].name].message
     assert not set(found.all.run) & {run.name for run in runs}
 

@@ -77,7 +77,7 @@ def test_autopilot_parameters_undo_scale_and_offset(run: Run) -> None:
 
 def test_says_what_a_format_leaves_out(run: Run) -> None:
     text = export_text("px4", unit_calibrations(run, ("A1",), failed=True), run.id, 256000.0)
-    assert "left out" in text
+    assert "not in these parameters" in text
     assert "misalignment" in text
 
 

@@ -116,7 +116,7 @@ def test_a_missing_event_is_found(tmp_path: Path) -> None:
     ledger.add(event(start="2026-10-01", until="2027-10-01", run="r-2"))
     [first] = tmp_path.glob("calibrations/*/*/000001.json")
     first.unlink()
-    with pytest.raises(ArchiveUnusable, match=r"has event 000002\.json where number 1 is due"):
+    with pytest.raises(ArchiveUnusable, match=r"has event 000002\.json where number 1 is needed"):
         ledger.valid_at("A1", "2026-11-01")
 
 

@@ -106,7 +106,7 @@ def test_a_file_that_was_copied_out_is_known_by_its_content(run: Run, tmp_path: 
     found = lineage(run.archive, str(copy))
     assert found.focus == (f"runs/{run.id}/grades.parquet",)
     (tmp_path / "strange.parquet").write_bytes(b"strange")
-    with pytest.raises(ArchiveUnusable, match="is of no table and no source"):
+    with pytest.raises(ArchiveUnusable, match="is no table and no source"):
         lineage(run.archive, str(tmp_path / "strange.parquet"))
 
 
@@ -203,7 +203,7 @@ def test_the_crate_holds_every_file_and_its_hash(of_unit: Lineage, run: Run, tmp
 
 def test_a_crate_is_written_into_a_new_folder_only(of_unit: Lineage, run: Run, tmp_path: Path) -> None:
     (tmp_path / "mine.txt").write_text("")
-    with pytest.raises(WrongUse, match="is there and not empty"):
+    with pytest.raises(WrongUse, match="exists and is not empty"):
         write_crate(run.archive, of_unit, tmp_path)
 
 

@@ -65,7 +65,7 @@ def test_refuses_what_is_unknown_or_there(effect, message):
     ("old", "new", "message"),
     [
         ('"humidity_pct"', '"sqr(humidity_pct)"', "formula wet: unknown function 'sqr'; did you mean sqrt"),
-        ('id = "wet"', 'id = "third_order"', "the catalogue has an effect of that id"),
+        ('id = "wet"', 'id = "third_order"', "the catalogue has an effect with this id"),
         ('id = "wet"', 'id = "Wet one"', "formula.0.id"),
         ('columns = ["humidity_pct"]', "columns = []", "formula.0.columns"),
     ],

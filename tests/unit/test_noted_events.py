@@ -54,7 +54,7 @@ def test_events_that_are_gone_are_not_told_from_what_was_noted(ledger: Ledger, t
     assert len(told(tmp_path)) == 199
     next((tmp_path / "calibrations").glob("*/*/000001.json")).unlink()
     assert len(histories_of(tmp_path).problems) == 1
-    with pytest.raises(ArchiveUnusable, match=r"has event 000002\.json where number 1 is due"):
+    with pytest.raises(ArchiveUnusable, match=r"has event 000002\.json where number 1 is needed"):
         list(ledger.all())
 
 

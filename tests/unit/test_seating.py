@@ -62,7 +62,7 @@ def test_a_scan_leaves_slots_empty_and_asks_again_for_what_was_there() -> None:
     lines, told = iter(["S1", "", "S1", "S2", ""]), []
     found = scan(4, lambda _slot: next(lines), told.append)
     assert found == Seating(("S1", "S2"), (0, 2))
-    assert told == ["slot 2: S1 was scanned for slot 0 already; scan the unit that sits in slot 2"]
+    assert told == ["slot 2: S1 was scanned for slot 0 already; scan the unit in slot 2"]
 
 
 def test_a_job_has_its_units_where_the_slot_map_says(tmp_path: Path) -> None:
