@@ -180,7 +180,7 @@ CASES: tuple[Case, ...] = (
     Case(f"stuck_encoder:at_s={MOVING}:device=outer", RUN, "outer axis: stands at"),
     Case(f"backlash:at_s={WITHIN}:device=outer", RUN, "check zero and gears"),
     Case("backlash:device=inner", RUN, "check zero and gears"),
-    Case(f"table_stall:at_s={MOVING}:device=outer", RUN, "standing is needed"),
+    Case(f"table_stall:at_s={MOVING}:device=outer", RUN, "axis at rest is needed"),
     Case(f"table_stall:at_s={MOVING}:device=outer:for_s=20", RECOVERED),
     Case(f"lost_home:at_s={WITHIN}:device=outer", RUN, "home the axis"),
     Case(f"lost_home:at_s={WITHIN}:device=inner:admitted=0", RUN, "its zero is lost"),

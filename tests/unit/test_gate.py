@@ -45,7 +45,7 @@ def test_only_whole_writable_registers_pass(name):
         if register.writable:
             gated.write(7, register.address, [0] * register.words, register.name, register.space)
             continue
-        with pytest.raises(StationRefused, match="lists no such writable registers"):
+        with pytest.raises(StationRefused, match="has no such writable registers"):
             gated.write(7, register.address, [0] * register.words, register.name, register.space)
     assert len(nowhere.sent) == sum(register.writable for register in profile.registers)
 
