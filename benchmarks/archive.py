@@ -160,7 +160,7 @@ def rates(size: Size, folder: Path) -> dict[str, float]:
         "query, the index": lambda: query(compact=True),
     }
     for name, way in ways.items():
-        times = []
+        times, count = [], 0
         for _ in range(3):
             start = time.perf_counter()
             count = way()

@@ -46,7 +46,7 @@ class Bank:
         missing = [r.name for r in profile.registers if r.access != "write" and r.name not in self._sources]
         if missing:
             raise LookupError(
-                f"profile {profile.name}: the plant has no source for {', '.join(missing)}, one is needed for each; add them"
+                f"profile {profile.name}: the plant has nothing for {', '.join(missing)}; add a source for each"
             )
 
     def _scaled(self, register: Register) -> Register:
