@@ -38,8 +38,8 @@ def main() -> None:
     peers = [allantools.oadev(row, rate=RATE, data_type="freq", taus=curve.tau)[1] for row in x]
     values = time.perf_counter() - start
     start = time.perf_counter()
-    for row, found in zip(x, peers, strict=True):
-        for m, deviation in zip(curve.m, found, strict=True):
+    for row, expected in zip(x, peers, strict=True):
+        for m, deviation in zip(curve.m, expected, strict=True):
             alpha = int(np.round(allantools.autocorr_noise_id(row, int(m), data_type="freq")[0])) if n // m >= 30 else 0
             edf = allantools.edf_greenhall(
                 int(np.clip(alpha, -2, 2)), 2, int(m), n + 1, overlapping=True, modified=False

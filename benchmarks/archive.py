@@ -1,9 +1,10 @@
 """The archive at the size of a factory: `python benchmarks/archive.py --lots 100 --lots 1000 --lots 10000`.
 
-Generated archives of so many lots (ten units each, `generated_archive.py`), one after the other, each with its ledger. Measured
-are whole processes as a user starts them: which calibration of a serial is valid on a date, the audit of everything (with the
-index made from the runs, and with the index there), and rows per second of a question in SQL, over the runs' own files and
-over the index, beside plain pyarrow.dataset on the same files. At the end: how the times grow with the size.
+It generates archives with the given numbers of lots (ten units each, `generated_archive.py`), each with its ledger. It
+measures complete processes as a user starts them: the valid calibration of a serial on a date, the audit of the complete
+archive (with creation of the index, and with an existing index), and rows per second of an SQL query over the files of the
+runs and over the index, compared with pyarrow.dataset on the same files. Finally it prints the growth of the times with the
+size.
 """
 
 from __future__ import annotations
@@ -24,7 +25,7 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT))
 
-from benchmarks.generated_archive import PER_LOT, write_archive  # noqa: E402 - run as a script from anywhere
+from benchmarks.generated_archive import PER_LOT, write_archive  # noqa: E402 - run as a script from any folder
 from benchmarks.generated_ledger import write_ledger  # noqa: E402
 from benchmarks.main_job import resident  # noqa: E402
 
@@ -37,7 +38,7 @@ TEN_MILLION = 10_000_000
 
 @dataclass
 class Size:
-    """What was measured on one archive; times in s, memory in bytes."""
+    """Measured values of one archive; times in s, memory in bytes."""
 
     lots: int
     calibrations: int = 0
@@ -55,13 +56,13 @@ class Size:
     rates: dict[str, float] = field(default_factory=dict)
 
 
-def timed(*words: str) -> tuple[float, int, str]:
-    """Wall time of a command in its own process, its peak memory, and what it printed."""
+def timed(*arguments: str) -> tuple[float, int, str]:
+    """Wall time of a command in its own process, its peak memory, and its output."""
     environment = {**os.environ, "OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
     with tempfile.TemporaryFile("w+") as out:
         start = time.perf_counter()
         process = subprocess.Popen(
-            [sys.executable, "-m", "pipelines.cli", *words],
+            [sys.executable, "-m", "pipelines.cli", *arguments],
             cwd=ROOT,
             env=environment,
             stdout=out,
@@ -72,21 +73,23 @@ def timed(*words: str) -> tuple[float, int, str]:
             peak = max(peak, resident(process.pid))
             time.sleep(0.01)
         seconds = time.perf_counter() - start
-        told = process.stderr.read().decode() if process.stderr else ""
+        errors = process.stderr.read().decode() if process.stderr else ""
         if process.returncode not in {0, 1}:
-            raise RuntimeError(f"archive: tumbleline {words[0]} ended with {process.returncode}: {told[-1000:]}")
+            raise RuntimeError(
+                f"archive: tumbleline {arguments[0]} ended with status {process.returncode}: {errors[-1000:]}"
+            )
         out.seek(0)
         return seconds, peak, out.read()
 
 
 def children_cpu() -> float:
-    """Processor time of all processes started and ended, s: what the wall time would be on one quiet core."""
+    """Processor time of all ended child processes, s: their wall time on one core without other load."""
     spent = os.times()
     return spent.children_user + spent.children_system
 
 
 def prepared(lots: int, folder: Path, workers: int) -> Size:
-    """The archive of a size with its ledger, made where it is not there yet."""
+    """The archive of a size with its ledger; it is generated where it does not exist."""
     size = Size(lots)
     if not folder.exists():
         start = time.perf_counter()
@@ -134,7 +137,7 @@ def measure(size: Size, folder: Path, workers: int) -> None:
 
 
 def rates(size: Size, folder: Path) -> dict[str, float]:
-    """Rows of coefficients per second, each way in a process that has its libraries loaded; the same answer from all."""
+    """Rows of coefficients per second for each method, with loaded libraries; all methods must give the same result."""
     import pyarrow.dataset as ds
 
     from pipelines.archive import Archive
@@ -148,29 +151,29 @@ def rates(size: Size, folder: Path) -> dict[str, float]:
         groups = table.group_by(["effect", "axis"]).aggregate([("value", "mean"), ("value", "count")])
         return sum(groups.column("value_count").to_pylist())
 
-    def asked(*, compact: bool) -> int:
+    def query(*, compact: bool) -> int:
         return sum(row[2] for row in ask(archive, QUESTION, compact=compact).rows)
 
     ways = {
-        "pyarrow.dataset, the runs' files": plain,
-        "query --no-index, the runs' files": lambda: asked(compact=False),
-        "query, the index": lambda: asked(compact=True),
+        "pyarrow.dataset, files of the runs": plain,
+        "query --no-index, files of the runs": lambda: query(compact=False),
+        "query, the index": lambda: query(compact=True),
     }
     for name, way in ways.items():
-        times = []
+        times, count = [], 0
         for _ in range(3):
             start = time.perf_counter()
-            found = way()
+            count = way()
             times.append(time.perf_counter() - start)
-        if size.rows not in {0, found}:
-            raise RuntimeError(f"archive: {name} counts {found} rows, {size.rows} before")
-        size.rows = found
-        out[name] = found / min(times)
+        if size.rows not in {0, count}:
+            raise RuntimeError(f"archive: {name} counts {count} rows, {size.rows} are needed")
+        size.rows = count
+        out[name] = count / min(times)
     return out
 
 
 def show(size: Size) -> None:
-    """Prints what was measured on one archive."""
+    """Prints the measured values of one archive."""
     made = f", made in {size.made_s:.0f} s" if math.isfinite(size.made_s) else ""
     print(
         f"\n{size.lots} lots, {size.calibrations} calibrations: {size.files} files, {size.bytes_on_disk / MB:.0f} MB{made}; "
@@ -178,23 +181,23 @@ def show(size: Size) -> None:
     )
     print(
         f"  validity of a serial on a date   {statistics.median(size.lookups_s):6.2f} s, worst of {LOOKUPS} "
-        f"{max(size.lookups_s):.2f} s, whole process"
+        f"{max(size.lookups_s):.2f} s, complete process"
     )
     print(
-        f"  audit of everything              {size.audit_s:6.1f} s ({size.audit_cpu_s:.1f} s of processor), peak "
+        f"  audit of the complete archive    {size.audit_s:6.1f} s ({size.audit_cpu_s:.1f} s processor time), peak "
         f"memory {size.audit_bytes / MB:.0f} MB"
     )
     print(
-        f"  … with the index made first      {size.first_audit_s:6.1f} s ({size.first_audit_cpu_s:.1f} s of processor)"
+        f"  … including creation of index    {size.first_audit_s:6.1f} s ({size.first_audit_cpu_s:.1f} s processor time)"
     )
     base = next(iter(size.rates.values()))
     for name, rate in size.rates.items():
-        print(f"  {name:<33}{rate / 1e6:6.2f} million rows a second, {rate / base:.1f} × pyarrow.dataset")
+        print(f"  {name:<33}{rate / 1e6:6.2f} million rows per second, {rate / base:.1f} × pyarrow.dataset")
     sys.stdout.flush()
 
 
 def growth(sizes: list[Size]) -> None:
-    """Prints how the times grow, and what ten million calibrations would take at the rates of the largest archive."""
+    """Prints the growth of the times, and the extrapolation to ten million calibrations at the rates of the largest archive."""
     if len(sizes) < 2:
         return
     first, last = sizes[0], sizes[-1]
@@ -202,7 +205,7 @@ def growth(sizes: list[Size]) -> None:
     print("\ngrowth: time ∝ size^k, from the smallest to the largest archive (k = 1 is linear)")
     for name, of in (
         ("audit", lambda s: s.audit_s),
-        ("audit with its index made", lambda s: s.first_audit_s),
+        ("audit including its index", lambda s: s.first_audit_s),
         ("validity", lambda s: statistics.median(s.lookups_s)),
     ):
         print(f"  {name:<28} k = {math.log(of(last) / of(first)) / span:.2f}")
@@ -223,7 +226,9 @@ def main() -> int:
         "--lots", type=int, action="append", help="lots of an archive (repeatable); 100 and 1000 by default"
     )
     parser.add_argument("--workers", type=int, default=2)
-    parser.add_argument("--folder", type=Path, help="where archives are made and kept; a temporary folder by default")
+    parser.add_argument(
+        "--folder", type=Path, help="folder for the archives, which are kept; a temporary folder by default"
+    )
     options = parser.parse_args()
     sizes: list[Size] = []
     with tempfile.TemporaryDirectory(prefix="tumbleline-archive-") as spare:

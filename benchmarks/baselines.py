@@ -1,7 +1,7 @@
-"""What a good engineer has at hand: forward selection, STLSQ and lasso over a fixed library of candidate columns.
+"""Standard methods for comparison: forward selection, STLSQ and lasso over a fixed library of candidate columns.
 
-The columns are written here from the textbook forms; neither the product's effects nor the hidden physics is used. Every baseline
-pools over the units of the lot: one candidate enters for all units and axes at once, each with coefficients of its own.
+The columns are textbook forms; neither the effects of the product nor the hidden physics is used. Every baseline pools the
+units of the lot: a candidate is added for all units and axes together, with separate coefficients for each.
 """
 
 from __future__ import annotations
@@ -33,13 +33,13 @@ class Fit:
 
 
 def _library(run: Run) -> Library:
-    """The candidates for the run, on the starting model and with the history that its specification gives to everybody."""
+    """The candidates for the run, with the starting model and the temperature history of its specification."""
     spec = run.sealed.spec
     return library(run.dwells, run.history if spec.history else None, bare=spec.base is not None)
 
 
 def _pooled(data: Library, names: list[str]) -> Fit:
-    """Least squares of the named candidates for every unit and axis of the lot."""
+    """Least-squares fit with the named candidates for every unit and axis of the lot."""
     chi2, parameters = 0.0, 0
     for unit in range(data.units):
         for axis in range(3):
@@ -51,7 +51,7 @@ def _pooled(data: Library, names: list[str]) -> Fit:
 
 
 def _forward(data: Library, judge: Callable[[Fit, Fit, int], float]) -> list[str]:
-    """Names added one at a time while `judge` of (before, after, candidates left) is positive; the best judged first."""
+    """Names added one by one while `judge` of (before, after, remaining candidates) is positive; the largest value first."""
     chosen: list[str] = []
     now = _pooled(data, chosen)
     while len(chosen) < MOST_EFFECTS:
@@ -91,7 +91,7 @@ def bonferroni(run: Run) -> tuple[dict[str, Any], float | None]:
 
 
 def _sparse(run: Run, choose: Callable[[Floats, Floats, Library], Floats]) -> tuple[dict[str, Any], float | None]:
-    """A baseline that regresses each axis of each unit sparsely and names what most of them keep."""
+    """A baseline that fits each axis of each unit sparsely, and names the candidates that most of them keep."""
     data = _library(run)
     votes: dict[str, float] = dict.fromkeys(data.names, 0.0)
     for unit in range(data.units):
@@ -106,7 +106,7 @@ def _sparse(run: Run, choose: Callable[[Floats, Floats, Library], Floats]) -> tu
 
 
 def _axis(data: Library, unit: int, axis: int) -> tuple[Floats, Floats, list[str]]:
-    """Candidate columns and output of one unit and axis less the starting model, and the name each column belongs to."""
+    """Candidate columns and output of one unit and axis without the starting model, and the name of each column."""
     basis = np.linalg.qr(data.base(unit, axis))[0]
     parts = {name: data.columns(name, unit, axis) for name in data.names}
     block = np.column_stack(list(parts.values()))
@@ -145,7 +145,7 @@ def lasso(run: Run) -> tuple[dict[str, Any], float | None]:
 
 
 def _fresh_rms(data: Library, run: Run, names: list[str]) -> float:
-    """RMS in µg of the fresh run's errors with the coefficients of this one."""
+    """RMS error of the fresh run with the coefficients of this run, µg."""
     fresh = library(run.fresh, run.fresh_history if run.sealed.spec.history else None, like=data)
     squares = []
     for unit in range(data.units):
@@ -160,7 +160,7 @@ def _fresh_rms(data: Library, run: Run, names: list[str]) -> float:
 
 
 def _answer(data: Library, run: Run, names: list[str]) -> tuple[dict[str, Any], float | None]:
-    """A document with the keys that are scored; baselines know neither classes nor faults, nor what they cannot see."""
+    """A document with the scored keys; baselines have no classes, no faults and no list of effects that are not visible."""
     document: Mapping[str, Any] = {
         "adequate": not names,
         "blocked_by": [],

@@ -1,7 +1,8 @@
 """Scores the diagnosis on blind runs: `python benchmarks/blind.py --runs 400 --jobs 2`.
 
-Each run is made from a seed, its truth stays here, and the diagnosis gets the tables alone: in process, or with `--cli`
-through the command line on files. `--runs` counts runs over all scenarios (dealt by weight), or per scenario with `--each`.
+Each run is made from a seed; its truth stays here, and the diagnosis gets only the tables: in this process, or with `--cli`
+through the command line and files. `--runs` is the number of runs over all scenarios (distributed by weight), or per scenario
+with `--each`.
 """
 
 from __future__ import annotations
@@ -20,7 +21,9 @@ from pathlib import Path
 from typing import Any
 
 for _name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
-    os.environ.setdefault(_name, "1")  # before numpy: threads of two processes fight over two cores
+    os.environ.setdefault(
+        _name, "1"
+    )  # before the import of numpy: threads of two processes would compete for two cores
 
 ROOT = Path(__file__).resolve().parents[1]
 sys.path[:0] = [str(ROOT), str(ROOT / "tests" / "blind")]
@@ -29,7 +32,7 @@ import pandas as pd  # noqa: E402
 from score import Score, score, table, text  # noqa: E402
 from truth import SCENARIOS, Run, case  # noqa: E402
 
-Answer = tuple[dict[str, Any], float | None]  # the document, and the fresh run's RMS in µg after extending
+Answer = tuple[dict[str, Any], float | None]  # the document, and the RMS error of the fresh run after extension, µg
 Method = Callable[[Run], Answer]
 
 WAYS = ("tumbleline", "cli", "bic", "bonferroni", "stlsq", "lasso")
@@ -43,7 +46,7 @@ WEIGHTS = {
 
 @dataclass(frozen=True)
 class Job:
-    """One run of one scenario, and how to diagnose it."""
+    """One run of one scenario, and its method of diagnosis."""
 
     scenario: str
     index: int
@@ -72,7 +75,7 @@ def in_process(run: Run) -> Answer:
 
 
 def write(run: Run, folder: Path) -> list[Path]:
-    """Writes the measurements, and only them: dwells, history, fresh, fresh_history."""
+    """Writes the measurements only: dwells, history, fresh, fresh_history."""
     folder.mkdir(parents=True, exist_ok=True)
     paths = []
     for name in ("dwells", "history", "fresh", "fresh_history"):
@@ -111,7 +114,7 @@ def by_command_line(run: Run) -> Answer:
 
 
 def method(name: str) -> Method:
-    """The way of that name to diagnose a run: `tumbleline`, `cli`, or a baseline."""
+    """The method of diagnosis with a name: `tumbleline`, `cli`, or a baseline."""
     if name == "tumbleline":
         return in_process
     if name == "cli":
@@ -122,7 +125,7 @@ def method(name: str) -> Method:
 
 
 def one(job: Job) -> Result:
-    """The score of one job, with the document and the truth for those who look into failures."""
+    """The score of one job, with the document and the truth for the analysis of failures."""
     run = case(job.scenario, job.index, job.seed)
     begin = time.perf_counter()
     try:
@@ -148,7 +151,7 @@ def deal(scenarios: list[str], runs: int, *, each: bool) -> Iterator[tuple[str, 
 
 
 def work(jobs: list[Job], processes: int) -> Iterator[Result]:
-    """Each job's result as it is done, in their order, with a line of progress on standard error."""
+    """The results of the jobs in their order, with a progress line on standard error."""
     with ProcessPoolExecutor(processes) as pool:
         results = pool.map(one, jobs) if processes > 1 else map(one, jobs)
         for count, result in enumerate(results, 1):
@@ -158,7 +161,7 @@ def work(jobs: list[Job], processes: int) -> Iterator[Result]:
 
 
 def failures(results: list[Result]) -> list[str]:
-    """One line for each run that went wrong: where to find it, what hid, what was said."""
+    """One line for each wrong run: its seed, the hidden effects, the named effects."""
     lines = []
     for job, got, document, truth in results:
         wrong = (
@@ -172,9 +175,9 @@ def failures(results: list[Result]) -> list[str]:
             variants = [effect["variant"] for effect in truth["effects"] if effect["variant"]]
             spec = truth["spec"]
             plan = f"{spec['plan']}/{spec['soaks']}x{spec['repeats']} 1/f {spec['flicker']:.1f} {spec['device']}"
-            said = " ".join("|".join(group) for group in got.named) or document.get("unexplained") or "nothing"
-            hid = ",".join([*got.truth, *variants, *spec["faults"]])
-            lines.append(f"{job.scenario}[{job.index}] {hid} -> {said} ({plan})")
+            named = " ".join("|".join(group) for group in got.named) or document.get("unexplained") or "nothing"
+            hidden = ",".join([*got.truth, *variants, *spec["faults"]])
+            lines.append(f"{job.scenario}[{job.index}] {hidden} -> {named} ({plan})")
     return lines
 
 
@@ -193,7 +196,7 @@ def save(folder: Path, results: list[Result]) -> None:
 
 
 def dump(folder: Path, cases: Iterator[tuple[str, int]], seed: int) -> None:
-    """Runs as files in FOLDER/runs, their truths in FOLDER-truth: nothing of the truth lies beside the measurements."""
+    """Writes runs as files to FOLDER/runs, and their truths to FOLDER-truth, separate from the measurements."""
     sealed = folder.with_name(folder.name + "-truth")
     sealed.mkdir(parents=True, exist_ok=True)
     for name, index in cases:
@@ -211,10 +214,10 @@ def arguments() -> argparse.Namespace:
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--jobs", type=int, default=2)
     parser.add_argument(
-        "--method", action="append", choices=WAYS, help="ways to diagnose (repeatable); tumbleline is the default"
+        "--method", action="append", choices=WAYS, help="methods of diagnosis (repeatable); tumbleline is the default"
     )
     parser.add_argument("--cli", action="store_true", help="the same as --method cli")
-    parser.add_argument("--failures", action="store_true", help="list the runs that went wrong")
+    parser.add_argument("--failures", action="store_true", help="list the wrong runs")
     parser.add_argument("--out", type=Path, help="folder for scores.parquet, runs.jsonl and figures.json")
     parser.add_argument(
         "--dump", type=Path, help="only write the runs into this folder, and their truth into FOLDER-truth"
@@ -242,14 +245,14 @@ def main() -> None:
             show(way, results, options.seed)
             if options.failures:
                 print("\n".join(failures(results)))
-    finally:  # a diagnosis that fails in the last run does not take the others with it
+    finally:  # a failure in the last run does not lose the results of the others
         if options.out and everything:
             save(options.out, everything)
             (options.out / "figures.json").write_text(json.dumps(figures, indent=1))
 
 
 def show(way: str, results: list[Result], seed: int) -> None:
-    """Prints the table of figures of one way to diagnose."""
+    """Prints the table of figures of one method."""
     times = sorted(s.seconds for _, s, _, _ in results)
     print(
         f"\n{way}: {len(results)} runs, seed {seed}, median {times[len(times) // 2]:.2f} s, longest {times[-1]:.2f} s"

@@ -1,6 +1,6 @@
 """A fixed library of textbook candidate columns for the baselines, from a table of dwells (and its history of temperature).
 
-Nonlinear parameters stand at one usual value each: that is what a fixed library means.
+Each nonlinear parameter has one usual value, as in any fixed library.
 """
 
 from __future__ import annotations
@@ -45,7 +45,7 @@ class Dwells:
 
     @cached_property
     def theta(self) -> Floats:
-        """Temperature less 25 °C, (n,)."""
+        """Temperature minus 25 °C, (n,)."""
         return self.array("unit_C") - 25.0
 
     @cached_property
@@ -57,12 +57,12 @@ class Dwells:
         return grid, np.interp(grid, seconds, warmth)
 
     def at_dwells(self, series: Floats) -> Floats:
-        """A series of the course, read at the dwells."""
+        """A time series interpolated at the dwells."""
         return np.interp(self.array("time_s"), self.course[0], series)
 
     @cached_property
     def lagged(self) -> Floats:
-        """A first-order lag of the temperature less the temperature, (n,)."""
+        """First-order lag of the temperature minus the temperature, (n,)."""
         warmth = self.course[1]
         keep = np.exp(-10.0 / LAG_S)
         late = lfilter([1.0 - keep], [1.0, -keep], warmth, zi=[warmth[0] * keep])[0]
@@ -103,7 +103,7 @@ def _loop(d: Dwells, _axis: int) -> list[Floats]:
 
 
 def _field(d: Dwells, _axis: int) -> list[Floats]:
-    """The two horizontal laboratory directions seen in the fixture."""
+    """The two horizontal directions of the laboratory in the frame of the fixture."""
     outer, inner = np.radians(d.array("outer_deg")), np.radians(d.array("inner_deg"))
     zero = np.zeros_like(outer)
     across = [np.cos(inner), -np.sin(inner), zero]
@@ -112,7 +112,7 @@ def _field(d: Dwells, _axis: int) -> list[Floats]:
 
 
 def _turned(change: Callable[[Floats, Floats], tuple[Floats, Floats]]) -> Columns:
-    """What small errors of the two angles do to the force along an axis."""
+    """Change of the force along an axis by small errors of the two angles."""
 
     def columns(d: Dwells, axis: int) -> list[Floats]:
         outer, inner = np.radians(d.array("outer_deg")), np.radians(d.array("inner_deg"))
@@ -196,7 +196,7 @@ STATION_FORMS: dict[str, Columns] = {
 
 @dataclass(frozen=True)
 class Library:
-    """The lot's outputs in µg and the candidates' columns, by unit and axis."""
+    """Outputs of the lot in µg and columns of the candidates, by unit and axis."""
 
     dwells: list[Dwells]
     per_g: float
@@ -207,12 +207,12 @@ class Library:
 
     @property
     def units(self) -> int:
-        """How many units the lot has."""
+        """Number of units in the lot."""
         return len(self.dwells)
 
     @cached_property
     def output(self) -> list[Floats]:
-        """Outputs of each unit, (n, 3), µg; a reference for fresh runs is the same."""
+        """Outputs of each unit, (n, 3), µg; fresh runs have the same reference."""
         return [1e6 * d.table[["out_x", "out_y", "out_z"]].to_numpy(dtype=float) / self.per_g for d in self.dwells]
 
     def base(self, unit: int, axis: int) -> Floats:
@@ -237,7 +237,7 @@ class Library:
         return self.cache[key]
 
     def scope(self, name: str) -> str:
-        """Station or sensor, as a candidate's kind says."""
+        """`station` or `sensor`, by the kind of a candidate."""
         return "station" if name in STATION_FORMS and name != "magnetic" else "sensor"
 
     def pure_error(self) -> tuple[float, float]:
@@ -257,7 +257,7 @@ def library(
 ) -> Library:
     """The library of a lot; `like` gives a fresh run the scales of another.
 
-    `bare` keeps temperature out of the starting model, among the candidates.
+    `bare` moves temperature from the starting model to the candidates.
     """
     units = [part.sort_values("dwell").reset_index(drop=True) for _, part in dwells.groupby("unit", sort=True)]
     courses = [None if history is None else history[history["unit"] == part["unit"].iloc[0]] for part in units]

@@ -1,7 +1,7 @@
 """Batch fit against a loop of least squares, and against imucal on six faces: `python benchmarks/fits.py`.
 
-The loop is the one that calibration notes print: per unit and axis, stack the poses, call `numpy.linalg.lstsq`. All three
-run in this one process on one thread; each figure is the best of several rounds.
+The loop is the textbook one: for each unit and axis, stack the poses and call `numpy.linalg.lstsq`. All three
+run in this process on one thread; each figure is the best of several rounds.
 """
 
 from __future__ import annotations
@@ -49,7 +49,7 @@ def best(function: Callable[[], object], rounds: int) -> float:
 
 
 def lot(units: int, rng: np.random.Generator) -> tuple[State, Array, Array]:
-    """State of 72 dwells (24 poses at 3 temperatures, as each unit's own thermometer reads), force, output."""
+    """State of 72 dwells (24 poses at 3 temperatures, read by the thermometer of each unit), force, output."""
     angles = np.radians(poses.plan("fibonacci24"))
     force = np.tile(force_from_angles(angles[:, 0], angles[:, 1]), (3, 1))
     heat = np.repeat([-20.0, 25.0, 60.0], 24) + rng.normal(scale=0.5, size=(units, 72))
@@ -63,28 +63,28 @@ def lot(units: int, rng: np.random.Generator) -> tuple[State, Array, Array]:
 
 
 def loop_linear(force: Array, out: Array, error: Array | None = None) -> Array:
-    """The notes' way: twelve unknowns, unit by unit and axis by axis."""
-    found = np.empty((len(out), 3, 4))
+    """The textbook method: twelve unknowns, unit by unit and axis by axis."""
+    solution = np.empty((len(out), 3, 4))
     for u in range(len(out)):
         for axis in range(3):
             h = np.column_stack([np.ones(len(force)), force])
             z = out[u, :, axis]
             if error is not None:
                 h, z = h / error[u, :, axis, None], z / error[u, :, axis]
-            found[u, axis] = np.linalg.lstsq(h, z, rcond=None)[0]
-    return found
+            solution[u, axis] = np.linalg.lstsq(h, z, rcond=None)[0]
+    return solution
 
 
 def loop_thermal(force: Array, out: Array, heat: Array) -> Array:
-    """The same with the thermal terms of one axis."""
-    found = np.empty((len(out), 3, 8))
+    """The same with the thermal terms of an axis."""
+    solution = np.empty((len(out), 3, 8))
     for u in range(len(out)):
         theta = heat[u] - 25.0
         for axis in range(3):
             f = force[:, axis]
             h = np.column_stack([np.ones(len(f)), force, theta, theta**2, theta * f, theta**2 * f])
-            found[u, axis] = np.linalg.lstsq(h, out[u, :, axis], rcond=None)[0]
-    return found
+            solution[u, axis] = np.linalg.lstsq(h, out[u, :, axis], rcond=None)[0]
+    return solution
 
 
 def with_imucal(up: Array, down: Array, samples: int) -> Callable[[], None]:
@@ -129,7 +129,7 @@ def main() -> None:
     common = State(force=force, time=state.time, temperature=heat[0])
     rows = (
         ("linear, one plan for the lot", LINEAR, plan, None, lambda: loop_linear(force, out)),
-        ("linear, each unit its weights", LINEAR, state, error, lambda: loop_linear(force, out, error)),
+        ("linear, weights by unit", LINEAR, state, error, lambda: loop_linear(force, out, error)),
         (
             "thermal, one temperature",
             THERMAL,
@@ -137,7 +137,7 @@ def main() -> None:
             None,
             lambda: loop_thermal(force, out, np.broadcast_to(heat[:1], heat.shape)),
         ),
-        ("thermal, each unit its own", THERMAL, state, None, lambda: loop_thermal(force, out, heat)),
+        ("thermal, by unit", THERMAL, state, None, lambda: loop_thermal(force, out, heat)),
     )
     for name, effects, where, weight, loop in rows:
 
@@ -147,7 +147,7 @@ def main() -> None:
         fast, slow = best(batch, options.rounds), best(loop, max(1, options.rounds // 2))
         off = np.abs(np.sort(batch()) - np.sort(loop())).max()
         print(
-            f"{name:<30} batch {1e3 * fast:7.1f} ms   loop {1e3 * slow:7.1f} ms   ratio {slow / fast:6.1f}   off by {off:.0e}"
+            f"{name:<30} batch {1e3 * fast:7.1f} ms   loop {1e3 * slow:7.1f} ms   ratio {slow / fast:6.1f}   difference {off:.0e}"
         )
     six(options.units, options.rounds, rng)
 

@@ -1,13 +1,13 @@
 """A generated archive of many lots in the archive's own format: `python benchmarks/generated_archive.py FOLDER --lots 10000`.
 
-Ten units a lot, 24 poses at three temperatures for the fit (72 dwells) and four for verification; half of the lots are
-new units, half units that come back about every half year. What is hidden in it (a drifting unit, two exchanged
-serials, a table that went out of level on a day, a knocked slot, a bad lot, a gauge study) is written beside the
+Each lot has ten units, 24 poses at three temperatures for the fit (72 dwells) and four for verification. Half of the lots have
+new units, half have units that return about every half year. The hidden events (a drifting unit, two exchanged
+serials, a change of the level of a table, a shifted slot, a bad lot, a gauge study) are written beside the
 archive, as FOLDER.truth.json.
 
-Files are written without fsync and without the product's stages: plain least squares stands for an earlier version of
-the code. Records (raw samples) are not made: re-runs begin at the fit, and `tumbleline verify` rightly says of every run that
-its capture is missing and that it has no report.
+Files are written without fsync and without the stages of the product: ordinary least squares represents an earlier version of
+the program. There are no records (raw samples): re-runs start with the fit, and `tumbleline verify` correctly reports for
+every run that its capture and its report are missing.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ import pyarrow.parquet as pq
 ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT))
 
-from benchmarks.generated_lots import PER_LOT, Factory, Lot  # noqa: E402 - run as a script from anywhere
+from benchmarks.generated_lots import PER_LOT, Factory, Lot  # noqa: E402 - run as a script from any folder
 from benchmarks.generated_tables import EFFECTS, Measured, base_tables, decided_tables, fitted_tables  # noqa: E402
 from inertial import poses  # noqa: E402
 from pipelines.archive import files, parquet  # noqa: E402
@@ -44,7 +44,7 @@ from schemas.station import load_station  # noqa: E402
 from stations.plant.device import stream  # noqa: E402
 
 BEGIN = datetime(2021, 1, 4, 6, tzinfo=UTC)
-CODE = "0" * 64  # of an earlier version: today's stages have other keys
+CODE = "0" * 64  # of an earlier version: the present stages have other keys
 VERIFICATION = ((35.0, 15.0), (70.0, 140.0), (105.0, -100.0), (140.0, 60.0))
 LIMITS = {
     "verification_norm_ug": (1500.0, "µg"), "verification_ratio": (1.5, "1"), "bias_error_ug": (1000.0, "µg"),
@@ -58,11 +58,11 @@ STAGES = {
     **dict.fromkeys(("figures", "grades"), "grade"),
 }  # fmt: skip
 ALLAN = ("tau_s", "deviation_ug", "low_ug", "high_ug", "fitted_ug")
-_context: dict[str, Any] = {}  # what the writers share, made before they are forked
+_context: dict[str, Any] = {}  # common data of the writers, made before the fork
 
 
 def recipe_for(device: str) -> Recipe:
-    """The line's recipe: 24 directions spread over the sphere, three temperatures, no static record."""
+    """The recipe: 24 directions spread over the sphere, three temperatures, no static record."""
     fit = [Pose(name=f"p{i:02d}", outer_deg=a, inner_deg=b) for i, (a, b) in enumerate(_directions(24), start=1)]
     check = [Pose(name=f"v{i:02d}", outer_deg=a, inner_deg=b) for i, (a, b) in enumerate(VERIFICATION, start=1)]
     return Recipe(
@@ -78,7 +78,7 @@ def _directions(count: int) -> list[tuple[float, float]]:
 
 
 def write_archive(folder: Path, lots: int, *, years: float = 5.0, seed: int = 1, workers: int = 2) -> dict[str, Any]:
-    """Write the archive; what is hidden in it."""
+    """Write the archive; its hidden events."""
     factory = Factory(lots, years, seed)
     made = factory.lots()
     folder.mkdir(parents=True)
@@ -107,7 +107,7 @@ def write_archive(folder: Path, lots: int, *, years: float = 5.0, seed: int = 1,
 
 
 def _dated(events: dict[str, Any], made: list[Lot]) -> dict[str, Any]:
-    """The events with their dates, and the runs that they concern."""
+    """The events with their dates and runs."""
     out: dict[str, Any] = {}
     for name, event in events.items():
         out[name] = dict(event)
@@ -138,10 +138,10 @@ def _write_chunk(numbers: range) -> int:
 def _write_lot(lot: Lot) -> None:
     limits, device = _context["limits"], lot.device
     recipe, preset = _context["recipes"][device], _context["presets"][device]
-    found = Measured(lot, recipe, preset, stream(_context["seed"], lot.number, "dwells"))
-    content = base_tables(found)
-    content |= fitted_tables(found, _context["names"], _context["texts"][device])
-    content |= decided_tables(found, limits, describe_rule(limits))
+    measured = Measured(lot, recipe, preset, stream(_context["seed"], lot.number, "dwells"))
+    content = base_tables(measured)
+    content |= fitted_tables(measured, _context["names"], _context["texts"][device])
+    content |= decided_tables(measured, limits, describe_rule(limits))
     content |= _no_static_record()
     run = _context["folder"] / "runs" / _run_id(lot)
     run.mkdir(parents=True)
@@ -215,14 +215,16 @@ def _arrays(columns: dict[str, Any]) -> list[tuple[str, np.ndarray]]:
 
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("folder", type=Path, help="where the archive is made; must not be there")
-    parser.add_argument("--lots", type=int, default=10000, help="of ten units each")
+    parser.add_argument("folder", type=Path, help="folder of the archive; must not exist")
+    parser.add_argument("--lots", type=int, default=10000, help="number of lots of ten units")
     parser.add_argument("--years", type=float, default=5.0)
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--workers", type=int, default=2)
     options = parser.parse_args()
     if options.folder.exists():
-        print(f"generated_archive: {options.folder} is there already; give a new folder", file=sys.stderr)
+        print(
+            f"generated_archive: {options.folder} exists already, a new folder is needed; give another", file=sys.stderr
+        )
         return 2
     start = time.perf_counter()
     truth = write_archive(options.folder, options.lots, years=options.years, seed=options.seed, workers=options.workers)

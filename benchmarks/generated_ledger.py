@@ -1,4 +1,4 @@
-"""The ledger of a generated archive: every calibration that passed is certified for a year, the next one takes its place."""
+"""The ledger of a generated archive: every passed calibration is certified for a year or until the next one."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ VALID_MONTHS = 12
 
 
 def write_ledger(folder: Path, calibrations: Iterable[tuple[str, str, str, str, str]]) -> int:
-    """Number of the events written.
+    """Writes the events; their number.
 
     Parameters
     ----------

@@ -1,7 +1,7 @@
-"""A made-up factory: units that drift over years, stations that get out of level, and the dwells that would be measured.
+"""A simulated factory: units that drift over years, stations whose level changes, and their dwells.
 
-The physics is the simulated plant's (:mod:`stations.plant`), not the columns of the fit nor the statistics of the audit,
-and what is true of every unit and station stays known.
+The physics is that of the simulated plant (:mod:`stations.plant`), not the columns of the fit or the statistics of the audit;
+the truth of every unit and station is known.
 """
 
 from __future__ import annotations
@@ -20,12 +20,12 @@ STATIONS = ("line-1", "line-2", "line-3", "line-4")
 PER_LOT = 10
 SLOTS = 12
 CHECK_SLOT = 10
-DEVICES = ("ADXL355", "ADXL355", "SF1500")  # two lots of the one to one of the other
+DEVICES = ("ADXL355", "ADXL355", "SF1500")  # two lots of the first type for one of the second
 SLOPE_UG = {"ADXL355": 60.0, "SF1500": 20.0}  # per year, one sigma over units
 WALK_UG = {"ADXL355": 40.0, "SF1500": 15.0}  # per root year
 SCALE_SLOPE_PPM = 25.0
-MOUNT_RAD, MOUNT_UG = 100e-6, 30.0  # what seating a unit anew changes
-TAU_S = (30.0, 300.0, 3000.0)  # of the processes that make the wander between dwells
+MOUNT_RAD, MOUNT_UG = 100e-6, 30.0  # change by reseating a unit
+TAU_S = (30.0, 300.0, 3000.0)  # time constants of the drift between dwells
 
 LEVEL_STATION, LEVEL_AT, LEVEL_RAD = "line-2", 0.8, 300e-6
 KNOCKED_STATION, KNOCKED_SLOT, KNOCKED_AT, KNOCKED_RAD = "line-3", 4, 0.5, 1.5e-3
@@ -36,8 +36,8 @@ GAUGE_MOUNTS, GAUGE_STATIONS, GAUGE_FEWEST_LOTS = 3, 3, 400
 
 
 @dataclass
-class Made:
-    """One unit: what it is when new, and how it changes."""
+class FactoryUnit:
+    """One unit: its initial state and its drift."""
 
     truth: Truth
     device: str
@@ -48,7 +48,7 @@ class Made:
     last_d: float = 0.0
 
     def at(self, day: float, rng: np.random.Generator) -> Truth:
-        """What the unit is on a day; days must come in order."""
+        """The state of the unit on a day; days must be in order."""
         years = (day - self.born_d) / YEAR_D
         since = max(day - self.last_d, 0.0) / YEAR_D
         self.walk_ug = self.walk_ug + WALK_UG[self.device] * math.sqrt(since) * rng.standard_normal(3)
@@ -62,7 +62,7 @@ class Made:
 
 @dataclass
 class Lot:
-    """One lot: where, when, which units in which slots, under which serials, and what is true of them that day."""
+    """One lot: station, day, units, slots, serials, and the true state on that day."""
 
     number: int
     day: float
@@ -84,7 +84,7 @@ class Factory:
         self.presets = {name: load_preset(name) for name in set(DEVICES)}
         self.level = {s: 60e-6 * self.rng.standard_normal(2) for s in STATIONS}
         self.slots = {s: 1e-3 * self.rng.standard_normal((SLOTS, 3)) for s in STATIONS}
-        self.units: dict[str, Made] = {}
+        self.units: dict[str, FactoryUnit] = {}
         self.queue: list[list[str]] = []
         self.events: dict[str, object] = {}
         self.checked: dict[str, float] = {}
@@ -92,7 +92,7 @@ class Factory:
             self._make(f"CS-{station}", "ADXL355", 0.0, quiet=0.1)
 
     def lots(self) -> list[Lot]:
-        """Every lot with what is true of it."""
+        """Every lot with its truth."""
         pool = max(3, self.count // 20)
         gauge = self._gauge() if self.count >= GAUGE_FEWEST_LOTS else {}
         out = []
@@ -111,7 +111,7 @@ class Factory:
         return out
 
     def _gauge(self) -> dict[int, str]:
-        """Lots that are a gauge study: the same units on three stations, three times, one lot after the other."""
+        """Lots of a gauge study: the same units on three stations, three times, in consecutive lots."""
         first = int(GAUGE_AT * self.count)
         mounts = GAUGE_STATIONS * GAUGE_MOUNTS
         self.events["gauge"] = {"first_lot": first, "lots": mounts}
@@ -129,14 +129,14 @@ class Factory:
             where = {"station": KNOCKED_STATION, "slot": KNOCKED_SLOT}
             self.events["slot"] = {**where, "day": KNOCKED_AT * self.days, "by_rad": KNOCKED_RAD}
 
-    def _make(self, serial: str, device: str, day: float, quiet: float = 1.0) -> Made:
+    def _make(self, serial: str, device: str, day: float, quiet: float = 1.0) -> FactoryUnit:
         rng = stream(self.seed, serial, "ageing")
         preset = self.presets[device]
         truth = draw_truth(
             preset, serial, self.seed, slot_rotation=np.eye(3), supply_ratio=1.0, output_scale=preset.scale
         )
         slope = quiet * SLOPE_UG[device] * rng.standard_normal(3)
-        made = Made(truth, device, day, slope, quiet * SCALE_SLOPE_PPM * rng.standard_normal(3), last_d=day)
+        made = FactoryUnit(truth, device, day, slope, quiet * SCALE_SLOPE_PPM * rng.standard_normal(3), last_d=day)
         self.units[serial] = made
         return made
 
@@ -155,7 +155,7 @@ class Factory:
         return self._measured(number, day, station, serials, "production")
 
     def _next_group(self) -> list[str]:
-        """The next ten units that are due, of one kind; every round mixes them anew over stations and slots."""
+        """The next ten units due of one type; every round distributes them again over stations and slots."""
         if not self.queue:
             for device in sorted(set(DEVICES)):
                 known = [s for s, unit in self.units.items() if unit.device == device and s.startswith("P")]
@@ -187,23 +187,23 @@ class Factory:
         return Lot(number, day, station, device, kind, list(serials), slots, truths, up)
 
     def _seated(self, truth: Truth, station: str, slot: int) -> Truth:
-        """A unit in a slot: the slot's rotation, and what this seating adds."""
+        """A unit in a slot: the rotation of the slot, and the change by this seating."""
         turned = rotation(self.slots[station][slot] + MOUNT_RAD * self.rng.standard_normal(3))
         stress = 1e-6 * MOUNT_UG * self.rng.standard_normal(3)
         return replace(truth, slot_rotation=turned, bias_g=truth.bias_g + stress)
 
 
 def lot_output(lot: Lot, preset: Preset, force: np.ndarray, temperature: np.ndarray) -> np.ndarray:
-    """Output of a lot's units without noise, (n, s, 3) in g.
+    """Output of the units of a lot without noise, (n, s, 3) in g.
 
-    force : (n, 3), what the table makes of the station's vertical; temperature : (n, s), °C
+    force : (n, 3), the vertical of the station in the frame of the fixture; temperature : (n, s), °C
     """
     turned = rotate(np.stack([t.slot_rotation for t in lot.truths]), force[:, None, :])
     return Devices(preset, lot.truths).output(turned, temperature)
 
 
 def table_force(outer_deg: np.ndarray, inner_deg: np.ndarray, up: np.ndarray) -> np.ndarray:
-    """The station's vertical (3,) seen from the fixture at table angles (n,), as (n, 3): two turns of the frame, written out."""
+    """The vertical (3,) of the station in the frame of the fixture at table angles (n,), as (n, 3): two explicit rotations."""
     outer, inner = np.radians(outer_deg), np.radians(inner_deg)
     x, y, z = up
     y_out = y * np.cos(outer) + z * np.sin(outer)
@@ -214,7 +214,7 @@ def table_force(outer_deg: np.ndarray, inner_deg: np.ndarray, up: np.ndarray) ->
 
 
 def dwell_noise(preset: Preset, time_s: np.ndarray, dwell_s: float, units: int, rng: np.random.Generator) -> np.ndarray:
-    """Noise of the means of dwells, (n, units, 3) in g: white, and wander that remembers for seconds to hours."""
+    """Noise of the means of dwells, (n, units, 3) in g: white noise, and drift with correlation times from seconds to hours."""
     white = (
         1e-6 * preset.noise_density_ug * math.sqrt(1.0 / (2.0 * dwell_s)) * rng.standard_normal((time_s.size, units, 3))
     )

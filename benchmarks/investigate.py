@@ -1,10 +1,10 @@
-"""Closes the loop on runs that begin ambiguous: `python benchmarks/investigate.py --seeds 3 --jobs 2`.
+"""Closed loop on initially ambiguous runs: `python benchmarks/investigate.py --seeds 3 --jobs 2`.
 
-An effect is hidden in the simulated station by its mechanism (stations/plant/hidden/, no column of the fit), and the recipe
-has a blind spot: edges without directions between, one wait, soaks one way, one temperature. Counted are the runs whose first
-diagnosis had the truth in a class with others, or among what it could not see; printed is in how many of them the truth stood
-alone in its class at the end, what station time the follow-ups took beside the first run, and what became of the rest: an
-open class is a weaker answer, another effect named alone in the truth's place is a wrong one.
+A mechanism is hidden in the simulated station (stations/plant/hidden/, no column of the fit), and the recipe cannot identify
+it: edges without directions between, one wait, soaks in one direction, one temperature. A run is ambiguous if its first
+diagnosis has the true effect in a class with others, or in the list of effects that are not visible. The output is the number
+of these runs with the true effect alone in its class at the end, the station time of the follow-ups relative to the first
+run, and the result of the other runs: an open class is a weaker answer, another effect alone in its class is a wrong one.
 """
 
 from __future__ import annotations
@@ -21,7 +21,9 @@ from pathlib import Path
 from typing import Any
 
 for _name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
-    os.environ.setdefault(_name, "1")  # before numpy: threads of two processes fight over two cores
+    os.environ.setdefault(
+        _name, "1"
+    )  # before the import of numpy: threads of two processes would compete for two cores
 
 ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT))
@@ -39,9 +41,9 @@ STEADY = {"bias_tempco_ug_per_K": 2.0, "scale_tempco_ppm_per_K": 4.0}
 
 @dataclass(frozen=True)
 class Scene:
-    """A hidden mechanism, the effects that are it, and a recipe with a blind spot.
+    """A hidden mechanism, its effects, and a recipe that cannot identify it.
 
-    truths : ids of the catalogue that describe the mechanism: one of them alone in its class is right
+    truths : ids of the catalogue that describe the mechanism; one of them alone in its class is correct
     """
 
     name: str
@@ -123,7 +125,7 @@ class Outcome:
 
 
 def job_of(scene: Scene, seed: int, units: int) -> Any:
-    """The job of a scene: a lot of quiet units on the simulated station with the mechanism in it."""
+    """The job of a scene: a lot of quiet units on the simulated station with the mechanism."""
     import numpy as np
 
     from inertial import poses
@@ -140,7 +142,7 @@ def job_of(scene: Scene, seed: int, units: int) -> Any:
     plain = load_recipe()
     changes = {
         "name": scene.name.replace(" ", "-"),
-        "description": "a recipe with a blind spot",
+        "description": "a recipe that cannot identify the mechanism",
         "poses": [
             {"name": f"p{k + 1:03d}", "outer_deg": o, "inner_deg": i} for k, (o, i) in enumerate(angles.tolist())
         ],
@@ -183,7 +185,7 @@ def one(task: tuple[str, int, int, float]) -> Outcome:
 
 
 def quickly(name: str, runner: Any) -> Any:
-    """A stage as a plain call; what the inquiry does not read is left out."""
+    """A stage as a plain call; stages that the inquiry does not use are skipped."""
     from pipelines.chain.runner import Done
 
     if name in {"fit", "verify", "noise", "grade", "report"}:
@@ -192,7 +194,7 @@ def quickly(name: str, runner: Any) -> Any:
 
 
 def outcome(scene: Scene, seed: int, looks: list[Any], document: dict[str, Any], seconds: float) -> Outcome:
-    """What came of an inquiry."""
+    """The outcome of an inquiry."""
     first = [group["effects"] for group in looks[0].document["classes"]]
     last = [group["effects"] for group in document["classes"]]
     held = [group for group in first if set(group) & set(scene.truths)]
@@ -219,9 +221,9 @@ def outcome(scene: Scene, seed: int, looks: list[Any], document: dict[str, Any],
     )
 
 
-def show(found: list[Outcome]) -> None:
+def show(outcomes: list[Outcome]) -> None:
     """Prints a line per inquiry, then the figures."""
-    for o in found:
+    for o in outcomes:
         first, last = (" ; ".join("|".join(g) for g in groups) or "nothing" for groups in (o.first, o.last))
         mark = "    "
         if o.ambiguous:
@@ -230,23 +232,24 @@ def show(found: list[Outcome]) -> None:
             f"{mark} {o.scene} [{o.seed}] {'ambiguous' if o.ambiguous else 'clear'}: {first} -> {last} "
             f"({o.rounds} rounds, {o.extra_minutes:.1f} of {o.first_minutes:.0f} min extra, {o.ended}, {o.seconds:.0f} s)"
         )
-    begun = [o for o in found if o.ambiguous]
-    if not begun:
-        print("no run began ambiguous")
+    ambiguous = [o for o in outcomes if o.ambiguous]
+    if not ambiguous:
+        print("no run was ambiguous at first")
         return
-    alone = sum(o.alone for o in begun)
-    shares = sorted(o.extra_minutes / o.first_minutes for o in begun)
+    alone = sum(o.alone for o in ambiguous)
+    shares = sorted(o.extra_minutes / o.first_minutes for o in ambiguous)
     print(
-        f"{len(found)} runs, {len(begun)} began ambiguous: truth alone in its class in {alone} "
-        f"({100.0 * alone / len(begun):.0f} %); extra station time {100.0 * sum(shares) / len(shares):.0f} % in the mean, "
-        f"{100.0 * shares[len(shares) // 2]:.0f} % in the median, {100.0 * shares[-1]:.0f} % at the most"
+        f"{len(outcomes)} runs, {len(ambiguous)} ambiguous at first: true effect alone in its class in {alone} "
+        f"({100.0 * alone / len(ambiguous):.0f} %); extra station time {100.0 * sum(shares) / len(shares):.0f} % on average, "
+        f"{100.0 * shares[len(shares) // 2]:.0f} % in the median, {100.0 * shares[-1]:.0f} % at most"
     )
-    still = sum(not o.alone and not o.lost for o in begun)
-    wrong, lost = sum(o.wrong for o in begun), sum(o.lost and not o.wrong for o in begun)
-    beside = sum(o.beside for o in begun)
+    still = sum(not o.alone and not o.lost for o in ambiguous)
+    wrong, lost = sum(o.wrong for o in ambiguous), sum(o.lost and not o.wrong for o in ambiguous)
+    beside = sum(o.beside for o in ambiguous)
     print(
-        f"of the others: {still} with the truth in a class that is open, {lost} with the truth in none and nothing named alone, "
-        f"{wrong} with another effect named in its place; another is named beside the truth in {beside}"
+        f"of the others: {still} with the true effect in an open class, {lost} with the true effect in no class and no other "
+        f"named alone, "
+        f"{wrong} with another effect in its place; another effect in addition to the true one in {beside}"
     )
 
 
@@ -257,9 +260,7 @@ def arguments() -> argparse.Namespace:
     parser.add_argument("--first", type=int, default=1, help="the first seed")
     parser.add_argument("--scene", action="append", choices=[s.name for s in SCENES], help="only these (repeatable)")
     parser.add_argument("--units", type=int, default=4)
-    parser.add_argument(
-        "--budget", type=float, default=0.0, help="station minutes; 30 %% of the first run's by default"
-    )
+    parser.add_argument("--budget", type=float, default=0.0, help="station minutes; by default 30 %% of the first run")
     parser.add_argument("--jobs", type=int, default=1)
     parser.add_argument("--out", type=Path, help="JSON lines with every outcome")
     return parser.parse_args()
@@ -273,15 +274,15 @@ def main() -> None:
         for n in names
         for s in range(options.first, options.first + options.seeds)
     ]
-    found: list[Outcome] = []
+    outcomes: list[Outcome] = []
     with ProcessPoolExecutor(options.jobs) as pool:
         for result in pool.map(one, tasks) if options.jobs > 1 else map(one, tasks):
-            found.append(result)
-            print(f"\r{len(found)}/{len(tasks)} {result.scene:28}", end="", file=sys.stderr, flush=True)
+            outcomes.append(result)
+            print(f"\r{len(outcomes)}/{len(tasks)} {result.scene:28}", end="", file=sys.stderr, flush=True)
     print(file=sys.stderr)
     if options.out:
-        options.out.write_text("".join(json.dumps(vars(o)) + "\n" for o in found))
-    show(found)
+        options.out.write_text("".join(json.dumps(vars(o)) + "\n" for o in outcomes))
+    show(outcomes)
 
 
 if __name__ == "__main__":

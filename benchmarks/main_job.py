@@ -1,7 +1,7 @@
 """The main job, timed from the command to the report: `python benchmarks/main_job.py`.
 
-`tumbleline run` is started as a user starts it, once with `--direct` and once through the orchestrator, each in an empty
-archive of its own. Wall time by stage is what the command itself tells; peak memory is of the command's process, and for the
+`tumbleline run` is started as by a user, once with `--direct` and once through the orchestrator, each in a new
+archive. Wall times by stage are those that the command prints; peak memory is that of the process of the command, and for the
 orchestrator also of its server.
 """
 
@@ -27,7 +27,7 @@ WAYS = {"direct": ("--direct",), "orchestrator": ()}
 
 @dataclass
 class Timed:
-    """One run: wall time in s, of the whole and of each stage, and peak memory in bytes of the command and its server."""
+    """One run: wall time in s, total and of each stage, and peak memory in bytes of the command and its server."""
 
     seconds: float = 0.0
     stages: dict[str, float] = field(default_factory=dict)
@@ -37,32 +37,32 @@ class Timed:
 
     @property
     def outside_capture(self) -> float:
-        """Time of all stages but the capture, s."""
+        """Time of all stages except the capture, s."""
         return sum(seconds for name, seconds in self.stages.items() if name != "capture")
 
     @property
     def around(self) -> float:
-        """Time in no stage: interpreter, imports, start of the orchestrator, its history, s."""
+        """Time outside the stages: interpreter, imports, start and history of the orchestrator, s."""
         return self.seconds - sum(self.stages.values())
 
 
 def resident(pid: int) -> int:
-    """Peak resident memory of a process, bytes; 0 where it has gone or the system does not tell."""
+    """Peak resident memory of a process, bytes; 0 where it has ended or the system does not report it."""
     try:
         status = Path(f"/proc/{pid}/status").read_text()
     except OSError:
         return 0
-    found = re.search(r"VmHWM:\s+(\d+) kB", status)
-    return 1024 * int(found[1]) if found else 0
+    match = re.search(r"VmHWM:\s+(\d+) kB", status)
+    return 1024 * int(match[1]) if match else 0
 
 
 def server_of(archive: Path) -> int:
-    """Process id of the orchestrator's server beside an archive; 0 while there is none."""
+    """Process id of the server of the orchestrator beside an archive; 0 without one."""
     try:
-        found = re.search(r'"pid":\s*(\d+)', (archive / "orchestrator" / "server.json").read_text())
+        match = re.search(r'"pid":\s*(\d+)', (archive / "orchestrator" / "server.json").read_text())
     except OSError:
         return 0
-    return int(found[1]) if found else 0
+    return int(match[1]) if match else 0
 
 
 def timed(recipe: str, options: tuple[str, ...]) -> Timed:
@@ -76,8 +76,8 @@ def timed(recipe: str, options: tuple[str, ...]) -> Timed:
         process = subprocess.Popen(
             command, cwd=ROOT, env=environment, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True
         )
-        told: list[str] = []
-        reader = threading.Thread(target=lambda: told.extend(process.stderr or ()))
+        output: list[str] = []
+        reader = threading.Thread(target=lambda: output.extend(process.stderr or ()))
         reader.start()
         while process.poll() is None:
             out.command_bytes = max(out.command_bytes, resident(process.pid))
@@ -87,8 +87,8 @@ def timed(recipe: str, options: tuple[str, ...]) -> Timed:
         reader.join()
     out.status = process.returncode
     if out.status not in {0, 1}:
-        raise RuntimeError(f"main_job: status {out.status}: {''.join(told)[-2000:]}")
-    out.stages = {m[1]: float(m[2]) for line in told if (m := STAGE.match(line.strip()))}
+        raise RuntimeError(f"main_job: status {out.status}: {''.join(output)[-2000:]}")
+    out.stages = {m[1]: float(m[2]) for line in output if (m := STAGE.match(line.strip()))}
     return out
 
 

@@ -1,4 +1,4 @@
-"""How often what is said of noise is wrong, on noise of an independent generator: `python benchmarks/noise_verdicts.py terms`.
+"""Rates of wrong statements about noise, with noise of an independent generator: `python benchmarks/noise_verdicts.py terms`.
 
 Each scene prints counts with exact 95 % intervals (Clopper and Pearson). The generator (`tests/independent_noise.py`) shares no
 code with the estimators.
@@ -36,7 +36,7 @@ RATE, SAMPLES = 10.0, 36_000
 
 
 def terms(records: int, seed: int) -> None:
-    """White noise and a walk: the ramp that is not there, and whether the limits and intervals of N, B, K, R hold the truth."""
+    """White noise and random walk: false ramps, and coverage of the limits and intervals of N, B, K, R."""
     rng = np.random.default_rng(seed)
     density = 100.0
     for walk, flicker in ((0.3, 0.0), (1.0, 0.0), (3.0, 0.0), (10.0, 0.0), (0.0, 0.0), (0.0, 30.0), (3.0, 30.0)):
@@ -57,24 +57,24 @@ def terms(records: int, seed: int) -> None:
             )
             if known.any():
                 held = known & (low <= true) & (true <= high)
-                print(made.told(f"  {symbol} interval holds the truth", int(held.sum()), int(known.sum())))
+                print(made.told(f"  {symbol} interval contains the truth", int(held.sum()), int(known.sum())))
             if not known.all():
                 held = ~known & (true <= high)
-                print(made.told(f"  {symbol} upper limit holds the truth", int(held.sum()), int((~known).sum())))
+                print(made.told(f"  {symbol} upper limit is above the truth", int(held.sum()), int((~known).sum())))
 
 
 CHECKS = ((35.0, 15.0), (125.0, -160.0), (70.0, 100.0), (160.0, 20.0), (100.0, -60.0), (20.0, -120.0))
 
 
 def verification(records: int, seed: int) -> None:
-    """The RMS error of the verification: its standard deviation between runs, and what is told of it."""
+    """The RMS error of the verification: its standard deviation between runs, and its stated uncertainty."""
     rng = np.random.default_rng(seed)
     for name, world in (
         ("B 30 µg", {"flicker": 30.0}),
         ("B 300 µg", {"flicker": 300.0}),
         ("B 30 µg, K 1 µg/√s", {"flicker": 30.0, "walk": 1.0}),
     ):
-        shown, told, plain = [], [], []
+        shown, stated, plain = [], [], []
         for _ in range(records):
             dwells = lots.world(
                 rng,
@@ -96,19 +96,19 @@ def verification(records: int, seed: int) -> None:
                     rms = float(np.sqrt(np.mean(own[f"error_{axis}_ug"] ** 2)))
                     shown.append(rms)
                     plain.append(rms / np.sqrt(2.0 * len(own)))
-                    told.append(float(own.get(f"rms_uncertainty_{axis}_ug", pd.Series([np.nan])).iloc[0]))
+                    stated.append(float(own.get(f"rms_uncertainty_{axis}_ug", pd.Series([np.nan])).iloc[0]))
         centre, real = float(np.mean(shown)), float(np.std(shown))
         print(
             f"{name}: rms error {centre:.1f} µg, between runs {real:.1f}; "
-            f"told rms/√(2n) {np.median(plain):.1f}, covariance {np.median(told):.1f}"
+            f"stated: rms/√(2n) {np.median(plain):.1f}, covariance {np.median(stated):.1f}"
         )
-        for what, u in (("rms/√(2n)", plain), ("the verification's covariance", told)):
+        for what, u in (("rms/√(2n)", plain), ("the verification's covariance", stated)):
             held = int(np.sum(np.abs(np.array(shown) - centre) <= 2.0 * np.array(u)))
-            print(made.told(f"  U (k = 2) by {what} holds the mean over runs", held, len(shown)))
+            print(made.told(f"  U (k = 2) by {what} contains the mean over runs", held, len(shown)))
 
 
 def bias(records: int, seed: int) -> None:
-    """Six faces at one temperature, and three rounds of 24 poses: what the stated uncertainties of the bias hold."""
+    """Six faces at one temperature, and three rounds of 24 poses: coverage of the stated uncertainties of the bias."""
     rounds = {"plan": "fibonacci", "temperatures": (25.0, 25.0, 25.0), "move_s": 20}
     rng = np.random.default_rng(seed)
     for name, world in (
@@ -134,7 +134,7 @@ def bias(records: int, seed: int) -> None:
             stated |= {n: own[n].to_numpy().reshape(-1, 3) for n in ("bias_record_u_ug", "bias_long_u_ug") if n in own}
             for what, u in stated.items():
                 for whom, truth in (("the record's mean", one.record), ("the day's mean", one.day)):
-                    key = f"  2·{what} holds {whom}"
+                    key = f"  2·{what} contains {whom}"
                     sums[key] = sums.get(key, 0) + int(np.sum(np.abs(value - truth) <= 2.0 * u))
             total += value.size
             ratio.append(np.mean(stated["standard error"]))
@@ -147,7 +147,7 @@ def bias(records: int, seed: int) -> None:
 
 
 def sphere(records: int, seed: int) -> None:
-    """Sphere fit of dwells whose poses are unknown: what twice the stated error of bias and scale holds."""
+    """Sphere fit of dwells with unknown poses: coverage of twice the stated error of bias and scale."""
     rng = np.random.default_rng(seed)
     thrice = (25.0, 25.0, 25.0)
     for name, world in (
@@ -175,13 +175,13 @@ def sphere(records: int, seed: int) -> None:
             spread = np.sqrt(np.diagonal(found.covariance)[3:6])
             held[1] += int(np.sum(np.abs(np.diagonal(found.correction) - np.diagonal(correction)) <= 2.0 * spread))
         print(f"sphere fit, 24 poses of 10 s every 30 s, one unit, {name}")
-        print(made.told("  2·u holds the bias of the day after", int(held[2]), 3 * records))
-        print(made.told("  2·u holds the record's mean bias", int(held[0]), 3 * records))
-        print(made.told("  2·u holds the inverse of the scale", int(held[1]), 3 * records))
+        print(made.told("  2·u contains the bias of the next day", int(held[2]), 3 * records))
+        print(made.told("  2·u contains the mean bias of the record", int(held[0]), 3 * records))
+        print(made.told("  2·u contains the inverse of the scale", int(held[1]), 3 * records))
 
 
 def series(records: int, seed: int) -> None:
-    """Series of a level that stands still: change points and control charts that say that it moved; and a step that is there.
+    """Series with a constant level: false change points and alarms of control charts; and series with a step.
 
     Of the changes found at p ≤ 0.01, those below 0.001 and 0.0001 are counted.
     """
@@ -210,18 +210,18 @@ def series(records: int, seed: int) -> None:
             for level in (0.01, 0.001):
                 print(made.told(f"{title}: out of control at p < {level:g}", int(np.sum(p < level)), records))
             found = sum(p_of_alarms(v + 2.0 * (np.arange(n) >= first), first) < 0.01 for v in made_)
-            print(made.told("    2 σ off after the baseline is found", found, records))
+            print(made.told("    a change of 2 σ after the baseline is found", found, records))
 
 
 def p_of_alarms(values: np.ndarray, first: int) -> float:
-    """Probability of a chart's alarms by chance, as the audit takes it."""
+    """Probability of the alarms of a chart by chance, as in the audit."""
     rules, moving = signals(values, baseline(values, first))
     number = alarms(rules, moving.outside, np.arange(values.size) >= first)
     return chance_of_alarms(values, first, values.size - first).p_value(number)
 
 
 def record(records: int, seed: int) -> None:
-    """Static records in a drifting room, and of coarse digits: what is said with the samples alone, and by the stage."""
+    """Static records in a room with drift, and with coarse resolution: results from the samples alone, and of the stage."""
     rng = np.random.default_rng(seed)
     dwells = lots.world(rng, units=1, temperatures=(0.0, 25.0, 50.0), flicker=0.0, density=1.0, day_s=0).dwells
     for axis in "xyz":
@@ -230,13 +230,13 @@ def record(records: int, seed: int) -> None:
     tables = fitted["coefficients"], fitted["covariance"]
     n, seconds = SAMPLES, SAMPLES / RATE
     for room_k in (0.1, 0.3):
-        slow = {"samples alone": 0, "tempco taken out": 0}
+        slow = {"samples alone": 0, "temperature coefficient removed": 0}
         for _ in range(records):
             history, course = lots.room(rng, 1, seconds, room_k)
             drift = 50.0 * np.interp(np.arange(n) / RATE, np.arange(0.0, seconds + 1.0, 10.0), course - 25.0)
             values = made.white(rng, 3, n, 25.0, RATE).T + drift[:, None]
             samples, readings = lots.static_record(1e-6 * values[None], RATE)
-            for name, past in (("samples alone", None), ("tempco taken out", history)):
+            for name, past in (("samples alone", None), ("temperature coefficient removed", history)):
                 rows = noise([samples], readings, *tables, past)["noise"]
                 slow[name] += int(rows[rows["term"].isin(["B", "K", "R"])].groupby("axis")["identified"].any().sum())
         for name, count in slow.items():
@@ -244,20 +244,20 @@ def record(records: int, seed: int) -> None:
                 made.told(f"room of {room_k:g} K, 50 µg/K, 25 µg/√Hz, {name}: B, K or R identified", count, 3 * records)
             )
     for step in (1.0, 1.8, 3.0, 5.0):
-        lsb, plain, told, held, limits = step * 25.0 * np.sqrt(RATE / 2.0), [], [], 0, 0
+        lsb, plain, stated, held, limits = step * 25.0 * np.sqrt(RATE / 2.0), [], [], 0, 0
         for _ in range(records):
             values = made.white(rng, 3, n, 25.0, RATE).T + rng.uniform(0.0, lsb, 3)
             samples, readings = lots.static_record(1e-6 * lsb * np.round(values / lsb)[None], RATE)
             rows = noise([samples], readings, *tables)["noise"]
             rows = rows[rows["term"] == "n_d"]
             plain += [float(np.sqrt(np.mean(np.diff(lsb * np.round(v / lsb)) ** 2) / RATE)) / 25.0 for v in values.T]
-            told += (rows["value"].dropna() / 25.0).tolist()
+            stated += (rows["value"].dropna() / 25.0).tolist()
             held += int(((rows["low"] <= 25.0) & (rows["high"] >= 25.0)).sum())
             limits += int((rows["value"].isna() & rows["high"].notna()).sum())
         low, middle, high = np.quantile(plain, (0.05, 0.5, 0.95))
-        print(f"digit of {step:g} σ: n_d of the samples {low:.2f} … {middle:.2f} … {high:.2f} of the truth; stated "
-              + (f"{np.mean(told):.3f} ± {np.std(told):.3f}" if told else "no value") + f", {limits} limits")  # fmt: skip
-        print(made.told("    interval or limit holds the truth", held, 3 * records))
+        print(f"resolution of {step:g} σ: n_d of the samples {low:.2f} … {middle:.2f} … {high:.2f} of the truth; stated "
+              + (f"{np.mean(stated):.3f} ± {np.std(stated):.3f}" if stated else "no value") + f", {limits} limits")  # fmt: skip
+        print(made.told("    interval or limit contains the truth", held, 3 * records))
 
 
 SCENES = {

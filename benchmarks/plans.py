@@ -1,9 +1,9 @@
 """Optimal recipes against the textbook plan: `python benchmarks/plans.py --units 200`.
 
-Both recipes are gone through by 200 units drawn from the plant's own physics (transfer, temperature, flicker, random walk,
-converter), at the times at which the station gets to each dwell; dwells are averaged and fitted as the chain does it. What
-is compared are the RMS errors (estimate − truth) of every coefficient, and the minutes of station time. The registers and the
-chamber are left out: a test holds the planned minutes against the simulated station's own clock.
+200 units drawn from the physics of the plant (transfer, temperature, flicker, random walk, converter) are measured with both
+recipes, at the time of each dwell on the station; dwells are averaged and fitted as in the chain. The benchmark compares the
+RMS errors (estimate − truth) of every coefficient, and the station time. Registers and chamber are not simulated: a test
+compares the planned station time with the clock of the simulated station.
 """
 
 from __future__ import annotations
@@ -57,7 +57,7 @@ class Course:
 
 
 def course_of(planned: PlanContext) -> Course:
-    """The dwells of the fit among what a station does."""
+    """The dwells of the fit in the activities of a station."""
     dwells = [s for s in planned.activities if s.kind == "dwell"]
     return Course(
         outer=np.array([s.step.pose.outer_deg for s in dwells]),
@@ -70,24 +70,24 @@ def course_of(planned: PlanContext) -> Course:
 
 
 def truths_of(preset: Preset, units: int, seed: int) -> list[Truth]:
-    """Units whose physics is exactly what the model holds: a comparison of plans, not of models.
+    """Units whose physics is exactly that of the model: a comparison of plans, not of models.
 
-    In the physics the tempco of the scale acts on what misalignment lets in, too. So every second unit is aligned and has one,
-    the others are misaligned and have none: every coefficient is away from zero in half of the units.
+    In the physics the temperature coefficient of the scale also acts on the misaligned force. Every second unit is therefore
+    aligned with such a coefficient, the others are misaligned without it: every coefficient differs from zero in half of them.
     """
-    none, found = np.zeros(3), []
+    none, drawn = np.zeros(3), []
     for k in range(units):
         serial = f"R{k:04d}"
         seat = rotation(1e-3 * stream(seed, serial, "slot").standard_normal(3))
         truth = draw_truth(preset, serial, seed, slot_rotation=seat, supply_ratio=1.0, output_scale=preset.scale)
         truth = replace(truth, cubic=none, bias_tempco_quadratic=none, scale_tempco_quadratic=none)
         aligned = {"misalignment": np.eye(3), "slot_rotation": np.eye(3)}
-        found.append(replace(truth, **(aligned if k % 2 else {"scale_tempco": none})))
-    return found
+        drawn.append(replace(truth, **(aligned if k % 2 else {"scale_tempco": none})))
+    return drawn
 
 
 def measured(course: Course, preset: Preset, truths: list[Truth], seed: int) -> tuple[State, Array, Array]:
-    """State, means and their white errors (units, n, 3) in g, of units that go through a course."""
+    """State, means and their white errors (units, n, 3) in g, of units measured with a plan."""
     parts = [_chunk(course, preset, truths[k : k + CHUNK], seed) for k in range(0, len(truths), CHUNK)]
     mean, sd = (np.concatenate([part[k] for part in parts]) / preset.scale for k in (0, 1))
     lsb = preset.lsb / preset.scale
@@ -144,12 +144,12 @@ def compared(name: str, options: argparse.Namespace) -> None:
     levels = tuple(float(part) for part in options.temperatures.split(","))
     station = load_station()
     against = plan_context(textbook(base, levels), station, noise)
-    wanted = identified(against).errors * options.factor
+    required = identified(against).errors * options.factor
     if options.bias_factor != 1.0:
-        wanted[:, 0] *= options.bias_factor
+        required[:, 0] *= options.bias_factor
     begun = time.perf_counter()
     requirement = Requirement(
-        wanted,
+        required,
         seen_by(against, levels),
         (min(levels), max(levels)),
         candidates(station),
@@ -166,7 +166,7 @@ def compared(name: str, options: argparse.Namespace) -> None:
     heat = ", ".join(f"{t:g}" for t in recipe.temperatures_C)
     print(
         f"{name}: soaks at {heat} °C, {best.planned.state.time.size} dwells of {recipe.dwell_s:g} s in {len(recipe.poses)} poses "
-        f"and {len(recipe.verification)} for verification; found in {took:.0f} s"
+        f"and {len(recipe.verification)} for verification; search time {took:.0f} s"
     )
     for title, course in (("textbook", against), ("optimal", best.planned)):
         parts = spent(course.activities).document()
@@ -174,19 +174,19 @@ def compared(name: str, options: argparse.Namespace) -> None:
         print(f"  {title:<9}{parts['total']:6.0f} min: {spread}")
     bound = lower_bound(base, against, requirement)
     if bound is not None:
-        print(f"  dwells without end would take {100.0 * bound.share:.0f} %, for {bound.effect}")
-    print(f"  station time {100.0 * best.share:.1f} %; errors expected at most {best.worst:.3f} of those wanted")
+        print(f"  uninterrupted measurement needs {100.0 * bound.share:.0f} %, for {bound.effect}")
+    print(f"  station time {100.0 * best.share:.1f} %; expected errors at most {best.worst:.3f} of the required ones")
     names, before = squared_errors(against, preset, options)
     _, after = squared_errors(best.planned, preset, options)
     table(names, before, after, best.expected.errors / identified(against).errors)
 
 
 def squared_errors(course: PlanContext, preset: Preset, options: argparse.Namespace) -> tuple[Names, Array]:
-    """Names, and squared errors (units, 3, p) in g, of fits to what units measured that were drawn from the plant's physics."""
+    """Names, and squared errors (units, 3, p) in g, of fits to measurements of units drawn from the physics of the plant."""
     truths = truths_of(preset, options.units, options.seed)
     state, mean, error = measured(course_of(course), preset, truths, options.seed)
-    found = fit_lot_with_wander(course.recipe.effects, state, mean, error).fit
-    return found.names, (found.coefficients - truth_of(truths, found.names)) ** 2
+    fit = fit_lot_with_wander(course.recipe.effects, state, mean, error).fit
+    return fit.names, (fit.coefficients - truth_of(truths, fit.names)) ** 2
 
 
 def table(names: Names, before: Array, after: Array, expected: Array) -> None:
@@ -198,9 +198,9 @@ def table(names: Names, before: Array, after: Array, expected: Array) -> None:
         a, b = (1e6 * float(np.sqrt(np.mean(x[..., columns]))) for x in (before, after))
         spread = float(np.exp(1.96 / np.sqrt(before[..., columns].size)))  # of the ratio of two independent RMS values
         worse += [effect] if b / a > spread else []
-        said = float(np.sqrt(np.mean(expected[:, columns] ** 2)))
-        print(f"  {effect:<24}{a:10.3g}{b:10.3g}{b / a:8.3f}{b / a / spread:10.3f} …{b / a * spread:6.3f}{said:10.3f}")
-    print(f"  worse than the textbook plan beyond chance: {', '.join(worse) or 'none'}")
+        ratio = float(np.sqrt(np.mean(expected[:, columns] ** 2)))
+        print(f"  {effect:<24}{a:10.3g}{b:10.3g}{b / a:8.3f}{b / a / spread:10.3f} …{b / a * spread:6.3f}{ratio:10.3f}")
+    print(f"  significantly worse than the textbook plan: {', '.join(worse) or 'none'}")
 
 
 def main() -> None:
@@ -209,8 +209,8 @@ def main() -> None:
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--device", action="append", help="preset; adxl355 and analogue by default")
     parser.add_argument("--temperatures", default="-10,25,60")
-    parser.add_argument("--factor", type=float, default=1.0, help="errors wanted over those of the textbook plan")
-    parser.add_argument("--bias-factor", type=float, default=1.0, help="besides, of the bias alone")
+    parser.add_argument("--factor", type=float, default=1.0, help="required errors over those of the textbook plan")
+    parser.add_argument("--bias-factor", type=float, default=1.0, help="additional factor for the bias")
     parser.add_argument(
         "--verification", type=int, default=1, help="dwells of each verification pose; the textbook plan has none"
     )

@@ -1,8 +1,8 @@
 """Recovery of known truth: `python benchmarks/recovery.py --units 200`.
 
-Units are drawn from the plant's own physics (presets, transfer, noise, converter), their dwells averaged as the chain does
-it, without the station in between. Reported per preset: pulls (estimate - truth)/sigma of every coefficient under three
-ways of stating sigma, and the error of the output before and after calibration on poses that the fit has not seen.
+Units are drawn from the physics of the plant (presets, transfer, noise, converter), and their dwells are averaged as in the
+chain, without the station. Output for each preset: pulls (estimate - truth)/sigma of every coefficient for three methods of
+stating sigma, and the error of the output before and after calibration in verification poses.
 """
 
 from __future__ import annotations
@@ -54,7 +54,7 @@ class Measured:
 
 
 def plan(rng: np.random.Generator) -> tuple[Array, Array, Array, Array]:
-    """Force, temperature, time and whether for verification, of every dwell in order."""
+    """Force, temperature, time and use for verification of every dwell in order."""
     fit, check = np.radians(poses.plan("fibonacci24")), np.radians(rng.uniform(-180.0, 180.0, (6, 2)))
     angles = np.tile(np.concatenate([fit, check]), (len(TEMPERATURES), 1))
     force = force_from_angles(angles[:, 0], angles[:, 1])
@@ -83,7 +83,7 @@ def measured(preset: Preset, units: int, seed: int) -> Measured:
     parts = [chunk(preset, truths[k : k + CHUNK], seed, (force, heat, start)) for k in range(0, units, CHUNK)]
     mean, sd = (np.concatenate([part[k] for part in parts]) for k in (0, 1))
     n = round(RATE * DWELL_S)
-    # a reading that does not move has the error of its last digit, not none
+    # a constant reading has the error of its last digit, not zero
     error = np.sqrt(sd**2 / n + np.where(sd < preset.lsb, preset.lsb**2 / 12.0, 0.0))
 
     def state(which: Array) -> State:
@@ -139,7 +139,7 @@ def truth_of(truths: list[Truth], names: tuple[tuple[tuple[str, str], ...], ...]
 
 
 def pulls(data: Measured) -> None:
-    """Prints mean and standard deviation of the pulls for three ways of stating sigma."""
+    """Prints mean and standard deviation of the pulls for three methods of stating sigma."""
     plain = fit_lot(EFFECTS, data.state, data.output, data.error)
     wander = fit_lot_with_wander(EFFECTS, data.state, data.output, data.error)
     truth = truth_of(data.truths, plain.names, data.preset.scale)
@@ -147,7 +147,7 @@ def pulls(data: Measured) -> None:
     ways = {
         "white sd/√n": (plain.coefficients - truth) / plain.standard_errors,
         "white × Birge ratio": (plain.coefficients - truth) / (plain.standard_errors * birge),
-        "white + wander": (wander.fit.coefficients - truth) / wander.fit.standard_errors,
+        "white + drift": (wander.fit.coefficients - truth) / wander.fit.standard_errors,
     }
     print(
         f"  between dwells, in standard errors sd/√n: flicker {wander.flicker:.1f}, random walk {wander.walk:.1f} at the"
@@ -171,25 +171,25 @@ def errors(data: Measured) -> None:
     reference = np.broadcast_to(fresh.force, data.fresh_output.shape)
     before = data.fresh_output / scale - reference
     base = EFFECTS[:7]
-    found = fit_lot_with_wander(base, data.state, data.output, data.error).fit
-    after = correct(base, fresh, data.fresh_output, found.coefficients, found.nonlinear) - reference
+    fit = fit_lot_with_wander(base, data.state, data.output, data.error).fit
+    after = correct(base, fresh, data.fresh_output, fit.coefficients, fit.nonlinear) - reference
     best = fit_lot(EFFECTS, data.state, data.output, data.error)
     truth = truth_of(data.truths, best.names, scale)
     floor = correct(EFFECTS, fresh, data.fresh_output, truth, best.nonlinear) - reference
     turned_on = before - before.mean(axis=(0, 1))
     notes = NOTES.get(data.preset.name)
-    beside = f"notes {notes[0]:.2f} → {notes[1]:.2f} mg" if notes else "not in the notes"
+    beside = f"published {notes[0]:.2f} → {notes[1]:.2f} mg" if notes else "not published"
     print(
-        f"  error on verification poses {rms(before):.3f} → {rms(after):.4f} mg rms ({beside}); before, less the kind's mean"
-        f" {rms(turned_on):.3f}; with the true coefficients {rms(floor):.4f} mg remain"
+        f"  error on verification poses {rms(before):.3f} → {rms(after):.4f} mg rms ({beside}); "
+        f"before, without the mean of the type {rms(turned_on):.3f}; with the true coefficients {rms(floor):.4f} mg remain"
     )
 
 
-WHY = """Why this differs from the notes. Before: the simulated units carry the presets' turn-on offset, sensitivity error,
-misalignment and slot rotation (ADXL355: 8 mg, 0.3 %, 3 mrad, 1 mrad, one sigma); the notes do not say what their "before"
-contains. After: what the true coefficients would leave is printed beside it, so the remainder is wander of the output
-during the run (bias instability, random walk), which coefficients cannot take out; the notes do not say over which time
-theirs is meant."""
+WHY = """Differences from the published values. Before: the simulated units have the turn-on offset, sensitivity error,
+misalignment and slot rotation of the presets (ADXL355: 8 mg, 0.3 %, 3 mrad, 1 mrad, one sigma); the content of the
+published "before" is not known. After: the error with the true coefficients is printed too, so the remainder is drift
+of the output during the run (bias instability, random walk), which coefficients cannot correct; the time span of the
+published value is not known."""
 
 
 def rms(values: Array) -> float:

@@ -1,10 +1,10 @@
-"""An archive through another model: re-fit and re-grade of 10 000 units × 72 dwells: `python benchmarks/refit.py`.
+"""Re-fit and re-grade of an archive with another model, 10 000 units × 72 dwells: `python benchmarks/refit.py`.
 
-An archive of lots of ten units is generated (see generated_archive.py), then run again with today's code by two worker
-processes of one BLAS thread each, once in memory only (as `tumbleline whatif` does), once with everything written (`tumbleline
-rerun`). Beside it, in the same processes on the same files: the time of reading the tables that a fit needs and of the bare
-solve, one weighted batch fit a lot. Memory is the largest of the parent and its workers together. `--units` may be
-repeated: the cost by the number of units.
+An archive of lots of ten units is generated (see generated_archive.py), then run again with the present program by two worker
+processes of one BLAS thread each, once in memory only (as in `tumbleline whatif`), once with all tables written (`tumbleline
+rerun`). For comparison, in the same processes on the same files: the time to read the tables of a fit and to solve
+one weighted batch fit per lot. Memory is the largest total of the parent and its workers. `--units` may be
+repeated, for the cost by number of units.
 """
 
 from __future__ import annotations
@@ -46,7 +46,7 @@ EFFECTS = (
 
 
 def bare(part: Batch) -> int:
-    """Read what a fit needs of every lot of a portion, and solve it once; how many units."""
+    """Read the tables of a fit for every lot of a batch, and solve it once; the number of units."""
     archive, units = Archive(part.archive), 0
     for run_id in part.runs:
         run = Run(archive, run_id)
@@ -61,7 +61,7 @@ def bare(part: Batch) -> int:
 
 
 class Memory:
-    """The largest resident memory of this process and its children together, MB, watched while a block runs."""
+    """The largest total resident memory of this process and its children during a block, MB."""
 
     def __enter__(self) -> Self:
         self.most, self._stop = 0.0, threading.Event()
@@ -79,7 +79,7 @@ class Memory:
 
 
 def _family(pid: int) -> list[int]:
-    """A process and all below it."""
+    """A process and all its descendants."""
     try:
         children = Path(f"/proc/{pid}/task/{pid}/children").read_text(encoding="ascii").split()
     except OSError:
@@ -88,7 +88,7 @@ def _family(pid: int) -> list[int]:
 
 
 def _resident(pid: int) -> float:
-    """Resident memory of a process, MB; pages that it shares with others count for each."""
+    """Resident memory of a process, MB; shared pages count for each process."""
     try:
         pages = int(Path(f"/proc/{pid}/statm").read_text(encoding="ascii").split()[1])
     except (OSError, IndexError):
@@ -97,13 +97,13 @@ def _resident(pid: int) -> float:
 
 
 def used() -> float:
-    """Seconds of processor time of this process and of its children that ended."""
+    """Processor time of this process and of its ended children, s."""
     own, children = (resource.getrusage(who) for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN))
     return own.ru_utime + own.ru_stime + children.ru_utime + children.ru_stime
 
 
 def timed(what: str, function: object, archive: Archive, change: ModelChange, workers: int) -> tuple[float, float]:
-    """Seconds by the clock and of processor time for all runs; prints them."""
+    """Wall time and processor time for all runs, s; prints them."""
     runs = archive.run_ids()
     with Memory() as memory:
         start, before = time.perf_counter(), used()
@@ -113,12 +113,12 @@ def timed(what: str, function: object, archive: Archive, change: ModelChange, wo
     if failed:
         sys.exit(f"refit: {what}: {len(failed)} runs failed: {failed[0]}")
     per_lot = 1e3 * seconds / len(runs)
-    print(f"{what:<34} {seconds:7.1f} s   {cpu:7.1f} s processor   {per_lot:6.1f} ms a lot   {memory.most:6.0f} MB")
+    print(f"{what:<34} {seconds:7.1f} s   {cpu:7.1f} s processor   {per_lot:6.1f} ms per lot   {memory.most:6.0f} MB")
     return seconds, cpu
 
 
 def measured(units: int, workers: int, folder: Path) -> None:
-    """All three ways on an archive of so many units."""
+    """All three measurements on an archive with this number of units."""
     place = folder / f"{units}"
     generate = [
         sys.executable,
@@ -130,11 +130,11 @@ def measured(units: int, workers: int, folder: Path) -> None:
     subprocess.run(generate, check=True, stdout=subprocess.DEVNULL)
     archive, change = Archive(place), wanted(",".join(EFFECTS))
     print(f"{units} units in {units // PER_LOT} lots × 72 dwells of the fit, {workers} processes of one thread")
-    read, read_cpu = timed("reading and the bare solve", bare, archive, ModelChange(), workers)
+    read, read_cpu = timed("reading and solution", bare, archive, ModelChange(), workers)
     memory, memory_cpu = timed("re-fit and re-grade in memory", judged, archive, change, workers)
-    whole, whole_cpu = timed("re-fit and re-grade, all written", run_again, archive, change, workers)
+    whole, whole_cpu = timed("re-fit and re-grade, tables written", run_again, archive, change, workers)
     for what, seconds, cpu in (("in memory", memory, memory_cpu), ("all written", whole, whole_cpu)):
-        print(f"  ratio {what}: {seconds / read:.1f} by the clock, {cpu / read_cpu:.1f} of processor time")
+        print(f"  ratio {what}: {seconds / read:.1f} wall time, {cpu / read_cpu:.1f} processor time")
     shutil.rmtree(place)
 
 

@@ -1,9 +1,9 @@
-"""What the station costs: `python benchmarks/station.py`.
+"""Station time and overhead: `python benchmarks/station.py`.
 
-- lots on one fixture: station time (the simulator's clock) of the same recipe for 1, 8, 16 and 32 units
-- orchestration: wall time that the orchestrator adds to a run, against the run's station time, which it would have on hardware
-- a day: 24 h of soaks and dwells of eight units, and a 24 h static record of one unit at 100 Hz streamed to Parquet, judged and
-  analysed; wall time, and the memory of the process as the record goes on
+- lots on one fixture: station time (clock of the simulation) of the same recipe for 1, 8, 16 and 32 units
+- orchestration: additional wall time of the orchestrator, compared with the station time of the run on hardware
+- a day: 24 h of soaks and dwells of eight units, and a 24 h static record of one unit at 100 Hz streamed to Parquet, validated
+  and analysed; wall time, and memory of the process during the record
 """
 
 from __future__ import annotations
@@ -53,17 +53,17 @@ def recipe(folder: Path, name: str, units: int, **figures: object) -> str:
 
 def memory() -> float:
     """Resident memory of this process now, MB."""
-    found = re.search(r"VmRSS:\s+(\d+) kB", Path("/proc/self/status").read_text())
-    return 1024 * int(found[1]) / MB if found else float("nan")
+    match = re.search(r"VmRSS:\s+(\d+) kB", Path("/proc/self/status").read_text())
+    return 1024 * int(match[1]) / MB if match else float("nan")
 
 
 def station_seconds(readings: object) -> float:
-    """From power-on to the end of the last record, s on the station's clock."""
+    """Time from power-on to the end of the last record, s on the clock of the station."""
     return float((readings["start_s"] + readings["duration_s"]).max())
 
 
 def captured(path: str, archive: Path, station: Path | None = None, *, upto: str = "capture") -> tuple[object, float]:
-    """The run of a recipe, direct, as far as a stage; and its wall time in s."""
+    """The direct run of a recipe up to a stage, and its wall time in s."""
     from pipelines.archive import Archive
     from pipelines.chain.chain import ORDER
     from pipelines.chain.runner import Runner
@@ -87,14 +87,14 @@ def lots(folder: Path, sizes: list[int], poses: str) -> None:
         alone = alone or seconds
         sound = readings.loc[readings["status"] == "ok", "unit"].nunique()
         print(
-            f"lot of {units:>2}: {seconds:8.1f} s of station time, {seconds / alone:.4f} of one unit's; "
+            f"lot of {units:>2}: {seconds:8.1f} s of station time, {seconds / alone:.4f} of that of one unit; "
             f"{sound} units measured; {wall:.1f} s of wall time",
             flush=True,
         )
 
 
 def orchestration(name: str) -> None:
-    """What the orchestrator adds to the main job."""
+    """Additional time of the orchestrator in the main job."""
     walls: dict[str, float] = {}
     seconds = 0.0
     for way, options in (("direct", ["--direct"]), ("orchestrator", [])):
@@ -121,8 +121,8 @@ def orchestration(name: str) -> None:
             seconds = station_seconds(Archive(archive).run("latest").table("readings"))
     added = walls["orchestrator"] - walls["direct"]
     print(
-        f"orchestration of '{name}': {walls['direct']:.1f} s direct, {walls['orchestrator']:.1f} s with it: {added:.1f} s more, "
-        f"{added / seconds:.2%} of {seconds:.0f} s of station time",
+        f"orchestration of '{name}': {walls['direct']:.1f} s direct, {walls['orchestrator']:.1f} s with orchestrator: "
+        f"{added:.1f} s more, {added / seconds:.2%} of {seconds:.0f} s of station time",
         flush=True,
     )
 
@@ -145,14 +145,14 @@ def day_of_noise(folder: Path, hours: float, units: int) -> None:
     """A static record of a day."""
     from pipelines.archive import Records
 
-    told: list[float] = []
+    memories: list[float] = []
     part = Records.part
 
-    def noted(self: Records, record: int, number: int, samples: object) -> None:
+    def record_part(self: Records, record: int, number: int, samples: object) -> None:
         part(self, record, number, samples)
-        told.append(memory())
+        memories.append(memory())
 
-    Records.part = noted
+    Records.part = record_part
     path = recipe(folder, "static", units, temperatures="25.0", static=hours * HOUR_S, poses="nine")
     run, wall = captured(path, folder / "static")
     after = memory()
@@ -162,14 +162,14 @@ def day_of_noise(folder: Path, hours: float, units: int) -> None:
     seconds = station_seconds(run.table("readings"))
     samples = sum(len(piece) for piece in run.records.samples())
     first = run.table("allan").query("axis == 'x'").iloc[0]
-    early = told[len(told) // 8] if told else after
+    early = memories[len(memories) // 8] if memories else after
     rate = wall * 24.0 * HOUR_S / seconds
     print(
-        f"static record of {hours:g} h, {units} unit(s) at 100 Hz: {samples} samples in {len(told) + 1} pieces; capture "
+        f"static record of {hours:g} h, {units} unit(s) at 100 Hz: {samples} samples in {len(memories) + 1} parts; capture "
         f"{wall:.0f} s, {rate:.0f} s for 24 h of station time; validate to noise {analysed:.0f} s "
         f"(σ of x {first['deviation_ug']:.0f} µg at {first['tau_s']:.2f} s)"
     )
-    late = told[-1] if told else after
+    late = memories[-1] if memories else after
     print(
         f"  memory: {early:.0f} MB after an eighth of it, {late:.0f} MB at its end, {after:.0f} MB after the capture, "
         f"{memory():.0f} MB after the analysis",

@@ -1,8 +1,8 @@
-"""Samples per second from one slot to one client, against a bare pymodbus loop: `python benchmarks/throughput.py`.
+"""Samples per second from one slot to one client, compared with a plain pymodbus loop: `python benchmarks/throughput.py`.
 
-Both read the same full ring from the same simulated reader, a process of its own, in turns. Ours is what a capture does with it:
-progress, window, unpacking, the check that every sample follows the one before, and the word of what was taken. The bare loop
-reads the same registers with pymodbus' synchronous client and throws them away.
+Both read the same full ring buffer of the same simulated reader, a separate process, alternately. The Tumbleline client
+carries out a complete transfer of a capture: progress, window, unpacking, check of the sequence numbers, and acknowledgement.
+The plain loop reads the same registers with the synchronous client of pymodbus and discards them.
 """
 
 from __future__ import annotations
@@ -46,22 +46,22 @@ def serve() -> None:
 
 
 def bare(client: ModbusTcpClient, device_id: int, samples: int, width: int, address: int) -> float:
-    """Seconds of a loop that does nothing but read the samples."""
+    """Duration of a loop that only reads the samples, s."""
     per_read = LONGEST_READ // width
     begun = time.perf_counter()
     for first in range(0, samples, per_read):
         count = min(per_read, samples - first) * width
         answer = client.read_holding_registers(address + first * width, count=count, device_id=device_id)
         if answer.isError():
-            sys.exit("the bare loop was refused")
+            sys.exit("the plain loop was refused")
     return time.perf_counter() - begun
 
 
 def ours(slot: Slot, registers: Registers, samples: int) -> float:
-    """Seconds of a whole taking, as a capture does it."""
+    """Duration of a complete transfer as in a capture, s."""
     begun = time.perf_counter()
     registers.read_group("progress")
-    counts = slot._window(0, samples, slot.identity())  # noqa: SLF001 - take() empties the ring once; this reads it again
+    counts = slot._window(0, samples, slot.identity())  # noqa: SLF001 - take() empties the ring buffer once; this reads it again
     registers.write("tail", samples)
     spent = time.perf_counter() - begun
     if len(counts) != samples:
@@ -71,7 +71,7 @@ def ours(slot: Slot, registers: Registers, samples: int) -> float:
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--rounds", type=int, default=15, help="turns of each")
+    parser.add_argument("--rounds", type=int, default=15, help="repetitions of each")
     parser.add_argument("--serve", action="store_true", help=argparse.SUPPRESS)
     options = parser.parse_args()
     if options.serve:
@@ -104,10 +104,12 @@ def measure(port: int, rounds: int) -> None:
     rate = {name: samples / statistics.median(spent[1:]) for name, spent in times.items()}
     ratios = [b / o for b, o in zip(times["bare"][1:], times["ours"][1:], strict=True)]
     print(
-        f"{rounds} turns of {samples} samples of {identity.packing}, {LONGEST_READ // width} a read, median of the turns"
+        f"{rounds} turns of {samples} samples of {identity.packing}, {LONGEST_READ // width} per read, median of the repetitions"
     )
-    print(f"bare pymodbus loop {rate['bare']:9.0f} samples/s")
-    print(f"a slot emptied     {rate['ours']:9.0f} samples/s, {100 * statistics.median(ratios):.0f} % of the bare loop")
+    print(f"plain pymodbus loop {rate['bare']:9.0f} samples/s")
+    print(
+        f"transfer of a slot  {rate['ours']:9.0f} samples/s, {100 * statistics.median(ratios):.0f} % of the plain loop"
+    )
 
 
 if __name__ == "__main__":

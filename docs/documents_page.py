@@ -33,7 +33,7 @@ NAMES = {str: "text", bool: "true or false", int: "integer", float: "number", An
 def documents() -> list[type]:
     """The type of every document that a command prints, in the order of the help.
 
-    It is a TypedDict in a module ``documents`` of a room of pipelines, whose docstring begins with the command.
+    A document is a TypedDict in a module ``documents`` of a package of pipelines; its docstring begins with the command.
     """
     modules = [
         import_module(f"pipelines.{path.parent.name}.documents") for path in ROOT.glob("pipelines/*/documents.py")
@@ -49,18 +49,18 @@ def documents() -> list[type]:
 
 
 def command_of(kind: type) -> str:
-    """The command that a document's docstring names first; empty for a part of documents."""
+    """The command at the start of the docstring of a document; empty for a part of a document."""
     match = COMMAND.match(kind.__doc__ or "")
     return match[1] if match else ""
 
 
 def head_of(kind: type) -> str:
-    """The command line in a document's docstring."""
+    """The command line in the docstring of a document."""
     return re.sub(r"\s+", " ", kind.__doc__ or "").split("``")[1]
 
 
 def tables() -> str:
-    """A section with a table of keys per document."""
+    """The sections of the documents, each with a table of keys."""
     return "\n".join(_section(kind) for kind in documents())
 
 
@@ -73,7 +73,7 @@ def _section(kind: type) -> str:
 
 
 def _bases(kind: type) -> list[type]:
-    """The documents whose keys a document has too."""
+    """The documents whose keys a document includes."""
     return [base for base in getattr(kind, "__orig_bases__", ()) if is_typeddict(base) and command_of(base)]
 
 
@@ -82,8 +82,8 @@ def _rows(kind: type, prefix: str, *, fixed: bool) -> list[str]:
     hints = get_type_hints(kind, include_extras=True)
     for base in _bases(kind):
         hints = {name: hint for name, hint in hints.items() if name not in get_type_hints(base)}
-    for name in sorted(hints, key=lambda name: not _plain(hints[name])[2]):
-        hint, meaning, required = _plain(hints[name])
+    for name in sorted(hints, key=lambda name: not _unwrapped(hints[name])[2]):
+        hint, meaning, required = _unwrapped(hints[name])
         required = fixed and required
         key = f"**`{prefix}{name}`**" if required else f"`{prefix}{name}`"
         rows.append(f"| {key} | {_text(hint)} | {meaning} |")
@@ -92,8 +92,8 @@ def _rows(kind: type, prefix: str, *, fixed: bool) -> list[str]:
     return rows
 
 
-def _plain(hint: Any) -> tuple[Any, str, bool]:
-    """A type without its remarks, its meaning, and whether it is not marked NotRequired."""
+def _unwrapped(hint: Any) -> tuple[Any, str, bool]:
+    """A type without annotations, its meaning, and whether it is required."""
     meaning, required = "", True
     while get_origin(hint) in (Annotated, NotRequired, Required):
         required = required and get_origin(hint) is not NotRequired
@@ -109,11 +109,11 @@ def _parts(hint: Any) -> list[tuple[type, str]]:
         return [] if command_of(hint) else [(hint, "")]
     marks = {list: "[]", dict: "{}"}
     mark = marks.get(get_origin(hint), "")
-    return [(kind, mark + below) for one in get_args(hint) for kind, below in _parts(_plain(one)[0])]
+    return [(kind, mark + below) for one in get_args(hint) for kind, below in _parts(_unwrapped(one)[0])]
 
 
 def _text(hint: Any) -> str:
-    """A type in words."""
+    """The description of a type."""
     origin, arguments = get_origin(hint), get_args(hint)
     if is_typeddict(hint):
         return f"document of `{head_of(hint)}`" if command_of(hint) else "object"
@@ -129,7 +129,7 @@ def _text(hint: Any) -> str:
 
 
 def page(text: str) -> str:
-    """The page with its written part renewed."""
+    """The page with its generated part replaced."""
     before, rest = text.split(BEGIN)
     return f"{before}{BEGIN}\n{tables()}\n{END}{rest.split(END)[1]}"
 

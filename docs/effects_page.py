@@ -17,36 +17,37 @@ if TYPE_CHECKING:
 
 PAGE = Path(__file__).resolve().parent.parent / "docs" / "reference" / "effects.md"
 SCOPES = {
-    "sensor": "In the sensor: coefficients of their own for every unit and axis",
-    "slot": "Of the fixture's slots",
-    "station": "Of the station: shared by all units of a run",
+    "sensor": "Effects of the sensor: separate coefficients for every unit and axis",
+    "slot": "Effects of the slots of the fixture",
+    "station": "Effects of the station: common to all units of a run",
 }
 HEAD = """\
 # Effects
 
-Written by `python -m docs.effects_page` from the catalogue; change an effect's file, not this page. Ids are the names in model
-files, on the command line and in JSON. i is the output axis, j and k the next two in the order x → y → z → x; f is specific
-force in g, θ the temperature above 25 °C, t the time, u the time since power-on, s the time since the last move.
+This page lists the effects of the catalogue. `python -m docs.effects_page` writes it from their files. Ids are the
+names in model files, on the command line and in JSON. i is the output axis, j and k the next two in the order x → y → z → x;
+f is the specific force in g, θ the temperature above 25 °C, t the time, u the time since power-on, s the time since the last
+move.
 """
 
 
 def page() -> str:
-    """The whole page as Markdown."""
-    found = sorted(effects.built_in().values(), key=lambda e: (list(SCOPES).index(e.scope), e.simplicity, e.id))
-    parts = [HEAD, _table(found)]
+    """The complete page as Markdown."""
+    catalogue = sorted(effects.built_in().values(), key=lambda e: (list(SCOPES).index(e.scope), e.simplicity, e.id))
+    parts = [HEAD, _table(catalogue)]
     for scope, title in SCOPES.items():
         parts.append(f"## {title}\n")
-        parts += [_section(effect) for effect in found if effect.scope == scope]
+        parts += [_section(effect) for effect in catalogue if effect.scope == scope]
     return "\n".join([*parts, _covariates(), _formulas()])
 
 
-def _table(found: list[AnyEffect]) -> str:
-    rows = [f"| [`{e.id}`](#{e.id}) | {_cell(e.symbol)} | {_cell(e.equation)} | {e.scope} |" for e in found]
-    return "\n".join(["| id | symbol | term | of the |", "|---|---|---|---|", *rows, ""])
+def _table(catalogue: list[AnyEffect]) -> str:
+    rows = [f"| [`{e.id}`](#{e.id}) | {_cell(e.symbol)} | {_cell(e.equation)} | {e.scope} |" for e in catalogue]
+    return "\n".join(["| id | symbol | term | scope |", "|---|---|---|---|", *rows, ""])
 
 
 def _cell(text: str) -> str:
-    """Text for a table, in which a stroke would end the cell."""
+    """Text for a cell of a table, with escaped strokes."""
     return text.replace("|", "\\|")
 
 
@@ -72,7 +73,7 @@ def _section(effect: AnyEffect) -> str:
 
 
 def first_line(effect: AnyEffect) -> str:
-    """The first line of an effect's docstring."""
+    """The first line of the docstring of an effect."""
     return (inspect.getdoc(effect) or "").partition("\n")[0]
 
 
@@ -80,7 +81,7 @@ def _covariates() -> str:
     lines = [
         "## covariate:&lt;column&gt;\n",
         f"{_summary(Covariate)}\n",
-        "Any numeric column of the dwells without a meaning of its own is one.\n",
+        "Every numeric column of the dwells without another meaning is a covariate.\n",
         f"- term: {Covariate.equation}",
         f"- becomes visible with: {Covariate.breaker}\n",
     ]
@@ -102,7 +103,7 @@ def _formulas() -> str:
         "| name | meaning |",
         "|---|---|",
         *rows,
-        "| any other | a recorded column of that name |",
+        "| any other | the recorded column with this name |",
         "",
     ]
     return "\n".join(lines)

@@ -1,1 +1,1 @@
-"""What crosses a boundary: tables, recipes, limits, station and model files, and the errors by who must act."""
+"""Data at the boundaries: tables, recipes, limits, station and model files, and the errors by who must act."""

@@ -1,4 +1,4 @@
-"""One look at a column of a table: what its values are, so that every question about it is answered from the same look."""
+"""One analysis of a column of a table, from which all checks of the column are answered."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ _NONE = np.zeros(0, dtype=np.intp)
 
 @cache
 def _named(kind: Hashable) -> str:
-    """The name of a type; the libraries put it together anew whenever they are asked."""
+    """The name of a type, cached, as the libraries compose it at each call."""
     return str(kind)
 
 
@@ -31,8 +31,8 @@ def _named(kind: Hashable) -> str:
 class Seen:
     """A column.
 
-    kind : name of its type; numbers : (rows,), its values where they are numbers or flags, none where they are texts
-    codes : (rows,), of the texts, −1 where one is missing; texts : each that occurs, once
+    kind : name of its type; numbers : (rows,), its values where they are numbers or flags, None for texts
+    codes : (rows,), index of each text, −1 where it is missing; texts : the different texts
     """
 
     kind: str
@@ -42,7 +42,7 @@ class Seen:
 
     @classmethod
     def of(cls, values: pd.Series) -> Self:
-        """What a column holds."""
+        """The analysis of a column."""
         if isinstance(values.dtype, np.dtype) and values.dtype.kind in "fiub":
             return cls(_named(values.dtype), values.to_numpy(), _NONE)
         codes, texts = values.factorize()
@@ -56,7 +56,7 @@ class Seen:
         return all(self._passes(check) for check in column.checks or [])
 
     def is_finite(self, rows: slice | NDArray[np.bool_]) -> bool:
-        """Whether it holds finite numbers in these rows."""
+        """Whether the column has finite numbers in these rows."""
         return self.numbers is not None and bool(np.all(np.isfinite(self.numbers[rows])))
 
     def _has_gaps(self) -> bool:
@@ -65,7 +65,7 @@ class Seen:
         return self.numbers.dtype.kind == "f" and bool(np.isnan(self.numbers).any())
 
     def _passes(self, check: pa.Check) -> bool:
-        """Whether the values pass a check of one of the kinds that tables here have; any other is left to the schema."""
+        """Whether the values pass a check of the kinds in these tables; false for other kinds, which the schema checks."""
         figures = check.statistics
         if check.name == "greater_than_or_equal_to" and self.numbers is not None:
             return not bool((self.numbers < figures["min_value"]).any())
@@ -77,23 +77,23 @@ class Seen:
 
 
 def all_different(columns: Sequence[Seen]) -> bool:
-    """Whether no two rows have the same values in all of these columns; no, too, where the values are too many to tell so."""
-    together, count = np.zeros(1, dtype=np.int64), 1
+    """Whether all rows differ in at least one of these columns; false, too, where there are too many values to decide."""
+    combined, count = np.zeros(1, dtype=np.int64), 1
     for column in columns:
-        codes, own = _numbered(column)
+        codes, own = _codes_of(column)
         count *= own
         if count > DIFFERENT:
             return False
-        together = together * own + codes
-    return not columns or np.unique(together).size == together.size
+        combined = combined * own + codes
+    return not columns or np.unique(combined).size == combined.size
 
 
-def _numbered(column: Seen) -> tuple[NDArray[np.int64], int]:
-    """A number (rows,) from nought for every value of a column, and how many there are at most."""
+def _codes_of(column: Seen) -> tuple[NDArray[np.int64], int]:
+    """A code (rows,) from 0 for every value of a column, and the largest possible number of codes."""
     if column.numbers is None:
         return column.codes + 1, len(column.texts) + 1
     if column.numbers.dtype.kind in "iu" and len(column.numbers):
         low, high = int(column.numbers.min()), int(column.numbers.max())
         return column.numbers - low, high - low + 1
-    found, codes = np.unique(column.numbers, return_inverse=True)
-    return codes, max(len(found), 1)
+    distinct, codes = np.unique(column.numbers, return_inverse=True)
+    return codes, max(len(distinct), 1)

@@ -17,27 +17,27 @@ PART_FAILED = 1
 UNUSABLE = 2
 STATION = 3
 UNEXPECTED = 70
-"""A defect of the program (EX_SOFTWARE of sysexits.h); never 1, which scripts read as a verdict."""
+"""A defect of the program (EX_SOFTWARE of sysexits.h); never 1, which scripts read as a result."""
 
 
 class TumblelineError(Exception):
-    """What a person can do something about; the command line prints it as one message and leaves with its status."""
+    """An error that a person can correct; the command line prints it as one message and exits with its status."""
 
     exit_status: ClassVar[int] = UNUSABLE
 
 
 class WrongUse(TumblelineError):
-    """A command or function called in a way that cannot work: the caller changes the call."""
+    """A command or function with unusable arguments: the caller corrects the call."""
 
 
 class RecipeInvalid(TumblelineError):
-    """A recipe, limits, station, profile or model file that cannot be used: its author changes the named key.
+    """An unusable recipe, limits, station, profile or model file: its author corrects the named key.
 
     Parameters
     ----------
     message : what was found and what is needed.
-    key : dotted path of the offending key, empty when the whole file is meant.
-    close : keys or values that exist and look like what was found.
+    key : dotted path of the offending key, empty for the whole file.
+    close : existing keys or values that are similar to the given one.
     """
 
     def __init__(self, message: str, *, key: str = "", close: Iterable[str] = ()) -> None:
@@ -47,7 +47,7 @@ class RecipeInvalid(TumblelineError):
 
 
 class DataRejected(TumblelineError):
-    """Data that cannot be used: they are measured or delivered again."""
+    """Unusable data: they must be measured or delivered again."""
 
 
 class ArchiveUnusable(TumblelineError):
@@ -55,7 +55,7 @@ class ArchiveUnusable(TumblelineError):
 
 
 class StationError(TumblelineError):
-    """The station did not do what it was asked."""
+    """The station did not carry out a command."""
 
     exit_status: ClassVar[int] = STATION
 
@@ -65,21 +65,21 @@ class StationTimeout(StationError):
 
 
 class NotReached(StationTimeout):
-    """A target that was not reached in its time, though the device answers: asking again at once gains nothing."""
+    """A target that was not reached in time, though the device answers: an immediate repetition has no use."""
 
 
 class LinkLost(StationError):
-    """A connection that broke; the attempt may be repeated once it is there again."""
+    """A lost connection; the attempt may be repeated on a new connection."""
 
 
 class OperatorNeeded(StationError):
-    """Something that only a person at the station can put right (door, interlock, power, a missing unit)."""
+    """A condition that only a person at the station can correct (door, interlock, power, a missing unit)."""
 
 
 class LeaseLost(TumblelineError):
-    """A run that may drive its station no longer: it stood still, or another drives. It sends nothing more and ends.
+    """A run that has lost the lease of its station: it stopped responding, or another run drives. It sends nothing more and ends.
 
-    Not one of the station's errors, so that nothing that tries again after those, or works round them, goes on after it.
+    Not a :class:`StationError`, so that no code that repeats or continues after those errors does so after this one.
     """
 
     exit_status: ClassVar[int] = STATION
@@ -90,7 +90,7 @@ class StationRefused(StationError):
 
 
 def close_matches(found: str, known: Iterable[str]) -> tuple[str, ...]:
-    """Up to three of the known names that look like the one found, best first."""
+    """Up to three known names that are similar to the given one, best first."""
     by_lower: dict[str, list[str]] = {}
     for name in sorted(set(known)):
         by_lower.setdefault(name.lower(), []).append(name)
@@ -99,7 +99,7 @@ def close_matches(found: str, known: Iterable[str]) -> tuple[str, ...]:
 
 
 def did_you_mean(found: str, known: Iterable[str]) -> str:
-    """A clause to end a message with: the close matches, or all that is known where there are none."""
+    """The end of a message: the similar names, or all known names where none is similar."""
     names = sorted(set(known))
     close = close_matches(found, names)
     if close:

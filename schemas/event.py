@@ -1,4 +1,4 @@
-"""An event of a run: what happened at the station, why, and what was done about it."""
+"""An event of a run: kind, reason and action."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ NO_RECORD = -1
 
 @dataclass(frozen=True)
 class Event:
-    """One event at ``time_s`` on the station's clock; ``record`` is the one it befell, −1 where it befell none.
+    """One event at ``time_s`` on the clock of the station; ``record`` is the affected record, −1 for none.
 
-    ``figures`` are the numbers that belong to it, named with their unit.
+    ``figures`` are its numerical values, named with their unit.
     """
 
     time_s: float
@@ -30,10 +30,10 @@ class Event:
 
 
 class EventLog(Protocol):
-    """Where the events of a capture are kept."""
+    """The log of the events of a capture."""
 
     def note(self, event: Event) -> None:
-        """Keep an event durably; one that is there already is not kept twice."""
+        """Write an event durably; an event in the log is not written twice."""
         ...
 
     def noted(self) -> list[Event]:
@@ -48,7 +48,7 @@ class MemoryLog:
     events: list[Event] = field(default_factory=list[Event])
 
     def note(self, event: Event) -> None:
-        """Keep an event."""
+        """Append an event that is not in the log."""
         if event not in self.events:
             self.events.append(event)
 

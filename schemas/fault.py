@@ -1,7 +1,7 @@
-"""A fault of a simulated station: what goes wrong, with whom, from when and for how long.
+"""A fault of a simulated station: its kind, target, start and duration.
 
-Which kinds there are is the plant's business: one file each in ``stations/plant/faults``. Here is only how one is written: in a
-station's file, in a recipe, on the command line, in a test.
+The kinds are defined in ``stations/plant/faults``. This module defines the notation in station files, recipes, command lines and
+tests.
 """
 
 from __future__ import annotations
@@ -23,9 +23,9 @@ SEPARATOR = ":"
 
 
 class FaultOrder(BaseModel):
-    """Something that goes wrong at ``at_s`` on the simulated station's clock, for ``for_s`` seconds or for good.
+    """A fault from ``at_s`` on the clock of the simulated station, for ``for_s`` seconds or permanently.
 
-    ``serial`` names the unit that is meant, ``device`` one of the station's own; ``figures`` are the kind's own numbers.
+    The target is the unit ``serial`` or the device ``device`` of the station; ``figures`` are the parameters of the kind.
     """
 
     model_config = ConfigDict(extra="forbid", frozen=True)
@@ -38,28 +38,28 @@ class FaultOrder(BaseModel):
     figures: dict[str, Number] = Field(default_factory=dict[str, float])
 
     @model_validator(mode="after")
-    def _means_one(self) -> FaultOrder:
+    def _one_target(self) -> FaultOrder:
         if self.serial and self.device:
             raise ValueError(
-                f"fault {self.kind}: serial '{self.serial}' and device '{self.device}', one of the two can be meant; "
+                f"fault {self.kind}: serial '{self.serial}' and device '{self.device}', only one of the two is allowed; "
                 "correct the fault"
             )
         return self
 
     @property
     def until_s(self) -> float:
-        """When it is over; infinite where it stays."""
+        """Its end; infinite for a permanent fault."""
         return math.inf if self.for_s is None else self.at_s + self.for_s
 
 
 def parse_fault(text: str) -> FaultOrder:
-    """The fault in ``kind[:key=value…]``: keys of a fault, or else figures of its kind.
+    """The fault in ``kind[:key=value…]``: keys of a fault, or figures of its kind.
 
     >>> parse_fault("silent:serial=U001:at_s=905").at_s
     905.0
     """
     kind, *pairs = text.split(SEPARATOR)
-    given: dict[str, str | dict[str, str]] = {"kind": kind}
+    keys: dict[str, str | dict[str, str]] = {"kind": kind}
     figures: dict[str, str] = {}
     for pair in pairs:
         key, equals, value = pair.partition("=")
@@ -67,9 +67,9 @@ def parse_fault(text: str) -> FaultOrder:
             raise WrongUse(
                 f"fault '{shown(text)}': found '{shown(pair)}', key=value is needed; write kind:key=value:key=value"
             )
-        (given if key in FaultOrder.model_fields and key != "figures" else figures)[key] = value
+        (keys if key in FaultOrder.model_fields and key != "figures" else figures)[key] = value
     try:
-        return FaultOrder.model_validate({**given, "figures": figures})
+        return FaultOrder.model_validate({**keys, "figures": figures})
     except ValidationError as problem:
         raise WrongUse(
             f"fault '{shown(text)}': {_sentence(problem.errors(include_url=False)[0])}; write kind:key=value:key=value"
@@ -77,7 +77,7 @@ def parse_fault(text: str) -> FaultOrder:
 
 
 def _sentence(detail: ErrorDetails) -> str:
-    """What is wrong, and where."""
+    """The error and its key, as a sentence."""
     where = ".".join(str(part) for part in detail["loc"] if part != "figures")
     reason = detail["msg"].removeprefix("Value error, ")
     return f"{where}: {reason[:1].lower()}{reason[1:]}" if where else reason

@@ -1,4 +1,4 @@
-"""How long work tells how far it is, without knowing who listens."""
+"""The interface through which long work reports its progress."""
 
 from __future__ import annotations
 
@@ -6,13 +6,13 @@ from typing import Protocol
 
 
 class Progress(Protocol):
-    """Told of work in parts: which part of how many is done, and what it was."""
+    """Receives the progress of work in parts: number of finished parts, total number, and a note."""
 
     def __call__(self, done: int, total: int, note: str) -> None:
-        """Take note that ``done`` of ``total`` parts are finished."""
+        """Report that ``done`` of ``total`` parts are finished."""
         ...
 
 
 def silent(done: int, total: int, note: str) -> None:
-    """Nobody listens."""
+    """Discards the progress."""
     del done, total, note

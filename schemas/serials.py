@@ -1,8 +1,8 @@
-"""Serial numbers: one rule for all that comes in, from lots, slot maps, scans, files of others and options.
+"""Serial numbers: one rule for all sources: lots, slot maps, scans, foreign files and options.
 
-A serial number is printed on a device, stands in lists and certificates, and becomes part of the names of files; somebody
-compares it by eye with another. So it has letters and digits that look like no others, and nothing that a file system, a
-spreadsheet or a shell reads as more than a name.
+A serial number is printed on devices, lists and certificates, is part of file names, and people compare it by eye. It therefore
+consists of letters and digits without look-alikes, and has no character with a special meaning in a file system, a spreadsheet or
+a shell.
 """
 
 from __future__ import annotations
@@ -24,12 +24,12 @@ _SERIAL = re.compile(SERIAL_PATTERN)
 
 
 def is_serial(text: str) -> bool:
-    """Whether a text can be a serial number."""
+    """Whether a text is a valid serial number."""
     return len(text) <= LONGEST_SERIAL and _SERIAL.fullmatch(text) is not None
 
 
 def serial_fault(text: str) -> str:
-    """What is wrong with a serial number and what is needed, as part of a message; empty where it can be one."""
+    """The fault of a serial number and what is needed, as part of a message; empty for a valid one."""
     if is_serial(text):
         return ""
     if not text.strip():
@@ -37,12 +37,12 @@ def serial_fault(text: str) -> str:
     if len(text) > LONGEST_SERIAL:
         return f"serial {shown(text)} is too long, {NEEDED}"
     foreign = next((letter for letter in text if not letter.isascii()), "")
-    strange = (
+    defect = (
         f" has {foreign!r} (U+{ord(foreign):04X}), which only looks like a plain letter,"
         if foreign.isalnum()
         else " is"
     )
-    return f"serial {shown(text)!r}{strange} not usable, {NEEDED}"
+    return f"serial {shown(text)!r}{defect} not usable, {NEEDED}"
 
 
 def refuse_unusable_serials(
@@ -51,7 +51,7 @@ def refuse_unusable_serials(
     remedy: str = "correct it, or give another with --unit",
     error: type[TumblelineError] = DataRejected,
 ) -> None:
-    """Refuse texts that cannot be serial numbers.
+    """Refuse invalid serial numbers.
 
     Parameters
     ----------

@@ -1,7 +1,7 @@
-"""Tables as older versions wrote them, brought up to what this version reads; files stay as they are.
+"""Conversion of tables of older versions to the present schema in memory; files stay unchanged.
 
-A change of a table's columns raises :data:`schemas.version.VERSION` by one and adds a line to :data:`UPGRADES`: what makes of a
-table of the version before one of the new. ``tests/archives`` keeps an archive of every version.
+A change of a table's columns raises :data:`schemas.version.VERSION` by one and adds a line to :data:`UPGRADES`: the conversion
+of a table from the version before. ``tests/archives`` keeps an archive of every version.
 """
 
 from __future__ import annotations
@@ -16,16 +16,16 @@ if TYPE_CHECKING:
     import pandas as pd
 
 UPGRADES: dict[tuple[str, int], Callable[[pd.DataFrame], pd.DataFrame]] = {}
-"""By table and the version that wrote it: the same table as the next version would have written it."""
+"""By table and version: the conversion to the next version."""
 
 
 def upgraded(name: str, frame: pd.DataFrame, version: int, where: str) -> pd.DataFrame:
-    """The table as this version reads it.
+    """The table in the schema of this version.
 
     Parameters
     ----------
-    version : of the schema that the table was written with.
-    where : names the file in a message.
+    version : schema version of the table.
+    where : name of the file in messages.
     """
     refuse_newer(version, where)
     for step in range(version, VERSION):

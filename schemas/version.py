@@ -1,4 +1,4 @@
-"""The version of the tables' schemas: what travels with every file, and is raised by one when a table's columns change."""
+"""The version of the tables' schemas: it is written into every file, and is raised by one when the columns of a table change."""
 
 from __future__ import annotations
 
@@ -8,11 +8,11 @@ VERSION = 1
 
 
 def refuse_newer(version: object, where: str) -> None:
-    """Refuse what a newer version wrote, whose columns may mean something else.
+    """Refuse files of a newer version, whose columns may have another meaning.
 
     Parameters
     ----------
-    where : names the file in a message.
+    where : name of the file in messages.
     """
     if isinstance(version, int) and version > VERSION:
         raise ArchiveUnusable(

@@ -1,4 +1,4 @@
-"""Words on the wire and values, both ways: the one codec that the client and the simulated station share."""
+"""Conversion between register words and values, in both directions; client and simulated station share it."""
 
 from __future__ import annotations
 
@@ -32,23 +32,23 @@ BITS: dict[Packing, int] = {"int20x3": 20, "int24x3": 24}
 
 
 class NotEncodable(ValueError):
-    """A value that a register cannot hold."""
+    """The register cannot hold the value."""
 
 
 def encode(register: Register, order: WordOrder, value: Value) -> list[int]:
-    """The words, or bits, that hold a value; a number outside the register's type or limits is refused."""
+    """The words, or bits, of a value; a number outside the type or limits of the register is refused."""
     if register.type == "string":
         return _encode_text(register, value)
     values = value if isinstance(value, list) else [value]
     if len(values) != register.count:
         raise NotEncodable(
-            f"{register.name}: {len(values)} values, the register holds {register.count}; give that many"
+            f"{register.name}: {len(values)} values, {register.count} are needed; give one value for each"
         )
     return [word for one in values for word in _encode_number(register, order, one)]
 
 
 def decode(register: Register, order: WordOrder, words: Sequence[int]) -> Value:
-    """The value that words hold: a number, a list where the register has a count, a text."""
+    """The value of words: a number, a list where the register has a count, or a text."""
     if register.type == "string":
         raw = struct.pack(f">{len(words)}H", *words)
         return raw.rstrip(b"\0").decode("ascii", errors="replace")
@@ -84,18 +84,18 @@ def _encode_number(register: Register, order: WordOrder, value: float | str) -> 
 
 
 def _arranged(words: tuple[int, ...], order: WordOrder) -> tuple[int, ...]:
-    """Words as they stand on the wire; every order is its own reverse."""
+    """Words in the order of the wire; each word order is its own inverse."""
     if order.startswith("low_first"):
         words = words[::-1]
     return tuple((w & 0xFF) << 8 | w >> 8 for w in words) if order.endswith("swapped") else words
 
 
 def _number(register: Register, value: float | str) -> float:
-    """The number behind a value, inside the register's limits."""
+    """The number of a value, checked against the limits of the register."""
     if isinstance(value, str):
         if value not in register.enumeration:
             raise NotEncodable(
-                f"{register.name}: '{value}' is none of {', '.join(register.enumeration) or 'nothing named'}"
+                f"{register.name}: '{value}' is unknown; known values: {', '.join(register.enumeration) or 'none'}"
             )
         return register.enumeration[value] * register.scale
     low, high = register.minimum, register.maximum
@@ -121,7 +121,7 @@ def named(register: Register, value: float) -> str:
 
 
 def pack_samples(counts: Counts, first: int, packing: Packing) -> Words:
-    """Samples as words, with the low bits of each sample's number beside it.
+    """Samples packed into words, each with the low bits of its sample number.
 
     Parameters
     ----------

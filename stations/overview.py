@@ -1,4 +1,4 @@
-"""A station at one instant: angles, temperatures, states, who sits in the slots, and who drives it."""
+"""State of a station at one instant: angles, temperatures, states, devices in the slots, and the holder of the lease."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ AXES = ("outer", "inner")
 
 @dataclass
 class SlotNow:
-    """A slot as it is now."""
+    """Present state of a slot."""
 
     slot: int
     serial: str
@@ -33,7 +33,7 @@ class SlotNow:
 
 @dataclass
 class Overview:
-    """A station as it is now; ``faults`` says of each part that does not answer why."""
+    """Present state of a station; ``faults`` has the error of each part that does not answer."""
 
     station: str
     kind: str
@@ -52,19 +52,19 @@ class Overview:
     faults: dict[str, str] = field(default_factory=dict[str, str])
 
     def document(self) -> dict[str, Any]:
-        """The same for JSON."""
+        """The JSON document of the state."""
         return asdict(self)
 
 
 @contextmanager
 def looked_at(config: StationConfig, lot: Lot) -> Generator[Callable[[], Overview]]:
-    """A block in which the station can be looked at again and again; nothing is moved, and no lease is needed.
+    """A block with a function that reads the state of the station at each call; nothing moves, and no lease is needed.
 
     Parameters
     ----------
-    lot : what sits in a simulated station; hardware is asked who sits there
+    lot : the units in a simulated station; hardware reports its own
     """
-    from stations.opening import make_plant, open_devices, serve_plant  # noqa: PLC0415 - light until it is looked at
+    from stations.opening import make_plant, open_devices, serve_plant  # noqa: PLC0415 - imported only when the state is read
 
     if config.kind == "simulated":
         with serve_plant(config, lot, make_plant(config, lot)) as station:
@@ -77,13 +77,13 @@ def looked_at(config: StationConfig, lot: Lot) -> Generator[Callable[[], Overvie
 
 
 def look_at(config: StationConfig, station: Station) -> Overview:
-    """The station as it is now; a part that does not answer is told, the others are shown all the same."""
+    """The present state of the station; a part that does not answer is recorded in ``faults``, the others are shown."""
     now = Overview(config.name, config.kind, station.clock.now())
     _ask(now, "table", lambda: _table(now, station))
     _ask(now, "chamber", lambda: _chamber(now, station))
     _ask(now, "reader", lambda: _reader(now, station))
     if config.kind != "simulated":
-        _ask(now, "lease", lambda: _leased(now, config))
+        _ask(now, "lease", lambda: _add_lease(now, config))
     return now
 
 
@@ -97,8 +97,8 @@ def _ask(now: Overview, part: str, question: Callable[[], None]) -> None:
 def _table(now: Overview, station: Station) -> None:
     for name, axis in station.table.axes.items():
         state = axis.state()
-        words = state.alarm or ("moving" if state.moving else "in position" if state.in_position else "standing")
-        now.axes[name] = words if state.homed else f"{words}, no home"
+        text = state.alarm or ("moving" if state.moving else "in position" if state.in_position else "standing")
+        now.axes[name] = text if state.homed else f"{text}, not homed"
         now.angles_deg[name] = axis.position()
 
 
@@ -126,26 +126,26 @@ def _reader(now: Overview, station: Station) -> None:
 
 
 def _occupied(station: Station) -> list[int]:
-    """Slots with a device in them, as the reader says; none where it does not answer, which the look then tells."""
+    """Occupied slots as the reader reports them; none where it does not answer, which the state then shows."""
     try:
         return station.reader.occupied()
     except StationError:
         return []
 
 
-def _leased(now: Overview, config: StationConfig) -> None:
-    """Who drives the station; and where a run has left it without making it safe, that it is not safe."""
+def _add_lease(now: Overview, config: StationConfig) -> None:
+    """Holder of the lease, and the reason where a run has not left the station safe."""
     now.lease = _lease(config)
     if problem := unsafe_reason(state_folder(), config):
         now.faults["safe state"] = problem
 
 
 def _lease(config: StationConfig) -> dict[str, Any] | None:
-    """Who drives the station; None where nobody does."""
-    found = [entry for entry in holders(state_folder(), config).values() if entry is not None]
-    if not found:
+    """Holder of the lease; None without one."""
+    entries = [entry for entry in holders(state_folder(), config).values() if entry is not None]
+    if not entries:
         return None
-    holder, age = found[0]
+    holder, age = entries[0]
     return {
         **{k: getattr(holder, k) for k in ("run", "pid", "host", "since", "role", "tripped")},
         "heard_s": round(age, 1),

@@ -1,4 +1,4 @@
-"""The register-map profiles that come with the product, by name."""
+"""The device profiles of the product, by name."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def profile_names() -> list[str]:
 
 
 def profile_of(device: Carried) -> Profile:
-    """The profile of a station's device, in the word order that the device is set to."""
+    """The profile of a device of a station, with the word order that the device is set to."""
     profile = load_profile(device.profile)
     if device.word_order is None:
         return profile
@@ -35,13 +35,13 @@ def profile_of(device: Carried) -> Profile:
 
 
 def recorded_columns(reader: Carried) -> list[str]:
-    """Columns that a station's reader records beside every dwell, besides those that every reader records."""
+    """Additional columns that the reader of a station records with every dwell."""
     return [register.column for register in profile_of(reader).registers if register.column]
 
 
 @cache
 def load_profile(name: str) -> Profile:
-    """The profile of that name; an unknown one is refused with the nearest names."""
+    """The profile with a name; an unknown name is refused with the most similar names."""
     if name not in profile_names():
         raise RecipeInvalid(f"profile: no '{name}'; {did_you_mean(name, profile_names())}", key="profile")
     source = f"stations/profiles/{name}.toml"

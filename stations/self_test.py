@@ -1,4 +1,4 @@
-"""The self-test of a station before a shift: what it reads, how it moves, how its slots are silent, and a check standard."""
+"""The self-test of a station before a shift: instruments, moves, noise of the slots, and a check standard."""
 
 from __future__ import annotations
 
@@ -21,11 +21,11 @@ if TYPE_CHECKING:
     from schemas.safety import SelfTest
     from stations.station import Station
 
-WILD = 0.05  # of full scale: no device at rest is so noisy
-NOISIER = 3.0  # times what is usual among the slots, of which there must be so many:
+WILD = 0.05  # of full scale; the noise of a device at rest is always lower
+NOISIER = 3.0  # times the median noise of the slots; needs at least so many slots:
 FEWEST_TO_COMPARE = 3
-KEPT = 0.99  # of the samples that the time between start and stop is worth, by the reader's own clock
-STANDS = 0.5  # of the seconds asked for: a clock that shows less stands, or is another's
+KEPT = 0.99  # of the samples expected between start and stop, by the clock of the reader
+STANDS = 0.5  # of the requested seconds; a clock that shows less has stopped, or is not that of the reader
 SIGMAS = 3.0
 MOVING_RANGE = 1.128  # mean range of two over sigma, normal: NIST/SEMATECH e-Handbook of Statistical Methods, 6.3.2.2
 UP, DOWN = (0.0, 0.0), (180.0, 0.0)
@@ -33,7 +33,7 @@ UP, DOWN = (0.0, 0.0), (180.0, 0.0)
 
 @dataclass(frozen=True)
 class CheckResult:
-    """One thing that was tested: what was found, what is allowed, whether it is good, and a sentence where it is not."""
+    """Result of one check: value, limits, whether it passed, and a message where it did not."""
 
     check: str
     part: str
@@ -47,7 +47,7 @@ class CheckResult:
 
 @dataclass(frozen=True)
 class Standard:
-    """The check standard as it was measured once; ``offset`` in the output's unit, ``scale`` in that per g."""
+    """One measurement of the check standard; ``offset`` in the unit of the output, ``scale`` in that unit per g."""
 
     serial: str
     offset: float
@@ -58,7 +58,7 @@ class Standard:
 
 @dataclass
 class Bench:
-    """The self-test of one station; findings gather as it goes on, and a part that fails leaves the others to be tested."""
+    """The self-test of one station; it collects the results, and continues with the other parts after a failure."""
 
     station: Station
     rules: SelfTest
@@ -68,8 +68,8 @@ class Bench:
     elapsed: float = 0.0
 
     def run(self) -> list[CheckResult]:
-        """Every finding, in the order of the test."""
-        self._tested("instruments", "reader", self._instruments)
+        """Runs the checks; the results in their order."""
+        self._run_check("instruments", "reader", self._instruments)
         if all(finding.ok for finding in self.findings if finding.check in {"door", "emergency stop"}):
             for check, part, test in (
                 ("chamber", "chamber", self._chamber),
@@ -77,16 +77,16 @@ class Bench:
                 ("noise", "slots", self._noise),
                 ("check standard", "slots", self._standard),
             ):
-                self._tested(check, part, test)
+                self._run_check(check, part, test)
         return self.findings
 
-    def _tested(self, check: str, part: str, test: Callable[[], None]) -> None:
+    def _run_check(self, check: str, part: str, test: Callable[[], None]) -> None:
         try:
             test()
         except StationError as problem:
             self.findings.append(CheckResult(check, part, ok=False, message=str(problem)))
 
-    def _found(self, check: str, part: str, value: float, unit: str, bounds: tuple[float, float]) -> None:
+    def _value(self, check: str, part: str, value: float, unit: str, bounds: tuple[float, float]) -> None:
         low, high = bounds
         ok = low <= value <= high
         measure = f" {unit}" if unit else ""
@@ -94,79 +94,79 @@ class Bench:
         text = "" if ok else f"{part}: {check} {value:.6g}{measure}, {needed}{measure} is needed"
         self.findings.append(CheckResult(check, part, ok, value, unit, _finite(low), _finite(high), text))
 
-    def _state(self, check: str, part: str, found: str, needed: str) -> None:
-        ok = found == needed
-        text = "" if ok else f"{part}: {check} is {found}, {needed} is needed"
-        self.findings.append(CheckResult(check, part, ok, found, message=text))
+    def _state(self, check: str, part: str, state: str, needed: str) -> None:
+        ok = state == needed
+        text = "" if ok else f"{part}: {check} is {state}, {needed} is needed"
+        self.findings.append(CheckResult(check, part, ok, state, message=text))
 
     def _instruments(self) -> None:
         now, limits = self.station.reader.instruments(), self.station.config.suspenders
         self._state("door", "reader", "open" if now.door_open else "closed", "closed")
         self._state("emergency stop", "reader", "pressed" if now.stop_pressed else "released", "released")
-        self._found("vibration", "reader", now.vibration_g, "g rms", (0.0, limits.vibration_g))
+        self._value("vibration", "reader", now.vibration_g, "g rms", (0.0, limits.vibration_g))
         for slot in sorted(self.station.reader.slots):
-            self._found("temperature", f"slot {slot}", now.temperature_C[slot], "°C", (-100.0, 250.0))
-            self._found("supply", f"slot {slot}", now.supply_V[slot], "V", limits.supply_V or (0.5, 60.0))
+            self._value("temperature", f"slot {slot}", now.temperature_C[slot], "°C", (-100.0, 250.0))
+            self._value("supply", f"slot {slot}", now.supply_V[slot], "V", limits.supply_V or (0.5, 60.0))
 
     def _chamber(self) -> None:
         chamber = self.station.chamber
-        self._found("air", "chamber", chamber.temperature(), "°C", (-100.0, 250.0))
+        self._value("air", "chamber", chamber.temperature(), "°C", (-100.0, 250.0))
         self._state("mode", "chamber", chamber.mode(), chamber.running)
 
     def _moves(self) -> None:
-        """There and back, each confirmed by the encoders."""
+        """Moves to the test pose and back, each confirmed by the encoders."""
         allowed = self.station.config.limits.position_deg
         for outer, inner in ((self.rules.outer_deg, self.rules.inner_deg), UP):
             self.station.table.move(outer, inner)
-            found = self.station.table.angles()
-            for name, target, angle in (("outer axis", outer, found[0]), ("inner axis", inner, found[1])):
-                self._found(f"move to {target:g}°", name, angle - target, "deg", (-allowed, allowed))
+            angles = self.station.table.angles()
+            for name, target, angle in (("outer axis", outer, angles[0]), ("inner axis", inner, angles[1])):
+                self._value(f"move to {target:g}°", name, angle - target, "deg", (-allowed, allowed))
 
     def _noise(self) -> None:
-        """Standard deviation of a sample at rest, the noisiest axis; samples that are missing, axes that say nothing."""
+        """Noise at rest: standard deviation of the noisiest axis, missing samples, axes with a constant output."""
         self.station.table.move(*UP)
         deviations: dict[int, NDArray[np.float64]] = {}
-        found = self._sampled()
-        self._found("clock", "reader", self.elapsed, "s", (STANDS * self.rules.sample_s, math.inf))
-        for slot, samples in found.items():
-            wanted = math.floor(KEPT * self.elapsed * self.rules.rate_hz) - 1.0
-            self._found("samples", f"slot {slot}", float(len(samples)), "", (max(wanted, 0.0), math.inf))
+        samples_of = self._sampled()
+        self._value("clock", "reader", self.elapsed, "s", (STANDS * self.rules.sample_s, math.inf))
+        for slot, samples in samples_of.items():
+            expected = math.floor(KEPT * self.elapsed * self.rules.rate_hz) - 1.0
+            self._value("samples", f"slot {slot}", float(len(samples)), "", (max(expected, 0.0), math.inf))
             if len(samples) > 1:
                 deviations[slot] = np.std(samples, axis=0, ddof=1)
         shaking = self.station.reader.instruments().vibration_g
         allowed = (0.0, self.station.config.suspenders.vibration_g)
-        self._found("vibration at rest", "reader", shaking, "g rms", allowed)
+        self._value("vibration at rest", "reader", shaking, "g rms", allowed)
         usual = float(np.median([deviation.max() for deviation in deviations.values()])) if deviations else 0.0
         for slot, deviation in deviations.items():
-            self._silent_or_wild(slot, deviation, usual if len(deviations) >= FEWEST_TO_COMPARE else math.inf)
+            self._check_noise(slot, deviation, usual if len(deviations) >= FEWEST_TO_COMPARE else math.inf)
 
-    def _silent_or_wild(self, slot: int, deviation: NDArray[np.float64], usual: float) -> None:
-        """The noise of one slot, (3,), against what is allowed, or what is usual among its neighbours."""
+    def _check_noise(self, slot: int, deviation: NDArray[np.float64], usual: float) -> None:
+        """Compares the noise of one slot, (3,), with its limit, or with the median of the slots."""
         part, identity = f"slot {slot}", self.station.reader.slots[slot].identity()
         if deviation.min() == 0.0:
             axis = "xyz"[int(np.argmin(deviation))]
-            text = f"{part}: the output on {axis} stands still, a living one is needed; check wiring and power"
+            text = f"{part}: the output on {axis} is constant, a changing output is needed; check wiring and power"
             self.findings.append(CheckResult("noise", part, ok=False, value=0.0, unit=identity.out_unit, message=text))
             return
         most = self.rules.noise_max or min(NOISIER * usual, WILD * identity.full_scale)
-        self._found("noise", part, float(deviation.max()), identity.out_unit, (0.0, most))
+        self._value("noise", part, float(deviation.max()), identity.out_unit, (0.0, most))
 
     def _standard(self) -> None:
-        """Offset and scale on z of the check standard from two poses, against its control limits."""
+        """Compares offset and scale of the check standard on z, from two poses, with their control limits."""
         if not self.rules.standard:
             return
         slots = self.station.reader.slots
-        found = [number for number, slot in slots.items() if slot.identity().serial == self.rules.standard]
-        if not found:
-            text = f"slots: check standard {self.rules.standard} sits in none of them; seat it, or correct [self_test]"
+        numbers = [number for number, slot in slots.items() if slot.identity().serial == self.rules.standard]
+        if not numbers:
+            text = f"slots: check standard {self.rules.standard} is in no slot; insert it, or correct [self_test]"
             self.findings.append(CheckResult("check standard", "slots", ok=False, message=text))
             return
         means: list[float] = []
         for pose in (UP, DOWN):
             self.station.table.move(*pose)
-            means.append(float(self._sampled()[found[0]][:, 2].mean()))
-        unit = slots[found[0]].identity().out_unit
-        temperature = self.station.reader.instruments().temperature_C[found[0]]
+            means.append(float(self._sampled()[numbers[0]][:, 2].mean()))
+        unit = slots[numbers[0]].identity().out_unit
+        temperature = self.station.reader.instruments().temperature_C[numbers[0]]
         self.standard = Standard(
             self.rules.standard, (means[0] + means[1]) / 2.0, (means[0] - means[1]) / 2.0, temperature, _now()
         )
@@ -178,12 +178,12 @@ class Bench:
         self, check: str, part: str, value: float, unit: str, given: tuple[float, float] | None, past: list[float]
     ) -> None:
         bounds = given or control_limits(past, self.rules.history_min) or (-math.inf, math.inf)
-        self._found(check, part, value, unit, bounds)
+        self._value(check, part, value, unit, bounds)
 
     def _sampled(self) -> dict[int, NDArray[np.float64]]:
-        """Samples by slot, (n, 3) in each output's unit, at the pose where the table stands.
+        """Samples by slot, (n, 3) in the unit of each output, at the present pose.
 
-        The reader's clock is read after the order to start and before that to stop, which may take their time on a busy link.
+        The clock of the reader is read after the start and before the stop, which may be slow on a busy link.
         """
         reader, clock = self.station.reader, self.station.clock
         clock.sleep(self.rules.settle_s)
@@ -192,7 +192,9 @@ class Bench:
         clock.sleep(self.rules.sample_s)
         ended = reader.since_power()
         reader.stop()
-        self.elapsed = ended - begun - 2.0 * float(np.spacing(np.float32(abs(ended))))  # a register of single precision
+        self.elapsed = (
+            ended - begun - 2.0 * float(np.spacing(np.float32(abs(ended))))
+        )  # the register has single precision
         return {number: slot.take().outputs for number, slot in sorted(reader.slots.items())}
 
 
@@ -210,19 +212,19 @@ def control_limits(past: Sequence[float], fewest: int) -> tuple[float, float] | 
 
 
 def read_history(path: Path) -> list[Standard]:
-    """Earlier measurements of check standards, oldest first; a torn line is left out."""
-    found: list[Standard] = []
+    """Earlier measurements of check standards, oldest first; an incomplete line is skipped."""
+    measurements: list[Standard] = []
     for line in path.read_text("utf-8").splitlines() if path.is_file() else []:
         try:
             content: dict[str, Any] = json.loads(line)
-            found.append(Standard(**content))
+            measurements.append(Standard(**content))
         except (ValueError, TypeError):
             continue
-    return found
+    return measurements
 
 
 def keep(path: Path, standard: Standard) -> None:
-    """Adds a measurement that was within its limits to the history."""
+    """Appends a measurement within its limits to the history."""
     path.parent.mkdir(parents=True, exist_ok=True)
     with path.open("a", encoding="utf-8") as file:
         file.write(json.dumps(asdict(standard)) + "\n")

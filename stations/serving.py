@@ -1,4 +1,4 @@
-"""A simulated station served alone, in wall time, for any Modbus client; and a look at every register of a station."""
+"""Serves a simulated station in wall time to any Modbus client, and reads every register of a station."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ NAMES = (("outer axis", "outer"), ("inner axis", "inner"), ("chamber", "chamber"
 
 @dataclass(frozen=True)
 class Served:
-    """Where a device of a station answers, and by which profile; ``place`` is what the station's file calls it."""
+    """Address and profile of a device of a station; ``place`` is its name in the station file."""
 
     name: str
     place: str
@@ -43,7 +43,7 @@ class Served:
 
 @dataclass(frozen=True)
 class Reading:
-    """One register as it reads now; ``fault`` says why it does not."""
+    """Present value of one register; ``fault`` is the error where it cannot be read."""
 
     device: str
     device_id: int
@@ -55,15 +55,15 @@ class Reading:
 
 
 def served(config: StationConfig, slots: list[int]) -> list[Served]:
-    """Every device of a station, the slots of these numbers among them."""
+    """Every device of a station, with the slots of these numbers."""
     devices = config.devices
-    found = [
+    shared = [
         Served(name, place, device.device_id, device.profile, device.host, device.port)
         for name, place in NAMES
         if (device := getattr(devices, place))
     ]
     s = devices.slots
-    return found + [Served(f"slot {i}", "slots", s.device_id + i, s.profile, s.host, s.port) for i in slots]
+    return shared + [Served(f"slot {i}", "slots", s.device_id + i, s.profile, s.host, s.port) for i in slots]
 
 
 def serve(
@@ -77,17 +77,17 @@ def serve(
     ready: Callable[[str, int], None],
     silence_s: float = 0.0,
 ) -> None:
-    """Comes back when ``stop`` is set; until then the station's time goes on at ``speed`` times the wall's.
+    """Serves until ``stop`` is set; the time of the station advances at ``speed`` times wall time.
 
-    Drives and reader have watchdogs of their own: ``silence_s`` after the last request they stop; 0 never.
-    ``ready`` gets host and port once they listen; a device with a text protocol has the next port. Nothing is sampled
-    unless a client starts it.
+    Drives and reader have communication time-outs: they stop ``silence_s`` after the last request; 0 means never.
+    ``ready`` gets host and port once they listen; a device with a text protocol has the next port. Sampling starts
+    only on the command of a client.
     """
     if config.kind != "simulated":
         raise WrongUse(
-            f"station {config.name}: kind {config.kind}, only a simulated station can be served; give such a file"
+            f"station {config.name}: kind {config.kind}, a simulated station is needed; give the file of one"
         )
-    from stations.clock import WallClock  # noqa: PLC0415 - only serving needs these
+    from stations.clock import WallClock  # noqa: PLC0415 - only the server needs these modules
     from stations.opening import make_plant  # noqa: PLC0415
     from stations.plant.line_server import LineServer  # noqa: PLC0415
     from stations.plant.server import PlantServer  # noqa: PLC0415
@@ -96,7 +96,7 @@ def serve(
     plant = make_plant(config, lot)
     silence = IdleStop(plant, config.devices, silence_s)
     with ExitStack() as stack:
-        begin = _with_room_behind(host) if plant.line_devices and port == 0 else port
+        begin = _free_port_pair(host) if plant.line_devices and port == 0 else port
         server = stack.enter_context(PlantServer(plant, host, begin))
         for number, device_id in enumerate(plant.line_devices, server.port + 1):
             stack.enter_context(LineServer(plant, device_id, host, number))
@@ -109,8 +109,8 @@ def serve(
             done = now
 
 
-def _with_room_behind(host: str) -> int:
-    """A free port whose next one is free too; 0, which is any, where there is none to be found."""
+def _free_port_pair(host: str) -> int:
+    """A free port with a free next port; 0, which means any port, where the search finds none."""
     for _ in range(TRIES):
         with socket.create_server((host, 0)) as first:
             port = int(first.getsockname()[1])
@@ -120,14 +120,14 @@ def _with_room_behind(host: str) -> int:
 
 
 def look(config: StationConfig, lot: Lot | None) -> list[Reading]:
-    """Every readable register of every device as it reads now; slots are those that the reader calls occupied.
+    """Present value of every readable register of every device, with the slots that the reader reports as occupied.
 
-    ``lot`` is what sits in a simulated station; hardware has what it has.
+    ``lot`` has the units of a simulated station; hardware needs none.
     """
     once = config.model_copy(update={"link": config.link.model_copy(update={"read_attempts": 1})})
     if config.kind == "simulated":
         if lot is None:
-            raise WrongUse(f"station {config.name}: simulated, it needs a lot of units to look at; give one")
+            raise WrongUse(f"station {config.name}: simulated without units, a lot is needed; give one")
         from stations.opening import make_plant, serve_devices  # noqa: PLC0415 - hardware needs no plant
 
         with serve_devices(once, make_plant(config, lot)) as links:
@@ -152,7 +152,7 @@ def _look(config: StationConfig, links: Links) -> Iterator[Reading]:
 
 
 def _values(links: Links, device: Served) -> Iterator[Reading]:
-    """What one device tells; after the first question that it leaves unanswered the others are not asked."""
+    """Values of one device; after the first request without an answer its other registers are not read."""
     profile = profile_of(getattr(links.config.devices, device.place))
     if profile.commands:
         commands = Commands(device.name, links.lines(device.place), profile)
@@ -182,7 +182,7 @@ def _reading(device: Served, register: Register, value: str, fault: str) -> Read
 
 def _shown(register: Register, value: Value) -> str:
     if isinstance(value, list):
-        return ", ".join(f"{one:.6g}" for one in value)
+        return ", ".join(f"{number:.6g}" for number in value)
     if isinstance(value, str):
         return value
     return named(register, value) if register.enumeration else f"{value:.9g}"

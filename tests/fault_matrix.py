@@ -1,7 +1,7 @@
-"""What becomes of a capture under each fault: the cases, how one is tried, and how its outcome is told.
+"""Outcome of a capture under each simulated fault: the cases, their execution, and the page of results.
 
-The truth is the plant's: every mean that a run would calibrate with is held against what the unit must have said in the pose and
-at the temperature that the plant really had. A mean that is off is bad data, whatever the station believed.
+The reference is the true state of the plant: every mean of an accepted unit is compared with the true output of the unit in
+the true pose and at the true temperature. A mean that differs is bad data, whatever the station reports.
 """
 
 from collections.abc import Iterator
@@ -28,13 +28,13 @@ from stations.plant.faults.catalogue import kinds
 from stations.plant.plant import Plant
 
 UNITS = 3
-FAR_UG = 100.0  # a mean this far from the truth is bad data; quiet devices in a sound station stay below 10 µg
+FAR_UG = 100.0  # limit of the error of a mean; quiet devices in a station without faults stay below 10 µg
 RECOVERED, UNIT, RUN = "recovered", "unit refused", "run refused"
 
 
 @dataclass(frozen=True)
 class Case:
-    """A fault, and what must come of it. ``says`` is part of what the operator is told."""
+    """A fault and its required outcome. ``says`` is a part of the message to the operator."""
 
     fault: str
     outcome: str
@@ -48,15 +48,15 @@ class Case:
 
 
 @dataclass
-class Tried:
-    """What came of a case."""
+class CaseResult:
+    """The outcome of a case."""
 
     outcome: str
-    told: str
+    message: str
     status: int
     refused: list[str]
     records: int
-    wanted: int
+    planned: int
     spoilt: list[str] = field(default_factory=list)
     bad: list[str] = field(default_factory=list)
 
@@ -91,31 +91,31 @@ def station_under(fault: str) -> StationConfig:
     return config.model_copy(update={"simulation": quiet, "link": patience, "soak": soak, "suspenders": rules})
 
 
-def tried(case: Case) -> Tried:
-    """A capture under the fault, its data judged, and every mean held against the plant's truth."""
+def run_case(case: Case) -> CaseResult:
+    """Capture under the fault, validation of its data, and comparison of every mean with the truth of the plant."""
     config, lot, recipe = station_under(case.fault), lot_of(UNITS), recipe_of(case.temperatures)
     sink, events, plant = MemorySink(), MemoryLog(), make_plant(station_under(case.fault), lot_of(UNITS))
-    told, status = "", 0
+    message, status = "", 0
     with serve_plant(config, lot, plant) as station:
         try:
             capture(station, recipe, lot, sink, progress=quiet_progress, events=events)
         except StationError as problem:
-            told, status = str(problem), problem.exit_status
-    wanted = len(steps(recipe))
+            message, status = str(problem), problem.exit_status
+    planned = len(steps(recipe))
     spoilt = [event.reason for event in events.noted() if event.kind in {"spoilt", "suspended"}]
     if not sink.records:
-        return Tried(RUN, told, status, [], 0, wanted, spoilt)
+        return CaseResult(RUN, message, status, [], 0, planned, spoilt)
     verdicts = validate([sink.records[n][0] for n in sorted(sink.records)], sink.all(1), lot.units)
     refused = verdicts.loc[verdicts["refused"], "unit"].tolist()
-    if not told and refused:
-        told = verdicts.loc[verdicts["refused"], "reason"].iloc[0]
+    if not message and refused:
+        message = verdicts.loc[verdicts["refused"], "reason"].iloc[0]
     outcome = RUN if status else UNIT if refused else RECOVERED
     bad = list(far_from_the_truth(plant, sink, verdicts, recipe))
-    return Tried(outcome, told, status, refused, len(sink.records), wanted, spoilt, bad)
+    return CaseResult(outcome, message, status, refused, len(sink.records), planned, spoilt, bad)
 
 
 def far_from_the_truth(plant: Plant, sink: MemorySink, verdicts: pd.DataFrame, recipe: Recipe) -> Iterator[str]:
-    """Means of accepted units that are not what the unit must have said; the truth is the plant's, not the station's."""
+    """Means of accepted units that differ from the true output; the truth is that of the plant, not of the station."""
     samples = [sink.records[n][0] for n in sorted(sink.records)]
     dwells = reduce(samples, sink.all(1), verdicts, recipe.local_gravity_m_s2)
     by_serial = {truth.serial: truth for truth in (plant.truth(unit.serial) for unit in lot_of(UNITS).units)}
@@ -123,9 +123,9 @@ def far_from_the_truth(plant: Plant, sink: MemorySink, verdicts: pd.DataFrame, r
         truth = by_serial[row.unit]
         device = Devices(plant.preset, [truth])
         force = (truth.slot_rotation @ np.array([row.force_x, row.force_y, row.force_z]))[None, None, :]
-        should = device.output(force, np.array([[row.unit_C]]))[0, 0]
-        found = np.array([row.out_x, row.out_y, row.out_z]) / plant.preset.scale
-        off = 1e6 * float(np.abs(found - should).max())
+        true = device.output(force, np.array([[row.unit_C]]))[0, 0]
+        measured = np.array([row.out_x, row.out_y, row.out_z]) / plant.preset.scale
+        off = 1e6 * float(np.abs(measured - true).max())
         if off > FAR_UG:
             yield f"{row.unit} {row.pose}: {off:.0f} µg"
 
@@ -135,7 +135,7 @@ WITHIN, MOVING, SOAKING, LATE = (
     443.0,
     900.0,
     1500.0,
-)  # s: in the third dwell, in the move behind it, in the second soak
+)  # s: in the third dwell, in the move after it, in the second soak, later
 CASES: tuple[Case, ...] = (
     # the wire
     Case(f"time_out:at_s={WITHIN}", RECOVERED),
@@ -150,7 +150,7 @@ CASES: tuple[Case, ...] = (
     Case(f"truncated:at_s={WITHIN}", RECOVERED),
     Case(f"byte_garbage:at_s={WITHIN}", RECOVERED),
     Case(f"byte_garbage:at_s={MOVING}:frames=200", RUN, "check gateway and cable"),
-    # what devices answer
+    # answers of devices
     Case(f"silent:at_s={WITHIN}:serial=U001", UNIT, "slot 1: no answer"),
     Case(f"silent:at_s={WITHIN}:device=reader:for_s=15", RECOVERED, spoilt=True),
     Case(f"silent:at_s={WITHIN}:device=chamber", RUN, "chamber"),
@@ -180,7 +180,7 @@ CASES: tuple[Case, ...] = (
     Case(f"stuck_encoder:at_s={MOVING}:device=outer", RUN, "outer axis: stands at"),
     Case(f"backlash:at_s={WITHIN}:device=outer", RUN, "check zero and gears"),
     Case("backlash:device=inner", RUN, "check zero and gears"),
-    Case(f"table_stall:at_s={MOVING}:device=outer", RUN, "standing is needed"),
+    Case(f"table_stall:at_s={MOVING}:device=outer", RUN, "axis at rest is needed"),
     Case(f"table_stall:at_s={MOVING}:device=outer:for_s=20", RECOVERED),
     Case(f"lost_home:at_s={WITHIN}:device=outer", RUN, "home the axis"),
     Case(f"lost_home:at_s={WITHIN}:device=inner:admitted=0", RUN, "its zero is lost"),
@@ -202,7 +202,7 @@ CASES: tuple[Case, ...] = (
     Case(f"dropped_samples:at_s={WITHIN}:numbered=0", RECOVERED, spoilt=True),
     Case(f"supply_sag:at_s={WITHIN}:serial=U001", UNIT, "supply out of tolerance", spoilt=True),
     Case(f"supply_sag:at_s={WITHIN}:device=reader:for_s=60", RECOVERED, spoilt=True),
-    # around the station
+    # environment of the station
     Case(f"clock_jump:at_s={WITHIN}", RECOVERED, spoilt=True),
     Case(f"clock_jump:at_s={WITHIN}:step_s=-30", RECOVERED, spoilt=True),
     Case(f"clock_jump:at_s={SOAKING}:step_s=3000", RECOVERED, spoilt=True),
@@ -217,21 +217,21 @@ CASES: tuple[Case, ...] = (
 
 PAGE = Path(__file__).resolve().parents[1] / "docs" / "reference" / "faults.md"
 HEAD = """\
-# Faults, and what becomes of them
+# Simulated faults and their outcome
 
-Written by `python tests/fault_matrix.py` from what the tests find; the tests hold every row against what they find again. A fault
-is given to a simulated station in its file or in a recipe (`faults = [{ kind = "door", at_s = 437.5, for_s = 100 }]`), on the
-command line (`tumbleline run --fault door:at_s=437.5:for_s=100`), or by a test. Each row is a capture of three units at two
-temperatures; the fault comes within the third dwell (437.5 s), in the move behind it (443 s), in the second soak (900 s), or is
-there from the beginning.
+This page lists the outcome of a run under each simulated fault. `python tests/fault_matrix.py` writes it from the test results;
+the tests check every row. A fault is defined in a station file or in a recipe
+(`faults = [{ kind = "door", at_s = 437.5, for_s = 100 }]`), on the command line
+(`tumbleline run --fault door:at_s=437.5:for_s=100`), or in a test. Each row is a capture of three units at two temperatures. The
+fault starts within the third dwell (437.5 s), in the move after it (443 s), in the second soak (900 s), or with the run.
 
-- **recovered**: the run came to its end, and every mean of every unit lies within 100 µg of what the plant knows to be true.
-  Where *measured again* stands, dwells were spoilt, thrown away, and measured again, with the reason in the run's journal
+- **recovered**: the run was completed, and every mean of every unit is within 100 µg of the true value of the simulation.
+  *Measured again* means that affected dwells were discarded and repeated, with the reason in the journal of the run
   (`tumbleline show RUN events`).
-- **unit refused**: the run came to its end; the unit that is concerned gets no coefficient, no grade and no certificate, the
-  others are true.
-- **run refused**: the run ended with exit status 3 and this message; what was finished before is kept, and the same command goes
-  on behind it.
+- **unit refused**: the run was completed; the affected unit gets no coefficients, no grade and no certificate, the results of
+  the others are correct.
+- **run refused**: the run ended with exit status 3 and this message; finished records are kept, and the same command resumes
+  the run.
 
 Faults of test equipment (exciter, shock machine, centrifuge) are not in the matrix: a spoilt recording is discarded and repeated,
 an abort, an open guard door or an overspeed ends the run for a person, and a unit whose cable is off has no figure
@@ -240,47 +240,47 @@ an abort, an open guard door or an overspeed ends the run for a person, and a un
 """
 
 
-def row(case: Case, found: Tried) -> str:
-    """The line of a case in the page."""
+def row(case: Case, result: CaseResult) -> str:
+    """The row of a case in the page."""
     fault = parse_fault(case.fault)
     figures = ", ".join(f"{name} {value:g}" for name, value in fault.figures.items())
-    who = "a unit" if fault.serial else fault.device or "the station"
-    when = "from the beginning" if fault.at_s == 0.0 else f"{fault.at_s:g} s"
-    how_long = "" if fault.for_s is None else f", for {fault.for_s:g} s"
-    again = " (measured again)" if found.spoilt and found.outcome == RECOVERED else ""
-    told = f"…{case.says}…" if case.says else ""
-    return f"| `{fault.kind}` | {who} | {when}{how_long} | {figures} | {found.outcome}{again} | {told} |"
+    target = "a unit" if fault.serial else fault.device or "the station"
+    start = "with the run" if fault.at_s == 0.0 else f"{fault.at_s:g} s"
+    duration = "" if fault.for_s is None else f", for {fault.for_s:g} s"
+    again = " (measured again)" if result.spoilt and result.outcome == RECOVERED else ""
+    message = f"…{case.says}…" if case.says else ""
+    return f"| `{fault.kind}` | {target} | {start}{duration} | {figures} | {result.outcome}{again} | {message} |"
 
 
 def page(rows: list[str]) -> str:
-    """The whole page."""
-    named = [f"| `{name}` | {(kind.__doc__ or '').splitlines()[0]} |" for name, kind in kinds().items()]
+    """The complete page."""
+    descriptions = [f"| `{name}` | {(kind.__doc__ or '').splitlines()[0]} |" for name, kind in kinds().items()]
     parts = [
-        HEAD + "## The matrix\n",
-        "| fault | whose | when | figures | outcome | what the operator is told |",
+        HEAD + "## Outcomes\n",
+        "| fault | target | start | figures | outcome | part of the message |",
         "|---|---|---|---|---|---|",
         *rows,
         "",
         HOST,
-        "## The kinds\n",
-        "| kind | what it is |",
+        "## Kinds of faults\n",
+        "| kind | description |",
         "|---|---|",
-        *named,
+        *descriptions,
         "",
     ]
     return "\n".join(parts)
 
 
 HOST = """\
-## The host
+## Faults of the computer
 
 | fault | outcome | test |
 |---|---|---|
-| disk full, at any write | refused by name with exit status 2; with space the same command goes on | `test_full_disk` |
-| killed (SIGKILL) at every stage boundary | the same command ends in the same bytes; no dwell is measured twice | `test_killed` |
-| killed at 50 random times of the capture | as above, bit for bit | `test_killed` |
+| disk full, at any write | refused with exit status 2; with free space the same command resumes | `test_full_disk` |
+| killed (SIGKILL) at every stage boundary | the same command gives the same bytes; no dwell is measured twice | `test_killed` |
+| killed at 50 random times of the capture | as above, bit by bit | `test_killed` |
 """
 
 
 if __name__ == "__main__":
-    PAGE.write_text(page([row(case, tried(case)) for case in CASES]), encoding="utf-8")
+    PAGE.write_text(page([row(case, run_case(case)) for case in CASES]), encoding="utf-8")

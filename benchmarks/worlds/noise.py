@@ -1,6 +1,6 @@
 """Noise of a device in real time on a grid of one second: white, 1/f by fractional summation, random walk, tails.
 
-Nothing here is shared with the estimator, which takes 1/f for a sum of relaxations, or with the blind runs.
+This code is independent of the estimator, which models 1/f as a sum of relaxations, and of the blind runs.
 """
 
 from __future__ import annotations
@@ -18,10 +18,10 @@ PAST = 3  # record lengths of 1/f before the record
 
 @dataclass(frozen=True)
 class Noise:
-    """What a device's output wanders by.
+    """Noise of the output of a device.
 
     white : one-sided density, µg/√Hz; flicker : bias instability B, µg; walk : K, µg/√s
-    unit_factors, axis_factors : factors on all of it, in turn over units and axes
+    unit_factors, axis_factors : factors on all terms, cyclic over units and axes
     unit_white, unit_slow, axis_slow : factors on the white part by unit; on 1/f and walk by unit and by axis
     tails : degrees of freedom of a t distribution for the white part of the dwells; 0 for normal
     """
@@ -37,7 +37,7 @@ class Noise:
     tails: int = 0
 
     def factors(self, units: int) -> Floats:
-        """Factor on everything, (units, 3)."""
+        """Factor on all terms, (units, 3)."""
         own = np.resize(self.unit_factors, units)
         return own[:, None] * np.array(self.axis_factors)
 
@@ -47,7 +47,7 @@ def dwell_noise(noise: Noise, start: Floats, duration: Floats, units: int, rng: 
     white = noise.white / np.sqrt(2.0 * duration)
     shape = (units, len(start), 3)
     drawn = rng.standard_t(noise.tails, shape) / np.sqrt(3.0) if noise.tails else rng.standard_normal(shape)
-    found = drawn * white[:, None] * np.resize(noise.unit_white, units)[:, None, None]
+    errors = drawn * white[:, None] * np.resize(noise.unit_white, units)[:, None, None]
     begin, end = float(start.min()), float((start + duration).max())
     steps = int(np.ceil((end - begin) / GRID_S)) + 2
     slow = np.zeros((3 * units, steps))
@@ -60,12 +60,12 @@ def dwell_noise(noise: Noise, start: Floats, duration: Floats, units: int, rng: 
     last = np.maximum(((start + duration - begin) / GRID_S).astype(int), first + 1)
     means = (whole[:, last] - whole[:, first]) / (last - first)
     slow_factors = np.resize(noise.unit_slow, units)[:, None] * np.array(noise.axis_slow)
-    found = found + means.reshape(units, 3, -1).transpose(0, 2, 1) * slow_factors[:, None, :]
-    return found * noise.factors(units)[:, None, :]
+    errors = errors + means.reshape(units, 3, -1).transpose(0, 2, 1) * slow_factors[:, None, :]
+    return errors * noise.factors(units)[:, None, :]
 
 
 def fractional(rng: np.random.Generator, channels: int, steps: int) -> Floats:
-    """1/f noise of bias instability one, (channels, steps): white noise summed to the order one half.
+    """1/f noise of bias instability one, (channels, steps): fractional summation of white noise of order one half.
 
     Kasdin, Proc. IEEE 83 (1995) 802, with alpha = 1: innovations of variance B² have the two-sided density B²/(2πf), whose
     Allan variance is B²·2·ln 2/π.

@@ -40,8 +40,8 @@ def terms(force: np.ndarray) -> np.ndarray:
     return np.stack([x**2, x * y, x**3, x * np.abs(x)], axis=1)
 
 
-def left(columns: np.ndarray, base: np.ndarray) -> np.ndarray:
-    """What a base model leaves of columns."""
+def residual(columns: np.ndarray, base: np.ndarray) -> np.ndarray:
+    """Residual of columns after a fit of the base model."""
     return columns - base @ np.linalg.lstsq(base, columns, rcond=None)[0]
 
 
@@ -51,7 +51,7 @@ def base_of(force: np.ndarray) -> np.ndarray:
 
 
 def draw_plans() -> None:
-    """Plans on the sphere, with the part of each term that they leave beside bias, scale and misalignment."""
+    """Plans on the sphere, with the remaining fraction of each term after bias, scale and misalignment."""
     figure, rows = plt.subplots(2, len(PLANS), figsize=(12, 4.6), height_ratios=(1.25, 1.0))
     for column, (plan, title) in enumerate(PLANS.items()):
         force = forces(plan)
@@ -64,11 +64,17 @@ def draw_plans() -> None:
         sky.axis("off")
         columns = terms(force)
         size = np.linalg.norm(columns, axis=0)
-        v = np.where(size > 1e-9, np.linalg.norm(left(columns, base_of(force)), axis=0) / np.maximum(size, 1e-9), 0.0)
+        v = np.where(
+            size > 1e-9, np.linalg.norm(residual(columns, base_of(force)), axis=0) / np.maximum(size, 1e-9), 0.0
+        )
         bars.barh(range(len(TERMS)), np.maximum(v, 0.004), color=[ORANGE if k < 0.01 else BLUE for k in v], height=0.6)
         for place, value in enumerate(v):
             bars.text(
-                min(value, 0.8) + 0.04, place, "unseen" if value < 0.01 else f"{value:.2f}", va="center", fontsize=9
+                min(value, 0.8) + 0.04,
+                place,
+                "not visible" if value < 0.01 else f"{value:.2f}",
+                va="center",
+                fontsize=9,
             )
         bars.set(
             xlim=(0, 1.15),
@@ -78,13 +84,13 @@ def draw_plans() -> None:
         )
         bars.invert_yaxis()
         bars.tick_params(length=0)
-    rows[1, 0].set_xlabel("part left, v")
+    rows[1, 0].set_xlabel("remaining fraction v")
     figure.tight_layout()
     save(figure, "poses-plans")
 
 
 def draw_rivals() -> None:
-    """Where a cubic and an odd quadratic differ once bias, scale and the wrong one are fitted to 26 poses."""
+    """Difference of a cubic and an odd quadratic after a fit of bias, scale and the wrong effect to 26 poses."""
     force = forces("twenty_six")
     f = np.linspace(-1.0, 1.0, 401)
     wrong = np.column_stack([force[:, 0], force[:, 0] * np.abs(force[:, 0])])
@@ -97,20 +103,20 @@ def draw_rivals() -> None:
     axes.plot(levels, np.interp(levels, f, curve), "o", color=GREY, label="the 26 poses")
     best = np.array([-0.24, 0.24])
     axes.plot(best, np.interp(best, f, curve), "o", color=ORANGE, markersize=9, label="|fx| = 0.24 g")
-    axes.set(xlabel="fx / g", ylabel="difference / µg", title="K3 = 30 µg/g³ less the best fx·|fx|")
+    axes.set(xlabel="fx / g", ylabel="difference / µg", title="K3 = 30 µg/g³ minus the best fx·|fx|")
     axes.legend(frameon=False)
     figure.tight_layout()
     save(figure, "poses-rivals")
 
 
 def draw_soaks() -> None:
-    """Soaks one way and there and back: what is left of time beside temperature."""
-    ways = {"one way": (0, 20, 40, 60), "there and back": (0, 30, 60, 30, 0)}
+    """Soaks in one and in both directions: remaining fraction of time after temperature."""
+    ways = {"one direction": (0, 20, 40, 60), "both directions": (0, 30, 60, 30, 0)}
     figure, rows = plt.subplots(1, 2, figsize=(8.4, 2.9), sharey=True)
     for axes, (title, stops) in zip(rows, ways.items(), strict=True):
         time = np.arange(len(stops)) * 0.5
         theta = np.array(stops) - 25.0
-        rest = left(time[:, None], np.column_stack([np.ones(len(stops)), theta]))
+        rest = residual(time[:, None], np.column_stack([np.ones(len(stops)), theta]))
         v = float(np.linalg.norm(rest) / np.linalg.norm(time))
         axes.step(np.append(time, time[-1] + 0.5), np.append(stops, stops[-1]), where="post", color=BLUE)
         axes.plot(time + 0.42, stops, "o", color=ORANGE)
@@ -121,7 +127,7 @@ def draw_soaks() -> None:
 
 
 def save(figure: plt.Figure, name: str) -> None:
-    """Writes a picture that is the same whenever it is drawn."""
+    """Writes a picture with the same bytes at every call."""
     figure.savefig(HERE / f"{name}.svg", metadata={"Date": None})
     plt.close(figure)
 

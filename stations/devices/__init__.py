@@ -1,1 +1,1 @@
-"""The production adapters: what a station's devices do, on whatever link; they know nothing of the simulated plant."""
+"""The production adapters of the devices of a station, for every link; they do not depend on the simulated plant."""

@@ -1,6 +1,6 @@
-"""One axis of the table behind a servo drive: absolute moves, ordered once, each read back.
+"""One axis of the table behind a servo drive: absolute moves, each commanded once and read back.
 
-What a drive's registers mean is the business of the adapter of its family; what a move is, is said here.
+The adapter of a drive family defines the meaning of its registers; this module defines a move.
 """
 
 from __future__ import annotations
@@ -16,13 +16,13 @@ if TYPE_CHECKING:
     from schemas.station import Limits
     from stations.devices.registers import Registers
 
-SETTLING_DEG = 0.5  # how near its target an axis is while it comes to rest
-BEGIN_LOOKS = 3  # looks at the drive before a move that has not begun counts as over
+SETTLING_DEG = 0.5  # largest distance from the target while an axis settles
+BEGIN_LOOKS = 3  # readings of the drive after which a move that has not started counts as finished
 
 
 @dataclass(frozen=True)
 class DriveState:
-    """What a drive says of itself; ``alarm`` is empty when there is none, else what a person should read."""
+    """State of a drive; ``alarm`` is the text of its alarm, empty without one."""
 
     ready: bool
     homed: bool
@@ -42,38 +42,38 @@ class TableAxis(ABC):
         self._low, self._high = bounds
         self._limits = limits
         self._target: float | None = None
-        self._pending: float | None = None  # a target that was ordered and has not been confirmed
+        self._pending: float | None = None  # the target of a command that has not been confirmed
         self._looks = 0
 
     @abstractmethod
     def state(self) -> DriveState:
-        """What the drive says of itself now."""
+        """The present state of the drive."""
 
     @abstractmethod
     def prepare(self) -> None:
-        """Makes the drive take orders, without moving anything."""
+        """Enables the drive for commands; nothing moves."""
 
     @abstractmethod
     def order(self, target: float) -> None:
-        """Orders a move to ``target`` degrees, with the station's speed and acceleration; what starts it is sent once."""
+        """Commands a move to ``target`` degrees with the speed and acceleration of the station; the start is sent once."""
 
     @abstractmethod
     def stop(self) -> None:
-        """Stops the axis where it is; it holds, and what was left of its move is dropped."""
+        """Stops the axis; it holds its position and discards the rest of its move."""
 
     def check(self, target: float) -> None:
-        """Refuses a target outside the station's limits; nothing has moved then."""
+        """Refuses a target outside the limits of the station before anything moves."""
         if not self._low <= target <= self._high:
             raise StationRefused(
                 f"{self.name}: target {target:g} deg, {self._low:g} to {self._high:g} deg is allowed; change the pose"
             )
 
     def start(self, target: float) -> float:
-        """Starts a move to ``target`` degrees and gives the seconds it should take.
+        """Starts a move to ``target`` degrees and returns its expected duration, s.
 
-        Where the answer to the order is lost, the drive is asked whether it has taken it; it is never sent a second time. A drive
-        that has not taken it raises what was lost. A later start to the same target finds out whether it has in the
-        meantime. An order that could not be sent soon after the reading that it rests on is not sent at all.
+        Where the answer to the command is lost, the state of the drive decides whether it has accepted it; the command is never
+        sent twice. If the drive has not accepted it, the error of the link is raised. A later start to the same target checks
+        again. A command that depends on a reading is not sent when the reading is too old.
         """
         self.check(target)
         limits = self._limits
@@ -97,7 +97,7 @@ class TableAxis(ABC):
             raise
 
     def _took(self, target: float) -> bool:
-        """Whether the drive is on its way, still rings at its target, or stands there."""
+        """Whether the drive moves to its target, settles at it, or stands there."""
         state = self.state()
         settling = not state.in_position and abs(self.position() - target) <= SETTLING_DEG
         return state.moving or settling or self._stands(target)
@@ -109,17 +109,19 @@ class TableAxis(ABC):
         return self._limits.position_deg + self._registers.step("feedback_position") / 2.0
 
     def _require_ready(self) -> None:
-        """A drive that takes orders; one that does not says why, to whom it may concern."""
+        """Enables the drive; refuses one that is not ready, with the reason."""
         self.prepare()
         state = self.state()
         self._refuse_alarm(state)
         if not state.homed:
-            message = f"{self.name}: the drive has no home, its angles mean nothing; home the axis at the drive"
+            message = (
+                f"{self.name}: the drive has no home position, its angles are not valid; home the axis at the drive"
+            )
             raise OperatorNeeded(f"{message} and check its zero")
         if not state.ready or state.moving:
-            found = "busy with a move" if state.moving else "not ready"
+            reason = "busy with a move" if state.moving else "not ready"
             raise StationRefused(
-                f"{self.name}: the drive is {found}, one that stands and is ready is needed; wait, or look at its panel"
+                f"{self.name}: the drive is {reason}, a drive that stands still and is ready is needed; wait, or check its panel"
             )
 
     def _refuse_alarm(self, state: DriveState) -> None:
@@ -127,13 +129,13 @@ class TableAxis(ABC):
             raise OperatorNeeded(f"{self.name}: {state.alarm}, none is needed; clear the cause and reset the drive")
 
     def moving(self) -> bool:
-        """Whether the drive says that it moves."""
+        """Whether the drive reports a move."""
         return self.state().moving
 
     def arrived(self) -> bool:
-        """Whether the drive says that it is in position; an alarm stops the run.
+        """Whether the drive reports that it is in position; an alarm stops the run.
 
-        A drive takes a moment to begin: one that says it stands, far from its target, is looked at again.
+        A drive starts after a delay: a drive that stands far from its target is read again before the move counts as finished.
         """
         state = self.state()
         self._refuse_alarm(state)
@@ -150,14 +152,14 @@ class TableAxis(ABC):
         return self._registers.number("feedback_position")
 
     def done(self) -> None:
-        """Forgets the order: all that was ordered with it has been confirmed, and the next one is new, whatever its target."""
+        """Ends the move: both axes are confirmed, so that the next command is a new one, also to the same target."""
         self._pending = None
 
     def confirm(self, target: float) -> None:
-        """Refuses to go on when the encoder says another angle than was asked."""
-        found = self.position()
-        if abs(found - target) > self._tolerance():
+        """Refuses to continue where the encoder reads another angle than the target."""
+        angle = self.position()
+        if abs(angle - target) > self._tolerance():
             raise OperatorNeeded(
-                f"{self.name}: stands at {found:.4f} deg, {target:g} ± {self._limits.position_deg:g} deg is needed; "
-                "check load and brake of the table"
+                f"{self.name}: stands at {angle:.4f} deg, {target:g} ± {self._limits.position_deg:g} deg is needed; "
+                "check the load and the brake of the table"
             )

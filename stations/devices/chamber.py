@@ -1,6 +1,6 @@
-"""The thermal chamber: a set point, read back, and the air's temperature.
+"""The thermal chamber: set point with read-back, and air temperature.
 
-What a controller's values mean is the business of the adapter of its family; what a chamber does is said here.
+The adapter of a controller family defines the meaning of its values; this module defines the functions of a chamber.
 """
 
 from __future__ import annotations
@@ -23,10 +23,10 @@ OWN_LIMITS = ("set_point_low", "set_point_high")
 
 
 class ThermalChamber(ABC):
-    """A chamber behind a controller that ramps by itself, whatever its lines carry."""
+    """A chamber behind a controller that ramps by itself, with registers or with text commands."""
 
     needs: ClassVar[tuple[str, ...]] = ("temperature", "set_point")
-    running: ClassVar[str] = AUTOMATIC  # what the controller calls the mode in which it keeps its set point
+    running: ClassVar[str] = AUTOMATIC  # the controller's name of the mode in which it controls to its set point
     standing: ClassVar[str] = "off"
 
     def __init__(self, values: Values, low: float, high: float) -> None:
@@ -36,18 +36,18 @@ class ThermalChamber(ABC):
 
     @abstractmethod
     def mode(self) -> str:
-        """The mode that the controller is in."""
+        """The present mode of the controller."""
 
     @abstractmethod
     def require_ready(self) -> None:
-        """Refuses a controller that would not do what it is told: an alarm, a program, another unit."""
+        """Refuses a controller that would not follow a set point: an alarm, a running program, another unit."""
 
     def order(self, temperature: float) -> None:
-        """Writes the set point; giving the same one twice changes nothing."""
+        """Writes the set point; the same value twice has no further effect."""
         self._values.write("set_point", temperature)
 
     def check(self, temperature: float) -> None:
-        """Refuses a temperature outside the station's limits; nothing has been set then."""
+        """Refuses a temperature outside the limits of the station before anything is set."""
         if not self._low <= temperature <= self._high:
             raise StationRefused(
                 f"{self.name}: set point {temperature:g} °C, {self._low:g} to {self._high:g} °C is allowed; "
@@ -55,7 +55,7 @@ class ThermalChamber(ABC):
             )
 
     def set_temperature(self, temperature: float) -> None:
-        """Sets the target in °C and makes sure that the controller has taken it; where an answer was lost, that decides."""
+        """Sets the target in °C and reads it back; after a lost answer the value read back decides."""
         self.check(temperature)
         self.require_ready()
         self._require_inside(temperature)
@@ -64,10 +64,10 @@ class ThermalChamber(ABC):
         except (StationTimeout, LinkLost):
             if not self._holds(temperature):
                 raise
-        found, mode = self._values.number("set_point"), self.mode()
-        if not self._near(found, temperature) or mode != self.running:
+        actual, mode = self._values.number("set_point"), self.mode()
+        if not self._near(actual, temperature) or mode != self.running:
             raise StationRefused(
-                f"{self.name}: set point {found:g} °C in mode {mode}, {temperature:g} °C in {self.running} is needed; "
+                f"{self.name}: set point {actual:g} °C in mode {mode}, {temperature:g} °C in {self.running} is needed; "
                 "check the controller's panel"
             )
 
@@ -80,11 +80,11 @@ class ThermalChamber(ABC):
         self._switch(self.running)
 
     def set_point(self) -> float:
-        """The target that the controller keeps, °C."""
+        """The set point in the controller, °C."""
         return self._values.number("set_point")
 
     def temperature(self) -> float:
-        """The air's temperature, °C; what no chamber can have is refused."""
+        """The air temperature, °C; a physically impossible one is refused."""
         value = self._values.number("temperature")
         if not (math.isfinite(value) and PLAUSIBLE_C[0] < value < PLAUSIBLE_C[1]):
             raise StationRefused(
@@ -97,38 +97,38 @@ class ThermalChamber(ABC):
         profile = self._values.profile
         if not profile.has("mode") or not profile.entry("mode").writable:
             raise StationRefused(
-                f"{self.name}: profile {profile.name} has nothing to write the mode to, which is needed to make it {mode}; "
+                f"{self.name}: profile {profile.name} has no writable mode, one is needed to switch to {mode}; "
                 "set safety.chamber to set_point or hold"
             )
         self._values.write("mode", mode)
-        found = self.mode()
-        if found != mode:
-            raise StationRefused(f"{self.name}: in mode {found}, {mode} is needed; check the controller's panel")
+        actual = self.mode()
+        if actual != mode:
+            raise StationRefused(f"{self.name}: in mode {actual}, {mode} is needed; check the controller's panel")
 
     def _require_inside(self, temperature: float) -> None:
-        """Refuses what the controller itself is set up to refuse."""
+        """Refuses a set point outside the limits that are set in the controller."""
         if not all(self._values.has(name) for name in OWN_LIMITS):
             return
         low, high = (self._values.number(name) for name in OWN_LIMITS)
         if not low <= temperature <= high:
             raise StationRefused(
-                f"{self.name}: set point {temperature:g} °C, the controller is set up for {low:g} to {high:g} °C; "
+                f"{self.name}: set point {temperature:g} °C, the controller allows {low:g} to {high:g} °C; "
                 "change the recipe, or the controller's limits"
             )
 
     def _holds(self, temperature: float) -> bool:
         return self._near(self._values.number("set_point"), temperature)
 
-    def _near(self, found: float, temperature: float) -> bool:
-        return abs(found - temperature) <= READ_BACK_K + self._values.step("set_point") / 2.0
+    def _near(self, actual: float, temperature: float) -> bool:
+        return abs(actual - temperature) <= READ_BACK_K + self._values.step("set_point") / 2.0
 
     def refuse(self, found: str, needed: str, remedy: str) -> None:
-        """Raises that the controller is not as it must be; nothing has been set."""
+        """Raises the error of a controller in the wrong state; nothing has been set."""
         raise StationRefused(f"{self.name}: {found}, {needed} is needed; {remedy}")
 
 
 def refuse_program(name: str, state: str) -> None:
-    """Refuses a controller that runs a program of its own: it is not ended from here."""
+    """Refuses a controller that runs its own program; this software does not end it."""
     if state in RUNNING:
         raise OperatorNeeded(
             f"{name}: the controller's own program is in state {state}, none is needed; end it at the panel"

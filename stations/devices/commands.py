@@ -1,4 +1,4 @@
-"""A device's lines of text by name: profile and link together."""
+"""Text commands of a device by name: profile and link together."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ if TYPE_CHECKING:
     from stations.codec import Value
     from stations.links.link import TextLink
 
-STEP = 0.1  # one decimal is what the lines are written with
+STEP = 0.1  # numbers are written with one decimal
 
 
 class Commands:
-    """Questions to and orders for one device; ``name`` is what messages call it."""
+    """Queries and commands of one device; ``name`` is its name in messages."""
 
     def __init__(self, name: str, link: TextLink, profile: Profile) -> None:
         self.name = name
@@ -27,14 +27,14 @@ class Commands:
         return self.profile.has(name)
 
     def text(self, name: str) -> str:
-        """The part of an answer that a command names."""
+        """The field of the answer that belongs to a command."""
         command = self.profile.command(name)
         answer = self._link.ask(command.ask, f"{self.name} {name}")
-        parts = [part.strip() for part in answer.split(",")]
-        if command.field >= len(parts):
-            message = f"{self.name}: '{command.ask}' was answered with '{answer}', {command.field + 1} parts are needed"
+        fields = [field.strip() for field in answer.split(",")]
+        if command.field >= len(fields):
+            message = f"{self.name}: the answer to '{command.ask}' is '{answer}', {command.field + 1} fields are needed"
             raise StationRefused(f"{message}; check the device and its profile")
-        return parts[command.field]
+        return fields[command.field]
 
     def number(self, name: str) -> float:
         """A number from an answer."""
@@ -47,11 +47,11 @@ class Commands:
             ) from None
 
     def step(self, name: str) -> float:
-        """The last decimal of what is written."""
+        """The resolution of a written number."""
         return STEP if self.profile.command(name).type == "number" else 0.0
 
     def write(self, name: str, value: Value) -> None:
-        """Gives an order, once."""
+        """Sends a command, once."""
         command = self.profile.command(name)
         self._refuse_outside(command, value)
         self._link.tell(command.tell.format(value), f"{self.name} {name} = {value}")
@@ -61,7 +61,5 @@ class Commands:
         inside = isinstance(value, int | float) and (low is None or value >= low) and (high is None or value <= high)
         if not command.writable or not (value in command.values if command.type == "text" else inside):
             allowed = ", ".join(command.values) if command.type == "text" else f"{low} to {high} {command.unit}"
-            message = (
-                f"{self.name}: {command.name} {value!r}; {allowed if command.writable else 'reading only'} is allowed"
-            )
-            raise StationRefused(f"{message}; give a value inside")
+            message = f"{self.name}: {command.name} {value!r}; {allowed if command.writable else 'no write'} is allowed"
+            raise StationRefused(f"{message}; give an allowed value")

@@ -15,17 +15,17 @@ if TYPE_CHECKING:
     from stations.devices.registers import Registers
     from stations.devices.slot import Slot
 
-RATE_HZ = 1e-3  # how well a rate is read back
+RATE_HZ = 1e-3  # allowed difference of the rate read back
 POSSIBLE_C = (-100.0, 250.0)
-POSSIBLE_V = (0.5, 60.0)  # no device in the catalogue works below; words in the wrong order read as next to nothing
+POSSIBLE_V = (0.5, 60.0)  # no supported device works below; a wrong word order gives values near zero
 STRONGEST_G = 50.0
 
 
 @dataclass(frozen=True)
 class Instruments:
-    """The fixture's instruments at one instant: by slot °C and V, for all g rms; and whether somebody is at the station.
+    """Readings of the fixture at one instant: temperature and supply by slot, vibration, door and emergency stop.
 
-    recorded : values of the registers that the profile records beside every dwell, by column; NaN for what cannot be
+    recorded : values of the registers that the profile records with every dwell, by column; NaN for an impossible value
     """
 
     temperature_C: list[float]
@@ -38,7 +38,7 @@ class Instruments:
 
 @dataclass(frozen=True)
 class Guarded:
-    """What the reader watches for people and fixture, of one instant."""
+    """Door, emergency stop and vibration at one instant."""
 
     door_open: bool
     stop_pressed: bool
@@ -54,7 +54,7 @@ class Reader:
         self._fastest = fastest_hz
 
     def check(self, rate_hz: float) -> None:
-        """Refuses a rate outside the station's limits."""
+        """Refuses a rate outside the limits of the station."""
         if not 0.0 < rate_hz <= self._fastest:
             raise StationRefused(
                 f"{self._registers.name}: {rate_hz:g} Hz, up to {self._fastest:g} Hz is allowed; change the recipe"
@@ -68,28 +68,28 @@ class Reader:
             self.stop()
         if abs(registers.number("rate") - rate_hz) > RATE_HZ:
             registers.write("rate", rate_hz)
-            found = registers.number("rate")
-            if abs(found - rate_hz) > RATE_HZ:
+            actual = registers.number("rate")
+            if abs(actual - rate_hz) > RATE_HZ:
                 raise StationRefused(
-                    f"{registers.name}: samples at {found:g} Hz, {rate_hz:g} Hz is needed; choose a rate it can keep"
+                    f"{registers.name}: samples at {actual:g} Hz, {rate_hz:g} Hz is needed; choose a supported rate"
                 )
         self._sample("running")
         for slot in self.slots.values():
             slot.begin()
 
     def stop(self) -> None:
-        """Stops sampling; the samples stay in the slots' memories."""
+        """Stops sampling; the samples stay in the memories of the slots."""
         self._sample("stopped")
 
-    def _sample(self, wanted: str) -> None:
-        """Starts or stops, and makes sure that the reader has."""
-        self._registers.write("sampling", wanted)
-        found = self._registers.text("sampling")
-        if found != wanted:
-            raise StationRefused(f"{self._registers.name}: sampling is {found}, {wanted} is needed; restart the reader")
+    def _sample(self, state: str) -> None:
+        """Starts or stops sampling and reads the state back."""
+        self._registers.write("sampling", state)
+        actual = self._registers.text("sampling")
+        if actual != state:
+            raise StationRefused(f"{self._registers.name}: sampling is {actual}, {state} is needed; restart the reader")
 
     def sampling(self) -> str:
-        """Whether samples are taken: ``running`` or ``stopped``."""
+        """State of the sampling: ``running`` or ``stopped``."""
         return self._registers.text("sampling")
 
     def occupied(self) -> list[int]:
@@ -100,8 +100,8 @@ class Reader:
     def instruments(self) -> Instruments:
         """Temperatures, supplies and vibration now.
 
-        A slot in use that tells the impossible has NaN for its temperature: its unit is lost, not the others. Where all do, the
-        reader itself is read wrongly, and that is refused.
+        A slot in use with an impossible value gets NaN as its temperature: only its unit is lost. Impossible values of all slots
+        are refused, as the reader itself is then read wrongly.
         """
         temperature, supply = self._registers.numbers("temperature"), self._registers.numbers("supply")
         guarded = self.guarded()
@@ -113,60 +113,60 @@ class Reader:
                 f"{self._registers.name}: slot {first} at {temperature[first]:g} °C and {supply[first]:g} V, vibration "
                 f"{vibration:g} g rms, possible values are needed; check supply, sensors, word order and counts"
             )
-        told = [math.nan if slot in wrong else value for slot, value in enumerate(temperature)]
-        return Instruments(told, supply, vibration, guarded.door_open, guarded.stop_pressed, self._recorded())
+        temperatures = [math.nan if slot in wrong else value for slot, value in enumerate(temperature)]
+        return Instruments(temperatures, supply, vibration, guarded.door_open, guarded.stop_pressed, self._recorded())
 
     def _recorded(self) -> dict[str, float]:
-        """What the profile records beside every dwell, by column; a value outside the register's bounds is none."""
-        found: dict[str, float] = {}
+        """Values that the profile records with every dwell, by column; NaN outside the bounds of the register."""
+        recorded: dict[str, float] = {}
         for register in self._registers.profile.registers:
             if register.column:
                 value = self._registers.number(register.name)
                 low = -math.inf if register.minimum is None else register.minimum
                 high = math.inf if register.maximum is None else register.maximum
-                found[register.column] = value if low <= value <= high else math.nan
-        return found
+                recorded[register.column] = value if low <= value <= high else math.nan
+        return recorded
 
     def guarded(self) -> Guarded:
         """Door, emergency stop and vibration now, in one request."""
         values, profile = self._registers.read_group("guard"), self._registers.profile
         door, stop, vibration = values["door"], values["emergency_stop"], values["vibration"]
         if not isinstance(door, int) or not isinstance(stop, int) or not isinstance(vibration, int | float):
-            found = f"door {door!r}, emergency stop {stop!r}, vibration {vibration!r}"
-            raise StationRefused(f"{self._registers.name}: {found}, numbers are needed; check the profile")
+            values_read = f"door {door!r}, emergency stop {stop!r}, vibration {vibration!r}"
+            raise StationRefused(f"{self._registers.name}: {values_read}, numbers are needed; check the profile")
         closed = named(profile.register("door"), door) == "closed"
         released = named(profile.register("emergency_stop"), stop) == "released"
         return Guarded(not closed, not released, float(vibration))
 
     def since_power(self) -> float:
-        """Seconds since the devices were powered."""
+        """Seconds since power-on of the devices."""
         return self._registers.number("since_power")
 
     @property
     def switches(self) -> bool:
-        """Whether the devices' supply can be switched from here."""
+        """Whether the reader can switch the supply of the devices."""
         return self._registers.has("power")
 
     def powered(self) -> bool:
-        """Whether the devices have their supply; those that nobody can switch always have."""
+        """Whether the supply of the devices is on; always true where the reader cannot switch it."""
         return not self.switches or self._registers.text("power") == "on"
 
     def require_switch(self) -> None:
-        """Refuses to switch the devices where the reader cannot."""
+        """Refuses a reader that cannot switch the supply of the devices."""
         if not self.switches:
             raise StationRefused(
                 f"{self._registers.name}: profile {self._registers.profile.name} has no register 'power', one is needed to "
-                "switch the devices off and on; take off_s out of the recipe's soaks, or name the register of the supply's relay"
+                "switch the devices off and on; remove off_s from the soaks of the recipe, or add the supply relay to the profile"
             )
 
-    def switch(self, wanted: Literal["on", "off"]) -> None:
-        """Switches the supply of all devices: an absolute state, written once and read back; given twice it changes nothing."""
+    def switch(self, state: Literal["on", "off"]) -> None:
+        """Switches the supply of all devices: an absolute state, written once and read back; a repetition changes nothing."""
         self.require_switch()
-        self._registers.set("power", wanted)
+        self._registers.set("power", state)
 
 
 def _possible(celsius: float, volts: float) -> bool:
-    """Whether a slot with a device in it can say so; a comparison with NaN is false."""
+    """Whether the readings of an occupied slot are physically possible; NaN is not."""
     low, high = POSSIBLE_C
-    least, most = POSSIBLE_V
-    return low < celsius < high and least < volts < most
+    lowest, highest = POSSIBLE_V
+    return low < celsius < high and lowest < volts < highest

@@ -1,4 +1,4 @@
-"""A device's registers by name: profile, codec and link together."""
+"""Registers of a device by name: profile, codec and link together."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 
 class Registers:
-    """Reads and writes of one device; ``name`` is what messages call it."""
+    """Reads and writes of one device; ``name`` is its name in messages."""
 
     def __init__(self, name: str, link: Link, device_id: int, profile: Profile) -> None:
         self.name = name
@@ -25,13 +25,13 @@ class Registers:
         self._link = link
         self._device_id = device_id
         self._decimals: dict[str, int] = {}
-        self._answered: float | None = None
+        self._read_at: float | None = None
         self._deciding = False
 
     @contextmanager
     def deciding(self) -> Generator[None]:
-        """A block whose orders rest on what is read in it: one that could not be sent soon after is refused by the gate."""
-        self._answered, self._deciding = None, True
+        """A block whose commands depend on its readings: the gate refuses a command that comes too late after the reading."""
+        self._read_at, self._deciding = None, True
         try:
             yield
         finally:
@@ -44,11 +44,11 @@ class Registers:
     def read(self, name: str) -> Value:
         """The value of a register: a number, a list where it has a count, a text."""
         register = self._scaled(name)
-        words = self._asked(register.address, register.words, name, register.space)
+        words = self._read_words(register.address, register.words, name, register.space)
         return decode(register, self.profile.order(register), words)
 
     def number(self, name: str) -> float:
-        """A register's number."""
+        """The value of a numeric register."""
         value = self.read(name)
         if not isinstance(value, int | float):
             raise StationRefused(
@@ -66,7 +66,7 @@ class Registers:
         return value
 
     def text(self, name: str) -> str:
-        """A register's text, or the name of its enumerated value."""
+        """The text of a register, or the name of its enumerated value."""
         value = self.read(name)
         if isinstance(value, str):
             return value
@@ -81,7 +81,7 @@ class Registers:
         return self.flags_in(name, self.number(name))
 
     def flags_in(self, name: str, value: Value) -> dict[str, bool]:
-        """The named bits in the value that a register had, as a group of them gave it."""
+        """The named bits of a register in a value that was read with a group."""
         if not isinstance(value, int | float):
             raise StationRefused(
                 f"{self.name}: {name} is {value!r}, a number is needed; check profile {self.profile.name}"
@@ -89,9 +89,9 @@ class Registers:
         return {flag: bool(int(value) >> bit & 1) for flag, bit in self.profile.register(name).bits.items()}
 
     def names_in(self, group: str) -> dict[str, str]:
-        """Names of the enumerated values of a group, of one instant."""
-        found = self.read_group(group)
-        return {n: named(self.profile.register(n), v) for n, v in found.items() if isinstance(v, int | float)}
+        """Names of the enumerated values of a group, read in one request."""
+        values = self.read_group(group)
+        return {n: named(self.profile.register(n), v) for n, v in values.items() if isinstance(v, int | float)}
 
     def step(self, name: str) -> float:
         """The smallest change that a register can hold; zero for a float."""
@@ -99,10 +99,10 @@ class Registers:
         return 0.0 if register.type == "float32" else register.scale
 
     def read_group(self, group: str) -> dict[str, Value]:
-        """Values of a group of registers, read in one request and so of one instant."""
+        """Values of a group of registers, read in one request."""
         registers = [self._scaled(name) for name in self.profile.groups[group]]
         first = registers[0].address
-        words = self._asked(first, registers[-1].end - first, group, registers[0].space)
+        words = self._read_words(first, registers[-1].end - first, group, registers[0].space)
         return {r.name: decode(r, self.profile.order(r), words[r.address - first : r.end - first]) for r in registers}
 
     def write(self, name: str, value: Value) -> None:
@@ -118,24 +118,24 @@ class Registers:
         self._order(registers[0].address, words, f"{group} {dict(values)}", registers[0].space)
 
     def set_group(self, group: str, values: Mapping[str, Value]) -> None:
-        """Writes registers that start nothing in one request, once; reading them back decides, also of a lost answer."""
+        """Writes registers that start no action in one request, once; the values read back decide, also after a lost answer."""
         lost: StationTimeout | LinkLost | None = None
         try:
             self.write_group(group, values)
         except (StationTimeout, LinkLost) as problem:
             lost = problem
-        found = self.read_group(group)
+        actual = self.read_group(group)
         for name, value in values.items():
             register = self._scaled(name)
-            if found[name] != decode(register, self.profile.order(register), self._encoded(register, value)):
+            if actual[name] != decode(register, self.profile.order(register), self._encoded(register, value)):
                 message = (
-                    f"{self.name}: {name} is {found[name]} {register.unit} after {value} was written; nothing was started; "
+                    f"{self.name}: {name} is {actual[name]} {register.unit} after {value} was written; nothing was started; "
                     "check the device"
                 )
                 raise lost or StationRefused(message)
 
     def set(self, name: str, value: Value) -> None:
-        """Writes a register that keeps what it is given, once, and reads it back; where the answer was lost, that decides."""
+        """Writes a register that keeps its value, once, and reads it back, which decides after a lost answer."""
         try:
             self.write(name, value)
         except (StationTimeout, LinkLost):
@@ -149,25 +149,25 @@ class Registers:
                 )
 
     def words(self, address: int, count: int, what: str) -> list[int]:
-        """Raw words, for windows that have no names."""
-        return self._asked(address, count, what)
+        """Raw words of an address range without register names."""
+        return self._read_words(address, count, what)
 
-    def _asked(self, address: int, count: int, what: str, space: Space = "holding") -> list[int]:
+    def _read_words(self, address: int, count: int, what: str, space: Space = "holding") -> list[int]:
         words = self._link.read(self._device_id, address, count, f"{self.name} {what}", space)
-        self._answered = steady()
+        self._read_at = steady()
         return words
 
     def _order(self, address: int, words: list[int], what: str, space: Space) -> None:
-        since = self._answered if self._deciding else None
+        since = self._read_at if self._deciding else None
         self._link.write(self._device_id, address, words, f"{self.name} {what}", space, since=since)
 
     def _holds(self, name: str, value: Value) -> bool:
-        """Whether a register holds what a value becomes on the wire."""
+        """Whether a register holds the encoded value."""
         register = self._scaled(name)
         return self.read(name) == decode(register, self.profile.order(register), self._encoded(register, value))
 
     def _scaled(self, name: str) -> Register:
-        """The register, its values in the steps that the device is set to; asked once."""
+        """The register with the decimals that are set in the device; they are read once."""
         register = self.profile.register(name)
         by = register.scaled_by
         if not by:

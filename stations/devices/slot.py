@@ -1,4 +1,4 @@
-"""One slot of the reader: who sits there, and the samples in its memory."""
+"""One slot of the reader: identity of its device, and the samples in its memory."""
 
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ if TYPE_CHECKING:
     from stations.devices.registers import Registers
 
 LONGEST_READ = 125  # registers in one request
-FEWEST_COUNTS, MOST_COUNTS = 100, 2**31  # of a full scale; words in the wrong order give anything
+FEWEST_COUNTS, MOST_COUNTS = 100, 2**31  # in a full scale; a wrong word order gives values outside
 UNITS = {"volt": "V", "lsb": "LSB", "g": "g", "m_s2": "m/s^2"}
 PACKINGS: dict[str, Packing] = {"int20x3": "int20x3", "int24x3": "int24x3"}
 
 
 @dataclass(frozen=True)
 class Identity:
-    """What a slot says of the device in it; ``lsb`` and ``full_scale`` in ``out_unit``, ``capacity`` in samples."""
+    """Identity of the device in a slot; ``lsb`` and ``full_scale`` in ``out_unit``, ``capacity`` in samples."""
 
     serial: str
     packing: Packing
@@ -35,7 +35,7 @@ class Identity:
 
 @dataclass(frozen=True)
 class Samples:
-    """Samples taken from a slot: first number since the start, outputs (n, 3) in the output's unit, whether some were lost."""
+    """Samples of a slot: first number since the start, outputs (n, 3) in the unit of the output, and whether any were lost."""
 
     first: int
     outputs: NDArray[np.float64]
@@ -43,7 +43,7 @@ class Samples:
 
 
 class SamplesLost(StationRefused):
-    """Samples that do not follow each other: some were lost, or changed on their way; the record is of no use."""
+    """Sample numbers are not consecutive: samples were lost or changed in transit; the record is not valid."""
 
 
 class Slot:
@@ -53,19 +53,19 @@ class Slot:
         self._registers = registers
         self.name = registers.name
         self._identity: Identity | None = None
-        self._taken: int | None = None
+        self._acknowledged: int | None = None
 
     def begin(self) -> None:
-        """Sampling starts afresh: nothing has been taken."""
-        self._taken = 0
+        """Sampling starts again: no sample has been read."""
+        self._acknowledged = 0
 
     def identity(self) -> Identity:
-        """What the slot says of the device in it; asked once."""
+        """Identity of the device in the slot; read once."""
         if self._identity is None:
-            self._identity = self._ask()
+            self._identity = self._read_identity()
         return self._identity
 
-    def _ask(self) -> Identity:
+    def _read_identity(self) -> Identity:
         values = self._registers.read_group("identity")
         packing = self._named("packing", values["packing"])
         unit = self._named("output_unit", values["output_unit"])
@@ -74,33 +74,33 @@ class Slot:
         if packing not in PACKINGS or unit not in UNITS or not possible:
             raise StationRefused(
                 f"{self.name}: packing {packing}, unit {unit}, {lsb:g} per count, full scale {full_scale:g}; known names and a "
-                f"full scale of {FEWEST_COUNTS} to {MOST_COUNTS} counts are needed; check the reader's set-up and word order"
+                f"full scale of {FEWEST_COUNTS} to {MOST_COUNTS} counts are needed; check the reader and its word order"
             )
         return Identity(
             str(values["serial"]), PACKINGS[packing], UNITS[unit], lsb, full_scale, int(_number(values["capacity"]))
         )
 
     def holds(self, serial: str) -> bool:
-        """Whether that unit sits here now; asked anew."""
+        """Whether the slot holds this unit now; read again at each call."""
         return self._registers.text("serial") == serial
 
     def take(self) -> Samples:
-        """Everything sampled since the last time; what the ring has lost is flagged, never made up."""
+        """All samples since the last call; samples that the ring has lost are flagged and never filled in."""
         identity = self.identity()
         head, tail, overflow = self._progress()
-        if tail > head or (self._taken is not None and tail != self._taken):
-            wanted = f"{self._taken}" if self._taken is not None else f"at most {head}"
+        if tail > head or (self._acknowledged is not None and tail != self._acknowledged):
+            expected = f"{self._acknowledged}" if self._acknowledged is not None else f"at most {head}"
             raise StationRefused(
-                f"{self.name}: says that {tail} samples of {head} were taken, {wanted} is right; restart the reader"
+                f"{self.name}: reports {tail} of {head} samples as read, {expected} is needed; restart the reader"
             )
         first = max(tail, head - identity.capacity)
         counts = self._window(first, head, identity)
         if head > tail:
-            self._tell_taken(head)
+            self._acknowledge(head)
         return Samples(first, counts * identity.lsb, overflow or first > tail)
 
     def _progress(self) -> tuple[int, int, bool]:
-        """Samples made, samples taken, and whether some were lost."""
+        """Number of samples made, number acknowledged as read, and whether any were lost."""
         values = self._registers.read_group("progress")
         bit = self._registers.profile.register("flags").bits["overflow"]
         return (
@@ -109,22 +109,22 @@ class Slot:
             bool(int(_number(values["flags"])) >> bit & 1),
         )
 
-    def _tell_taken(self, head: int) -> None:
-        """Tells how far samples were taken; where the answer is lost the slot is asked, and told again if it does not know."""
+    def _acknowledge(self, head: int) -> None:
+        """Acknowledges the samples before ``head``; after a lost answer the register is read, and written again if it differs."""
         try:
             self._registers.write("tail", head)
         except (StationTimeout, LinkLost):
             if self._progress()[1] != head:
                 self._registers.write("tail", head)
-        if self._taken is not None:
-            self._taken = head
+        if self._acknowledged is not None:
+            self._acknowledged = head
 
     def _window(self, first: int, head: int, identity: Identity) -> NDArray[np.float64]:
-        """Counts (n, 3) of the samples numbered ``first`` to ``head`` − 1; numbers out of order are :class:`SamplesLost`."""
+        """Counts (n, 3) of the samples numbered ``first`` to ``head`` − 1; gaps raise :class:`SamplesLost`."""
         fifo = self._registers.profile.fifo
         if fifo is None:
             raise StationRefused(
-                f"{self.name}: profile {self._registers.profile.name} has no fifo, a slot needs one; add it"
+                f"{self.name}: profile {self._registers.profile.name} has no fifo, a slot needs one; add it to the profile"
             )
         width = WORDS_PER_SAMPLE[identity.packing]
         words: list[int] = []
@@ -138,7 +138,7 @@ class Slot:
         wrong = np.flatnonzero(numbers != np.arange(first, head) % SEQUENCE[identity.packing])
         if len(wrong):
             raise SamplesLost(
-                f"{self.name}: sample {first + int(wrong[0])} does not follow the one before; check the reader"
+                f"{self.name}: sample {first + int(wrong[0])} is out of sequence, the next number is needed; check the reader"
             )
         return counts.astype(np.float64)
 
@@ -147,7 +147,7 @@ class Slot:
 
 
 def _number(value: Value) -> float:
-    """The number that a register holds by its profile."""
+    """The value of a register that is numeric by its profile."""
     if isinstance(value, int | float):
         return value
     raise StationRefused(f"{value!r} is not a number; check the slot's profile")

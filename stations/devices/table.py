@@ -13,9 +13,9 @@ if TYPE_CHECKING:
 __all__ = ["TableAxis", "TiltTable"]
 
 POLL_S = 0.25
-PATIENCE = 2.0  # times what a move should take
+PATIENCE = 2.0  # times the expected duration of a move
 GRACE_S = 10.0
-REST_S = 300.0  # longest that an axis may still be under way from an earlier order
+REST_S = 300.0  # longest time in which an axis may finish an earlier move
 
 
 class TiltTable:
@@ -28,12 +28,12 @@ class TiltTable:
         self.still_since = clock.now()
 
     def check(self, outer_deg: float, inner_deg: float) -> None:
-        """Refuses a pose outside the station's limits."""
+        """Refuses a pose outside the limits of the station."""
         self._outer.check(outer_deg)
         self._inner.check(inner_deg)
 
     def move(self, outer_deg: float, inner_deg: float) -> None:
-        """Goes to a pose and comes back when both axes stand there, confirmed by the encoders."""
+        """Moves to a pose and returns when both axes stand there, confirmed by the encoders."""
         self.check(outer_deg, inner_deg)
         self._rest()
         expected = max(self._outer.start(outer_deg), self._inner.start(inner_deg))
@@ -42,7 +42,7 @@ class TiltTable:
             if self._clock.now() > give_up:
                 raise StationTimeout(
                     f"table: not at ({outer_deg:g}, {inner_deg:g}) deg after {PATIENCE * expected + GRACE_S:.0f} s, "
-                    f"{expected:.0f} s should do; check drive and load"
+                    f"{expected:.0f} s are expected; check drive and load"
                 )
             self._clock.sleep(POLL_S)
         self.still_since = self._clock.now()
@@ -52,15 +52,15 @@ class TiltTable:
             axis.done()
 
     def _rest(self) -> None:
-        """Waits for axes that an earlier order, or an earlier process, has left moving."""
+        """Waits for axes that still move after an earlier command or process."""
         give_up = self._clock.now() + REST_S
         while self._outer.moving() or self._inner.moving():
             if self._clock.now() > give_up:
                 raise StationTimeout(
-                    f"table: an axis moves since {REST_S:.0f} s, standing is needed; stop it at the drive"
+                    f"table: an axis has been moving for {REST_S:.0f} s, an axis at rest is needed; stop it at the drive"
                 )
             self._clock.sleep(POLL_S)
 
     def angles(self) -> tuple[float, float]:
-        """The encoders' readings (outer, inner), degrees."""
+        """The readings of the encoders (outer, inner), degrees."""
         return self._outer.position(), self._inner.position()

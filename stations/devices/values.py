@@ -1,4 +1,4 @@
-"""What an adapter needs of a device's values, whatever carries them."""
+"""Interface of adapters to the values of a device, for registers and for text commands."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ if TYPE_CHECKING:
 
 
 class Values(Protocol):
-    """Values of one device by the names of its profile; ``name`` is what messages call the device."""
+    """Values of one device by the names of its profile; ``name`` is its name in messages."""
 
     name: str
     profile: Profile
@@ -28,7 +28,7 @@ class Values(Protocol):
         ...
 
     def step(self, name: str) -> float:
-        """The smallest change that a value can have on its way; zero where that is none."""
+        """The resolution of a value in transmission; zero for a float."""
         ...
 
     def write(self, name: str, value: Value) -> None:

@@ -1,1 +1,1 @@
-"""Links: what carries register reads and writes to a device."""
+"""Links: transport of register access and text commands to the devices."""

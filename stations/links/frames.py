@@ -1,4 +1,4 @@
-"""Modbus requests and the answers that fit them: everything else is no answer.
+"""Modbus requests and their answers; any other answer is malformed.
 
 Source: Modbus Application Protocol 1.1b3, 6.1–6.12 and 7; Modbus over serial line 1.02, 6.2.2 (CRC).
 """
@@ -24,7 +24,7 @@ BYTE = 8
 
 
 class Malformed(Exception):
-    """What came back is no answer to what was asked."""
+    """The received bytes are no valid answer to the request."""
 
 
 class Refused(Exception):
@@ -52,7 +52,7 @@ def write_request(space: Space, address: int, values: Sequence[int]) -> bytes:
 
 
 def reply_size(request: bytes) -> int:
-    """Bytes in the answer to a request that is not an exception."""
+    """Size of the normal answer to a request, bytes."""
     function, count = request[0], int.from_bytes(request[3:5], "big")
     if function in {READ["holding"], READ["input"]}:
         return 2 + 2 * count
@@ -62,7 +62,7 @@ def reply_size(request: bytes) -> int:
 
 
 def values_in(request: bytes, reply: bytes) -> list[int]:
-    """The words or bits that answer a read, nothing for a write; :class:`Refused` or :class:`Malformed` otherwise."""
+    """The words or bits in the answer to a read, none for a write; :class:`Refused` or :class:`Malformed` otherwise."""
     function = request[0]
     if len(reply) == 2 and reply[0] == function | EXCEPTION and reply[1]:
         raise Refused(reply[1])
@@ -72,24 +72,24 @@ def values_in(request: bytes, reply: bytes) -> list[int]:
         raise Malformed(f"{shown}; function {function}, {size} bytes are needed")
     if function in WRITES:
         if reply != request[:5]:
-            raise Malformed(f"it confirms {reply[1:].hex()}; {request[1:5].hex()} is needed")
+            raise Malformed(f"the answer confirms {reply[1:].hex()}; {request[1:5].hex()} is needed")
         return []
     if reply[1] != size - 2:
-        raise Malformed(f"it counts {reply[1]} bytes; {size - 2} are needed")
+        raise Malformed(f"the byte count is {reply[1]}; {size - 2} are needed")
     if function in {READ["holding"], READ["input"]}:
         return list(struct.unpack(f">{(size - 2) // 2}H", reply[2:]))
     return unpack_bits(reply[2:], int.from_bytes(request[3:5], "big"))
 
 
 def echo_request(data: bytes) -> bytes:
-    """The request that has a device on a serial line say the same two bytes; it changes nothing (6.8.1)."""
+    """The request on which a device on a serial line returns the same two bytes; it has no other effect (6.8.1)."""
     return struct.pack(">BH", DIAGNOSTICS, ECHO) + data
 
 
 def read_of_other_size(request: bytes) -> bytes:
-    """A read whose answer cannot be taken for that to a request: of one register or bit, or of more where it asks for one.
+    """A read whose answer has another size than that of a request: one register or bit, or more where the request reads one.
 
-    For a write it is a read of a register, which is another function.
+    For a write it is a read of one register, which has another function code.
     """
     if request[0] in WRITES:
         return read_request("holding", int.from_bytes(request[1:3], "big"), 1)
@@ -99,10 +99,10 @@ def read_of_other_size(request: bytes) -> bytes:
 
 
 def ends_with_sign(heard: bytes, device_id: int, sign: bytes) -> bool:
-    """Whether what was heard on a serial line ends with a device's answer to an echo, or to a read of a size of its own.
+    """Whether received bytes end with the answer of a device to an echo, or to a read of a distinct size.
 
-    An echo that a device does not know is answered with an exception of that function, which nothing else is. An exception to the
-    read might be one to an earlier read, and is no sign.
+    A device without the echo function answers with an exception of that function code, which no other request causes. An
+    exception to the read could belong to an earlier read, so it does not count.
     """
     frame = bytes([device_id]) + sign
     if sign[0] == DIAGNOSTICS:
@@ -116,12 +116,12 @@ def ends_with_sign(heard: bytes, device_id: int, sign: bytes) -> bool:
 
 
 def pack_bits(values: Sequence[int]) -> bytes:
-    """Bits as bytes, the first in the lowest place."""
+    """Bits packed into bytes, the first in the least significant bit."""
     return sum(1 << i for i, value in enumerate(values) if value).to_bytes((len(values) + BYTE - 1) // BYTE, "little")
 
 
 def unpack_bits(data: bytes, count: int) -> list[int]:
-    """The first ``count`` bits of bytes."""
+    """The first ``count`` bits in bytes."""
     number = int.from_bytes(data, "little")
     return [number >> i & 1 for i in range(count)]
 
@@ -140,7 +140,7 @@ _CRC = _crc_table()
 
 
 def crc16(data: bytes) -> bytes:
-    """The check of a serial frame, low byte first, as it goes onto the line."""
+    """The CRC of a serial frame, low byte first, in transmission order."""
     crc = 0xFFFF
     for byte in data:
         crc = crc >> 8 ^ _CRC[(crc ^ byte) & 0xFF]

@@ -1,7 +1,7 @@
-"""The gate that every write passes.
+"""The gate: the check of every write before it is sent.
 
-Writes go only to devices that the station's file names, only to what their profiles let be written, and on hardware that a run
-drives only while the run holds the station's lease, which is asked as the last thing before each is sent.
+Writes go only to devices in the station file, and only to registers that their profiles declare writable. On hardware that a
+run drives, the run must hold the lease of the station; this is the last check before each write is sent.
 """
 
 from __future__ import annotations
@@ -25,34 +25,34 @@ class Lease(Protocol):
     """Whether this process may drive the station; both raise :class:`schemas.errors.LeaseLost` where it may not."""
 
     def alive(self) -> None:
-        """By the age of its own heartbeat alone; costs nothing, and is asked before each reading."""
+        """Checks the age of the own heartbeat only; it is fast and is called before each reading."""
         ...
 
     def held(self) -> None:
-        """By its heartbeat and by what the lease's files say; asked before each write."""
+        """Checks the heartbeat and the files of the lease; called before each write."""
         ...
 
 
 @dataclass(frozen=True)
 class Permit:
-    """What the gate asks on hardware that a run drives: the lease, and that orders are sent ``patience_s`` after a reading."""
+    """Conditions for a write to hardware in a run: the lease, and at most ``patience_s`` seconds after the reading."""
 
     lease: Lease
     patience_s: float
 
     def require(self, order: str, since: float | None) -> None:
-        """Refuses an order that may not be sent now; it is not sent then."""
+        """Refuses a command that must not be sent now, before it is sent."""
         self.lease.held()
         late = 0.0 if since is None else steady() - since
         if not late <= self.patience_s:
             raise StationTimeout(
-                f"{order}: {late:.1f} s after the reading that it rests on, at most {self.patience_s:g} s is allowed; it was not "
-                "sent: this process or machine stood still; look what kept it busy, or raise timeout_s in [link]"
+                f"{order}: {late:.1f} s after the reading that it depends on, at most {self.patience_s:g} s is allowed; it was "
+                "not sent, as this process or machine stopped for a while; reduce the load, or raise timeout_s in [link]"
             )
 
 
 class GatedLink:
-    """A link whose writes are held against the profiles of the devices behind it, by device id."""
+    """A link that checks each write against the profile of its device, by device id."""
 
     def __init__(
         self, link: Carrier, where: str, profiles: Mapping[int, Profile], permit: Permit | None = None
@@ -63,7 +63,7 @@ class GatedLink:
         self._permit = permit
 
     def read(self, device_id: int, address: int, count: int, what: str, space: Space = "holding") -> list[int]:
-        """Words of registers, or bits; a run that has lost its lease is told here, whatever it finds at the station."""
+        """Words of registers, or bits; a run that has lost its lease is refused before the read."""
         if self._permit is not None:
             self._permit.lease.alive()
         return self._link.read(device_id, address, count, what, space)
@@ -78,28 +78,28 @@ class GatedLink:
         *,
         since: float | None = None,
     ) -> None:
-        """Writes once, whole writable registers of a known device; anything else is refused and never sent.
+        """Writes whole writable registers of a known device, once; any other write is refused before it is sent.
 
         Parameters
         ----------
-        since : when the reading came that the order rests on; one that is not sent in time is refused
+        since : time of the reading that the command depends on; a command that is too late is refused
         """
         profile = self._profiles.get(device_id)
         if profile is None:
             raise StationRefused(
-                f"{self._where} device {device_id}: write {what}, the station's file names no such device; name it there"
+                f"{self._where} device {device_id}: write {what}, the station file has no such device; add it there"
             )
         if not profile.may_write(space, address, len(words)):
-            found = f"write {what} ({len(words)} of {space} from {address})"
+            request = f"write {what} ({len(words)} of {space} from {address})"
             message = (
-                f"{self._where} device {device_id}: {found}, profile {profile.name} lists no such writable registers"
+                f"{self._where} device {device_id}: {request}, profile {profile.name} has no such writable registers"
             )
             raise StationRefused(f"{message}; correct the caller, or the profile")
         if self._permit is None:
             self._link.write(device_id, address, words, what, space)
             return
         before = partial(self._permit.require, f"{self._where} device {device_id}: write {what}", since)
-        before()  # nothing is connected for an order that may not be sent
+        before()  # no connection is made for a command that must not be sent
         self._link.write(device_id, address, words, what, space, before=before)
 
     def close(self) -> None:
@@ -108,27 +108,27 @@ class GatedLink:
 
 
 class GatedLines:
-    """A line to one device whose orders are held against its profile."""
+    """A text connection to one device that checks each command against its profile."""
 
     def __init__(self, link: TextCarrier, where: str, profile: Profile, permit: Permit | None = None) -> None:
         self._link = link
         self._where = where
-        self._orders = [command for command in profile.commands if command.writable]
-        self._questions = {command.ask for command in profile.commands}
+        self._commands = [command for command in profile.commands if command.writable]
+        self._queries = {command.ask for command in profile.commands}
         self._name = profile.name
         self._permit = permit
 
     def ask(self, question: str, what: str) -> str:
-        """The answer to a question that the profile has."""
-        if question not in self._questions:
+        """The answer to a query that the profile contains."""
+        if question not in self._queries:
             raise self._refusal(question, what)
         if self._permit is not None:
             self._permit.lease.alive()
         return self._link.ask(question, what)
 
     def tell(self, order: str, what: str) -> str:
-        """Gives an order, once, that the profile has."""
-        if not any(_fits(command, order) for command in self._orders):
+        """Sends a command that the profile contains, once."""
+        if not any(_fits(command, order) for command in self._commands):
             raise self._refusal(order, what)
         if self._permit is None:
             return self._link.tell(order, what)
@@ -146,7 +146,7 @@ class GatedLines:
 
 
 def _fits(command: Command, order: str) -> bool:
-    """Whether an order is this command with a value that it may have."""
+    """Whether a line is this command with an allowed value."""
     head = command.tell.split("{", 1)[0]
     value = order.removeprefix(head)
     if value == order:

@@ -1,4 +1,4 @@
-"""Lines of text over TCP: a question or an order, one line back."""
+"""Text lines over TCP: a query or a command, and one line as the answer."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import time
 from typing import TYPE_CHECKING
 
 from schemas.errors import LinkLost, StationRefused, StationTimeout
-from stations.links.wires import drop_what_is_late
+from stations.links.wires import discard_undelivered
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -29,7 +29,7 @@ class LineLink:
         self._socket: socket.socket | None = None
 
     def ask(self, question: str, what: str) -> str:
-        """The answer to a question; after a time-out or a loss it is put again on a fresh connection."""
+        """The answer to a query; after a time-out or a lost connection the query is repeated on a new connection."""
         for attempt in range(1, self._attempts + 1):
             try:
                 return self._exchange(question, what)
@@ -37,45 +37,45 @@ class LineLink:
                 if attempt == self._attempts:
                     raise
         raise StationTimeout(
-            f"{self._where}: no attempt to ask '{question}' was allowed; set read_attempts to 1 or more"
+            f"{self._where}: read_attempts is {self._attempts} for '{question}', 1 or more is needed; raise it in [link]"
         )
 
     def tell(self, order: str, what: str, *, before: Callable[[], None] | None = None) -> str:
-        """The answer to an order, sent once: after a failure it is unknown whether the device acted."""
+        """The answer to a command, sent once: after a failure it is unknown whether the device acted."""
         return self._exchange(order, what, before)
 
     def close(self) -> None:
         """Ends the connection."""
         if self._socket is not None:
-            self._socket.close()  # what could not be sent is dropped with it
+            self._socket.close()  # undelivered bytes are discarded
         self._socket = None
 
     def _exchange(self, line: str, what: str, before: Callable[[], None] | None = None) -> str:
-        """The line that comes back. A line has no number, so a connection whose answer is late or strange is not used again."""
-        asked = f"{what} '{line}'"
+        """The answer line. A line has no number, so a connection with a late or malformed answer is not used again."""
+        request = f"{what} '{line}'"
         try:
-            answer = self._spoken(line, before)
+            answer = self._converse(line, before)
         except TimeoutError:
             self.close()
             raise StationTimeout(
-                f"{self._where}: no answer to {asked} in {self._timeout:g} s; check device and cable"
+                f"{self._where}: no answer to {request} in {self._timeout:g} s; check device and cable"
             ) from None
         except OSError as problem:
             self.close()
             raise LinkLost(
-                f"{self._where}: connection lost at {asked} ({problem}), a listening device is needed; check power"
+                f"{self._where}: connection lost at {request} ({problem}), a listening device is needed; check power"
             ) from None
         if answer.startswith(REFUSED):
             raise StationRefused(
-                f"{self._where}: {asked} was answered with '{answer}'; check the device and its profile"
+                f"{self._where}: the answer to {request} is '{answer}'; check the device and its profile"
             )
         return answer
 
-    def _spoken(self, line: str, before: Callable[[], None] | None) -> str:
+    def _converse(self, line: str, before: Callable[[], None] | None) -> str:
         deadline = time.monotonic() + self._timeout
         if self._socket is None:
             self._socket = socket.create_connection(self._address, self._timeout)
-            drop_what_is_late(self._socket, self._timeout)
+            discard_undelivered(self._socket, self._timeout)
         if before is not None:
             before()
         self._socket.sendall(line.encode("ascii") + END)

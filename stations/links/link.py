@@ -1,4 +1,4 @@
-"""What a device needs of a link; who it is connected to, and by what, is the link's business."""
+"""Interface between devices and links; address and protocol belong to the link."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ if TYPE_CHECKING:
 class Link(Protocol):
     """Registers and bits of the devices behind one address.
 
-    Reading and writing raise :class:`StationTimeout`, :class:`LinkLost` or :class:`StationRefused`, naming device, address and
-    what was asked.
+    Reading and writing raise :class:`StationTimeout`, :class:`LinkLost` or :class:`StationRefused`, with device, address and
+    request.
     """
 
     def read(self, device_id: int, address: int, count: int, what: str, space: Space = "holding") -> list[int]:
-        """Words, or bits, of ``count`` registers; ``what`` names them in messages."""
+        """Words, or bits, of ``count`` registers; ``what`` is their name in messages."""
         ...
 
     def write(
@@ -35,7 +35,7 @@ class Link(Protocol):
 
         Parameters
         ----------
-        since : when the reading came that the order rests on, :func:`stations.clock.steady`; None where it rests on none
+        since : time of the reading that the command depends on, :func:`stations.clock.steady`; None without one
         """
         ...
 
@@ -45,7 +45,7 @@ class Link(Protocol):
 
 
 class Carrier(Protocol):
-    """What is behind the gate: registers and bits on a wire. ``before`` is called as the last thing before a write is sent."""
+    """The link behind the gate: registers and bits on a wire. ``before`` is the last call before a write is sent."""
 
     def read(self, device_id: int, address: int, count: int, what: str, space: Space = "holding") -> list[int]:
         """Words, or bits."""
@@ -70,14 +70,14 @@ class Carrier(Protocol):
 
 
 class TextCarrier(Protocol):
-    """What is behind the gate for lines."""
+    """The text link behind the gate."""
 
     def ask(self, question: str, what: str) -> str:
-        """The answer to a question."""
+        """The answer to a query."""
         ...
 
     def tell(self, order: str, what: str, *, before: Callable[[], None] | None = None) -> str:
-        """The answer to an order, sent once."""
+        """The answer to a command, sent once."""
         ...
 
     def close(self) -> None:
@@ -86,14 +86,14 @@ class TextCarrier(Protocol):
 
 
 class TextLink(Protocol):
-    """Lines to and from one device; raises as :class:`Link` does."""
+    """Text lines to and from one device; the errors are those of :class:`Link`."""
 
     def ask(self, question: str, what: str) -> str:
-        """The answer to a question that changes nothing; it may be put twice."""
+        """The answer to a query without side effects; the query may be repeated."""
         ...
 
     def tell(self, order: str, what: str) -> str:
-        """The answer to an order, sent once."""
+        """The answer to a command, sent once."""
         ...
 
     def close(self) -> None:

@@ -1,4 +1,4 @@
-"""Modbus on any wire: reads are tried again, which changes nothing in any device; writes never are.
+"""Modbus on any wire: reads are repeated, as they have no side effects; writes are never repeated.
 
 After a failed write it is unknown whether the device acted: the adapter reads back and reports it.
 """
@@ -43,17 +43,18 @@ class WireLink:
         self._attempts = read_attempts
 
     def read(self, device_id: int, address: int, count: int, what: str, space: Space = "holding") -> list[int]:
-        """Words of registers, or bits; after a time-out or a loss it is tried again on a fresh connection."""
-        asked = f"read {what} ({count} {NAMES[space]} from {address})"
+        """Words of registers, or bits; after a time-out or a lost connection the read is repeated on a new connection."""
+        purpose = f"read {what} ({count} {NAMES[space]} from {address})"
         request = read_request(space, address, count)
         for attempt in range(1, self._attempts + 1):
             try:
-                return self._ask(device_id, request, asked)
+                return self._ask(device_id, request, purpose)
             except (StationTimeout, LinkLost) as problem:
                 if attempt == self._attempts or isinstance(problem, _BehindGateway):
                     raise
+        where = f"{self._wire.where} device {device_id}"
         raise StationTimeout(
-            f"{self._wire.where} device {device_id}: no attempt to {asked} was allowed; set read_attempts to 1 or more"
+            f"{where}: read_attempts is {self._attempts} for '{purpose}', 1 or more is needed; raise it in [link]"
         )
 
     def write(
@@ -66,30 +67,30 @@ class WireLink:
         *,
         before: Callable[[], None] | None = None,
     ) -> None:
-        """Writes registers or bits in one request, sent once, unless ``before`` raises when it is about to be sent."""
-        asked = f"write {what} ({len(words)} {NAMES[space]} from {address})"
-        self._ask(device_id, write_request(space, address, words), asked, before)
+        """Writes registers or bits in one request, sent once; not sent where ``before`` raises."""
+        purpose = f"write {what} ({len(words)} {NAMES[space]} from {address})"
+        self._ask(device_id, write_request(space, address, words), purpose, before)
 
     def close(self) -> None:
         """Ends the connection."""
         self._wire.close()
 
-    def _ask(self, device_id: int, request: bytes, asked: str, before: Callable[[], None] | None = None) -> list[int]:
+    def _ask(self, device_id: int, request: bytes, purpose: str, before: Callable[[], None] | None = None) -> list[int]:
         where = f"{self._wire.where} device {device_id}"
         try:
             return values_in(request, self._wire.exchange(device_id, request, before))
         except Silence:
             raise StationTimeout(
-                f"{where}: no answer to '{asked}' in {self._wire.timeout_s:g} s; check device and cable"
+                f"{where}: no answer to '{purpose}' in {self._wire.timeout_s:g} s; check device and cable"
             ) from None
         except Broken as problem:
-            message = f"{where}: connection lost at '{asked}' ({problem}), a listening device is needed"
+            message = f"{where}: connection lost at '{purpose}' ({problem}), a listening device is needed"
             raise LinkLost(f"{message}; check power, network and port") from None
         except Malformed as problem:
             self._wire.close()
-            raise LinkLost(f"{where}: no answer to '{asked}' but {problem}; check gateway and cable") from None
+            raise LinkLost(f"{where}: no valid answer to '{purpose}' ({problem}); check gateway and cable") from None
         except Refused as problem:
-            raise _refusal(where, asked, problem.code) from None
+            raise _refusal(where, purpose, problem.code) from None
 
 
 class ModbusLink(WireLink):
@@ -100,10 +101,10 @@ class ModbusLink(WireLink):
 
 
 class _BehindGateway(StationTimeout):
-    """The gateway answered that the device behind it does not: asking again gains nothing."""
+    """The gateway reports that the device behind it does not answer; a repetition has no use."""
 
 
-def _refusal(where: str, asked: str, code: int) -> StationRefused | StationTimeout:
+def _refusal(where: str, purpose: str, code: int) -> StationRefused | StationTimeout:
     reason = REASONS.get(code, f"exception {code}")
-    message = f"{where}: '{asked}' was answered with exception {code} ({reason}); check the device and its profile"
+    message = f"{where}: exception {code} ({reason}) in answer to '{purpose}'; check the device and its profile"
     return _BehindGateway(message) if code in GATEWAY else StationRefused(message)

@@ -1,4 +1,4 @@
-"""Modbus over a serial line: frames with a check and without a number, on a wire that several devices share."""
+"""Modbus over a serial line: frames with a CRC and without a transaction number, on a line shared by several devices."""
 
 from __future__ import annotations
 
@@ -33,9 +33,9 @@ QUIET_S = 0.00175  # above 19200 baud
 class SerialWire:
     """Modbus RTU over a serial line.
 
-    A serial frame has no number, so that an answer which comes late could be taken for that to the next question. After a failure
-    the line is therefore heard out for as long as an answer may take; then the device is asked for a sign that can be the answer
-    to nothing before it. A device answers in order: with the sign everything earlier has come, or never will.
+    A serial frame has no transaction number, so that a late answer could be mistaken for the answer to the next request. After a
+    failure the wire therefore discards input for the longest answer time, then sends a request with a distinct answer, the sign.
+    A device answers in order: after the sign no answer to an earlier request can follow.
     """
 
     def __init__(self, device: str, timeout_s: float, *, baud: int, parity: str, stop_bits: int) -> None:
@@ -44,17 +44,19 @@ class SerialWire:
         self._baud, self._parity, self._stop_bits = baud, PARITIES[parity], stop_bits
         self._port: Serial | None = None
         self._late_until = 0.0
-        self._unsure: dict[int, int] = {}  # devices that owe an answer, and how often they were asked for a sign since
+        self._unsure: dict[
+            int, int
+        ] = {}  # devices with an outstanding answer, and the number of requests for a sign since
         character = (10 if parity == "none" else 11) / baud
         self._quiet = max(QUIET_S, QUIET_CHARACTERS * character)
-        self._heard = 0.0
+        self._last_input = 0.0
 
     def exchange(self, device_id: int, request: bytes, before: Callable[[], None] | None = None) -> bytes:
-        """The answer to a request; its check must be right."""
+        """The answer to a request; its CRC must be correct."""
         frame = bytes([device_id]) + request
         try:
             port = self._opened()
-            self._hear_out(port)
+            self._discard_late_input(port)
             if device_id in self._unsure:
                 self._await_sign(port, device_id, request)
             if before is not None:
@@ -66,12 +68,12 @@ class SerialWire:
             self._late_until = time.monotonic() + self.timeout_s
             self._unsure.setdefault(device_id, 0)
             raise
-        except (serial.SerialException, OSError, termios.error) as problem:  # settings that the line cannot have
+        except (serial.SerialException, OSError, termios.error) as problem:  # settings that the line does not support
             self.close()
             raise Broken(reason_of(problem)) from None
 
     def close(self) -> None:
-        """Leaves the line."""
+        """Closes the line."""
         if self._port is not None:
             self._port.close()
         self._port = None
@@ -89,27 +91,27 @@ class SerialWire:
             )
         return self._port
 
-    def _hear_out(self, port: Serial) -> None:
-        """Drops what comes late, and keeps the silence that ends a frame."""
+    def _discard_late_input(self, port: Serial) -> None:
+        """Discards late input, and waits for the silent interval that ends a frame."""
         while (left := self._late_until - time.monotonic()) > 0.0:
             port.timeout = left
             port.read(CHUNK)
-        time.sleep(max(0.0, self._heard + self._quiet - time.monotonic()))
+        time.sleep(max(0.0, self._last_input + self._quiet - time.monotonic()))
         port.reset_input_buffer()
 
     def _await_sign(self, port: Serial, device_id: int, request: bytes) -> None:
-        """Drops everything until the device's sign comes; :class:`Silence` where it does not."""
+        """Discards input until the sign of the device arrives; :class:`Silence` without one."""
         tries = self._unsure[device_id]
         self._unsure[device_id] = tries + 1
         sign = echo_request(os.urandom(2)) if tries % 2 == 0 else read_of_other_size(request)
         frame = bytes([device_id]) + sign
         port.write(frame + crc16(frame))
-        deadline, heard = time.monotonic() + self.timeout_s, b""
-        while not ends_with_sign(heard, device_id, sign):
-            heard += _read(port, max(1, port.in_waiting), deadline)
-        self._heard = time.monotonic()
+        deadline, received = time.monotonic() + self.timeout_s, b""
+        while not ends_with_sign(received, device_id, sign):
+            received += _read(port, max(1, port.in_waiting), deadline)
+        self._last_input = time.monotonic()
         del self._unsure[device_id]
-        self._hear_out(port)
+        self._discard_late_input(port)
 
     def _answer(self, port: Serial, device_id: int, request: bytes) -> bytes:
         deadline = time.monotonic() + self.timeout_s
@@ -120,11 +122,11 @@ class SerialWire:
             )
         if not data[1] & EXCEPTION:
             data += _read(port, 1 + reply_size(request) + 2 - EXCEPTION_FRAME, deadline)
-        self._heard = time.monotonic()
+        self._last_input = time.monotonic()
         if crc16(data[:-2]) != data[-2:]:
-            raise Malformed(f"check {data[-2:].hex()}; {crc16(data[:-2]).hex()} is needed")
+            raise Malformed(f"CRC {data[-2:].hex()}; {crc16(data[:-2]).hex()} is needed")
         if port.in_waiting:
-            raise Malformed(f"{port.in_waiting} bytes behind an answer; silence is needed")
+            raise Malformed(f"{port.in_waiting} bytes after an answer; silence is needed")
         return data[1:-2]
 
 

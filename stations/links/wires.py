@@ -1,10 +1,11 @@
-"""What carries Modbus: TCP and TCP with TLS. A wire sends a request once and gives the answer, or says why not.
+"""Wires for Modbus: TCP and TCP with TLS. A wire sends a request once and returns the answer, or raises the reason.
 
-Whatever goes wrong, the connection is closed: an answer that comes late must not meet the next question. On TCP the transaction's
-number tells too, and it goes on counting over connections, because a gateway may answer the next one with the last one's answer.
+After an error the connection is closed, so that a late answer cannot be mistaken for the answer to the next request. On TCP the
+transaction number distinguishes answers too; it continues over connections, because a gateway may send the answer of an earlier
+connection on the next one.
 
-One thing keeps its connection: a write without an answer. What is asked next is to find out what became of it, and only on
-the same connection can it not overtake the write. Should that be met with silence too, the connection is closed.
+Exception: a write without an answer keeps its connection. The next request reads the effect of the write, and only on the same
+connection it cannot overtake the write. If that request has no answer either, the connection is closed.
 """
 
 from __future__ import annotations
@@ -29,7 +30,7 @@ CHUNK = 4096
 
 
 class Silence(Exception):
-    """Nothing came back in time."""
+    """No answer arrived in time."""
 
 
 class Broken(Exception):
@@ -37,7 +38,7 @@ class Broken(Exception):
 
 
 class Wire(Protocol):
-    """A way to devices; ``where`` names it in messages, ``timeout_s`` is its patience."""
+    """A connection to devices; ``where`` is its name in messages, ``timeout_s`` the longest answer time."""
 
     where: str
     timeout_s: float
@@ -47,7 +48,7 @@ class Wire(Protocol):
 
         Parameters
         ----------
-        before : called when the connection stands and nothing but the sending is left; what it raises leaves the request unsent
+        before : called on the open connection immediately before sending; the request is not sent where it raises
         """
         ...
 
@@ -57,7 +58,7 @@ class Wire(Protocol):
 
 
 class TcpWire:
-    """Modbus TCP, over TLS when a context is given; connected when it is first needed and again after it broke."""
+    """Modbus TCP, over TLS with a context; it connects at the first request and again after a lost connection."""
 
     def __init__(
         self, host: str, port: int, timeout_s: float, *, tls: ssl.SSLContext | None = None, server_name: str = ""
@@ -69,14 +70,14 @@ class TcpWire:
         self._server_name = server_name or host
         self._socket: socket.socket | None = None
         self._buffer = b""
-        self._unsure = False  # the last request was a write, and nothing came back
-        self._number = int.from_bytes(os.urandom(2), "big")  # a gateway may still hold what an earlier process asked
+        self._unanswered_write = False  # the last request was a write without an answer
+        self._number = int.from_bytes(os.urandom(2), "big")  # a gateway may still hold requests of an earlier process
 
     def exchange(self, device_id: int, request: bytes, before: Callable[[], None] | None = None) -> bytes:
-        """The answer under this request's number; answers under other numbers are dropped."""
+        """The answer with the transaction number of this request; other answers are discarded."""
         deadline = time.monotonic() + self.timeout_s
         self._number = self._number % 0xFFFF + 1
-        first, self._unsure = not self._unsure, False
+        first, self._unanswered_write = not self._unanswered_write, False
         frame = struct.pack(">HHHB", self._number, 0, len(request) + 1, device_id) + request
         try:
             connection = self._connected()
@@ -86,8 +87,8 @@ class TcpWire:
             connection.sendall(frame)
             return self._answer(connection, device_id, deadline)
         except TimeoutError:
-            self._unsure = first and request[0] in WRITES and self._socket is not None
-            if not self._unsure:
+            self._unanswered_write = first and request[0] in WRITES and self._socket is not None
+            if not self._unanswered_write:
                 self._abort()
             raise Silence from None
         except OSError as problem:
@@ -98,26 +99,26 @@ class TcpWire:
             raise
 
     def close(self) -> None:
-        """Ends the connection; in peace where every request had its answer."""
-        if self._socket is not None and not self._unsure:
+        """Ends the connection, orderly where every request had its answer."""
+        if self._socket is not None and not self._unanswered_write:
             with suppress(OSError):
                 self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, struct.pack("ii", 0, 0))
         self._abort()
 
     def _abort(self) -> None:
-        """Ends the connection; what could not be delivered is dropped."""
+        """Ends the connection; undelivered bytes are discarded."""
         if self._socket is not None:
             self._socket.close()
-        self._socket, self._buffer, self._unsure = None, b"", False
+        self._socket, self._buffer, self._unanswered_write = None, b"", False
 
     def _connected(self) -> socket.socket:
         if self._socket is None:
-            plain = socket.create_connection(self._address, self.timeout_s)
-            plain.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
-            drop_what_is_late(plain, self.timeout_s)
-            self._socket = plain
+            connection = socket.create_connection(self._address, self.timeout_s)
+            connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+            discard_undelivered(connection, self.timeout_s)
+            self._socket = connection
             if self._tls is not None:
-                self._socket = self._tls.wrap_socket(plain, server_hostname=self._server_name)
+                self._socket = self._tls.wrap_socket(connection, server_hostname=self._server_name)
         return self._socket
 
     def _answer(self, connection: socket.socket, device_id: int, deadline: float) -> bytes:
@@ -138,7 +139,7 @@ class TcpWire:
             return frame[HEADER:]
 
     def _frame(self) -> bytes | None:
-        """The next whole frame of the stream; a stream that cannot be one is refused."""
+        """The next complete frame of the stream; a stream that is not Modbus TCP is refused."""
         if len(self._buffer) < HEADER:
             return None
         protocol, length = struct.unpack(">HH", self._buffer[2:6])
@@ -151,11 +152,11 @@ class TcpWire:
         return frame
 
 
-def drop_what_is_late(connection: socket.socket, patience_s: float) -> None:
-    """Has the system drop what it could not deliver: at the end of the connection, also of the process, and after a while.
+def discard_undelivered(connection: socket.socket, patience_s: float) -> None:
+    """Sets the socket to discard undelivered bytes at the end of the connection or process, and after ``patience_s``.
 
-    Without this the system goes on delivering for minutes what was sent while the network was away: an order would reach the
-    device after the run had given it up, or after a watchdog had made the station safe.
+    Without this the system continues for minutes to deliver bytes that were sent while the network was down: a command would
+    reach the device after the run had abandoned it, or after a watchdog had made the station safe.
     """
     connection.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, struct.pack("ii", 1, 0))
     if hasattr(socket, "TCP_USER_TIMEOUT"):
@@ -163,7 +164,7 @@ def drop_what_is_late(connection: socket.socket, patience_s: float) -> None:
 
 
 def tls_context(ca: Path, certificate: Path | None = None, key: Path | None = None) -> ssl.SSLContext:
-    """A context that trusts this authority alone, checks the name, and shows a certificate where one is given."""
+    """A context that trusts this authority only, checks the host name, and presents the client certificate, if any."""
     context = ssl.SSLContext(ssl.PROTOCOL_TLS_CLIENT)
     context.minimum_version = ssl.TLSVersion.TLSv1_2
     context.load_verify_locations(ca)
@@ -173,9 +174,9 @@ def tls_context(ca: Path, certificate: Path | None = None, key: Path | None = No
 
 
 def reason_of(problem: Exception) -> str:
-    """What a system says went wrong with a connection."""
+    """The reason of a failed connection, from its exception."""
     if isinstance(problem, ssl.SSLCertVerificationError):
-        return f"its certificate does not hold: {problem.verify_message}"
+        return f"its certificate is not valid: {problem.verify_message}"
     if isinstance(problem, OSError) and problem.strerror:
         return problem.strerror
     return str(problem)

@@ -1,1 +1,1 @@
-"""The simulated station: physics behind a Modbus TCP server. Only :mod:`stations.opening` and tests know of it."""
+"""The simulated station: physics behind a Modbus TCP server. Only :mod:`stations.opening` and tests import it."""

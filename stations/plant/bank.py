@@ -1,4 +1,4 @@
-"""Registers of one simulated device: the profile on one side, the plant's values on the other."""
+"""Registers of one simulated device: the profile connected to the values of the plant."""
 
 from __future__ import annotations
 
@@ -16,16 +16,16 @@ Window = Callable[[int, int], list[int]]
 
 
 class Busy(Exception):
-    """The device cannot do this now; the server answers exception 6."""
+    """The device cannot carry this out now; the server answers with exception 6."""
 
 
 def refuse_write(values: dict[str, Value]) -> None:
-    """The sink of a device that takes no commands."""
-    raise NotEncodable(f"{', '.join(values)}: not to be written")
+    """The write function of a device without commands."""
+    raise NotEncodable(f"{', '.join(values)}: read-only")
 
 
 def number(values: dict[str, Value], name: str) -> float:
-    """The number that is written to a register."""
+    """The number in a write to a register."""
     value = values[name]
     if not isinstance(value, int | float):
         raise NotEncodable(f"{name}: {value!r} is not a number")
@@ -33,7 +33,7 @@ def number(values: dict[str, Value], name: str) -> float:
 
 
 class Bank:
-    """What a device's registers hold now, and what a write to them means."""
+    """The present values of the registers of a device, and the effect of writes."""
 
     def __init__(
         self, profile: Profile, sources: Mapping[str, Source], sink: Sink = refuse_write, window: Window | None = None
@@ -50,12 +50,12 @@ class Bank:
             )
 
     def _scaled(self, register: Register) -> Register:
-        """The register in the decimals that the device is set to."""
+        """The register with the decimals that are set in the device."""
         decimals = self._sources[register.scaled_by]() if register.scaled_by in self._sources else 0
         return register.with_decimals(decimals) if isinstance(decimals, int) and register.scaled_by else register
 
     def read(self, address: int, count: int, space: Space = "holding") -> list[tuple[int, list[int]]]:
-        """Words, or bits, of every register that the span touches, each with its address."""
+        """Words, or bits, of every register in an address range, each with its address."""
         fifo = self.profile.fifo
         if fifo is not None and self._window is not None and address >= fifo.address and space == "holding":
             return [(address, self._window(address - fifo.address, count))]
@@ -67,7 +67,7 @@ class Bank:
         ]
 
     def write(self, address: int, words: list[int], space: Space = "holding") -> None:
-        """Acts on the registers in the span; half a register, a value outside its limits or a read-only one is refused."""
+        """Writes the registers in an address range; an incomplete or read-only register or a value outside limits is refused."""
         end = address + len(words)
         values: dict[str, Value] = {}
         for register in self._registers:
@@ -79,8 +79,8 @@ class Bank:
         first = register.address - address
         part = words[max(first, 0) : first + register.words]
         if register.access == "read" or first < 0 or len(part) != register.words:
-            raise NotEncodable(f"{register.name}: read-only or cut in half; write whole registers that may be written")
+            raise NotEncodable(f"{register.name}: read-only or incomplete; write whole writable registers")
         order = self.profile.order(register)
         value = decode(register, order, part)
-        encode(register, order, value)  # refuses what is outside the limits
+        encode(register, order, value)  # refuses a value outside the limits
         return value

@@ -1,4 +1,4 @@
-"""The plant as the clock: sleeping is what lets its time pass."""
+"""The clock of the plant: a sleep advances its time."""
 
 from __future__ import annotations
 
@@ -9,15 +9,15 @@ if TYPE_CHECKING:
 
 
 class PlantClock:
-    """Time of the world, in whole microseconds, so that the way a sleep is chopped up leaves no trace."""
+    """Time of the simulated world in whole microseconds, so that the division of a sleep into parts has no effect."""
 
     def __init__(self, world: World) -> None:
         self._world = world
 
     def now(self) -> float:
-        """Seconds since the plant's power-on."""
+        """Seconds since power-on of the plant."""
         return self._world.now + self._world.clock_offset_s
 
     def sleep(self, seconds: float) -> None:
-        """Lets the plant's time go on."""
+        """Advances the time of the plant."""
         self._world.advance(max(0, round(seconds * 1e6)))

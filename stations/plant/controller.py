@@ -1,4 +1,4 @@
-"""What the simulated chamber controllers share: the registers that most of them have, and the write of a set point."""
+"""Common parts of the simulated chamber controllers: usual registers, and the write of a set point."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ if TYPE_CHECKING:
     from stations.plant.chamber import Chamber
     from stations.plant.world import World
 
-DEFAULT_LIMITS_C = (-100.0, 250.0)  # where a profile gives no limits
+DEFAULT_LIMITS_C = (-100.0, 250.0)  # for profiles without limits
 HUMIDITY_PCT = 40.0
 
 
 def controller_bank(world: World, profile: Profile, own: Mapping[str, Source], command: Sink) -> Bank:
-    """A bank with the common registers of a chamber's controller and ``own``, which come first; ``command`` takes writes."""
+    """A bank with the registers ``own`` and then the common registers of a chamber controller; ``command`` handles writes."""
     chamber = world.fixture.chamber
     point = profile.register("set_point")
     sources: dict[str, Source] = {
@@ -38,7 +38,7 @@ def controller_bank(world: World, profile: Profile, own: Mapping[str, Source], c
 
 
 def set_by(chamber: Chamber, name: str) -> Callable[[dict[str, Value]], None]:
-    """What a write to the register that sets the chamber does."""
+    """The effect of a write to the register of the set point."""
 
     def command(values: dict[str, Value]) -> None:
         if name in values:

@@ -1,4 +1,4 @@
-"""What the simulated drives share: the start of a move."""
+"""Common part of the simulated drives: the start of a move."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ ABSOLUTE = 1
 
 
 def start_move(world: World, axis: Axis, profile: Profile, values: dict[str, Value]) -> None:
-    """Starts a move of a drive that stands."""
+    """Starts a move of a drive at rest."""
     if axis.moving(world.now):
         raise Busy(profile.name)
     axis.go(world.now, number(values, "target"), number(values, "speed"), number(values, "acceleration"))

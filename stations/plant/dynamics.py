@@ -1,4 +1,4 @@
-"""The devices' frequency response: a mass on a spring, then the low-pass of the output stage."""
+"""Frequency response of the devices: a spring-mass system, then the low-pass filter of the output stage."""
 
 from __future__ import annotations
 
@@ -16,10 +16,10 @@ Array = NDArray[np.float64]
 
 
 def output_pole_hz(preset: Preset) -> float:
-    """Corner of the output stage, Hz, that puts the −3 dB point of the chain at the sheet's bandwidth.
+    """Corner frequency of the output stage, Hz, for which the −3 dB point of the chain is the bandwidth of the data sheet.
 
-    A mass with 2500 Hz and ζ = 0.7 alone passes 2500 Hz; the sheet's 1500 Hz is the chain's, so the rest is the output stage's.
-    Infinite where the mass alone already ends below the bandwidth.
+    A spring-mass system with 2500 Hz and ζ = 0.7 alone passes 2500 Hz; the 1500 Hz of the data sheet hold for the whole chain.
+    Infinite where the spring-mass system alone has a smaller bandwidth.
     """
     u = preset.bandwidth_hz / preset.natural_frequency_hz
     squared = (1.0 - u**2) ** 2 + (2.0 * preset.damping * u) ** 2  # 1/|H|² of the mass at the bandwidth
@@ -28,7 +28,7 @@ def output_pole_hz(preset: Preset) -> float:
 
 
 def transfer(preset: Preset) -> tuple[Array, Array]:
-    """Numerator and denominator of the chain in s, gain 1 at rest."""
+    """Numerator and denominator of the chain in s, with gain 1 at zero frequency."""
     wn = 2.0 * math.pi * preset.natural_frequency_hz
     mass = np.array([1.0 / wn**2, 2.0 * preset.damping / wn, 1.0])
     pole = output_pole_hz(preset)
@@ -37,7 +37,7 @@ def transfer(preset: Preset) -> tuple[Array, Array]:
 
 
 class Dynamics:
-    """The response of every axis of every unit to sampled force, exact for force that runs straight between samples."""
+    """Response of every axis of every unit to sampled force; exact for force that is linear between samples."""
 
     def __init__(self, preset: Preset) -> None:
         self._transfer = transfer(preset)
@@ -47,8 +47,8 @@ class Dynamics:
 
     def begin(self, rate: float, force: Array) -> None:
         """Starts at ``rate`` Hz from rest under ``force`` (units, 3), g."""
-        found: Any = cont2discrete(self._transfer, 1.0 / rate, method="foh")
-        numerator, denominator = found[0], found[1]
+        system: Any = cont2discrete(self._transfer, 1.0 / rate, method="foh")
+        numerator, denominator = system[0], system[1]
         self._b, self._a = np.atleast_1d(np.squeeze(numerator)), np.atleast_1d(denominator)
         self._state = lfilter_zi(self._b, self._a)[:, None, None] * force[None]
 

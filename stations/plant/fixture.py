@@ -1,4 +1,4 @@
-"""The fixture in the chamber: temperatures of air and elements, vibration and supply, second by second."""
+"""The fixture in the chamber: temperatures of air and elements, vibration and supply, in steps of a second."""
 
 from __future__ import annotations
 
@@ -26,10 +26,10 @@ AIR_UNREST_S = 30.0
 
 
 class Fixture:
-    """Slots with a lag and a place in the air stream each. Steps are computed one ahead of the clock.
+    """Slots, each with its thermal lag and its place in the air stream. Steps are computed one ahead of the clock.
 
-    A command in the middle of a second acts from the next whole second on, so what happens does not depend on how the time until
-    then was cut up.
+    A command in the middle of a second acts from the next whole second on, so that the result does not depend on the division of
+    the time before it into steps.
     """
 
     def __init__(

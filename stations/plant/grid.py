@@ -1,4 +1,4 @@
-"""Rows at every second of the plant's time, grown as it goes, read between the seconds along straight lines."""
+"""Rows at every second of the time of the plant, appended step by step and interpolated linearly."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ class Grid:
         self.length = 1
 
     def append(self, row: Array) -> None:
-        """Adds the row of the next step."""
+        """Appends the row of the next step."""
         if self.length == len(self._rows):
             self._rows = np.concatenate((self._rows, np.zeros_like(self._rows)))
         self._rows[self.length] = row
@@ -29,7 +29,7 @@ class Grid:
         return self._rows[self.length - 1]
 
     def at(self, steps: Array) -> Array:
-        """Rows at ``steps`` (n,), whole or broken, (n, *shape)."""
+        """Rows (n, *shape) at ``steps`` (n,), integer or fractional."""
         left = np.minimum(np.floor(steps).astype(np.int64), self.length - 2)
         part = (steps - left).reshape(-1, *(1,) * (self._rows.ndim - 1))
         return self._rows[left] + part * (self._rows[left + 1] - self._rows[left])

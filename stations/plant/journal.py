@@ -1,6 +1,6 @@
 """The plant's journal: every write, line and fault since its start, with its time.
 
-Replayed on a fresh plant, it gives the same state, bit for bit.
+A replay on a new plant gives the same state, bit by bit.
 """
 
 from __future__ import annotations
@@ -24,12 +24,12 @@ if TYPE_CHECKING:
 
 VERSION = 1
 SPACES: tuple[Space, ...] = get_args(Space)
-HEAD = 5  # numbers in front of the words of a write
+HEAD = 5  # numbers before the words of a write
 
 
 @dataclass(frozen=True)
 class Write:
-    """Words, or bits, written to a device's registers at a time of the plant."""
+    """Words, or bits, written to registers of a device, with the time of the plant."""
 
     at_us: int
     device_id: int
@@ -40,7 +40,7 @@ class Write:
 
 @dataclass(frozen=True)
 class LineOrder:
-    """An order given to a device in a line of text, at a time of the plant."""
+    """A text command to a device, with the time of the plant."""
 
     at_us: int
     device_id: int
@@ -49,7 +49,7 @@ class LineOrder:
 
 @dataclass(frozen=True)
 class Injection:
-    """A fault arranged at a time of the plant."""
+    """A fault injected at a time of the plant."""
 
     at_us: int
     fault: FaultOrder
@@ -59,17 +59,17 @@ Event = Write | LineOrder | Injection
 
 
 def fingerprint(config: StationConfig, lot: Lot) -> str:
-    """Hash of station and lot: a state can be resumed only where it is the same."""
+    """Hash of station and lot: a state can be resumed only with the same hash."""
     text = config.model_dump_json(exclude={"suspenders", "safety", "self_test"}) + lot.model_dump_json()
     return hashlib.sha256(text.encode()).hexdigest()
 
 
 class Journal:
-    """Events in order. Writes are kept packed: a day of them takes a few megabytes."""
+    """Events in order. Writes are stored packed: those of a day need a few megabytes."""
 
     def __init__(self, belongs_to: str) -> None:
         self._belongs_to = belongs_to
-        self._writes = array("q")  # time, device, space, address, count, words; one after the other
+        self._writes = array("q")  # time, device, space, address, count and words of each write, in sequence
         self._count = 0
         self._others: list[tuple[int, LineOrder | Injection]] = []  # with the number of writes before each
 
@@ -115,7 +115,7 @@ class Journal:
             content: dict[str, Any] = json.loads(zlib.decompress(state))
         except (zlib.error, ValueError):
             raise ArchiveUnusable(
-                "station state: not readable, bytes of an earlier capture are needed; start the run afresh"
+                "station state: not readable, the state of an earlier capture is needed; start the run again"
             ) from None
         if content.get("version") != VERSION or content.get("belongs_to") != self._belongs_to:
             raise DataRejected(

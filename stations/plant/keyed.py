@@ -1,4 +1,4 @@
-"""Numbers that belong to an instant: reading twice gives the same, and reading moves nothing."""
+"""Random numbers of an instant: a repeated reading gives the same number, and a reading changes no state."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The plant's devices with a text protocol, over TCP on loopback."""
+"""Server for the devices of the plant with a text protocol, over TCP on loopback."""
 
 from __future__ import annotations
 
@@ -22,18 +22,18 @@ POLL_S = 0.02
 
 
 class LineServer:
-    """Serves one speaking device of a plant while the context is open; ``port`` is the one it got."""
+    """Serves one device with a text protocol while the context is open; ``port`` is its port."""
 
     def __init__(self, plant: Plant, device_id: int, host: str = LOOPBACK, port: int = 0) -> None:
         self._thread = threading.Thread(
             target=self._serve, name="line-server", daemon=True, kwargs={"poll_interval": POLL_S}
         )
 
-        class Conversation(socketserver.StreamRequestHandler):
-            """Lines until the client hangs up."""
+        class Handler(socketserver.StreamRequestHandler):
+            """Answers lines until the client closes the connection."""
 
             def handle(self) -> None:
-                """One answer for each line; none where the device is mute."""
+                """Sends one answer for each line; none while the device does not respond."""
                 with suppress(OSError):
                     while line := self.rfile.readline(LONGEST):
                         answer = plant.send_line(device_id, line.rstrip(END).decode("ascii", errors="replace"))
@@ -41,10 +41,10 @@ class LineServer:
                             self.wfile.write(answer.encode("ascii", errors="replace") + END)
 
         try:
-            self._server = _Server((host, port), Conversation)
+            self._server = _Server((host, port), Handler)
         except OSError as problem:
             raise StationRefused(
-                f"simulated station: {host}:{port} does not listen ({problem.strerror}); give a free port"
+                f"simulated station: {host}:{port} cannot listen ({problem.strerror}), a free port is needed; give one"
             ) from None
         self.host, self.port = host, int(self._server.server_address[1])
 
@@ -56,7 +56,7 @@ class LineServer:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        """Stops, and closes open connections."""
+        """Stops and closes open connections."""
         self._server.shutdown()
         self._server.server_close()
         self._thread.join(END_S)
@@ -66,7 +66,7 @@ class LineServer:
 
 
 class _Server(socketserver.ThreadingTCPServer):
-    """A server whose conversations end with it."""
+    """A server that ends its connections with itself."""
 
     allow_reuse_address = True
     daemon_threads = True

@@ -1,4 +1,4 @@
-"""Water in the air around the devices: what the hall lets into the chamber, and what part of saturation that is there."""
+"""Humidity of the air around the devices: vapour pressure of the room, and relative humidity at chamber temperature."""
 
 from __future__ import annotations
 
@@ -7,13 +7,13 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
-ROOM_HPA = 12.5  # vapour pressure of a hall at 23 °C and 45 %
-UNREST = 0.12  # part of it by which each swing moves it
+ROOM_HPA = 12.5  # vapour pressure of a room at 23 °C and 45 %
+UNREST = 0.12  # relative amplitude of each variation
 PERIODS_S = (1500.0, 4100.0, 11000.0)  # air conditioning, doors, weather
 
 
 class Moisture:
-    """Vapour pressure as a function of time. The chamber's port keeps it near the hall's, so nothing has to be stepped."""
+    """Vapour pressure as a function of time; through the port of the chamber it follows that of the room."""
 
     def __init__(self, rng: np.random.Generator) -> None:
         self._phases = rng.uniform(0.0, 2.0 * np.pi, len(PERIODS_S))
@@ -28,7 +28,7 @@ class Moisture:
         return np.asarray(ROOM_HPA * (1.0 + np.sum(swings, axis=0)), dtype=np.float64)
 
     def relative(self, time: Array, air: Array) -> Array:
-        """Relative humidity (n,), %, in air of so many °C (n,): what is beyond saturation has condensed."""
+        """Relative humidity (n,), %, at air temperatures (n,), °C; at most 100 %, as the rest condenses."""
         return np.minimum(100.0 * self.pressure(time) / saturation(air), 100.0)
 
 

@@ -1,6 +1,6 @@
-"""Noise of the devices under test: white, flicker, random walk, each from the unit's own stream of numbers.
+"""Noise of the devices under test: white, flicker and random walk, from one stream of random numbers for each unit.
 
-Draws are made sample by sample in order, so that a record does not depend on how it was asked for.
+Draws are made sample by sample in order, so that a record does not depend on the size of the requests.
 """
 
 from __future__ import annotations
@@ -19,14 +19,14 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-RATIO = 3.0  # between time constants; a sum of Lorentzians spaced like this follows 1/f within 0.1 %
+RATIO = 3.0  # ratio of adjacent time constants; the sum of Lorentzians at this ratio follows 1/f within 0.1 %
 SHORTEST, LONGEST = -6, 10  # powers of the ratio around 0.1 s: from 0.14 ms to 1.6 hours
 TERMS = LONGEST - SHORTEST + 1
-FASTEST = 0.5  # sample periods; what changes faster is averaged out by the reader's decimation filter
+FASTEST = 0.5  # sample periods; the decimation filter of the reader averages faster changes
 
 
 def flicker_time_constants() -> Array:
-    """Time constants of the Ornstein–Uhlenbeck processes that make flicker noise, (17,), s."""
+    """Time constants of the Ornstein–Uhlenbeck processes of the flicker noise, (17,), s."""
     return np.array([0.1 * RATIO**k for k in range(SHORTEST, LONGEST + 1)])
 
 
@@ -40,7 +40,7 @@ def flicker_variance(instability: float) -> float:
 
 
 class Noise:
-    """The noise of a lot, in g, with the state that goes on from one run of sampling to the next."""
+    """The noise of a lot, in g, with the state that continues from one sampling to the next."""
 
     def __init__(self, preset: Preset, streams: Sequence[np.random.Generator]) -> None:
         self._density = preset.noise_density_ug * 1e-6
@@ -52,7 +52,7 @@ class Noise:
         self._walk: Array = np.zeros((len(self._streams), 3))
 
     def jump(self, gap: float) -> None:
-        """Carries the slow processes over ``gap`` seconds in which nothing was sampled; exact, not stepped."""
+        """Advances the slow processes over ``gap`` seconds without sampling; exact, in one step."""
         keep = np.exp(-gap / self._tau)
         z = self._draw(1, TERMS + 1)[0]
         self._flicker = keep * self._flicker + self._sigma * np.sqrt(1.0 - keep**2) * z[..., :TERMS]
@@ -83,5 +83,5 @@ class Noise:
         return total
 
     def _draw(self, n: int, terms: int) -> Array:
-        """Standard normal numbers, (n, units, 3, terms); each unit's come from its own stream."""
+        """Standard normal numbers, (n, units, 3, terms); those of each unit come from its own stream."""
         return np.stack([stream.standard_normal((n, 3, terms)) for stream in self._streams], axis=1)

@@ -1,4 +1,4 @@
-"""The reader's sampling: one clock for all slots, a ring of packed samples per slot."""
+"""Sampling of the reader: one clock for all slots, a ring buffer of packed samples per slot."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ CHUNK = 1024
 
 
 class Source(Protocol):
-    """Who makes the samples."""
+    """Source of the samples."""
 
     def begin(self, start: float, rate: float) -> None:
         """Sampling starts at ``start`` s with ``rate`` Hz; the first sample is one period later."""
@@ -29,7 +29,7 @@ class Source(Protocol):
 
 
 class Sampler:
-    """Rings of ``registers`` words, filled as the plant's time goes on."""
+    """Ring buffers of ``registers`` words, filled as the time of the plant advances."""
 
     def __init__(self, source: Source, units: int, packing: Packing, registers: int) -> None:
         self._source = source
@@ -47,7 +47,7 @@ class Sampler:
         self._skipped = 0
 
     def start(self, now_us: int) -> None:
-        """Starts afresh: counters at zero, flags down."""
+        """Starts again: counters at zero, flags cleared."""
         self.running, self._start_us, self.head = True, now_us, 0
         self.tail = [0] * len(self.tail)
         self.overflow = [False] * len(self.overflow)
@@ -55,7 +55,7 @@ class Sampler:
         self._source.begin(now_us * 1e-6, self.rate)
 
     def stop(self) -> None:
-        """Stops; what has been sampled stays in the rings."""
+        """Stops; the samples stay in the ring buffers."""
         self.running = False
 
     @property
@@ -64,7 +64,7 @@ class Sampler:
         return self.millihertz * 1e-3
 
     def advance(self, now_us: int) -> None:
-        """Makes every sample that is due at ``now_us``."""
+        """Takes every sample that is due at ``now_us``."""
         if not self.running:
             return
         due = (now_us - self._start_us) * self.millihertz // 10**9 - self._lost
@@ -82,19 +82,19 @@ class Sampler:
         self.head += n
 
     def overrun(self, unit: int) -> None:
-        """A unit's ring was written over before it was read: its oldest samples are gone, and the flag is up."""
+        """Overwrites the ring buffer of a unit before it was read: its oldest samples are lost, and the overflow flag is set."""
         if self.running:
             self.overflow[unit] = True
             self._ring[unit] = 0
 
     def lose(self, samples: int, *, numbered: bool) -> None:
-        """The next samples are never made: told by their numbers, or only missing in the count."""
+        """Loses the next samples: the sample numbers show the gap where ``numbered``, else only the count does."""
         if self.running:
             self._lost += samples
             self._skipped += samples if numbered else 0
 
     def words(self, unit: int, first: int, count: int) -> list[int]:
-        """``count`` words of a unit's ring from word ``first`` on."""
+        """``count`` words of the ring buffer of a unit from word ``first`` on."""
         flat = self._ring[unit].reshape(-1)
         part: list[int] = flat[first : first + count].tolist()
         return part + [0] * (count - len(part))

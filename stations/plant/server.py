@@ -1,6 +1,6 @@
-"""The plant's Modbus TCP server, in a thread of its own, on loopback.
+"""Modbus TCP server of the plant, in its own thread, on loopback.
 
-Nothing is awaited inside an action: pymodbus would answer one request under the next one's number.
+An action awaits nothing: pymodbus would otherwise answer one request with the transaction number of the next.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ START_S = 20.0
 
 
 def sim_device(device_id: int, profile: Profile, plant: Plant) -> SimDevice:
-    """What pymodbus needs to serve a bank: every register of its profile, none beside them."""
+    """The pymodbus device of a bank: every register of its profile and no other."""
     data = {space: _blocks(profile, space) for space in get_args(Space)}
     if profile.fifo is not None:
         fifo = profile.fifo
@@ -47,13 +47,13 @@ def sim_device(device_id: int, profile: Profile, plant: Plant) -> SimDevice:
     action = partial(_answer, plant, device_id)
     if not any(data[space] for space in ("coil", "discrete", "input")):
         return SimDevice(device_id, simdata=data["holding"], action=action)
-    nobody = {"coil": _bits(0, 1), "discrete": _bits(0, 1), "input": _words(0, 1), "holding": _words(0, 1)}
-    filled = [data[space] or [nobody[space]] for space in ("coil", "discrete", "holding", "input")]
+    empty = {"coil": _bits(0, 1), "discrete": _bits(0, 1), "input": _words(0, 1), "holding": _words(0, 1)}
+    filled = [data[space] or [empty[space]] for space in ("coil", "discrete", "holding", "input")]
     return SimDevice(device_id, simdata=(filled[0], filled[1], filled[2], filled[3]), action=action)
 
 
 def _blocks(profile: Profile, space: Space) -> list[SimData]:
-    """The registers of one space; the bits of one as a single block, holes are refused when they are asked for."""
+    """The registers of one space; bits form a single block, whose gaps are refused at each request."""
     registers = [r for r in profile.registers if r.space == space]
     if space not in BITS or not registers:
         return [_words(r.address, r.words, readonly=not r.writable) for r in registers]
@@ -79,7 +79,7 @@ async def _answer(
     registers: list[int],
     written: list[int] | list[bool] | None,
 ) -> ExcCodes | None:
-    """Fills the registers that are read, or hands on those that are written."""
+    """Fills the registers of a read, or passes on the values of a write."""
     space = SPACES[function]
     if not any(r.space == space and r.address <= address < r.end for r in plant.banks[device_id].profile.registers):
         fifo = plant.banks[device_id].profile.fifo
@@ -89,7 +89,7 @@ async def _answer(
         plant.requested.add(device_id)
         code = plant.exception_of(device_id)
         if code == MUTE:
-            raise NoSuchIdException  # the server, told to ignore missing devices, sends nothing
+            raise NoSuchIdException  # the server is set to ignore missing devices, so it sends no answer
         try:
             if code == 0 and written is not None:
                 code = plant.write(device_id, address, [int(word) for word in written], space)
@@ -104,9 +104,9 @@ async def _answer(
     return None
 
 
-def _fill(plant: Plant, device_id: int, space: Space, span: tuple[int, int], held: tuple[int, list[int]]) -> None:
-    """Puts what a device tells into pymodbus' words; bits lie in them sixteen to a word, and are counted so."""
-    (address, count), (start, registers) = span, held
+def _fill(plant: Plant, device_id: int, space: Space, span: tuple[int, int], block: tuple[int, list[int]]) -> None:
+    """Copies values of a device into the words of pymodbus, which hold sixteen bits each."""
+    (address, count), (start, registers) = span, block
     bits = space in BITS
     for first, values in plant.read(device_id, address, count * WORD if bits else count, space):
         if not bits:
@@ -119,7 +119,7 @@ def _fill(plant: Plant, device_id: int, space: Space, span: tuple[int, int], hel
 
 
 class PlantServer:
-    """Serves a plant while the context is open; ``port`` is the one it got."""
+    """Serves a plant while the context is open; ``port`` is its port."""
 
     def __init__(self, plant: Plant, host: str = LOOPBACK, port: int = 0) -> None:
         self._plant = plant
@@ -132,10 +132,12 @@ class PlantServer:
 
     def __enter__(self) -> Self:
         """Starts, and waits until the port listens."""
-        logging.getLogger("pymodbus").setLevel(logging.CRITICAL)  # its errors reach the client as answers
+        logging.getLogger("pymodbus").setLevel(logging.CRITICAL)  # the client gets its errors as answers
         self._thread.start()
         if not self._ready.wait(START_S) or self._server is None:
-            raise StationRefused(f"simulated station: {self.host}:{self.port} does not listen; give a free port")
+            raise StationRefused(
+                f"simulated station: {self.host}:{self.port} cannot listen, a free port is needed; give one"
+            )
         return self
 
     def __exit__(
@@ -155,7 +157,7 @@ class PlantServer:
         server = self.make(devices)
         try:
             await server.serve_forever(background=True)
-        except (RuntimeError, OSError):  # the port is taken: told by the thread that waits
+        except (RuntimeError, OSError):  # the port is in use; the waiting thread reports it
             self._ready.set()
             return
         self.port = self.listening_at(server)
@@ -164,12 +166,12 @@ class PlantServer:
         await server.serving
 
     def make(self, devices: list[SimDevice]) -> ModbusBaseServer:
-        """The server itself; another wire overrides it."""
+        """The server for TCP; servers for other wires override this method."""
         return ModbusTcpServer(devices, address=(self.host, self.port), ignore_missing_devices=True)
 
     def listening_at(self, server: ModbusBaseServer) -> int:
-        """The port that a listening server has got."""
+        """The port of a listening server."""
         transport = server.transport
         if not isinstance(transport, asyncio.Server):
-            raise StationRefused("simulated station: the server does not listen; give a free port")
+            raise StationRefused("simulated station: the server cannot listen, a free port is needed; give one")
         return int(transport.sockets[0].getsockname()[1])

@@ -1,7 +1,7 @@
-"""The devices' own watchdogs: a drive and a reader that receive no request for some time stop by themselves.
+"""Communication time-outs of the devices: a drive or a reader without requests stops after some time.
 
-Real drives have such a communication time-out (the AZ series calls it so, and stops with an alarm); controllers of
-chambers mostly have none and keep their set point. It lives in wall time, and so only in a station that is served.
+Real drives have this function (in the AZ series "communication timeout", which stops with an alarm); most chamber controllers do
+not, and keep their set point. The time is wall time, so the function exists only in a served station.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 
 class IdleStop:
-    """Stops devices without a request for ``seconds``; the time counts from a device's first request."""
+    """Stops devices without a request for ``seconds``; the time counts from the first request to a device."""
 
     def __init__(self, plant: Plant, devices: Devices, seconds: float) -> None:
         self._plant, self._seconds = plant, seconds
@@ -25,16 +25,16 @@ class IdleStop:
             devices.inner.device_id: lambda: plant.inner.halt(plant.now),
             devices.reader.device_id: plant.sampler.stop,
         }
-        self._asked: dict[int, float] = {}
+        self._last_request: dict[int, float] = {}
 
     def look(self, now: float) -> None:
-        """Looks who has been asked since the last look, at ``now`` s of the wall, and stops who has waited too long."""
+        """Updates the time of the last request of each device at ``now`` s wall time, and stops devices after the time-out."""
         if self._seconds == 0.0:
             return
         with self._plant.lock:
-            self._asked.update(dict.fromkeys(self._plant.requested & self._stops.keys(), now))
+            self._last_request.update(dict.fromkeys(self._plant.requested & self._stops.keys(), now))
             self._plant.requested.clear()
-            late = [device_id for device_id, asked in self._asked.items() if now - asked > self._seconds]
+            late = [device_id for device_id, last in self._last_request.items() if now - last > self._seconds]
             for device_id in late:
                 self._stops[device_id]()
-                del self._asked[device_id]
+                del self._last_request[device_id]

@@ -1,4 +1,4 @@
-"""The simulated controllers by the family that a profile names; each module in ``families`` has the function ``simulated``."""
+"""The simulated controllers by the family in the profile; each module in ``families`` has the function ``simulated``."""
 
 from __future__ import annotations
 
@@ -17,22 +17,22 @@ if TYPE_CHECKING:
 
 
 def family_names() -> list[str]:
-    """Names of the families that can be simulated, sorted."""
+    """Names of the simulated families, sorted."""
     return sorted(module.name for module in pkgutil.iter_modules(families.__path__))
 
 
 def axis_bank(world: World, axis: Axis, profile: Profile) -> Bank:
-    """The registers of the drive behind a profile."""
+    """The registers of the drive with a profile."""
     return _module(profile).simulated(world, axis, profile)
 
 
 def chamber_bank(world: World, profile: Profile) -> Bank:
-    """The registers of the chamber's controller behind a profile."""
+    """The registers of the chamber controller with a profile."""
     return _module(profile).simulated(world, profile)
 
 
 def chamber_line_device(world: World, profile: Profile) -> LineDevice:
-    """The chamber's controller behind a profile of commands."""
+    """The chamber controller with a profile of text commands."""
     return _module(profile).simulated(world, profile)
 
 

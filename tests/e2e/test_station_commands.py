@@ -157,7 +157,7 @@ def test_without_limits_the_check_standard_makes_its_own_from_its_history(tmp_pa
 def test_a_check_standard_that_is_not_seated_is_named(tmp_path):
     path = changed(tmp_path, self_test={"standard": "CS-1"})
     failed = ask("station", "check", "--station", path, "--units", "1", status=3)["failed"]
-    assert failed == ["slots: check standard CS-1 sits in none of them; seat it, or correct [self_test]"]
+    assert failed == ["slots: check standard CS-1 is in no slot; insert it, or correct [self_test]"]
 
 
 def test_control_limits_are_those_of_an_individuals_chart():

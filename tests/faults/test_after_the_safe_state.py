@@ -153,10 +153,10 @@ def test_an_order_that_comes_long_after_its_reading_is_not_sent_and_may_be_tried
         with monkeypatch.context() as patch:
 
             def is_late():
-                axis._registers._answered -= 6.0
+                axis._registers._read_at -= 6.0
 
             between_reading_and_order(axis, patch, is_late)
-            with pytest.raises(StationTimeout, match=r"6\.\d s after the reading that it rests on, at most 1 s"):
+            with pytest.raises(StationTimeout, match=r"6\.\d s after the reading that it depends on, at most 1 s"):
                 axis.start(30.0)
         assert moves_ordered(plant) == before
         station.table.move(0.0, 30.0)

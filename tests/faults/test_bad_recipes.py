@@ -20,7 +20,7 @@ RECIPE = ROOT / "schemas" / "samples" / "production.toml"
     [
         ("soak_min_s = 900.0", "soak_min_s = 9e302", "'soak_min_s': found 9e\\+302"),
         ("dwell_s = 10.0", "dwell_s = 1e200", "'dwell_s': found 1e\\+200"),
-        ("dwell_s = 10.0", "dwell_s = true", "true and false are no numbers"),
+        ("dwell_s = 10.0", "dwell_s = true", "true and false are not numbers"),
         ("dwell_s = 10.0", "dwell_s = -10.0", "'dwell_s': found -10"),
         ("settle_s = 2.0", "settle_s = 1e300", "'settle_s': found 1e\\+300"),
         ("settle_s = 2.0", "settle_s = 1e6", "days, at most 366 are possible"),

@@ -1,9 +1,9 @@
-"""Every fault ends well: recovered, a unit refused, or the run refused by name; never a calibration on bad data."""
+"""Every fault ends well: recovered, a unit refused, or the run refused with a message; never a calibration on bad data."""
 
 from pathlib import Path
 
 import pytest
-from fault_matrix import CASES, PAGE, RECOVERED, RUN, UNIT, Case, page, row, tried
+from fault_matrix import CASES, PAGE, RECOVERED, RUN, UNIT, Case, page, row, run_case
 
 from schemas.errors import STATION
 from stations.plant.faults.base import DEVICES
@@ -13,21 +13,21 @@ from stations.plant.faults.catalogue import figures, kinds
 
 @pytest.mark.parametrize("case", CASES, ids=lambda case: case.fault)
 def test_a_fault_ends_as_the_matrix_says(case: Case) -> None:
-    found = tried(case)
-    assert (found.outcome, found.told) == (case.outcome, found.told)
-    assert case.says in found.told
+    result = run_case(case)
+    assert (result.outcome, result.message) == (case.outcome, result.message)
+    assert case.says in result.message
     if case.outcome == RUN:
-        assert found.status == STATION
-        assert found.told.count(";") >= 1, "what was found, what is needed; what to do"
-        assert found.records < found.wanted
+        assert result.status == STATION
+        assert result.message.count(";") >= 1, "what was found, what is needed; what to do"
+        assert result.records < result.planned
     else:
-        assert found.status == 0
-        assert found.records == found.wanted
-        assert not found.bad, found.bad
-    assert found.refused == (["U001"] if case.outcome == UNIT else [])
+        assert result.status == 0
+        assert result.records == result.planned
+        assert not result.bad, result.bad
+    assert result.refused == (["U001"] if case.outcome == UNIT else [])
     if case.spoilt:
-        assert found.spoilt, "spoilt dwells are measured again, with the reason in the journal"
-    assert row(case, found) in PAGE.read_text(encoding="utf-8"), "write the page again: python tests/fault_matrix.py"
+        assert result.spoilt, "spoilt dwells are measured again, with the reason in the journal"
+    assert row(case, result) in PAGE.read_text(encoding="utf-8"), "write the page again: python tests/fault_matrix.py"
 
 
 def test_every_kind_is_in_the_matrix_and_the_page_is_of_these_cases() -> None:
@@ -42,8 +42,8 @@ def test_every_kind_is_in_the_matrix_and_the_page_is_of_these_cases() -> None:
 
 
 def test_a_sound_station_is_true_to_the_last_dwell() -> None:
-    found = tried(Case("vibration:rms_g=0", RECOVERED))
-    assert (found.outcome, found.bad, found.spoilt) == (RECOVERED, [], [])
+    result = run_case(Case("vibration:rms_g=0", RECOVERED))
+    assert (result.outcome, result.bad, result.spoilt) == (RECOVERED, [], [])
 
 
 @pytest.mark.parametrize("name", kinds())

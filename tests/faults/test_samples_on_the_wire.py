@@ -115,7 +115,7 @@ def test_a_slot_that_forgets_what_was_taken_is_refused() -> None:
         assert len(slot.take().outputs) == 100
         plant.sampler.tail[0] = 50
         station.clock.sleep(1.0)
-        with pytest.raises(StationRefused, match="says that 50 samples of 200 were taken, 100 is right"):
+        with pytest.raises(StationRefused, match="reports 50 of 200 samples as read, 100 is needed"):
             slot.take()
 
 

@@ -259,7 +259,7 @@ def test_a_fault_with_a_typo_is_refused_with_what_was_meant(fault, needed):
 
 def test_hardware_is_not_served():
     config = load_station().model_copy(update={"kind": "modbus"})
-    with pytest.raises(WrongUse, match="only a simulated station"):
+    with pytest.raises(WrongUse, match="a simulated station is needed"):
         serve(config, lot_of(), host="127.0.0.1", port=0, speed=1.0, stop=threading.Event(), ready=print)
 
 

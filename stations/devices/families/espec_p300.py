@@ -20,10 +20,10 @@ class P300Chamber(ThermalChamber):
         return self._values.text("mode")
 
     def require_ready(self) -> None:
-        """Refuses an alarm and a program that runs."""
+        """Refuses a controller with an alarm or a running program."""
         count = int(self._values.number("alarms"))
         if count:
-            raise OperatorNeeded(f"{self.name}: {count} alarms, none is needed; clear their cause at the panel")
+            raise OperatorNeeded(f"{self.name}: {count} alarms, none is needed; clear the cause at the panel")
         if self.mode().startswith(("RUN", "RMT")):
             refuse_program(self.name, "runs")
 

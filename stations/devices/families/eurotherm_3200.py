@@ -8,7 +8,7 @@ from stations.devices.chamber import AUTOMATIC, ThermalChamber, refuse_program
 
 
 class EurothermChamber(ThermalChamber):
-    """Eurotherm 3200: only the remote set point is written, because writes to the others wear its memory."""
+    """Eurotherm 3200: only the remote set point is written, because writes to the others wear out its memory."""
 
     needs: ClassVar[tuple[str, ...]] = ("temperature", "set_point", "remote_enable", "program_status")
 
@@ -18,7 +18,7 @@ class EurothermChamber(ThermalChamber):
         return AUTOMATIC if state == "remote" else state
 
     def require_ready(self) -> None:
-        """Refuses while a program runs."""
+        """Refuses a controller with a running program."""
         refuse_program(self.name, self._values.text("program_status"))
 
     def order(self, temperature: float) -> None:

@@ -1,4 +1,4 @@
-"""IAI's ROBO Cylinder controllers, by numbers: the move starts with the low word of its target."""
+"""IAI ROBO Cylinder controllers in direct numerical mode: the low word of the target starts the move."""
 
 from __future__ import annotations
 
@@ -16,10 +16,10 @@ class NumericAxis(TableAxis):
     )  # fmt: skip
 
     def state(self) -> DriveState:
-        """Both status registers, of one instant; the alarm's code where there is one."""
-        registers, found = self._registers, self._registers.read_group("state")
-        flags, more = (registers.flags_in(name, found[name]) for name in ("status", "extended_status"))
-        alarm = f"drive alarm 0x{int(float(str(found['alarm']))):02X}" if flags["alarm"] else ""
+        """Both status registers, read in one request, and the alarm code where an alarm is active."""
+        registers, status = self._registers, self._registers.read_group("state")
+        flags, more = (registers.flags_in(name, status[name]) for name in ("status", "extended_status"))
+        alarm = f"drive alarm 0x{int(float(str(status['alarm']))):02X}" if flags["alarm"] else ""
         if flags["emergency_stop"]:
             alarm = "emergency stop at the drive"
         ready = flags["ready"] and flags["servo_on"] and not flags["paused"]
@@ -32,7 +32,7 @@ class NumericAxis(TableAxis):
                 self._registers.set(coil, "on")
 
     def order(self, target: float) -> None:
-        """Band, speed and acceleration, read back; then the target, whose low word starts the move, in one request."""
+        """Writes band, speed and acceleration and reads them back; then writes the target, whose low word starts the move."""
         registers, limits = self._registers, self._limits
         values = {
             "position_band": max(limits.position_deg, registers.step("target")),
@@ -43,7 +43,7 @@ class NumericAxis(TableAxis):
         registers.write("target", target)
 
     def stop(self) -> None:
-        """A pause, and an alarm reset during it, which discards the rest of the move; then the pause ends."""
+        """Pauses, resets the alarm, which discards the rest of the move, and ends the pause."""
         for name in ("pause", "alarm_reset"):
             self._registers.write(name, "on")
         for name in ("alarm_reset", "pause"):

@@ -1,4 +1,4 @@
-"""Oriental Motor's AZ drives, by direct data: all of a move in one request, its trigger among it."""
+"""Oriental Motor AZ drives in direct data operation: one request holds the whole move with its trigger."""
 
 from __future__ import annotations
 
@@ -8,21 +8,21 @@ from stations.devices.axis import DriveState, TableAxis
 
 
 class DirectDataAxis(TableAxis):
-    """An AZ drive. A request that fails may leave some of its registers written; the trigger comes last, so nothing has moved."""
+    """An AZ drive. A failed request may have written some of its registers; the trigger comes last, so nothing has moved."""
 
     needs: ClassVar[tuple[str, ...]] = ("direct_data", "command", "status", "alarm", "feedback_position")
 
     def state(self) -> DriveState:
-        """Status bits; the alarm's code where there is one."""
+        """Status bits, and the alarm code where an alarm is active."""
         flags = self._registers.flags("status")
         alarm = f"drive alarm 0x{int(self._registers.number('alarm')):02X}" if flags["alarm"] else ""
         return DriveState(flags["ready"], flags["home_end"], flags["move"], flags["in_position"], alarm)
 
     def prepare(self) -> None:
-        """Nothing: an AZ drive takes direct data as soon as it is ready."""
+        """Does nothing: an AZ drive accepts direct data as soon as it is ready."""
 
     def order(self, target: float) -> None:
-        """One request with the trigger at its end."""
+        """Sends one request with the trigger at its end."""
         limits = self._limits
         values = {
             "data_number": 0,
@@ -38,7 +38,7 @@ class DirectDataAxis(TableAxis):
         self._registers.write_group("direct_data", values)
 
     def stop(self) -> None:
-        """The STOP input, up and down again."""
+        """Sets and clears the STOP input."""
         bit = self._registers.profile.register("command").bits["stop"]
         self._registers.write("command", 1 << bit)
         self._registers.write("command", 0)

@@ -1,4 +1,4 @@
-"""A controller with a set point and nothing else, such as Watlow's EZ-ZONE PM."""
+"""A controller with a set point only, such as the Watlow EZ-ZONE PM."""
 
 from __future__ import annotations
 
@@ -6,10 +6,10 @@ from stations.devices.chamber import AUTOMATIC, ThermalChamber
 
 
 class SetPointChamber(ThermalChamber):
-    """A controller that reports no alarm and no program; where it has ``actual_mode``, that must be ``automatic``."""
+    """A controller without alarm and program registers; ``actual_mode``, where it exists, must be ``automatic``."""
 
     def mode(self) -> str:
-        """The actual mode, else the mode that was set, else automatic where the controller reports none."""
+        """The actual mode; without it the written mode; without both ``automatic``."""
         register = next((name for name in ("actual_mode", "mode") if self._values.has(name)), "")
         return self._values.text(register) if register else AUTOMATIC
 

@@ -1,4 +1,4 @@
-"""SMC's LEC controllers: coils to make it ready, step data read back, then a start register that is written alone."""
+"""SMC LEC controllers: coils enable the drive, step data are read back, then the start register is written alone."""
 
 from __future__ import annotations
 
@@ -15,13 +15,13 @@ class StepDataAxis(TableAxis):
     )  # fmt: skip
 
     def state(self) -> DriveState:
-        """Discrete inputs, of one instant; a move is over when BUSY is off and INP on."""
-        found = self._registers.names_in("state")
-        alarm = "drive alarm" if found["alarm"] != "none" else ""
-        if found["emergency_stop"] != "released":
+        """Discrete inputs, read in one request; a move has ended when BUSY is off and INP is on."""
+        inputs = self._registers.names_in("state")
+        alarm = "drive alarm" if inputs["alarm"] != "none" else ""
+        if inputs["emergency_stop"] != "released":
             alarm = "emergency stop at the drive"
-        busy, there = found["busy"] == "on", found["in_position"] == "on"
-        return DriveState(found["servo_ready"] == "on", found["homed"] == "on", busy, there and not busy, alarm)
+        busy, arrived = inputs["busy"] == "on", inputs["in_position"] == "on"
+        return DriveState(inputs["servo_ready"] == "on", inputs["homed"] == "on", busy, arrived and not busy, alarm)
 
     def prepare(self) -> None:
         """Selects the serial line as the source of commands and switches the servo on."""
@@ -30,7 +30,7 @@ class StepDataAxis(TableAxis):
                 self._registers.set(coil, "on")
 
     def order(self, target: float) -> None:
-        """Writes the step data, which start nothing, and reads them back; then writes the start register."""
+        """Writes the step data, which start no move, and reads them back; then writes the start register."""
         registers, limits = self._registers, self._limits
         values = {
             "operation_type": "absolute",

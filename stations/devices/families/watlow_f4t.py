@@ -9,7 +9,7 @@ from stations.devices.chamber import CELSIUS, RUNNING, ThermalChamber, refuse_pr
 
 
 class F4TChamber(ThermalChamber):
-    """Watlow F4T: floats, a mode of its own, programs, alarms."""
+    """Watlow F4T: 32-bit floats, a loop mode, programs, alarms."""
 
     needs: ClassVar[tuple[str, ...]] = (
         "temperature", "set_point", "set_point_low", "set_point_high", "mode", "actual_mode", "alarm_1", "temperature_unit",
@@ -21,16 +21,16 @@ class F4TChamber(ThermalChamber):
         return self._values.text("actual_mode")
 
     def require_ready(self) -> None:
-        """Refuses other units than °C, an alarm and a program that runs."""
+        """Refuses other units than °C, an alarm and a running program."""
         unit, alarm = self._values.text("temperature_unit"), self._values.text("alarm_1")
         if unit != CELSIUS:
             self.refuse(f"shows {unit}", CELSIUS, "set the controller's unit")
         if not alarm.startswith("inactive"):
-            raise OperatorNeeded(f"{self.name}: alarm 1 in state {alarm}, none is needed; clear its cause at the panel")
+            raise OperatorNeeded(f"{self.name}: alarm 1 in state {alarm}, none is needed; clear the cause at the panel")
         refuse_program(self.name, self._values.text("program_state"))
 
     def off(self) -> None:
-        """Ends a program that runs, then switches the loop off."""
+        """Ends a running program, then switches the loop off."""
         if self._values.text("program_state") in RUNNING:
             self._values.write("program_end", "act")
         super().off()

@@ -1,1 +1,1 @@
-"""Simulated controllers, one module per family: ``simulated`` puts the registers of the family in front of the world."""
+"""Simulated controllers, one module per family: its function ``simulated`` makes the registers of a controller."""

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 
 def simulated(world: World, profile: Profile) -> Bank:
-    """Binder: set points to write beside the active one; the MB1 is in manual operation."""
+    """Binder: writable set points beside the active one; the MB1 is in manual operation."""
     chamber = world.fixture.chamber
     written: dict[str, Value] = {
         name: chamber.set_point for name in ("set_point_basic", "set_point_manual") if profile.has(name)

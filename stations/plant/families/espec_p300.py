@@ -15,12 +15,12 @@ UNKNOWN, OUTSIDE, WRONG = "NA:CMD ERR", "NA:DATA OUT OF RANGE", "NA:PARA ERR"
 
 
 def simulated(world: World, profile: Profile) -> P300:
-    """A P300 in front of the world's chamber."""
+    """A P300 that controls the simulated chamber."""
     return P300(world, profile)
 
 
 class P300:
-    """The controller in front of the world's chamber; it starts in constant operation."""
+    """The controller of the simulated chamber; it starts in constant operation."""
 
     def __init__(self, world: World, profile: Profile) -> None:
         self._world = world
@@ -38,14 +38,14 @@ class P300:
             return self._switch(line)
         return UNKNOWN, False
 
-    def _report(self, question: str) -> str:
+    def _report(self, query: str) -> str:
         chamber = self._world.fixture.chamber
         answers = {
             "TEMP?": f"{self._world.air_reading():.1f},{chamber.set_point:.1f},{self._high:.1f},{self._low:.1f}",
             "MODE?": self._mode,
             "ALARM?": "0",
         }
-        return answers.get(question, UNKNOWN)
+        return answers.get(query, UNKNOWN)
 
     def _set(self, line: str) -> tuple[str, bool]:
         match = SET.fullmatch(line)

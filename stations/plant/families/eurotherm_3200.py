@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 
 def simulated(world: World, profile: Profile) -> Bank:
-    """Eurotherm 3200: the remote set point counts while it is enabled, the first set point otherwise."""
+    """Eurotherm 3200: the remote set point is active while it is enabled, set point 1 otherwise."""
     chamber = world.fixture.chamber
     local = chamber.set_point
     state: dict[str, float] = {"remote": local, "enabled": 0.0}

@@ -16,9 +16,9 @@ if TYPE_CHECKING:
 
 
 def simulated(world: World, axis: Axis, profile: Profile) -> Bank:
-    """IAI ROBO Cylinder: writing the target moves at once, with what band, speed and acceleration were before."""
+    """IAI ROBO Cylinder: a write of the target starts the move, with the band, speed and acceleration written before."""
     status_bits, more_bits = profile.register("status").bits, profile.register("extended_status").bits
-    kept: dict[str, Value] = {"position_band": 0.1, "speed": 10.0, "acceleration": 9.80665}
+    settings: dict[str, Value] = {"position_band": 0.1, "speed": 10.0, "acceleration": 9.80665}
     coils: dict[str, Value] = dict.fromkeys(("servo_on", "alarm_reset", "pause", "home", "serial_mode"), 0)
 
     def status() -> Value:
@@ -32,7 +32,7 @@ def simulated(world: World, axis: Axis, profile: Profile) -> Bank:
         return sum(1 << more_bits[flag] for flag, up in flags.items() if up)
 
     def command(values: dict[str, Value]) -> None:
-        kept.update({name: value for name, value in values.items() if name in kept})
+        settings.update({name: value for name, value in values.items() if name in settings})
         coils.update({name: value for name, value in values.items() if name in coils})
         if values.get("alarm_reset") == 1 and coils["pause"] == 1:
             axis.halt(world.now)
@@ -40,13 +40,13 @@ def simulated(world: World, axis: Axis, profile: Profile) -> Bank:
             return
         if coils["servo_on"] != 1 or coils["serial_mode"] != 1 or coils["pause"] == 1 or not axis.homed:
             raise Busy(profile.name)
-        start_move(world, axis, profile, {**kept, "target": values["target"]})
+        start_move(world, axis, profile, {**settings, "target": values["target"]})
 
-    def own(held: dict[str, Value], name: str) -> Callable[[], Value]:
-        return lambda: held[name]
+    def own(values: dict[str, Value], name: str) -> Callable[[], Value]:
+        return lambda: values[name]
 
     sources: dict[str, Callable[[], Value]] = {
-        **{name: own(kept, name) for name in kept},
+        **{name: own(settings, name) for name in settings},
         **{name: own(coils, name) for name in coils},
         "feedback_position": lambda: axis.encoder(world.now),
         **{name: lambda: 0 for name in ("alarm", "inputs", "outputs")},

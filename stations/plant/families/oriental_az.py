@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 
 def simulated(world: World, axis: Axis, profile: Profile) -> Bank:
-    """Oriental Motor AZ: the trigger inside the data starts the move; the STOP input ends it."""
+    """Oriental Motor AZ: the trigger in the direct data starts the move; the STOP input ends it."""
     bits = profile.register("status").bits
     stop = 1 << profile.register("command").bits["stop"]
     level = {"command": 0}
@@ -34,7 +34,7 @@ def simulated(world: World, axis: Axis, profile: Profile) -> Bank:
         if "target" not in values:
             return
         if values.get("trigger") != 1 or values.get("operation_type") != ABSOLUTE:
-            raise NotEncodable("direct data: only absolute moves, triggered at once, are simulated")
+            raise NotEncodable("direct data: only absolute moves with an immediate trigger are simulated")
         start_move(world, axis, profile, values)
 
     sources = {

@@ -1,4 +1,4 @@
-"""A simulated controller with a set point and nothing else."""
+"""A simulated controller with a set point only."""
 
 from __future__ import annotations
 
@@ -13,6 +13,6 @@ if TYPE_CHECKING:
 
 
 def simulated(world: World, profile: Profile) -> Bank:
-    """A controller with a set point and nothing else."""
+    """A controller with a set point only."""
     chamber = world.fixture.chamber
     return controller_bank(world, profile, {}, set_by(chamber, "set_point"))

@@ -18,29 +18,29 @@ GO = 0x0100
 
 
 def simulated(world: World, axis: Axis, profile: Profile) -> Bank:
-    """SMC LEC: step data are kept; the start register moves a drive in serial mode whose servo is on."""
+    """SMC LEC: step data are stored; the start register moves a drive in serial mode with its servo on."""
     names = [*profile.groups["step_data"], "serial_mode", "servo_on", "reset", "hold", "drive", "setup"]
-    kept: dict[str, Value] = dict.fromkeys(names, 0)
+    registers: dict[str, Value] = dict.fromkeys(names, 0)
 
     def command(values: dict[str, Value]) -> None:
-        kept.update({name: value for name, value in values.items() if name in kept})
+        registers.update({name: value for name, value in values.items() if name in registers})
         if values.get("reset") == 1:
             axis.halt(world.now)
-        ready = kept["serial_mode"] == 1 and kept["servo_on"] == 1 and axis.homed
+        ready = registers["serial_mode"] == 1 and registers["servo_on"] == 1 and axis.homed
         if values.get("start") != GO or not ready:
             return  # a drive that is not ready accepts the start register and does not move
-        if kept["operation_type"] != ABSOLUTE:
+        if registers["operation_type"] != ABSOLUTE:
             raise NotEncodable("step data: only absolute moves are simulated")
-        start_move(world, axis, profile, kept)
+        start_move(world, axis, profile, registers)
 
     def own(name: str) -> Callable[[], Value]:
-        return lambda: kept[name]
+        return lambda: registers[name]
 
     sources: dict[str, Callable[[], Value]] = {
         **{name: own(name) for name in names},
         "step_inputs": lambda: [0.0] * 6,
         "busy": lambda: int(axis.moving(world.now)),
-        "servo_ready": lambda: kept["servo_on"],
+        "servo_ready": lambda: registers["servo_on"],
         "homed": lambda: int(axis.homed),
         "in_position": lambda: int(axis.in_position(world.now)),
         "area": lambda: 0,

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
 
 def simulated(world: World, profile: Profile) -> Bank:
-    """Watlow F4: whole numbers with one decimal, a static set point."""
+    """Watlow F4: integers with one decimal, a static set point."""
     chamber = world.fixture.chamber
     sources: dict[str, Source] = {
         "status": lambda: "static",

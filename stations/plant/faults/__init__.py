@@ -1,1 +1,1 @@
-"""Trouble for the simulated station: what a plant floor does to wires and devices, one kind a file, injectable by name."""
+"""Faults of the simulated station, of its wires, devices and units; each kind is a class, injected by its name."""

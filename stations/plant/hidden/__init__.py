@@ -1,8 +1,8 @@
-"""Hidden effects: physics that a station or a device may have and that no client is told of.
+"""Hidden effects: physical effects of a station or device that no register reports.
 
-Each is written from its mechanism, independently of the columns in ``inertial.effects``: a truth that is made of the
-fit's own columns would prove nothing. A new one is a class with the methods of :class:`HiddenEffect`, entered here; what
-it does not touch it inherits from :class:`Untouched`.
+Each effect is modelled from its mechanism, independently of the columns in ``inertial.effects``: a truth made of the columns of
+the fit would prove nothing. A new effect is a class with the methods of :class:`HiddenEffect`, listed here; it inherits the
+methods that it does not need from :class:`Untouched`.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ HIDDEN: Mapping[str, Callable[..., HiddenEffect]] = {
 
 
 def hidden_effect(kind: str, figures: Mapping[str, float]) -> HiddenEffect:
-    """The hidden effect of that kind with these figures; unknown kinds and figures are refused."""
+    """The hidden effect of a kind with its figures; unknown kinds and figures are refused."""
     if kind not in HIDDEN:
         raise RecipeInvalid(
             f"simulation.hidden: no effect '{kind}'; {did_you_mean(kind, HIDDEN)}", key="simulation.hidden"

@@ -1,5 +1,5 @@
-# ruff: noqa: ARG002 - an effect is told everything and uses what its physics needs
-"""Where physics may act that no client is told of, and what holds while it does."""
+# ruff: noqa: ARG002 - the interface passes all quantities; each effect uses those of its physics
+"""Interface of the hidden effects, and the quantities at their instants."""
 
 from __future__ import annotations
 
@@ -14,13 +14,13 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Block:
-    """What holds during a run of samples: n instants, s units.
+    """Quantities during a block of samples: n instants, s units.
 
     Parameters
     ----------
     time, since_power, vibration, humidity : (n,), s, s, g rms, % of the air around the devices
     temperature : (n, s), °C of the sensing element
-    memory : (n, s, 3), what the effect's own ``slow`` gave for these instants
+    memory : (n, s, 3), the result of ``slow`` of the effect for these instants
     """
 
     time: Array
@@ -32,53 +32,53 @@ class Block:
 
 
 class HiddenEffect(Protocol):
-    """Where physics may act. Forces and outputs in g, angles in rad, temperatures in °C."""
+    """A hidden effect. Forces and outputs in g, angles in rad, temperatures in °C."""
 
     def begin(self, units: int, stream: np.random.Generator) -> None:
-        """Draws what differs between the units; called once."""
+        """Draws the parameters of each unit; called once."""
         ...
 
     def table(self, outer: Array, inner: Array) -> tuple[Array, Array]:
-        """The table's true angles (n,) where the encoders say ``outer`` and ``inner``."""
+        """True angles of the table (n,) where the encoders read ``outer`` and ``inner``."""
         ...
 
     def up(self, direction: Array) -> Array:
-        """The direction (3,) of specific force at rest in the frame of the table's base."""
+        """Direction (3,) of the specific force at rest in the frame of the table base."""
         ...
 
     def force(self, force: Array) -> Array:
-        """True specific force on every unit, (n, s, 3), from what the table and slot make of it."""
+        """True specific force on every unit, (n, s, 3), after table and slot."""
         ...
 
     def slow(self, temperature: Array, force: Array, step: float) -> Array:
-        """The effect's memory (s, 3) after ``step`` seconds at ``temperature`` (s,) and ``force`` (s, 3)."""
+        """Memory of the effect (s, 3) after ``step`` seconds at ``temperature`` (s,) and ``force`` (s, 3)."""
         ...
 
     def power(self, now: float, *, on: bool) -> None:
-        """The devices' supply is switched at ``now`` s; they have it when everything begins."""
+        """The supply of the devices is switched at ``now`` s; it is on at the start."""
         ...
 
     def output(self, force: Array, block: Block) -> Array | float:
-        """What is added to the outputs, (n, s, 3), g, under ``force`` (n, s, 3)."""
+        """Addition to the outputs, (n, s, 3), g, under ``force`` (n, s, 3)."""
         ...
 
 
 class Untouched:
-    """An effect that does nothing; the base of those that do one thing."""
+    """An effect without action; the base class of the effects."""
 
     def begin(self, units: int, stream: np.random.Generator) -> None:
-        """Nothing is drawn."""
+        """No parameters."""
 
     def table(self, outer: Array, inner: Array) -> tuple[Array, Array]:
-        """The angles as they are."""
+        """The angles unchanged."""
         return outer, inner
 
     def up(self, direction: Array) -> Array:
-        """The direction as it is."""
+        """The direction unchanged."""
         return direction
 
     def force(self, force: Array) -> Array:
-        """The force as it is."""
+        """The force unchanged."""
         return force
 
     def slow(self, temperature: Array, force: Array, step: float) -> Array:
@@ -86,8 +86,8 @@ class Untouched:
         return np.zeros_like(force)
 
     def power(self, now: float, *, on: bool) -> None:
-        """It goes on as it did."""
+        """No effect."""
 
     def output(self, force: Array, block: Block) -> Array | float:
-        """Nothing is added."""
+        """No addition."""
         return 0.0

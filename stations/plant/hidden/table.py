@@ -1,4 +1,4 @@
-"""What table, encoder and fixture do to the force: the same for every device, or for every device in a slot."""
+"""Errors of table, encoder and fixture: the same for every device, or for every device in a slot."""
 
 from __future__ import annotations
 
@@ -16,13 +16,13 @@ if TYPE_CHECKING:
 
 @dataclass
 class LevelError(Untouched):
-    """The table's base is tilted in the laboratory."""
+    """Level error of the table base."""
 
     about_x: float = 200e-6  # rad
     about_y: float = -100e-6
 
     def up(self, direction: Array) -> Array:
-        """The vertical as the base sees it."""
+        """The vertical in the frame of the base."""
         x, y, z = direction
         y, z = (
             y * math.cos(self.about_x) + z * math.sin(self.about_x),
@@ -37,29 +37,29 @@ class LevelError(Untouched):
 
 @dataclass
 class EncoderHarmonic(Untouched):
-    """A disc mounted off its centre: the outer encoder's scale is off by a wave over the turn."""
+    """An eccentric encoder disc: the angle error of the outer encoder is a sine over the turn."""
 
     size: float = 200e-6  # rad
     order: float = 1.0
     phase: float = 0.7
 
     def table(self, outer: Array, inner: Array) -> tuple[Array, Array]:
-        """The shaft's angle."""
+        """Angles of the shafts."""
         return outer + self.size * np.sin(self.order * outer + self.phase), inner
 
 
 @dataclass
 class SlotRotation(Untouched):
-    """The fixture has been knocked: every slot sits rotated by a small vector of its own."""
+    """Misaligned fixture: every slot is rotated by its own small vector."""
 
     size: float = 1e-3  # rad
     _vector: Array = field(default_factory=lambda: np.zeros(0), init=False)
 
     def begin(self, units: int, stream: np.random.Generator) -> None:
-        """Each slot's rotation."""
+        """Draws the rotation of each slot."""
         self._vector = self.size * stream.standard_normal((units, 3))
 
     def force(self, force: Array) -> Array:
-        """The force seen from the rotated slot, to second order."""
+        """The force in the frame of the rotated slot, to second order."""
         first = np.cross(force, self._vector)
         return force + first + 0.5 * np.cross(first, self._vector)
