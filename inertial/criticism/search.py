@@ -104,14 +104,22 @@ def convincing(field: Candidates, model: Model, rival: Rival) -> bool:
         return False
     if -rival.cost < np.log(max(field.problem.count, 1)):
         return False
-    if isinstance(rival.term.effect, Handling):
-        return True
-    return size_of(model, rival.term) > MATERIAL * model.with_term(rival.term).floor()
+    return _size_where_it_acts(model, rival.term) > MATERIAL * model.with_term(rival.term).scatter()
 
 
 def size_of(model: Model, term: Term) -> float:
-    """RMS, g, of what a term explains that the model cannot absorb, less what noise would."""
-    return model.explained(term.candidate(model.problem), model.with_term(term).floor())
+    """RMS, g, over all dwells of what a term explains that the model cannot absorb, less what noise would."""
+    return model.explained(term.candidate(model.problem), model.with_term(term).scatter())
+
+
+def _size_where_it_acts(model: Model, term: Term) -> float:
+    """The same over the dwells that the term changes: what happened to one dwell of one unit is not thinned out by the others."""
+    size = size_of(model, term)
+    if not isinstance(term.effect, Handling):
+        return size
+    problem = model.problem
+    changed = np.any(problem.columns(term.effect, term.keywords) != 0.0, axis=-1) & problem.covariance.there
+    return size * float(np.sqrt(problem.count / max(int(changed.sum()), 1)))
 
 
 def contest(field: Candidates, model: Model, barred: str = "", finalists: int = _FINALISTS) -> list[Rival]:

@@ -28,12 +28,16 @@ if TYPE_CHECKING:
     from pipelines.tables.dwells import Measured
     from schemas.progress import Progress
 
-End = Literal["adequate", "told_apart", "nothing_parts", "budget", "declined", "asked", "blocked", "unexplained"]
+End = Literal["adequate", "told_apart", "nothing_parts", "budget", "declined", "asked", "blocked", "not_judged", "unexplained"]
 
 EXTRA = 0.3
 """Default budget of follow-ups, as a share of the first run's station time."""
 
 MOST_ROUNDS = 6
+
+NO_FOLLOW_UP: frozenset[End] = frozenset({"blocked", "not_judged"})
+"""Endings after which nothing is measured for effects that are not visible: the data do not judge the model at all."""
+
 FOLLOW_UP = ("capture", "validate", "reduce")
 SOURCES = ("inertial", "pipelines.diagnosis.diagnose", "pipelines.tables.dwells")
 FILE = "inquiry.json"
@@ -134,7 +138,7 @@ class Inquiry:
         ended = _ended(joint)
         showing = joint.following.showing
         if ended is not None:
-            if self.unseen and showing is not None and ended.end != "blocked" and len(self.lineage.runs) <= MOST_ROUNDS:
+            if self.unseen and showing is not None and ended.end not in NO_FOLLOW_UP and len(self.lineage.runs) <= MOST_ROUNDS:
                 return self._follow_up((showing,), (shows(joint.state, self.effects, showing),))
             return ended
         if len(self.lineage.runs) > MOST_ROUNDS:
@@ -284,6 +288,8 @@ def _ended(joint: JointDiagnosis) -> Ending | None:
         return Ending("blocked", "every unit has a data fault; correct it, then diagnose again")
     if document["adequate"]:
         return Ending("adequate", "the model is adequate: the residuals are at the noise floor")
+    if document["adequate"] is None:
+        return Ending("not_judged", f"the model cannot be judged: {document['reason']}")
     if joint.ambiguous:
         return None
     if not document["classes"]:
