@@ -179,7 +179,9 @@ def _moved(before: Term, after: Term) -> bool:
 
 
 def judge(field: Candidates, model: Model, term: Term) -> Rival:
-    """A term beside a model, with the noise estimated with it inside."""
+    """A term beside a model, with the noise estimated with it inside; nothing of an alternative whose coefficients it cannot have."""
+    if isinstance(term.effect, Handling) and not term.effect.possible(model.with_term(term).shared_sizes(term)):
+        return Rival(term, 0.0, 0, 0.0, 0.0)
     found = likelihood_ratio(model, term, field.places(term.effect.id))
     return Rival(term, found.deviance, found.rank, -found.score, found.log_p)
 
