@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from inertial.criticism import decisions
 from inertial.criticism.covariance import Shares
-from inertial.criticism.decisions import MATERIAL, NAMED_BELOW
+from inertial.criticism.decisions import MATERIAL, NAMED_BELOW, REMAINDER
 from inertial.criticism.field import Candidates
 from inertial.criticism.handling.base import Handling
 from inertial.criticism.likelihood import likelihood_ratio, weighed
@@ -67,7 +67,7 @@ def search(
     for _ in range(_MOST - len(chosen)):
         rivals = contest(field, model)
         ladder = ladder or tuple(rivals)
-        best = next((r for r in rivals if convincing(field, model, r)), None)
+        best = next((r for r in rivals if convincing(field, model, r) and not _remainder(model, r, chosen)), None)
         if best is None or (len(chosen) >= 2 and stop(chosen)):
             break
         if isinstance(best.term.effect, Handling):
@@ -110,6 +110,14 @@ def convincing(field: Candidates, model: Model, rival: Rival) -> bool:
 def size_of(model: Model, term: Term) -> float:
     """RMS, g, over all dwells of what a term explains that the model cannot absorb, less what noise would."""
     return model.explained(term.candidate(model.problem), model.with_term(term).scatter())
+
+
+def _remainder(model: Model, rival: Rival, chosen: Sequence[Term]) -> bool:
+    """Whether handling explains no more than what effects leave over whose shape is not known exactly."""
+    if not chosen or not isinstance(rival.term.effect, Handling):
+        return False
+    largest = max(size_of(model.without_term(t), t) for t in chosen)
+    return _size_where_it_acts(model, rival.term) < REMAINDER * largest
 
 
 def _size_where_it_acts(model: Model, term: Term) -> float:
