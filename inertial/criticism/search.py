@@ -11,7 +11,7 @@ from inertial.criticism.covariance import Shares
 from inertial.criticism.decisions import MATERIAL, NAMED_BELOW, REMAINDER
 from inertial.criticism.field import Candidates
 from inertial.criticism.handling.base import Handling
-from inertial.criticism.likelihood import likelihood_ratio, weighed
+from inertial.criticism.likelihood import Ratio, likelihood_ratio, weighed
 from inertial.criticism.model import Model, Term
 from inertial.criticism.penalty import cost_of_model, fall
 from inertial.criticism.refinement import refine
@@ -30,6 +30,7 @@ class Rival:
     """A candidate on its best values, judged beside a model.
 
     drop : deviance that it takes off; cost : what is left to pay, the less the better
+    ratio : the likelihood ratio behind them; None where there is none
     """
 
     term: Term
@@ -37,6 +38,11 @@ class Rival:
     rank: int
     cost: float
     log_p: float
+    ratio: Ratio | None = None
+
+    def at(self, shared: float) -> "Rival":
+        """The same rival with another φ."""
+        return self if self.ratio is None else _rival(self.term, self.ratio.at(shared))
 
 
 @dataclass(frozen=True)
@@ -140,7 +146,7 @@ def contest(field: Candidates, model: Model, barred: str = "", finalists: int = 
         looked = scanned(field, model.at(other), leave)
         for term, _ in looked[:finalists]:
             chosen.setdefault(term.effect.id, term)
-    return sorted((_exact(field, model, term) for term in chosen.values()), key=lambda r: r.cost)
+    return ranked([_exact(field, model, term) for term in chosen.values()])
 
 
 def scanned(field: Candidates, space: Space, leave: set[str]) -> list[tuple[Term, float]]:
@@ -191,7 +197,24 @@ def judge(field: Candidates, model: Model, term: Term) -> Rival:
     if isinstance(term.effect, Handling) and not term.effect.possible(model.with_term(term).shared_sizes(term)):
         return Rival(term, 0.0, 0, 0.0, 0.0)
     found = likelihood_ratio(model, term, field.places(term.effect.id))
-    return Rival(term, found.deviance, found.rank, -found.score, found.log_p)
+    return _rival(term, found)
+
+
+def _rival(term: Term, ratio: Ratio) -> Rival:
+    return Rival(term, ratio.deviance, ratio.rank, -ratio.score, ratio.log_p, ratio)
+
+
+def ranked(rivals: Sequence[Rival]) -> list[Rival]:
+    """Rivals, best first, at the φ of the one that is best at its own.
+
+    Two effects that are one function in the poses of a plan leave the same, and the medians behind φ differ by a few per cent of
+    their whole deviance: each at its own, one of the two would stand alone in its class.
+    """
+    own = sorted(rivals, key=lambda r: r.cost)
+    if not own or own[0].ratio is None:
+        return own
+    shared = own[0].ratio.shared
+    return sorted((r.at(shared) for r in own), key=lambda r: r.cost)
 
 
 def _reexamine(field: Candidates, base: Model, model: Model, chosen: list[Term]) -> tuple[Model, list[Term]]:
