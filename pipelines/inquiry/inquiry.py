@@ -154,9 +154,7 @@ class Inquiry:
         if not affordable:
             proposals = proposed(diagnosis, circumstances(self.base, self.jobs[-1], float("inf"))).found
             if not proposals:
-                return Ending(
-                    "nothing_parts", f"no measurement on this station discriminates between {_classes(joint)}"
-                )
+                return Ending("nothing_parts", _not_parted(joint))
             needed = sum(p.minutes for p in proposals)
             text = (
                 f"discriminating between {_classes(joint)} needs {needed:.0f} min more station time, {max(left, 0.0):.0f} of "
@@ -295,6 +293,16 @@ def _ended(joint: JointDiagnosis) -> Ending | None:
     if not document["classes"]:
         return Ending("unexplained", "the model is not adequate, and no effect of the catalogue explains the residuals")
     return Ending("told_apart", f"every class contains one effect: {', '.join(document['recommended'])}")
+
+
+def _not_parted(joint: JointDiagnosis) -> str:
+    """Why there is no follow-up: no measurement of the station parts a class, or none is sure enough to."""
+    if any(joint.following.twins):
+        return f"no measurement on this station discriminates between {_classes(joint)}"
+    return (
+        f"no follow-up was found that is expected to discriminate between {_classes(joint)}: they differ by too little beside the "
+        "noise; measure the plan again with longer dwells, or more units"
+    )
 
 
 def _classes(joint: JointDiagnosis) -> str:
