@@ -8,7 +8,7 @@ from inertial.criticism.field import Candidates
 from inertial.criticism.handling.base import Handling
 from inertial.criticism.model import Model, Term
 from inertial.criticism.refinement import refine
-from inertial.criticism.search import judge, scanned, size_of
+from inertial.criticism.search import judge, ranked, scanned, size_of
 
 __all__ = ["TOLD_APART", "EffectClass", "Member", "class_of"]
 
@@ -67,7 +67,7 @@ def class_of(field: Candidates, model: Model, term: Term) -> EffectClass:
     near = [t for t, score in looked[:_MOST] if score > least and t.effect.id != term.effect.id]
     near = [t for t in near if term.effect.id not in t.effect.after]
     judged = [judge(field, rest, refine(rest, t, model.noise)) for t in near]
-    judged = sorted([judge(field, rest, term), *judged], key=lambda r: r.cost)
+    judged = ranked([judge(field, rest, term), *judged])
     best = judged[0]
     members = tuple(Member(r.term, r.cost - best.cost) for r in judged if r.cost < best.cost + TOLD_APART)
     return EffectClass(members, best.log_p, size_of(rest, best.term))

@@ -157,6 +157,21 @@ class Covariance:
                 found[blocks] += share * 10.0 ** (steps / SHARE_STEP) * (np.trace(own) / n - own.sum() / n**2)
         return found
 
+    def side_by_side(self, shares: Shares) -> Array:
+        """Half the mean variance of the steps that the wander makes from one dwell to the next, over the white variance, (blocks,)."""
+        found = np.zeros(len(self.level))
+        if self._wander is None:
+            return found
+        for place, steps, blocks in self._groups:
+            there = self._kernels[place].there
+            for share, kernel in zip(shares, self._wander, strict=True):
+                own = kernel[place][np.ix_(there, there)]
+                if len(own) > 1:
+                    each = np.diagonal(own)
+                    step = 0.5 * (each[1:] + each[:-1]) - np.diagonal(own, 1)
+                    found[blocks] += share * 10.0 ** (steps / SHARE_STEP) * float(np.mean(step))
+        return found
+
     def _whitener(self, place: int, steps: int, shares: Shares) -> tuple[Array, float] | None:
         """Lower triangle (n, n) that makes a block's noise white, and the log-determinant of its covariance."""
         index = [None if s <= 0.0 else round(SHARE_STEP * np.log10(s)) + steps for s in shares]

@@ -48,7 +48,17 @@ NAMED_BELOW = 1e-3
 """Probability of the chi-square, times the number of looks, below which something is named; beside the price."""
 
 MATERIAL = 0.2
-"""Share of the floor below which a significant effect is not named: remainders of imperfect drivers are of that size."""
+"""Share of the scatter between neighbouring dwells below which nothing significant is named: remainders of imperfect drivers.
+
+Of the scatter and not of the whole floor: a walk of 4 µg/√s over 2.5 h raises the floor tenfold, and no such remainder with it.
+Of handling the size counts in the dwells that it changes.
+"""
+
+REMAINDER = 0.1
+"""Share of the largest effect found below which what handling does beside it is taken for what the effect leaves over.
+
+The lag of a part, found as `thermal_rate` of 30 µg, left 2 µg of a `gain_step` in one unit, with a probability below 1e-8.
+"""
 
 TOLD_APART = 15.0
 """Difference of scores within which rivals stand in one class.

@@ -5,7 +5,8 @@ model is its own: D = −2[ℓ(V0; H) − ℓ(V1; H, C)], error contrasts of the
 their best, V1 the better of the model's and the richer one's noise.
 """
 
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,12 +31,19 @@ class Ratio:
 
     deviance : D, what units share of the noise taken out; rank : coefficients that the plan determines
     price : of them, and of the places looked at; log_p : of the chi-square, one look
+    shared : φ with the term inside, by which the part that is alike in all units was divided; again : the ratio with another φ
     """
 
     deviance: float
     rank: int
     price: float
     log_p: float
+    shared: float = 1.0
+    again: Callable[[float], "Ratio"] | None = None
+
+    def at(self, shared: float) -> "Ratio":
+        """The same with another φ: rivals are compared at one, as it is found from what each of them leaves, and scatters."""
+        return self if self.again is None else self.again(shared)
 
     @property
     def score(self) -> float:
@@ -63,9 +71,14 @@ def likelihood_ratio(model: Model, term: Term, places: int = 1) -> Ratio:
     plain = _deviance(model.space, model.space)
     dof = max(space.dof, 1)
     deviance = max(plain - full[best], 0.0) * max(dof - rank, 0) / dof
+    along, nonlinear = along_mean(model, noises[best], term), freedom(term)
+
+    def divided(shared: float) -> Ratio:
+        found = weighed(deviance * (1.0 - along * (1.0 - 1.0 / shared)), rank, nonlinear, places)
+        return replace(found, shared=shared, again=divided)
+
     # by what the units share with the term inside: an effect that is alike in all of them is no noise
-    deviance *= 1.0 - along_mean(model, noises[best], term) * (1.0 - 1.0 / shared_noise(richer))
-    return weighed(deviance, rank, freedom(term), places)
+    return divided(shared_noise(richer))
 
 
 def weighed(deviance: float, rank: int, nonlinear: int, places: int = 1) -> Ratio:

@@ -192,9 +192,20 @@ class Model:
 
     def floor(self) -> float:
         """RMS of the noise of a dwell mean, g: white and wander about the record's own mean."""
-        covariance, noise = self.problem.covariance, self.noise
         # the constant part of the wander goes into the bias of the run and is no error of the dwells against each other
-        each = (noise.scale * covariance.level) ** 2 * (1.0 + covariance.about_mean(noise.shares))
+        return self._noise_rms(self.problem.covariance.about_mean(self.noise.shares))
+
+    def scatter(self) -> float:
+        """RMS of the noise of a dwell mean against its neighbours, g: white, and as much of the wander as shows from dwell to dwell.
+
+        A random walk raises :meth:`floor` with the length of the record, this with the time between two dwells only.
+        """
+        return self._noise_rms(self.problem.covariance.side_by_side(self.noise.shares))
+
+    def _noise_rms(self, wander: Array) -> float:
+        """RMS, g, over all dwells of white noise and a wander of variance (blocks,) over it."""
+        covariance = self.problem.covariance
+        each = (self.noise.scale * covariance.level) ** 2 * (1.0 + wander)
         return float(np.sqrt(np.sum(each * covariance.count) / max(int(covariance.count.sum()), 1)))
 
     def shared_sizes(self, term: Term) -> Array:

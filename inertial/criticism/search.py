@@ -8,10 +8,10 @@ from numpy.typing import NDArray
 
 from inertial.criticism import decisions
 from inertial.criticism.covariance import Shares
-from inertial.criticism.decisions import MATERIAL, NAMED_BELOW
+from inertial.criticism.decisions import MATERIAL, NAMED_BELOW, REMAINDER
 from inertial.criticism.field import Candidates
 from inertial.criticism.handling.base import Handling
-from inertial.criticism.likelihood import likelihood_ratio, weighed
+from inertial.criticism.likelihood import Ratio, likelihood_ratio, weighed
 from inertial.criticism.model import Model, Term
 from inertial.criticism.penalty import cost_of_model, fall
 from inertial.criticism.refinement import refine
@@ -30,6 +30,7 @@ class Rival:
     """A candidate on its best values, judged beside a model.
 
     drop : deviance that it takes off; cost : what is left to pay, the less the better
+    ratio : the likelihood ratio behind them; None where there is none
     """
 
     term: Term
@@ -37,6 +38,11 @@ class Rival:
     rank: int
     cost: float
     log_p: float
+    ratio: Ratio | None = None
+
+    def at(self, shared: float) -> "Rival":
+        """The same rival with another φ."""
+        return self if self.ratio is None else _rival(self.term, self.ratio.at(shared))
 
 
 @dataclass(frozen=True)
@@ -67,7 +73,7 @@ def search(
     for _ in range(_MOST - len(chosen)):
         rivals = contest(field, model)
         ladder = ladder or tuple(rivals)
-        best = next((r for r in rivals if convincing(field, model, r)), None)
+        best = next((r for r in rivals if convincing(field, model, r) and not _remainder(model, r, chosen)), None)
         if best is None or (len(chosen) >= 2 and stop(chosen)):
             break
         if isinstance(best.term.effect, Handling):
@@ -104,14 +110,30 @@ def convincing(field: Candidates, model: Model, rival: Rival) -> bool:
         return False
     if -rival.cost < np.log(max(field.problem.count, 1)):
         return False
-    if isinstance(rival.term.effect, Handling):
-        return True
-    return size_of(model, rival.term) > MATERIAL * model.with_term(rival.term).floor()
+    return _size_where_it_acts(model, rival.term) > MATERIAL * model.with_term(rival.term).scatter()
 
 
 def size_of(model: Model, term: Term) -> float:
-    """RMS, g, of what a term explains that the model cannot absorb, less what noise would."""
-    return model.explained(term.candidate(model.problem), model.with_term(term).floor())
+    """RMS, g, over all dwells of what a term explains that the model cannot absorb, less what noise would."""
+    return model.explained(term.candidate(model.problem), model.with_term(term).scatter())
+
+
+def _remainder(model: Model, rival: Rival, chosen: Sequence[Term]) -> bool:
+    """Whether handling explains no more than what effects leave over whose shape is not known exactly."""
+    if not chosen or not isinstance(rival.term.effect, Handling):
+        return False
+    largest = max(size_of(model.without_term(t), t) for t in chosen)
+    return _size_where_it_acts(model, rival.term) < REMAINDER * largest
+
+
+def _size_where_it_acts(model: Model, term: Term) -> float:
+    """The same over the dwells that the term changes: what happened to one dwell of one unit is not thinned out by the others."""
+    size = size_of(model, term)
+    if not isinstance(term.effect, Handling):
+        return size
+    problem = model.problem
+    changed = np.any(problem.columns(term.effect, term.keywords) != 0.0, axis=-1) & problem.covariance.there
+    return size * float(np.sqrt(problem.count / max(int(changed.sum()), 1)))
 
 
 def contest(field: Candidates, model: Model, barred: str = "", finalists: int = _FINALISTS) -> list[Rival]:
@@ -124,7 +146,7 @@ def contest(field: Candidates, model: Model, barred: str = "", finalists: int = 
         looked = scanned(field, model.at(other), leave)
         for term, _ in looked[:finalists]:
             chosen.setdefault(term.effect.id, term)
-    return sorted((_exact(field, model, term) for term in chosen.values()), key=lambda r: r.cost)
+    return ranked([_exact(field, model, term) for term in chosen.values()])
 
 
 def scanned(field: Candidates, space: Space, leave: set[str]) -> list[tuple[Term, float]]:
@@ -171,9 +193,28 @@ def _moved(before: Term, after: Term) -> bool:
 
 
 def judge(field: Candidates, model: Model, term: Term) -> Rival:
-    """A term beside a model, with the noise estimated with it inside."""
+    """A term beside a model, with the noise estimated with it inside; nothing of an alternative whose coefficients it cannot have."""
+    if isinstance(term.effect, Handling) and not term.effect.possible(model.with_term(term).shared_sizes(term)):
+        return Rival(term, 0.0, 0, 0.0, 0.0)
     found = likelihood_ratio(model, term, field.places(term.effect.id))
-    return Rival(term, found.deviance, found.rank, -found.score, found.log_p)
+    return _rival(term, found)
+
+
+def _rival(term: Term, ratio: Ratio) -> Rival:
+    return Rival(term, ratio.deviance, ratio.rank, -ratio.score, ratio.log_p, ratio)
+
+
+def ranked(rivals: Sequence[Rival]) -> list[Rival]:
+    """Rivals, best first, at the φ of the one that is best at its own.
+
+    Two effects that are one function in the poses of a plan leave the same, and the medians behind φ differ by a few per cent of
+    their whole deviance: each at its own, one of the two would stand alone in its class.
+    """
+    own = sorted(rivals, key=lambda r: r.cost)
+    if not own or own[0].ratio is None:
+        return own
+    shared = own[0].ratio.shared
+    return sorted((r.at(shared) for r in own), key=lambda r: r.cost)
 
 
 def _reexamine(field: Candidates, base: Model, model: Model, chosen: list[Term]) -> tuple[Model, list[Term]]:

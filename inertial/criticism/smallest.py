@@ -36,7 +36,7 @@ def smallest_named(field: Candidates, model: Model) -> list[Smallest]:
     """
     noise = model.noise
     spaces = model.at(noise), model.at(Noise(Shares(), noise.scale, noise.prior))
-    least = MATERIAL * model.floor()
+    least = MATERIAL * model.scatter()
     held = {t.effect.id for t in model.terms}
     found: list[Smallest] = []
     for name in (e.id for e in field.effects if e.id not in held):

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, get_args
 from pipelines.cli.options import console, error_console, print_table, short
 from schemas.bounds import COLDEST_C, HOTTEST_C
 from schemas.errors import TumblelineError, WrongUse, did_you_mean
+from schemas.foreign import shown
 from schemas.units import MICRO
 
 if TYPE_CHECKING:
@@ -360,7 +361,7 @@ def _refuse_unknown_plan(name: str) -> None:
     from inertial.poses import NAMED
 
     if name and name not in NAMED:
-        raise WrongUse(f"plan: no plan of poses is called '{name}'; {did_you_mean(name, list(NAMED))}")
+        raise WrongUse(f"plan: no plan of poses is called '{shown(name)}'; {did_you_mean(name, list(NAMED))}")
 
 
 def _required_errors(

@@ -28,12 +28,16 @@ if TYPE_CHECKING:
     from pipelines.tables.dwells import Measured
     from schemas.progress import Progress
 
-End = Literal["adequate", "told_apart", "nothing_parts", "budget", "declined", "asked", "blocked", "unexplained"]
+End = Literal["adequate", "told_apart", "nothing_parts", "budget", "declined", "asked", "blocked", "not_judged", "unexplained"]
 
 EXTRA = 0.3
 """Default budget of follow-ups, as a share of the first run's station time."""
 
 MOST_ROUNDS = 6
+
+NO_FOLLOW_UP: frozenset[End] = frozenset({"blocked", "not_judged"})
+"""Endings after which nothing is measured for effects that are not visible: the data do not judge the model at all."""
+
 FOLLOW_UP = ("capture", "validate", "reduce")
 SOURCES = ("inertial", "pipelines.diagnosis.diagnose", "pipelines.tables.dwells")
 FILE = "inquiry.json"
@@ -134,7 +138,7 @@ class Inquiry:
         ended = _ended(joint)
         showing = joint.following.showing
         if ended is not None:
-            if self.unseen and showing is not None and ended.end != "blocked" and len(self.lineage.runs) <= MOST_ROUNDS:
+            if self.unseen and showing is not None and ended.end not in NO_FOLLOW_UP and len(self.lineage.runs) <= MOST_ROUNDS:
                 return self._follow_up((showing,), (shows(joint.state, self.effects, showing),))
             return ended
         if len(self.lineage.runs) > MOST_ROUNDS:
@@ -150,9 +154,7 @@ class Inquiry:
         if not affordable:
             proposals = proposed(diagnosis, circumstances(self.base, self.jobs[-1], float("inf"))).found
             if not proposals:
-                return Ending(
-                    "nothing_parts", f"no measurement on this station discriminates between {_classes(joint)}"
-                )
+                return Ending("nothing_parts", _not_parted(joint))
             needed = sum(p.minutes for p in proposals)
             text = (
                 f"discriminating between {_classes(joint)} needs {needed:.0f} min more station time, {max(left, 0.0):.0f} of "
@@ -284,11 +286,23 @@ def _ended(joint: JointDiagnosis) -> Ending | None:
         return Ending("blocked", "every unit has a data fault; correct it, then diagnose again")
     if document["adequate"]:
         return Ending("adequate", "the model is adequate: the residuals are at the noise floor")
+    if document["adequate"] is None:
+        return Ending("not_judged", f"the model cannot be judged: {document['reason']}")
     if joint.ambiguous:
         return None
     if not document["classes"]:
         return Ending("unexplained", "the model is not adequate, and no effect of the catalogue explains the residuals")
     return Ending("told_apart", f"every class contains one effect: {', '.join(document['recommended'])}")
+
+
+def _not_parted(joint: JointDiagnosis) -> str:
+    """Why there is no follow-up: no measurement of the station parts a class, or none is sure enough to."""
+    if any(joint.following.twins):
+        return f"no measurement on this station discriminates between {_classes(joint)}"
+    return (
+        f"no follow-up was found that is expected to discriminate between {_classes(joint)}: they differ by too little beside the "
+        "noise; measure the plan again with longer dwells, or more units"
+    )
 
 
 def _classes(joint: JointDiagnosis) -> str:

@@ -177,7 +177,7 @@ def _resolve(given: str | Sequence[Sequence[float]], letter: str, key: str, sour
         if given not in poses.NAMED:
             known = list(poses.NAMED)
             raise RecipeInvalid(
-                f"{source}: key '{key}': no plan is called '{given}'; {did_you_mean(given, known)}",
+                f"{source}: key '{key}': no plan is called '{shown(given)}'; {did_you_mean(given, known)}",
                 key=key,
                 close=close_matches(given, known),
             )

@@ -18,7 +18,7 @@ from pipelines.tables.calibration import coefficient_rows, covariance_rows
 from pipelines.tables.dwells import KINDS, LotArrays, lot_arrays
 from pipelines.tables.frames import empty_table, picked
 from schemas.errors import DataRejected
-from schemas.units import AXES, MICRO
+from schemas.units import AXES, MICRO, STANDARD_GRAVITY_M_S2
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -28,6 +28,9 @@ if TYPE_CHECKING:
     Array = NDArray[np.float64]
 
 FEWEST_TO_SPARE = 4  # degrees of freedom of the lot, below which nothing can be said of the kind of its noise
+
+_PER_G = {"g": 1.0, "m/s^2": STANDARD_GRAVITY_M_S2}
+"""Output per g by the name of the output's unit, for models without a scale."""
 
 LONG_S = 3600.0  # record from which on its walk is carried over a day: it then grows three times at most
 
@@ -40,6 +43,7 @@ class _Noisy:
     predicted : (units, 3, m, m), covariance of what is left of the m dwells for verification
     flicker, walk, white : (units, 3), standard deviations; walk at the end of the record; walk_shown : that it is no flicker
     lack_of_fit : (units, 3), variance over that of the noise, one where it is no larger
+    per_g : (units, 3), output per g
     """
 
     method: Literal["wander", "birge"]
@@ -52,6 +56,7 @@ class _Noisy:
     walk: Array
     lack_of_fit: Array
     nonlinear_error: dict[str, dict[str, float]]
+    per_g: Array
     walk_shown: bool = False
 
 
@@ -119,6 +124,7 @@ def _by_wander(lot: LotArrays, found: WanderFit, used: NDArray[np.bool_]) -> _No
         walk=level * found.walk,
         lack_of_fit=found.lack_of_fit,
         nonlinear_error=found.nonlinear_error,
+        per_g=_per_g(lot, found.fit),
         walk_shown=found.walk_shown,
     )
 
@@ -144,7 +150,27 @@ def _by_birge(lot: LotArrays, plain: LotFit, used: NDArray[np.bool_]) -> _Noisy:
         walk=np.zeros_like(stretch),
         lack_of_fit=stretch,
         nonlinear_error={},
+        per_g=_per_g(lot, plain),
     )
+
+
+def _per_g(lot: LotArrays, found: LotFit) -> Array:
+    """Output per g of every unit and axis, (units, 3): the scale of the model, or what the output's unit says where it has none.
+
+    Raises
+    ------
+    DataRejected
+        The model has no scale, and the output is in a unit of its own: nothing says what it is in g.
+    """
+    scale = np.abs(np.diagonal(found.response(), axis1=-2, axis2=-1))
+    if "scale" in found.effects:
+        return scale
+    if lot.out_unit not in _PER_G:
+        raise DataRejected(
+            f"fit: the model {', '.join(found.effects)} has no 'scale', and the outputs are in {lot.out_unit}: residuals in µg need "
+            "the output per g; add 'scale' to the effects (it needs at least two orientations), or import outputs in g"
+        )
+    return np.full_like(scale, _PER_G[lot.out_unit])
 
 
 def birge_squared(found: LotFit) -> Array:
@@ -154,7 +180,7 @@ def birge_squared(found: LotFit) -> Array:
 
 def _residual_rows(lot: LotArrays, found: _Noisy) -> pd.DataFrame:
     used = lot.of_kind("dwell")
-    scale = np.abs(np.diagonal(found.fit.response(), axis1=-2, axis2=-1))[:, None, :]
+    scale = found.per_g[:, None, :]
     force = np.broadcast_to(lot.state.force, lot.output.shape)[:, used]
     u, n, a = (index.ravel() for index in np.meshgrid(*(np.arange(size) for size in force.shape), indexing="ij"))
     temperature = lot.state.temperature
@@ -175,7 +201,7 @@ def _residual_rows(lot: LotArrays, found: _Noisy) -> pd.DataFrame:
 
 def _prediction_rows(lot: LotArrays, found: _Noisy) -> pd.DataFrame:
     """Covariance of what should be left at the dwells for verification, as a long table of lower triangles."""
-    scale = np.abs(np.diagonal(found.fit.response(), axis1=-2, axis2=-1))
+    scale = found.per_g
     dwells = lot.dwells[~lot.of_kind("dwell")]
     row, column = np.tril_indices(dwells.size)
     u, a, k = (
@@ -195,7 +221,7 @@ def _prediction_rows(lot: LotArrays, found: _Noisy) -> pd.DataFrame:
 
 def _wander_rows(lot: LotArrays, found: _Noisy) -> pd.DataFrame:
     """How the noise of the dwells was found, and its parts, by unit and axis."""
-    scale = np.abs(np.diagonal(found.fit.response(), axis1=-2, axis2=-1))
+    scale = found.per_g
     u, a = (index.ravel() for index in np.meshgrid(np.arange(len(lot.units)), np.arange(3), indexing="ij"))
     parts = {"white_ug": found.white, "flicker_ug": found.flicker, "walk_ug": found.walk}
     return pd.DataFrame(

@@ -10,6 +10,7 @@ from inertial.noise import generate
 from pipelines.stages.fit import fit
 from pipelines.stages.verify import verify
 from pipelines.tables.calibration import read_calibration
+from schemas.errors import DataRejected
 from schemas.tables import check
 
 LINEAR = ["bias", "scale", "misalignment", "bias_temperature"]
@@ -109,6 +110,32 @@ def test_the_tables_keep_their_contract(rng: np.random.Generator) -> None:
     dwells, history = lot(rng, units=2)
     for name, table in fit(dwells, history, LINEAR).items():
         check(name, table)
+
+
+@pytest.mark.parametrize(("unit", "per_g"), [("g", 1.0), ("m/s^2", 9.80665)])
+def test_a_model_without_scale_has_residuals_by_the_unit_of_its_output(
+    rng: np.random.Generator, unit: str, per_g: float
+) -> None:
+    """One orientation: a bias and its tempco, in which the force is a part of the bias."""
+    dwells, _ = lot(rng, units=2, lagging=0.0)
+    tempco = np.array([1e-4, -2e-4, 3e-4])
+    for i, a in enumerate("xyz"):
+        dwells[f"force_{a}"] = float(a == "z")
+        noise = WHITE * rng.normal(size=len(dwells))
+        dwells[f"out_{a}"] = per_g * (float(a == "z") + tempco[i] * (dwells["unit_C"] - 25.0) + noise)
+        dwells[f"sd_{a}"] *= per_g
+    found = fit(dwells.assign(out_unit=unit), NO_HISTORY, ["bias", "bias_temperature"])
+    for name, table in found.items():
+        check(name, table)
+    residuals = found["residuals"]["residual_ug"]
+    assert 0.8 * WHITE < 1e-6 * float(np.std(residuals)) < 1.2 * WHITE
+    assert np.isfinite(found["wander"]["white_ug"]).all()
+
+
+def test_a_model_without_scale_of_counts_is_refused_with_what_it_needs(rng: np.random.Generator) -> None:
+    dwells, _ = lot(rng, units=2)
+    with pytest.raises(DataRejected, match="no 'scale', and the outputs are in LSB.* add 'scale'"):
+        fit(dwells.assign(out_unit="LSB"), NO_HISTORY, ["bias", "bias_temperature"])
 
 
 def test_wander_between_dwells_is_found_and_told(rng: np.random.Generator) -> None:

@@ -48,6 +48,16 @@ def test_a_random_walk_is_no_physics():
     assert 15.0 < dark["to"] < 35.0
 
 
+def test_a_walk_over_the_record_does_not_hide_a_cubic_that_stands_out_between_neighbours():
+    # a fifth of the noise of a dwell about the record's mean, most of which is walk: 20 of 116 µg, p below 1e-10
+    made = make(World(units=2, poses=12, hidden=(("third_order", 0.2),), noise=Noise(walk=4.0)), 41_000_007)
+    document = diagnose(made.dwells, made.history)
+    (group,) = document["classes"]
+    assert "third_order" in group["effects"]
+    assert group["size_ug"] < 0.2 * document["error"]["floor_ug"]
+    assert document["adequate"] is False
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("name", sorted(set(NULLS) - {"lsb5", "many_units"}))
 @pytest.mark.parametrize("seed", [SEED + 1, SEED + 2])

@@ -55,6 +55,11 @@ class Handling(Effect):
     def told(self, lot: "Lot", size: Array, **place: float) -> str:
         """What happened, for people; ``size`` (k,) are the coefficients."""
 
+    def possible(self, size: Array) -> bool:
+        """Whether coefficients (k,) are such as the alternative can have; others are something else of the same shape."""
+        del size
+        return True
+
     def every_dwell(self, lot: "Lot") -> Array:
         """Columns (units or 1, n, 3, k) of an alternative of one dwell, for each dwell as if it were the one."""
         raise NotImplementedError(self.id)

@@ -17,6 +17,7 @@ _FASTEST, _SLOWEST, _GRID = 30.0, 3000.0, 12  # s, s, values of the time constan
 _BETWEEN = 9  # values between two of the grid
 _SPREAD = 3.0  # factor within which each unit's own time constant is looked for
 _EXACT = 1e-3  # of the logarithm of a time constant
+_OF_ONE = 3.0  # factor within which the coefficient must be one: the output follows by the coefficients that it has
 
 
 class NotSoaked(Handling):
@@ -52,6 +53,14 @@ class NotSoaked(Handling):
             return np.zeros((units, n, 3, 1))
         behind = _temperature(lot.state, place["tau"]) - _temperature(lot.state, 0.0)
         return (slope * behind[..., None])[..., None]
+
+    def possible(self, size: Array) -> bool:
+        """Whether the output changes by about what its own coefficients make of the delay.
+
+        A delay in a fiftieth of them, or against them, is an effect with a lag of its own; with the temperatures delayed after
+        that the residuals would grow.
+        """
+        return bool(1.0 / _OF_ONE < size[0] < _OF_ONE)
 
     def told(self, lot: "Lot", size: Array, **place: float) -> str:
         """The time constant."""
