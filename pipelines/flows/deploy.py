@@ -22,7 +22,7 @@ from pipelines.flows.settings import CLIENT_KEY, use_key
 from schemas.errors import TumblelineError
 
 NOT_HERE = "deployments are registered from code that is not asynchronous"
-ROOT = Path(__file__).resolve().parents[2]
+TREE = Path(__file__).resolve().parents[2]
 ONE_AT_A_TIME = 1
 
 
@@ -93,12 +93,17 @@ def _register(item: dict[str, Any]) -> str:
         # by its module: by its file Prefect would put the file's folder first on sys.path, where our operator.py hides
         # Python's own, and no process that a flow starts (a station's watchdog) would come up
         entrypoint_type=EntrypointType.MODULE_PATH,
-        job_variables={"working_dir": str(ROOT)},  # where recipes and stations of deploy/ are found
+        job_variables={"working_dir": str(_working_folder())},  # where recipes and stations of deploy/ are found
     )
     if not isinstance(deployment, RunnerDeployment):
         raise TypeError(NOT_HERE)
     deployment.apply(work_pool_name=item["work_pool"]["name"])
     return f"{deployment.flow_name}/{deployment.name}"
+
+
+def _working_folder() -> Path:
+    """The folder that flows run in: the source tree, or for an installed product, which has none, the present folder."""
+    return TREE if (TREE / "deploy" / "prefect.yaml").is_file() else Path.cwd()
 
 
 if __name__ == "__main__":
