@@ -41,6 +41,7 @@ CASES = {
     "run --json": ["fit", "latest", "--limits", "consumer"],
     "allan --json": ["allan", "{folder}/rest.csv", "--rate", "100"],
     "psd --json": ["psd", "{folder}/rest.csv", "--rate", "100"],
+    "doctor --json": ["doctor"],
 }
 WITHOUT_ARCHIVE = {"plan", "station", "inspect"}
 

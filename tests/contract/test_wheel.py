@@ -112,7 +112,7 @@ def test_every_file_that_is_used_by_name_is_read_from_the_wheel(unpacked: Path, 
         ("pages", "pipelines/report", ".html"),
     ):
         assert len(found[key]) == len([p for p in tracked(folder) if p.suffix == suffix]), key
-    assert "run" in found["commands"]
+    assert "doctor" in found["commands"]
 
 
 def test_metadata_say_what_was_tested(unpacked: Path) -> None:
@@ -169,3 +169,5 @@ def test_the_product_runs_from_the_wheel_in_an_empty_folder(built: tuple[Path, P
     document = json.load(io.StringIO(line))
     assert document["units"][0]["outcome"] in {"pass", "fail"}
     assert (empty / document["report"]).stat().st_size > 10000
+    checked = json.loads(run(product, "doctor", "--json"))
+    assert checked["samples"] == str(samples)
