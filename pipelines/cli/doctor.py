@@ -44,18 +44,27 @@ def command(
 
 
 def _show(document: DoctorDocument) -> None:
-    """A table of the checks, and below it what has to be done."""
+    """A table of the checks, and below it what is not good, the faults last, where they are seen."""
     from rich.text import Text
 
     checks = document["checks"]
-    lines = [[c["part"], c["check"], Text(c["state"], COLOURS[c["state"]]), c["found"]] for c in checks]
+    lines = [
+        [
+            c["part"],
+            c["check"],
+            Text(c["state"], COLOURS[c["state"]]),
+            c["found"] if c["state"] == "good" else "see below",
+        ]
+        for c in checks
+    ]
     print_table(["part", "check", "state", "found"], lines, whole=3)
     out = console()
-    for state in ("fault", "warning"):
-        for c in (c for c in checks if c["state"] == state):
-            needed = f", needed: {c['needed']}" if c["needed"] else ""
-            text = f"{state}: {c['part']}, {c['check']}: {c['found']}{needed}; {c['remedy']}"
-            out.print(text, style=COLOURS[state], markup=False, soft_wrap=True)
     if document["samples"]:
         out.print(f"sample recipes and stations: {document['samples']}", markup=False, soft_wrap=True)
+    for state in ("not configured", "warning", "fault"):
+        for c in (c for c in checks if c["state"] == state):
+            needed = f", needed: {c['needed']}" if c["needed"] else ""
+            remedy = f"; {c['remedy']}" if c["remedy"] else ""
+            text = f"{state}: {c['part']}, {c['check']}: {c['found']}{needed}{remedy}"
+            out.print(text, style=COLOURS[state], markup=False, soft_wrap=True)
     out.print(f"{document['faults']} faults, {document['warnings']} warnings", markup=False)

@@ -152,6 +152,11 @@ def _optional() -> Check:
         ]
         if own:
             (have if all(_is_installed(one.name) for one in own) else lack).append(extra)
+    if not have and not lack:
+        remedy = "install the product again, so that its metadata are those of its code"
+        return Check(
+            PART, "optional formats", "warning", "the metadata name none", "the extras of this version", remedy
+        )
     found = f"installed: {', '.join(have) or 'none'}; not installed: {', '.join(lack) or 'none'}"
     if not lack:
         return Check(PART, "optional formats", "good", found)
