@@ -180,6 +180,7 @@ def test_entries_later_than_now_are_a_fault(tmp_path: Path) -> None:
     assert "clock" in fault.remedy
 
 
+@pytest.mark.slow
 def test_an_object_store_is_written_to_timed_and_left_as_it_was(monkeypatch: pytest.MonkeyPatch) -> None:
     for name, value in CREDENTIALS.items():
         monkeypatch.setenv(name, value)
