@@ -9,7 +9,7 @@ export OPENBLAS_NUM_THREADS ?= 1
 export PREFECT_SERVER_ANALYTICS_ENABLED = false
 export DO_NOT_TRACK = 1
 
-.PHONY: run test help check lint types layers pytest test-slow debian clean locks bench
+.PHONY: run test help check lint types layers pytest test-slow debian clean locks bench release
 
 run: $(VENV)/.run  ## set up and run the main job on the simulated station
 	$(BIN)/tumbleline run || [ $$? -eq 1 ]  # 1: the run is done and a unit missed its limits, which is a result
@@ -39,6 +39,9 @@ test-slow: $(VENV)/.dev $(CRATE)/.done debian  ## suites that take minutes
 
 bench: $(VENV)/.bench  ## figures of docs/reference/measured.md in a short form
 	$(BIN)/python -m benchmarks
+
+release: $(VENV)/.dev  ## wheel, source distribution, bill of materials and hashes, into dist/
+	$(BIN)/python -m deploy.release
 
 debian:  ## programs of other makers that tests talk to: mbpoll, chromium
 	@sh deploy/debian-packages.sh

@@ -22,7 +22,7 @@ from pipelines.flows.settings import CLIENT_KEY, use_key
 from schemas.errors import TumblelineError
 
 NOT_HERE = "deployments are registered from code that is not asynchronous"
-ROOT = Path(__file__).resolve().parents[2]
+TREE = Path(__file__).resolve().parents[2]
 ONE_AT_A_TIME = 1
 
 
@@ -93,12 +93,17 @@ def _register(item: dict[str, Any]) -> str:
         # by module: for a file Prefect would put its folder first on sys.path, where operator.py of this package hides
         # Python's own, and processes of a flow (a station's watchdog) could not start
         entrypoint_type=EntrypointType.MODULE_PATH,
-        job_variables={"working_dir": str(ROOT)},  # folder of recipes and stations of deploy/
+        job_variables={"working_dir": str(_working_folder())},  # where recipes and stations of deploy/ are found
     )
     if not isinstance(deployment, RunnerDeployment):
         raise TypeError(NOT_HERE)
     deployment.apply(work_pool_name=item["work_pool"]["name"])
     return f"{deployment.flow_name}/{deployment.name}"
+
+
+def _working_folder() -> Path:
+    """The folder that flows run in: the source tree, or for an installed product, which has none, the present folder."""
+    return TREE if (TREE / "deploy" / "prefect.yaml").is_file() else Path.cwd()
 
 
 if __name__ == "__main__":

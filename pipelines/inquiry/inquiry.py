@@ -28,7 +28,9 @@ if TYPE_CHECKING:
     from pipelines.tables.dwells import Measured
     from schemas.progress import Progress
 
-End = Literal["adequate", "told_apart", "nothing_parts", "budget", "declined", "asked", "blocked", "not_judged", "unexplained"]
+End = Literal[
+    "adequate", "told_apart", "nothing_parts", "budget", "declined", "asked", "blocked", "not_judged", "unexplained"
+]
 
 EXTRA = 0.3
 """Default budget of follow-ups, as a share of the first run's station time."""
@@ -138,7 +140,12 @@ class Inquiry:
         ended = _ended(joint)
         showing = joint.following.showing
         if ended is not None:
-            if self.unseen and showing is not None and ended.end not in NO_FOLLOW_UP and len(self.lineage.runs) <= MOST_ROUNDS:
+            if (
+                self.unseen
+                and showing is not None
+                and ended.end not in NO_FOLLOW_UP
+                and len(self.lineage.runs) <= MOST_ROUNDS
+            ):
                 return self._follow_up((showing,), (shows(joint.state, self.effects, showing),))
             return ended
         if len(self.lineage.runs) > MOST_ROUNDS:

@@ -15,6 +15,7 @@ from root_process import ROOT, python
 from typer.testing import CliRunner
 
 from pipelines.cli import app
+from pipelines.doctor.orchestrator import orchestrator_checks
 from pipelines.flows.credentials import REFUSED
 from pipelines.flows.knock import knock
 from schemas.errors import LinkLost, WrongUse
@@ -217,3 +218,16 @@ def test_a_server_without_a_key_does_not_start() -> None:
     assert done.returncode == 2
     assert "orchestrator: no key was found" in done.stderr
     assert "PREFECT_SERVER_API_AUTH_STRING" in done.stderr
+
+
+def test_doctor_finds_the_server_good_and_a_wrong_key_at_fault(
+    line: Orchestrator, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for name in ("PREFECT_API_URL", "PREFECT_API_AUTH_STRING"):
+        monkeypatch.setenv(name, line.environment[name])
+    monkeypatch.delenv("PREFECT_SERVER_API_AUTH_STRING", raising=False)
+    found = {check.check: check.state for check in orchestrator_checks()}
+    assert found == dict.fromkeys(("reachable", "database", "authenticated", "version", "clock"), "good")
+    monkeypatch.setenv("PREFECT_API_AUTH_STRING", "line:" + "x" * 32)
+    faults = [check for check in orchestrator_checks() if check.state == "fault"]
+    assert [(check.check, check.found) for check in faults] == [("authenticated", "the key is refused (401)")]

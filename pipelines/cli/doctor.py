@@ -1,0 +1,70 @@
+"""``tumbleline doctor``: what is configured, reachable, authenticated, writable and in time, with which versions."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from pipelines.cli.options import ArchiveOption, JsonOption, StationOption, console, print_json, print_table
+
+if TYPE_CHECKING:
+    from pipelines.doctor.documents import DoctorDocument
+
+PART = "Measure"
+ORDER = 165
+SUMMARY = "Check installation, archive, orchestrator, station and clock; a remedy for each fault."
+
+COLOURS = {"good": "green", "warning": "yellow", "fault": "bold red", "not configured": "dim"}
+
+
+def command(
+    archive: ArchiveOption = None,
+    station: StationOption = None,
+    free_gb: Annotated[
+        float, typer.Option("--free-gb", min=0.0, metavar="GB", help="Free space that the archive needs.")
+    ] = 1.0,
+    *,
+    as_json: JsonOption = False,
+) -> None:
+    """Check the installation and what it is connected to, and say for each fault what to do.
+
+    Nothing is moved, and no lease is needed. A file of 1 MiB is written to the archive and to the state folder, read back and
+    removed. A station is checked only if --station names it. Exit 1: at least one fault; warnings leave it at 0.
+    """
+    from pipelines.doctor.examine import examine
+    from schemas.errors import DONE, PART_FAILED
+
+    document = examine(archive, station, free_gb)
+    if as_json:
+        print_json(document)
+    else:
+        _show(document)
+    raise typer.Exit(DONE if document["ok"] else PART_FAILED)
+
+
+def _show(document: DoctorDocument) -> None:
+    """A table of the checks, and below it what is not good, the faults last, where they are seen."""
+    from rich.text import Text
+
+    checks = document["checks"]
+    lines = [
+        [
+            c["part"],
+            c["check"],
+            Text(c["state"], COLOURS[c["state"]]),
+            c["found"] if c["state"] == "good" else "see below",
+        ]
+        for c in checks
+    ]
+    print_table(["part", "check", "state", "found"], lines, whole=3)
+    out = console()
+    if document["samples"]:
+        out.print(f"sample recipes and stations: {document['samples']}", markup=False, soft_wrap=True)
+    for state in ("not configured", "warning", "fault"):
+        for c in (c for c in checks if c["state"] == state):
+            needed = f", needed: {c['needed']}" if c["needed"] else ""
+            remedy = f"; {c['remedy']}" if c["remedy"] else ""
+            text = f"{state}: {c['part']}, {c['check']}: {c['found']}{needed}{remedy}"
+            out.print(text, style=COLOURS[state], markup=False, soft_wrap=True)
+    out.print(f"{document['faults']} faults, {document['warnings']} warnings", markup=False)

@@ -1,0 +1,145 @@
+"""The orchestrator: it answers, its database is ready, it takes the key, it has the version of the client, it is in time."""
+
+from __future__ import annotations
+
+import base64
+import http.client
+import json
+import os
+import time
+import urllib.error
+import urllib.request
+from email.utils import parsedate_to_datetime
+from http import HTTPStatus
+from importlib import metadata
+from typing import NamedTuple
+from urllib.parse import urlsplit
+
+from pipelines.doctor.check import Check, clock_check, of_error, offset
+from pipelines.flows.credentials import without_credentials
+from pipelines.flows.settings import CLIENT_KEY, KEY_FILE, LOOPBACK, use_key
+from schemas.errors import TumblelineError
+
+PART = "orchestrator"
+VARIABLE = "PREFECT_API_URL"
+TIMEOUT_S = 5.0
+LARGEST_BODY = 65536
+
+
+class Answer(NamedTuple):
+    """What a server answered; ``ahead_s``: of its clock against the host's, None where it states no time."""
+
+    status: int
+    body: str
+    ahead_s: float | None
+
+
+def orchestrator_checks() -> list[Check]:
+    """The checks of the orchestrator that PREFECT_API_URL names."""
+    address = os.environ.get(VARIABLE, "").rstrip("/")
+    if not address:
+        found = f"{VARIABLE} is not set: each run starts an orchestrator of its own"
+        return [
+            Check(PART, "address", "not configured", found, "", f"for scheduled runs name the server in {VARIABLE}")
+        ]
+    shown = without_credentials(address)
+    if not address.startswith(("http://", "https://")):
+        remedy = f"correct {VARIABLE}"
+        return [Check(PART, "address", "fault", shown, "an address such as http://127.0.0.1:4200/api", remedy)]
+    try:
+        health, ready = ask(f"{address}/health"), ask(f"{address}/ready")
+    except (OSError, http.client.HTTPException, ValueError) as problem:
+        found = f"{shown} does not answer ({getattr(problem, 'reason', None) or problem})"
+        return [Check(PART, "reachable", "fault", found, "a server that runs", f"start it, or correct {VARIABLE}")]
+    return [
+        _reachable(shown, health),
+        _database(ready),
+        *_authenticated(address),
+        *([clock_check(PART, health.ahead_s, "its server")] if health.ahead_s is not None else []),
+        *_in_clear(address),
+    ]
+
+
+def ask(address: str, key: str = "") -> Answer:
+    """The answer to a GET, whatever its status.
+
+    Raises
+    ------
+    OSError, http.client.HTTPException
+        There is no answer within 5 s.
+    """
+    request = urllib.request.Request(address)  # noqa: S310 - http or https, looked at above
+    if key:
+        request.add_header("Authorization", "Basic " + base64.b64encode(key.encode()).decode())
+    begun = time.time()
+    try:
+        with urllib.request.urlopen(request, timeout=TIMEOUT_S) as reply:  # noqa: S310
+            status, head, body = reply.status, reply.headers, reply.read(LARGEST_BODY)
+    except urllib.error.HTTPError as problem:
+        with problem:
+            status, head, body = problem.code, problem.headers, b""
+    return Answer(status, body.decode("utf-8", "replace"), _ahead(head.get("Date"), begun, time.time()))
+
+
+def _ahead(stated: str | None, begun: float, ended: float) -> float | None:
+    if not stated:
+        return None
+    try:
+        return offset(parsedate_to_datetime(stated).timestamp(), begun, ended, 1.0)
+    except ValueError:
+        return None
+
+
+def _reachable(shown: str, answer: Answer) -> Check:
+    if answer.status == HTTPStatus.OK:
+        return Check(PART, "reachable", "good", shown)
+    remedy = f"correct {VARIABLE}: it ends in /api"
+    return Check(PART, "reachable", "fault", f"{shown} answers {answer.status}", "200 of a Prefect server", remedy)
+
+
+def _database(answer: Answer) -> Check:
+    if answer.status == HTTPStatus.OK:
+        return Check(PART, "database", "good", "ready")
+    remedy = "look into the server's log: its database does not answer, or its disk is full"
+    return Check(PART, "database", "fault", f"not ready ({answer.status})", "200 at /ready", remedy)
+
+
+def _authenticated(address: str) -> list[Check]:
+    """Whether the server takes the key of this process, and has its version."""
+    try:
+        key = use_key(CLIENT_KEY)
+        answer = ask(f"{address}/admin/version", key)
+    except TumblelineError as problem:
+        return [of_error(PART, "authenticated", problem)]
+    except (OSError, http.client.HTTPException) as problem:
+        return [Check(PART, "authenticated", "fault", f"no answer ({problem})", "a server that runs", "start it again")]
+    if answer.status in (HTTPStatus.UNAUTHORIZED, HTTPStatus.FORBIDDEN):
+        remedy = f"give the server's key in {CLIENT_KEY}, or its file in {KEY_FILE}"
+        return [
+            Check(PART, "authenticated", "fault", f"the key is refused ({answer.status})", "its server's key", remedy)
+        ]
+    if answer.status != HTTPStatus.OK:
+        remedy = "look into the server's log"
+        return [Check(PART, "authenticated", "fault", f"answers {answer.status}", "200", remedy)]
+    return [Check(PART, "authenticated", "good", "the key is accepted"), _version(answer.body)]
+
+
+def _version(body: str) -> Check:
+    own = metadata.version("prefect")
+    try:
+        found = str(json.loads(body))
+    except ValueError:
+        found = "no version"
+    if found == own:
+        return Check(PART, "version", "good", found)
+    remedy = "install one version of Prefect on the server and here"
+    return Check(PART, "version", "warning", f"the server has {found}", f"{own}, as here", remedy)
+
+
+def _in_clear(address: str) -> list[Check]:
+    """A warning where the key crosses a network in clear."""
+    parts = urlsplit(address)
+    if parts.scheme == "https" or parts.hostname in (*LOOPBACK, "::1"):
+        return []
+    remedy = "put a proxy with TLS before the server, and name it with https://"
+    return [Check(PART, "encryption", "warning", "the key crosses the network in clear", "https", remedy)]

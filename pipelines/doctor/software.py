@@ -1,0 +1,172 @@
+"""Versions: of Python and of the libraries, against the ranges that the product declares and against its lock."""
+
+from __future__ import annotations
+
+import platform
+import re
+import sysconfig
+from importlib import metadata
+from pathlib import Path
+from typing import TYPE_CHECKING, NamedTuple
+
+from packaging.requirements import Requirement
+from packaging.specifiers import SpecifierSet
+from packaging.utils import canonicalize_name
+
+from pipelines.doctor.check import Check
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Iterator
+
+PART = "software"
+PRODUCT = "tumbleline"
+TESTED = "3.11"
+"""The version of Python that the tests run on and the lock is for."""
+
+LOCK = "requirements-run.lock"
+PIN = re.compile(r"^([\w.-]+)(?:\[[\w, -]+\])?==([^\s;\\]+)", re.MULTILINE)
+SHOWN = 5
+DEVELOPMENT = {"build", "dev", "bench"}  # extras of those who change the product, not of those who use it
+
+
+class Needed(NamedTuple):
+    """A requirement, and the distribution that declares it."""
+
+    by: str
+    requirement: Requirement
+
+
+def software_checks() -> list[Check]:
+    """Python, the product, its libraries, the lock, and the optional libraries."""
+    return [_python(), _product(), *_libraries(), _pinned(), _optional()]
+
+
+def shipped(name: str) -> Path | None:
+    """A file or folder of the deployment: of the source tree, else of ``share/tumbleline``; None where it is in neither."""
+    tree = Path(__file__).resolve().parents[2]
+    places = [tree] if (tree / "pyproject.toml").is_file() else []
+    found = [place / name for place in (*places, Path(sysconfig.get_path("data")) / "share" / PRODUCT)]
+    return next((path for path in found if path.exists()), None)
+
+
+def _python() -> Check:
+    version = platform.python_version()
+    needed = metadata.metadata(PRODUCT)["Requires-Python"] or ""
+    if version not in SpecifierSet(needed, prereleases=True):
+        return Check(PART, "Python", "fault", version, needed, "install the product in an environment of that version")
+    if not version.startswith(f"{TESTED}."):
+        remedy = f"install the product in an environment of Python {TESTED} where it is validated"
+        return Check(PART, "Python", "warning", f"{version}, not tested", f"{TESTED}, which the tests run on", remedy)
+    return Check(PART, "Python", "good", version)
+
+
+def _product() -> Check:
+    return Check(PART, PRODUCT, "good", f"{metadata.version(PRODUCT)} in {Path(__file__).resolve().parents[2]}")
+
+
+def _libraries() -> list[Check]:
+    """Libraries that are missing or outside the ranges of the product or of one another: a check each, the product's first."""
+    found: dict[str, Check] = {}
+    count = 0
+    for needed in _closure():
+        count += 1
+        name, by = needed.requirement.name, needed.by
+        remedy = f"run: pip install '{name}{needed.requirement.specifier}'"
+        try:
+            version = metadata.version(name)
+        except metadata.PackageNotFoundError:
+            found.setdefault(name, Check(PART, name, "fault", "not installed", f"{by} needs it", remedy))
+            continue
+        if not needed.requirement.specifier.contains(version, prereleases=True):
+            state = "fault" if by == PRODUCT else "warning"
+            check = Check(PART, name, state, version, f"{needed.requirement.specifier} for {by}", remedy)
+            found.setdefault(name, check)
+    return list(found.values()) or [Check(PART, "libraries", "good", f"{count} requirements are met")]
+
+
+def _closure() -> Iterator[Needed]:
+    """The requirements of the product and, of what is installed, theirs; each once per distribution that declares it."""
+    left: list[tuple[str, frozenset[str]]] = [(PRODUCT, frozenset())]
+    seen: set[tuple[str, frozenset[str]]] = set()
+    while left:
+        name, extras = left.pop()
+        if (name, extras) in seen:
+            continue
+        seen.add((name, extras))
+        try:
+            declared = metadata.requires(name) or []
+        except metadata.PackageNotFoundError:
+            continue
+        for requirement in _that_hold(declared, extras):
+            yield Needed(name, requirement)
+            left.append((canonicalize_name(requirement.name), frozenset(requirement.extras)))
+
+
+def _that_hold(declared: Iterable[str], extras: frozenset[str]) -> list[Requirement]:
+    parsed = [Requirement(one) for one in declared]
+    return [
+        one
+        for one in parsed
+        if one.marker is None or any(one.marker.evaluate({"extra": extra}) for extra in extras or {""})
+    ]
+
+
+def _pinned() -> Check:
+    """Versions that are not those of the lock: they may work, and nobody has tested them."""
+    path = shipped(LOCK)
+    if path is None:
+        return Check(
+            PART, "lock", "not configured", f"{LOCK} is not installed", "", "install the product from its wheel"
+        )
+    pins = {canonicalize_name(name): version for name, version in PIN.findall(path.read_text(encoding="utf-8"))}
+    held = {canonicalize_name(one.name): one.version for one in metadata.distributions()}
+    other = [
+        f"{name} {held[name]}, not {pins[name]}" for name in sorted(pins) if name in held and held[name] != pins[name]
+    ]
+    if not other:
+        return Check(PART, "lock", "good", f"{len(pins.keys() & held.keys())} libraries have the versions of the lock")
+    more = f" and {len(other) - SHOWN} more" if len(other) > SHOWN else ""
+    return Check(
+        PART,
+        "lock",
+        "warning",
+        f"{'; '.join(other[:SHOWN])}{more}",
+        "the versions of the lock, which were tested together",
+        f"run: pip install --no-deps --require-hashes -r {path}",
+    )
+
+
+def _optional() -> Check:
+    """Extras whose libraries are installed, and those whose libraries are not."""
+    declared = [Requirement(one) for one in metadata.requires(PRODUCT) or ()]
+    have: list[str] = []
+    lack: list[str] = []
+    for extra in sorted(set(metadata.metadata(PRODUCT).get_all("Provides-Extra") or ()) - DEVELOPMENT):
+        own = [
+            one
+            for one in declared
+            if one.marker is not None
+            and not one.marker.evaluate({"extra": ""})
+            and one.marker.evaluate({"extra": extra})
+            and canonicalize_name(one.name) != PRODUCT
+        ]
+        if own:
+            (have if all(_is_installed(one.name) for one in own) else lack).append(extra)
+    if not have and not lack:
+        remedy = "install the product again, so that its metadata are those of its code"
+        return Check(
+            PART, "optional formats", "warning", "the metadata name none", "the extras of this version", remedy
+        )
+    found = f"installed: {', '.join(have) or 'none'}; not installed: {', '.join(lack) or 'none'}"
+    if not lack:
+        return Check(PART, "optional formats", "good", found)
+    remedy = f"where such files are read, run: pip install '{PRODUCT}[{','.join(lack)}]'"
+    return Check(PART, "optional formats", "not configured", found, "", remedy)
+
+
+def _is_installed(name: str) -> bool:
+    try:
+        metadata.version(name)
+    except metadata.PackageNotFoundError:
+        return False
+    return True

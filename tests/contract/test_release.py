@@ -1,0 +1,113 @@
+"""The bill of materials of a release says what the lock says, and the hashes of a release are those of its files."""
+
+import hashlib
+import json
+import re
+from datetime import UTC, datetime
+from functools import cache
+from pathlib import Path
+
+import pytest
+from test_packaging import ROOT
+
+from deploy import release, sbom
+from deploy.sbom import LOCK, bill, pins, project_of, release_time
+from pipelines.flows import deploy
+
+WHEN = datetime(2026, 1, 2, 3, 4, 5, tzinfo=UTC)
+
+
+@cache
+def made(lock: str | None = None) -> dict:
+    return bill(lock or LOCK.read_text(encoding="utf-8"), project_of(ROOT), WHEN)
+
+
+def test_every_library_of_the_lock_is_in_the_bill_with_its_version_and_hashes() -> None:
+    text = LOCK.read_text(encoding="utf-8")
+    entries = re.findall(r"^([\w.-]+)(?:\[.*?\])?==(\S+)", text, re.MULTILINE)
+    components = made()["components"]
+    assert len(entries) > 100
+    assert [(c["name"], c["version"]) for c in components] == sorted((name.lower(), v) for name, v in entries)
+    assert sum(len(c["properties"]) for c in components) == text.count("--hash=sha256:")
+
+
+def test_the_bill_has_the_form_of_cyclonedx() -> None:
+    content = made()
+    assert (content["bomFormat"], content["specVersion"], content["version"]) == ("CycloneDX", "1.6", 1)
+    assert re.fullmatch(r"urn:uuid:[0-9a-f]{8}(-[0-9a-f]{4}){3}-[0-9a-f]{12}", content["serialNumber"])
+    assert content["metadata"]["timestamp"] == "2026-01-02T03:04:05Z"
+    own = content["metadata"]["component"]
+    assert (own["name"], own["licenses"]) == ("tumbleline", [{"license": {"id": "Apache-2.0"}}])
+    references = [own["bom-ref"], *(c["bom-ref"] for c in content["components"])]
+    assert len(set(references)) == len(references)
+    assert [d["ref"] for d in content["dependencies"]] == references
+    assert {ref for d in content["dependencies"] for ref in d["dependsOn"]} <= set(references)
+
+
+def test_the_product_depends_on_what_it_declares_and_nothing_is_out_of_reach() -> None:
+    content = made()
+    below = {d["ref"]: d["dependsOn"] for d in content["dependencies"]}
+    own = below["pkg:pypi/tumbleline@" + project_of(ROOT)["version"]]
+    assert len(own) == len(project_of(ROOT)["dependencies"])
+    reached, left = set(), [*own]
+    while left:
+        ref = left.pop()
+        left += [] if ref in reached else below[ref]
+        reached.add(ref)
+    lost = {c["name"] for c in content["components"]} - {ref.split("/")[1].split("@")[0] for ref in reached}
+    assert len(lost) < 10, lost  # those of extras, and of the build
+
+
+def test_licences_are_those_of_the_installed_version() -> None:
+    licences = {c["name"]: c.get("licenses") for c in made()["components"]}
+    assert "BSD-3-Clause" in json.dumps(licences["numpy"])
+    assert sum(one is None for one in licences.values()) < 5
+    (unknown,) = made("numpy==0.0.1 \\\n    --hash=sha256:" + "0" * 64)["components"]
+    assert "licenses" not in unknown
+
+
+def test_extras_and_markers_of_a_lock_are_read() -> None:
+    text = "a.b[c]==1.0 \\\n    --hash=sha256:" + "1" * 64 + "\nd==2 ; python_version > '3'\n"
+    assert pins(text) == {"a-b": ("1.0", ["1" * 64]), "d": ("2", [])}
+
+
+def test_a_release_has_its_hashes_and_nothing_of_an_earlier_one(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    folder = tmp_path / "dist"
+    folder.mkdir()
+    (folder / "old.whl").write_bytes(b"")
+
+    def built(place: Path, root: Path = ROOT) -> tuple[Path, Path]:
+        place.mkdir(exist_ok=True)
+        wheel, source = place / "a.whl", place / "a.tar.gz"
+        wheel.write_bytes(b"wheel")
+        source.write_bytes(b"source")
+        return wheel, source
+
+    monkeypatch.setattr(release, "build", built)
+    monkeypatch.setenv("SOURCE_DATE_EPOCH", "0")
+    written = release.release(folder)
+    assert sorted(folder.iterdir()) == sorted(written)
+    sums = dict(line.split("  ")[::-1] for line in (folder / "SHA256SUMS").read_text(encoding="utf-8").splitlines())
+    assert sums == {p.name: hashlib.sha256(p.read_bytes()).hexdigest() for p in written if p.name != "SHA256SUMS"}
+    bom = json.loads(next(folder.glob("*.cdx.json")).read_text(encoding="utf-8"))
+    assert bom["metadata"]["timestamp"] == "1970-01-01T00:00:00Z"
+    assert any("a.whl" in one["value"] for one in bom["metadata"]["component"]["properties"])
+
+
+def test_the_time_of_a_release_is_now_or_what_is_given(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delenv("SOURCE_DATE_EPOCH", raising=False)
+    assert abs((release_time() - datetime.now(UTC)).total_seconds()) < 60.0
+    monkeypatch.setenv("SOURCE_DATE_EPOCH", "86400")
+    assert release_time() == datetime(1970, 1, 2, tzinfo=UTC)
+    assert sbom.LOCK.name == "requirements-run.lock"
+
+
+def test_flows_of_an_installed_product_work_in_the_folder_that_they_were_registered_from(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    assert deploy._working_folder() == ROOT
+    monkeypatch.setattr(deploy, "TREE", tmp_path / "site-packages")
+    monkeypatch.chdir(tmp_path)
+    assert deploy._working_folder() == tmp_path

@@ -1,0 +1,173 @@
+"""The wheel holds what the tree holds, and the product runs from it where no tree is."""
+
+import io
+import json
+import os
+import subprocess
+import sys
+import tarfile
+import venv
+import zipfile
+from pathlib import Path
+
+import pytest
+from test_packaging import ROOT, SHIPPED, tracked
+
+from deploy.release import build
+
+SHARE = "share/tumbleline/"
+SAMPLES = ("deploy/recipes", "deploy/stations", "deploy/systemd", "deploy/prefect.yaml", "requirements-run.lock")
+LOADS = """
+import json, sys
+from pathlib import Path
+import inertial, pipelines, schemas, stations
+from pipelines.audit.rules import load_rules
+from pipelines.cli import COMMANDS
+from pipelines.export.formats import __path__ as formats
+from pipelines.jobs.recipes import load_limits, load_recipe, read_limits, sample_names
+from pipelines.report.templates import template
+from schemas.station import load_station
+from stations.plant.preset import load_preset, preset_names
+from stations.profile_files import load_profile, profile_names
+folder = Path(pipelines.__file__).parent
+load_rules(), load_station()
+print(json.dumps({
+    "from": sorted({str(Path(m.__file__).parents[1]) for m in (inertial, pipelines, schemas, stations)}),
+    "recipes": [load_limits(load_recipe(name)).name and name for name in sample_names()],
+    "limits": [read_limits(name) and name for name in sample_names("limits-")],
+    "presets": [load_preset(name) and name for name in preset_names()],
+    "profiles": [load_profile(name) and name for name in profile_names()],
+    "pages": [template(p.name) and p.name for p in sorted((folder / "report").glob("*.html"))],
+    "commands": list(COMMANDS),
+}))
+"""
+
+
+@pytest.fixture(scope="module")
+def built(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path]:
+    """Wheel and source distribution, built without a network."""
+    return build(tmp_path_factory.mktemp("built"))
+
+
+@pytest.fixture(scope="module")
+def unpacked(built: tuple[Path, Path], tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("unpacked")
+    with zipfile.ZipFile(built[0]) as wheel:
+        wheel.extractall(folder)
+    return folder
+
+
+def own_environment(**more: str) -> dict[str, str]:
+    """This environment without what would lead a process to the source tree."""
+    kept = {
+        k: v for k, v in os.environ.items() if not k.startswith(("PYTHON", "TUMBLELINE_", "PREFECT_", "VIRTUAL_ENV"))
+    }
+    return {**kept, "OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1", **more}
+
+
+def test_the_wheel_holds_every_tracked_file_of_the_packages(unpacked: Path) -> None:
+    needed = {str(path.relative_to(ROOT)) for path in tracked(*SHIPPED)}
+    held = {
+        str(path.relative_to(unpacked)) for top in SHIPPED for path in (unpacked / top).rglob("*") if path.is_file()
+    }
+    assert needed - held == set()
+    assert {name for name in held if not name.endswith(".pyc")} - needed == set()
+
+
+def test_the_wheel_holds_the_samples_of_the_deployment_and_the_lock(unpacked: Path) -> None:
+    (share,) = unpacked.glob(f"*.data/data/{SHARE}")
+    needed = {str(path.relative_to(ROOT)): path.read_bytes() for path in tracked(*SAMPLES)}
+    assert len(needed) > 15
+    held = {str(path.relative_to(share)): path.read_bytes() for path in share.rglob("*") if path.is_file()}
+    assert {name for name, content in needed.items() if held.get(name) != content} == set()
+
+
+def test_the_source_distribution_holds_what_the_wheel_was_built_from(built: tuple[Path, Path]) -> None:
+    with tarfile.open(built[1]) as source:
+        held = {name.partition("/")[2] for name in source.getnames()}
+    needed = {
+        str(path.relative_to(ROOT)) for path in tracked(*SHIPPED, *SAMPLES, "pyproject.toml", "LICENSE", "README.md")
+    }
+    assert needed - held == set()
+    assert not [name for name in held if name.startswith((".venv", "tests", "archive/"))]
+
+
+def test_every_file_that_is_used_by_name_is_read_from_the_wheel(unpacked: Path, tmp_path: Path) -> None:
+    done = subprocess.run(
+        [sys.executable, "-c", LOADS],
+        cwd=tmp_path,
+        env=own_environment(PYTHONPATH=str(unpacked)),
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
+    found = json.loads(done.stdout)
+    assert found.pop("from") == [str(unpacked)]
+    assert "production" in found["recipes"]
+    assert {"consumer", "industrial", "navigation"} <= set(found["limits"])
+    for key, folder, suffix in (
+        ("presets", "stations/plant/presets", ".toml"),
+        ("profiles", "stations/profiles", ".toml"),
+        ("pages", "pipelines/report", ".html"),
+    ):
+        assert len(found[key]) == len([p for p in tracked(folder) if p.suffix == suffix]), key
+    assert "doctor" in found["commands"]
+
+
+def test_metadata_say_what_was_tested(unpacked: Path) -> None:
+    (path,) = unpacked.glob("*.dist-info/METADATA")
+    text = path.read_text(encoding="utf-8")
+    versions = [line for line in text.splitlines() if "Programming Language :: Python :: 3." in line]
+    assert versions == ["Classifier: Programming Language :: Python :: 3.11"]
+    assert "\nLicense-Expression: Apache-2.0\n" in text
+
+
+@pytest.mark.slow
+def test_the_product_runs_from_the_wheel_in_an_empty_folder(built: tuple[Path, Path], tmp_path: Path) -> None:
+    """The libraries are those of this environment, by path: its own installation of the product is not reached that way."""
+    home, empty = tmp_path / "venv", tmp_path / "empty"
+    empty.mkdir()
+    venv.create(home, with_pip=False, symlinks=True)
+    python = home / "bin" / "python"
+    pip = [
+        sys.executable,
+        "-m",
+        "pip",
+        "--python",
+        str(python),
+        "install",
+        "--quiet",
+        "--no-deps",
+        "--no-index",
+        built[0],
+    ]
+    subprocess.run(pip, check=True, env=own_environment(PIP_DISABLE_PIP_VERSION_CHECK="1"))
+    (site,) = home.glob("lib/python*/site-packages")
+    libraries = next(p for p in sys.path if p.endswith("site-packages"))
+    (site / "libraries.pth").write_text(libraries + "\n", encoding="utf-8")
+    environment = own_environment(XDG_STATE_HOME=str(tmp_path / "state"), XDG_CONFIG_HOME=str(tmp_path / "config"))
+
+    def run(*words: str) -> str:
+        done = subprocess.run(words, cwd=empty, env=environment, capture_output=True, text=True, check=False)
+        assert done.returncode in (0, 1), (words, done.stderr)
+        assert "Traceback" not in done.stderr
+        return done.stdout
+
+    where = (
+        "import inertial as i, pipelines as p, schemas as s, stations as t; print(*(m.__file__ for m in (i, p, s, t)))"
+    )
+    places = run(str(python), "-c", where).split()
+    assert all(Path(place).is_relative_to(site) for place in places)
+    product = str(home / "bin" / "tumbleline")
+    samples = home / "share" / "tumbleline" / "deploy"
+    assert "investigate" in run(product, "--help")
+    assert json.loads(run(product, "plan", "production", "--json"))
+    assert "dwells.parquet" in run(product, "demo", "--by-hand", "--seed", "3")
+    assert sorted(p.suffix for p in (empty / "demo").iterdir()) == [".parquet"] * 4
+    line = run(product, "run", str(samples / "recipes" / "line-six.toml"), "--units", "A1", "--direct", "--json")
+    document = json.load(io.StringIO(line))
+    assert document["units"][0]["outcome"] in {"pass", "fail"}
+    assert (empty / document["report"]).stat().st_size > 10000
+    checked = json.loads(run(product, "doctor", "--json"))
+    assert checked["samples"] == str(samples)
