@@ -158,7 +158,7 @@ class Covariance:
         return found
 
     def side_by_side(self, shares: Shares) -> Array:
-        """Half the mean variance of the steps that the wander makes from one dwell to the next, over the white variance, (blocks,)."""
+        """Half the mean variance of the wander's steps from one dwell to the next, over the white variance, (blocks,)."""
         found = np.zeros(len(self.level))
         if self._wander is None:
             return found

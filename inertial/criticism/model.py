@@ -196,7 +196,7 @@ class Model:
         return self._noise_rms(self.problem.covariance.about_mean(self.noise.shares))
 
     def scatter(self) -> float:
-        """RMS of the noise of a dwell mean against its neighbours, g: white, and as much of the wander as shows from dwell to dwell.
+        """RMS of the noise of a dwell mean against its neighbours, g: white, and the wander from dwell to dwell.
 
         A random walk raises :meth:`floor` with the length of the record, this with the time between two dwells only.
         """

@@ -193,7 +193,7 @@ def _moved(before: Term, after: Term) -> bool:
 
 
 def judge(field: Candidates, model: Model, term: Term) -> Rival:
-    """A term beside a model, with the noise estimated with it inside; nothing of an alternative whose coefficients it cannot have."""
+    """A term beside a model, with the noise estimated with it inside; no gain where an alternative cannot have its size."""
     if isinstance(term.effect, Handling) and not term.effect.possible(model.with_term(term).shared_sizes(term)):
         return Rival(term, 0.0, 0, 0.0, 0.0)
     found = likelihood_ratio(model, term, field.places(term.effect.id))

@@ -299,7 +299,17 @@ def _ended(joint: JointDiagnosis) -> Ending | None:
         return None
     if not document["classes"]:
         return Ending("unexplained", "the model is not adequate, and no effect of the catalogue explains the residuals")
-    return Ending("told_apart", f"every class contains one effect: {', '.join(document['recommended'])}")
+    return Ending("told_apart", _told_apart(document))
+
+
+def _told_apart(document: dict[str, Any]) -> str:
+    """That every class has one effect, and which of them is not recommended as no dwells left out judge it."""
+    groups = document["classes"]
+    text = f"every class contains one effect: {', '.join(g['effects'][0] for g in groups)}"
+    unjudged = [g["effects"][0] for g in groups if g.get("scope") != "data" and g.get("heldout_after_ug", 0.0) is None]
+    if not unjudged:
+        return text
+    return f"{text}; not recommended yet: {', '.join(unjudged)}, which no dwells left out can judge: confirm with a fresh run"
 
 
 def _not_parted(joint: JointDiagnosis) -> str:
@@ -307,7 +317,7 @@ def _not_parted(joint: JointDiagnosis) -> str:
     if any(joint.following.twins):
         return f"no measurement on this station discriminates between {_classes(joint)}"
     return (
-        f"no follow-up was found that is expected to discriminate between {_classes(joint)}: they differ by too little beside the "
+        f"no follow-up was found that is expected to discriminate between {_classes(joint)}: they differ too little beside the "
         "noise; measure the plan again with longer dwells, or more units"
     )
 

@@ -167,8 +167,8 @@ def _per_g(lot: LotArrays, found: LotFit) -> Array:
         return scale
     if lot.out_unit not in _PER_G:
         raise DataRejected(
-            f"fit: the model {', '.join(found.effects)} has no 'scale', and the outputs are in {lot.out_unit}: residuals in µg need "
-            "the output per g; add 'scale' to the effects (it needs at least two orientations), or import outputs in g"
+            f"fit: the model {', '.join(found.effects)} has no 'scale', and the outputs are in {lot.out_unit}: residuals in µg "
+            "need the output per g; add 'scale' to the effects (it needs at least two orientations), or import outputs in g"
         )
     return np.full_like(scale, _PER_G[lot.out_unit])
 

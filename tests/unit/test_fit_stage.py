@@ -134,7 +134,7 @@ def test_a_model_without_scale_has_residuals_by_the_unit_of_its_output(
 
 def test_a_model_without_scale_of_counts_is_refused_with_what_it_needs(rng: np.random.Generator) -> None:
     dwells, _ = lot(rng, units=2)
-    with pytest.raises(DataRejected, match="no 'scale', and the outputs are in LSB.* add 'scale'"):
+    with pytest.raises(DataRejected, match=r"no 'scale', and the outputs are in LSB.* add 'scale'"):
         fit(dwells.assign(out_unit="LSB"), NO_HISTORY, ["bias", "bias_temperature"])
 
 

@@ -1,6 +1,7 @@
 """Why an inquiry ends without a follow-up."""
 
 from types import SimpleNamespace
+from typing import Literal
 
 import numpy as np
 import pytest
@@ -11,7 +12,9 @@ from pipelines.jobs.recipes import _resolve
 from schemas.errors import RecipeInvalid
 
 
-def joint(adequate: bool | None, *classes: list[str], twins: tuple[tuple[str, ...], ...] = ()) -> SimpleNamespace:
+def joint(
+    adequate: Literal[True, False] | None, *classes: list[str], twins: tuple[tuple[str, ...], ...] = ()
+) -> SimpleNamespace:
     document = {
         "adequate": adequate,
         "reason": "6 degrees of freedom, 15 are needed" if adequate is None else None,
@@ -43,6 +46,17 @@ def test_a_model_that_is_not_adequate_ends_otherwise() -> None:
     assert open_ is None
 
 
+def test_what_no_dwells_left_out_judge_is_named_and_said_to_be_unconfirmed() -> None:
+    one = joint(False, ["cross_coupling"])
+    one.document["classes"][0] |= {"scope": "sensor", "heldout_after_ug": None}
+    one.document["recommended"] = []
+    ending = _ended(one)
+    assert ending is not None
+    assert ending.text.startswith(
+        "every class contains one effect: cross_coupling; not recommended yet: cross_coupling"
+    )
+
+
 def test_a_class_that_no_follow_up_parts_for_sure_is_not_called_impossible_to_part() -> None:
     group = ["third_order", "clipping"]
     assert "no follow-up was found" in _not_parted(joint(False, group))
@@ -50,7 +64,7 @@ def test_a_class_that_no_follow_up_parts_for_sure_is_not_called_impossible_to_pa
 
 
 @pytest.mark.parametrize(("size", "possible"), [(1.15, True), (0.7, True), (0.022, False), (-1.0, False), (8.0, False)])
-def test_a_device_that_had_not_soaked_follows_by_about_its_own_coefficients(size: float, possible: bool) -> None:
+def test_a_device_that_had_not_soaked_follows_by_about_its_own_coefficients(size: float, *, possible: bool) -> None:
     assert NotSoaked().possible(np.array([size])) is possible
 
 
