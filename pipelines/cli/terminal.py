@@ -49,15 +49,25 @@ def scanned(slots: int) -> Seating:
     return found
 
 
-def agreed(question: str) -> bool:
-    """Whether whoever sits at the terminal says yes; Enter alone is yes, anything that is neither is asked again."""
+MEASURES = "y or Enter measures it, n leaves it; Ctrl-C stops, and the same command goes on later"
+UNATTENDED = "operator: standard input ended before an answer, a line is needed; run with --no-prompts where nobody is"
+
+
+def agreed(question: str, choices: str = MEASURES, unattended: str = UNATTENDED) -> bool:
+    """The answer at the terminal to a question: Enter alone is yes; an answer that is neither yes nor no is asked again.
+
+    Parameters
+    ----------
+    choices : what the answers do
+    unattended : the error where standard input ends before an answer
+    """
     while True:
-        answer = _line(f"{question} [Y/n] ").lower()
+        answer = _line(f"{question} [Y/n] ", unattended).lower()
         if answer in YES:
             return True
         if answer in STOP:
             return False
-        words = f"'{answer}' is neither: y or Enter measures it, n leaves it; Ctrl-C stops, and the same command goes on later"
+        words = f"'{answer}' is neither: {choices}"
         error_console().print(words, style="yellow", markup=False, soft_wrap=True)
 
 
@@ -66,12 +76,10 @@ def attended() -> bool:
     return sys.stdin.isatty() and sys.stderr.isatty()
 
 
-def _line(question: str) -> str:
+def _line(question: str, unattended: str = UNATTENDED) -> str:
     """A line of standard input; its end is nobody to ask."""
-    error_console().print(question, end="", markup=False)
+    error_console().print(question, end="", markup=False, soft_wrap=True)
     line = sys.stdin.readline()
     if not line:
-        raise WrongUse(
-            "operator: standard input ended before an answer, a line is needed; run with --no-prompts where nobody is"
-        )
+        raise WrongUse(unattended)
     return line.strip()
