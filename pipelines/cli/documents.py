@@ -69,6 +69,10 @@ class ListedRun(TypedDict):
     started: Annotated[str, "ISO date and time, UTC"]
     finished: bool
     stages: list[str]
+    station: NotRequired[Annotated[str, "its name; empty for an import"]]
+    rerun_of: NotRequired[Annotated[str, "the run that it computes again; empty for others"]]
+    passed: NotRequired[Annotated[int | None, "units that passed; null before the grades are there"]]
+    graded: NotRequired[Annotated[int | None, "units with a decision; null before the grades are there"]]
 
 
 class ListDocument(TypedDict):
