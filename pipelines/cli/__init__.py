@@ -44,11 +44,13 @@ class _OnDemand(TyperCommand):
 
     def _load(self) -> Command:
         module = import_module(f"{__name__}.{self._module}")
-        if hasattr(module, "app"):
-            return typer.main.get_command(module.app)
-        own = typer.Typer(add_completion=False, pretty_exceptions_enable=False)
-        own.command(self.name)(module.command)
-        return typer.main.get_command(own)
+        own = getattr(module, "app", None)
+        if own is None:
+            own = typer.Typer(add_completion=False, pretty_exceptions_enable=False)
+            own.command(self.name)(module.command)
+        command = typer.main.get_command(own)
+        command.epilog = "\n\n".join(["Examples:", *getattr(module, "EXAMPLES", ())])  # a paragraph each
+        return command
 
 
 class _Commands(TyperGroup):

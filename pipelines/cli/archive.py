@@ -13,6 +13,10 @@ from pipelines.cli.options import ArchiveOption, JsonOption, console, print_json
 PART = "Certificates, trace, audit"
 ORDER = 460
 SUMMARY = "Maintain the archive: the signing key, and what interrupted writers left."
+EXAMPLES = (
+    "tumbleline archive clean --dry-run",
+    "tumbleline archive key --output signing.key",
+)
 
 app = typer.Typer(
     help="Look after the archive.", no_args_is_help=True, add_completion=False, pretty_exceptions_enable=False

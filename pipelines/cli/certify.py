@@ -23,6 +23,10 @@ if TYPE_CHECKING:
 PART = "Certificates, trace, audit"
 ORDER = 410
 SUMMARY = "Certify the units of a run that passed, from a first to a last day of validity."
+EXAMPLES = (
+    "tumbleline certify latest --months 12",
+    "tumbleline certify latest --units SN1",
+)
 
 
 def command(

@@ -30,6 +30,10 @@ if TYPE_CHECKING:
 PART = "Is the model good enough, and what is missing?"
 ORDER = 220
 SUMMARY = "Judge whether a model is adequate, where it fails, and which effect is missing."
+EXAMPLES = (
+    "tumbleline diagnose latest",
+    "tumbleline diagnose dwells.csv --effects bias,scale,misalignment --report report.html",
+)
 
 
 def command(

@@ -15,6 +15,10 @@ if TYPE_CHECKING:
 PART = "Old data, new models"
 ORDER = 530
 SUMMARY = "Show what differs between two runs, by how much, and the cause."
+EXAMPLES = (
+    "tumbleline diff latest RE-RUN",
+    "tumbleline diff RUN-A RUN-B --all",
+)
 
 SHOWN = 12
 

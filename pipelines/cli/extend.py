@@ -16,6 +16,10 @@ if TYPE_CHECKING:
 PART = "Is the model good enough, and what is missing?"
 ORDER = 230
 SUMMARY = "Write the next version of a model: one effect more, or one removed."
+EXAMPLES = (
+    "tumbleline extend model.toml third_order --why 'the diagnosis names it'",
+    "tumbleline extend model.toml --remove third_order --why 'not seen in the fresh run'",
+)
 
 
 def command(

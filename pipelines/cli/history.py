@@ -25,6 +25,10 @@ from pipelines.cli.options import (
 PART = "Is the model good enough, and what is missing?"
 ORDER = 250
 SUMMARY = "Show the error of a model, version by version."
+EXAMPLES = (
+    "tumbleline history model.toml",
+    "tumbleline history model.toml --dwells dwells.csv --fresh fresh.csv --picture history.png",
+)
 
 
 def command(

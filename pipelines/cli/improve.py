@@ -29,6 +29,10 @@ if TYPE_CHECKING:
 PART = "Is the model good enough, and what is missing?"
 ORDER = 215
 SUMMARY = "Diagnose a model, add what is missing, and judge it by a fresh run, in one command."
+EXAMPLES = (
+    "tumbleline improve latest",
+    "tumbleline improve dwells.csv --model model.toml --fresh fresh.csv --yes",
+)
 
 CHOICES = "y or Enter adds it, n leaves it out; Ctrl-C stops, and nothing is written"
 UNATTENDED = "improve: standard input ended before an answer, a line is needed; give --yes where nobody answers"

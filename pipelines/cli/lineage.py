@@ -12,6 +12,10 @@ from pipelines.cli.options import ArchiveOption, JsonOption, console, print_json
 PART = "Certificates, trace, audit"
 ORDER = 430
 SUMMARY = "Show the origin of certificates, tables and samples, and what was made of them."
+EXAMPLES = (
+    "tumbleline lineage latest",
+    "tumbleline lineage SN1 --prov sn1.jsonld",
+)
 
 
 def command(

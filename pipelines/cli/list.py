@@ -13,6 +13,10 @@ if TYPE_CHECKING:
 PART = "Results"
 ORDER = 310
 SUMMARY = "List the runs of the archive."
+EXAMPLES = (
+    "tumbleline list",
+    "tumbleline list --json",
+)
 
 
 def command(archive: ArchiveOption = None, *, as_json: JsonOption = False) -> None:

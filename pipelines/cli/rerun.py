@@ -34,6 +34,10 @@ if TYPE_CHECKING:
 PART = "Old data, new models"
 ORDER = 520
 SUMMARY = "Run archived runs through today's code, another model or other limits."
+EXAMPLES = (
+    "tumbleline rerun all --check",
+    "tumbleline rerun device:adxl355 since:2026-01-01 --model model.toml",
+)
 
 SHOWN = 40
 

@@ -17,6 +17,10 @@ if TYPE_CHECKING:
 PART = "Certificates, trace, audit"
 ORDER = 440
 SUMMARY = "Recompute every hash of the archive: find files that were changed, edited or lost."
+EXAMPLES = (
+    "tumbleline verify",
+    "tumbleline verify latest",
+)
 
 
 def command(
