@@ -90,7 +90,9 @@ def command(
     dwells = without_dwells(dwells, named_dwells(leave_out))
     tables = _Tables(dwells, temperatures, again, again_temperatures)
     beside = history or (history_beside(data) if is_file(data) else "")
-    document = _Improvement(data, tables, model, target, beside, by, as_json).run(judged, _names(choose), yes=yes)
+    document = _Improvement(data, tables, model, target, beside, by, as_json, archive).run(
+        judged, _names(choose), yes=yes
+    )
     if as_json:
         print_json(document)
     else:
@@ -125,6 +127,7 @@ class _Improvement:
     used_history: str
     by: str
     quiet: bool
+    archive: str | None
 
     def run(self, judged: list[str] | None, named: list[str], *, yes: bool) -> dict[str, Any]:
         """The document of the command; the model file is written last, when nothing can be refused any more."""
@@ -156,7 +159,9 @@ class _Improvement:
             "warnings": list(dict.fromkeys(text for row in rows for text in row["warnings"])),
         }
         fresh = self.tables.fresh is not None
-        document["next"] = next_lines(document, self.target, self.used_history, after=after, fresh=fresh)
+        document["next"] = next_lines(
+            document, self.target, self.used_history, after=after, fresh=fresh, archive=self.archive
+        )
         return document
 
     def _diagnosis(self, effects: list[str] | None, *, full: bool) -> dict[str, Any]:

@@ -73,7 +73,13 @@ def _ladder(rows: list[dict[str, Any]]) -> None:
 
 
 def next_lines(
-    document: dict[str, Any], target: Path, history: str, *, after: dict[str, Any], fresh: bool
+    document: dict[str, Any],
+    target: Path,
+    history: str,
+    *,
+    after: dict[str, Any],
+    fresh: bool,
+    archive: str | None = None,
 ) -> list[str]:
     """The commands to give next; empty where the model is adequate and a fresh run has judged it.
 
@@ -83,12 +89,13 @@ def next_lines(
     history : the file of temperatures against time that was read; empty where there was none
     after : the diagnosis of the resulting model
     fresh : whether there was a fresh run
+    archive : as it was given; None for the default one
     """
     from pipelines.cli.history import removal
 
     if document["refuted"]:
         return [removal(target, effect) for effect in document["refuted"]]
-    temperatures = ["--history", history] if history else []
+    temperatures = [*(["--history", history] if history else []), *(["--archive", archive] if archive else [])]
     own = ["--model", str(target)] if document["file"] else ["--effects", ",".join(document["effects"])]
     again = ["tumbleline", "improve", document["data"], *own, *temperatures]
     left = [c for c in document["choices"] if not c["added"]]

@@ -214,3 +214,18 @@ def test_the_last_effect_and_a_file_that_is_not_there_are_refused(tmp_path: Path
 
 def test_other_questions_keep_their_words() -> None:
     assert "--no-prompts" in terminal.UNATTENDED
+
+
+def test_a_run_of_an_archive_is_improved_and_its_next_line_names_the_archive(tmp_path: Path) -> None:
+    import tarfile
+
+    with tarfile.open(Path(__file__).resolve().parents[1] / "archives" / "v1.tar.xz") as kept:
+        kept.extractall(tmp_path / "kept", filter="data")
+    words = ("--archive", tmp_path / "kept", "--out", tmp_path / "m.toml", "--effects", f"{PLAIN},scale_temperature")
+    status, out, _ = run("improve", "latest", *words, "--json", typed="\n" * 9)
+    document = json.loads(out)
+    assert status in {0, 1}
+    assert document["added"]
+    assert document["next"]
+    assert all(f"--archive {tmp_path / 'kept'}" in line for line in document["next"])
+    assert [change.run for change in read_model(tmp_path / "m.toml").change][1:] == ["latest"] * len(document["added"])
