@@ -162,6 +162,7 @@ def test_what_cannot_be_is_one_message_and_nothing_is_written(alike: Path, tmp_p
     assert target.read_text(encoding="utf-8") == "a model of somebody else"
 
 
+@pytest.mark.slow
 def test_units_that_differ_in_the_fresh_run_leave_no_model_behind(alike: Path, tmp_path: Path) -> None:
     other = pd.read_parquet(alike / "fresh.parquet").assign(unit=lambda table: "other-" + table["unit"])
     other.to_parquet(tmp_path / "other.parquet")
@@ -216,6 +217,7 @@ def test_other_questions_keep_their_words() -> None:
     assert "--no-prompts" in terminal.UNATTENDED
 
 
+@pytest.mark.slow
 def test_a_run_of_an_archive_is_improved_and_its_next_line_names_the_archive(tmp_path: Path) -> None:
     import tarfile
 
