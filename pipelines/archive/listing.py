@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import time
+from collections import Counter
 from contextlib import suppress
-from dataclasses import astuple, dataclass
+from dataclasses import astuple, dataclass, fields
 from typing import TYPE_CHECKING, Any
 
 from pipelines.archive import derived, files
@@ -22,7 +23,11 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class RunInfo:
-    """One line of the archive's list."""
+    """One line of the archive's list.
+
+    station : its name; empty for an import · rerun_of : the run that it computes again; empty for others
+    passed, graded : units; None before the grades are there
+    """
 
     id: str
     recipe: str
@@ -31,6 +36,10 @@ class RunInfo:
     started: str
     finished: bool
     stages: tuple[str, ...]
+    station: str = ""
+    rerun_of: str = ""
+    passed: int | None = None
+    graded: int | None = None
 
 
 def info_of(run: Run) -> RunInfo | None:
@@ -40,6 +49,7 @@ def info_of(run: Run) -> RunInfo | None:
         return None
     about = run.about
     lot = about.get("lot", {})
+    outcomes = _outcomes(run, names)
     return RunInfo(
         id=run.id,
         recipe=about.get("recipe", {}).get("name", about.get("name", "")),
@@ -48,7 +58,25 @@ def info_of(run: Run) -> RunInfo | None:
         started=about["when"],
         finished="report.html" in names or SEALED in names,  # a re-run is sealed without a report
         stages=tuple(_sealed_stages(run, names) or stages_of(run.path, names)),
+        station=(about.get("station") or {}).get("name", ""),
+        rerun_of=about.get("rerun_of") or "",
+        passed=None if outcomes is None else outcomes["pass"],
+        graded=None if outcomes is None else outcomes.total(),
     )
+
+
+def _outcomes(run: Run, names: set[str]) -> Counter[str] | None:
+    """How many units passed, failed and were refused; None where there are no grades, or they cannot be read."""
+    if f"{GRADES}.parquet" not in names:
+        return None
+    import pyarrow as pa  # a list of runs without grades does without it
+    from pyarrow import parquet
+
+    try:
+        data = pa.BufferReader((run.path / f"{GRADES}.parquet").read_bytes())
+        return Counter(parquet.read_table(data, columns=["outcome"])["outcome"].to_pylist())
+    except (OSError, pa.ArrowInvalid, KeyError):  # 'tumbleline verify' says what is wrong with the file
+        return None
 
 
 def _sealed_stages(run: Run, names: set[str]) -> list[str]:
@@ -61,6 +89,7 @@ def _sealed_stages(run: Run, names: set[str]) -> list[str]:
     return seal.get("stages", []) if there == named else []
 
 
+GRADES = "grades"
 FEWEST_NEW = 32  # reading fewer again is faster than writing the list
 TICK_NS = 2_000_000_000
 FINISHED = 1  # stamp of a finished run in an object store, whose folders have no time
@@ -75,7 +104,7 @@ def infos_of(root: Place, runs: Sequence[Run]) -> list[RunInfo]:
     stored, lines, new = dict[str, Any](), list[RunInfo](), 0
     for run in runs:
         before, stamp = known.get(run.id), stamp_of(run)
-        if before is not None and before[0] == stamp:
+        if before is not None and before[0] == stamp and len(before[1]) == len(fields(RunInfo)):
             stored[run.id] = before
             lines.append(line_of(before[1]))
             continue
@@ -116,7 +145,13 @@ def noted_lines(place: Place) -> tuple[dict[str, Any], str]:
     return (lines if state == derived.SOUND else {}), state
 
 
+def agrees(info: RunInfo, values: Sequence[Any]) -> bool:
+    """Whether a stored line says what the files of its run say; one of an older version has fewer values."""
+    stored = line_of(values)
+    return astuple(info)[: len(values)] == astuple(stored)[: len(values)]
+
+
 def line_of(values: Sequence[Any]) -> RunInfo:
     """A line of the list from its stored values."""
-    run_id, recipe, device, units, started, finished, stages = values
-    return RunInfo(run_id, recipe, device, tuple(units), started, finished, tuple(stages))
+    run_id, recipe, device, units, started, finished, stages, *more = values
+    return RunInfo(run_id, recipe, device, tuple(units), started, finished, tuple(stages), *more)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import errno
+import os
 import sys
 from importlib import import_module
 from pathlib import Path
@@ -22,6 +23,9 @@ if TYPE_CHECKING:
 INTERRUPTED = 130  # the exit status that shells use for Ctrl-C
 PIPE_CLOSED = 141  # the exit status that shells use for a reader that closed the pipe
 
+THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "VECLIB_MAXIMUM_THREADS")
+"""Variables that BLAS libraries read when they are loaded."""
+
 COMMANDS = find_commands(Path(__file__).parent)
 """The commands by name, in the order of the help."""
 
@@ -40,11 +44,13 @@ class _OnDemand(TyperCommand):
 
     def _load(self) -> Command:
         module = import_module(f"{__name__}.{self._module}")
-        if hasattr(module, "app"):
-            return typer.main.get_command(module.app)
-        own = typer.Typer(add_completion=False, pretty_exceptions_enable=False)
-        own.command(self.name)(module.command)
-        return typer.main.get_command(own)
+        own = getattr(module, "app", None)
+        if own is None:
+            own = typer.Typer(add_completion=False, pretty_exceptions_enable=False)
+            own.command(self.name)(module.command)
+        command = typer.main.get_command(own)
+        command.epilog = "\n\n".join(["Examples:", *getattr(module, "EXAMPLES", ())])  # a paragraph each
+        return command
 
 
 class _Commands(TyperGroup):
@@ -96,6 +102,7 @@ def _product(
 
 def main() -> None:
     """Run the command line; an error that the user can correct is one message on standard error and an exit status."""
+    _one_thread()
     try:
         app()
     except TumblelineError as problem:
@@ -117,6 +124,15 @@ def main() -> None:
         from pipelines.cli.unexpected import write_report
 
         _leave(write_report(problem), UNEXPECTED)
+
+
+def _one_thread() -> None:
+    """One BLAS thread, unless the user has set another number: on small matrices threads wait for each other.
+
+    The libraries read the number when they are loaded, so it is set before a command imports numpy; child processes inherit it.
+    """
+    for name in THREADS:
+        os.environ.setdefault(name, os.environ.get("OMP_NUM_THREADS", "1"))
 
 
 def _leave(message: str, status: int) -> None:

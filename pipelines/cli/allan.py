@@ -34,6 +34,10 @@ if TYPE_CHECKING:
 PART = "Results"
 ORDER = 370
 SUMMARY = "Compute the Allan deviation of a record and its noise terms, with intervals."
+EXAMPLES = (
+    "tumbleline allan rest.csv --rate 100",
+    "tumbleline allan latest --plot allan.png",
+)
 
 SPACINGS = ("octave", "decade")
 

@@ -14,6 +14,10 @@ from schemas.counts import number_of
 PART = "Certificates, trace, audit"
 ORDER = 460
 SUMMARY = "Maintain the archive: the signing key, and leftovers of interrupted commands."
+EXAMPLES = (
+    "tumbleline archive clean --dry-run",
+    "tumbleline archive key --output signing.key",
+)
 
 app = typer.Typer(
     help="Maintain the archive.", no_args_is_help=True, add_completion=False, pretty_exceptions_enable=False

@@ -17,6 +17,10 @@ if TYPE_CHECKING:
 PART = "Certificates, trace, audit"
 ORDER = 450
 SUMMARY = "Audit the archive: drift, calibrations due, stations that changed, the population."
+EXAMPLES = (
+    "tumbleline audit --page audit.html",
+    "tumbleline audit --since 2026-01-01 --device ADXL355",
+)
 
 SHOWN = 12  # findings of one kind
 

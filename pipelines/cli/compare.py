@@ -30,6 +30,10 @@ if TYPE_CHECKING:
 PART = "Is the model good enough, and what is missing?"
 ORDER = 240
 SUMMARY = "Compare a model with dwells, and with a fresh run of the same units."
+EXAMPLES = (
+    "tumbleline compare latest --model model.toml",
+    "tumbleline compare dwells.csv --effects bias,scale,misalignment --fresh fresh.csv",
+)
 
 POSES = 6
 

@@ -20,6 +20,10 @@ if TYPE_CHECKING:
 PART = "Is the model good enough, and what is missing?"
 ORDER = 210
 SUMMARY = "Hide an effect in the simulated station, find it, add it and see the error fall."
+EXAMPLES = (
+    "tumbleline demo",
+    "tumbleline demo --effect pendulous_mass --seed 11 --by-hand",
+)
 
 
 def command(

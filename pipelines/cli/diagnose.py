@@ -27,9 +27,15 @@ if TYPE_CHECKING:
 
     import pandas as pd
 
+    from schemas.recipe import Recipe
+
 PART = "Is the model good enough, and what is missing?"
 ORDER = 220
 SUMMARY = "Judge whether a model is adequate, where it fails, and which effect is missing."
+EXAMPLES = (
+    "tumbleline diagnose latest",
+    "tumbleline diagnose dwells.csv --effects bias,scale,misalignment --report report.html",
+)
 
 
 def command(
@@ -46,6 +52,16 @@ def command(
             "--report", "--page", metavar="FILE.html", help="Write the diagnosis with pictures, as one HTML file."
         ),
     ] = None,
+    following: Annotated[
+        Path | None,
+        typer.Option("--next", metavar="FILE.toml", help="Write a recipe: the measured one and the proposed steps."),
+    ] = None,
+    recipe: Annotated[
+        str,
+        typer.Option(
+            "--recipe", metavar="RECIPE", help="Recipe of the dwells, for --next; a run of the archive has its own."
+        ),
+    ] = "",
     archive: ArchiveOption = None,
     *,
     as_json: JsonOption = False,
@@ -67,6 +83,7 @@ def command(
 
     add_effect_files(effect_file)
     add_formulas(formula, "diagnose")
+    base = measured_recipe(dwells, recipe, archive) if following is not None else None
     judged = judged_effects(dwells, archive, effects, model, "diagnose")
     table, temperatures = dwells_and_history(dwells, history, archive)
     table, left_out = without_dwells(table, leave_out)
@@ -75,6 +92,8 @@ def command(
     document["history"] = beside or None
     if report is not None:
         write_report(report, report_text)
+    if following is not None and base is not None:
+        write_next(following, document, base, Path(recipe).parent if recipe else Path(), dwells)
     if as_json:
         print_json(document)
     else:
@@ -107,6 +126,55 @@ def diagnosed(
         from pipelines.report.diagnosis import render_diagnosis
 
         return made.document, render_diagnosis(made.document, made.found, made.diagnosis, source, coefficients)
+
+
+def measured_recipe(dwells: str, recipe: str, archive: str | None) -> Recipe:
+    """The recipe that dwells were measured with: the one named, else the one of the run.
+
+    Raises
+    ------
+    WrongUse
+        Neither a file of dwells nor an import states its recipe, and none is named.
+    """
+    from pipelines.archive import Archive
+    from pipelines.importers.exchange import is_file
+    from pipelines.jobs.job import job_of_run
+    from pipelines.jobs.recipes import load_recipe
+    from schemas.errors import WrongUse
+
+    if recipe:
+        return load_recipe(recipe)
+    if is_file(dwells) or not Archive(archive).run(dwells).about.get("capture"):
+        raise WrongUse(
+            f"diagnose: --next needs the recipe that {dwells} was measured with (device, poses, soaks), which dwells do not "
+            "state; add --recipe FILE"
+        )
+    return job_of_run(Archive(archive).run(dwells)).recipe
+
+
+def write_next(path: Path, document: dict[str, Any], base: Recipe, home: Path, source: str) -> None:
+    """Write the proposed measurement as a recipe, and say where; nothing is written where no steps are proposed.
+
+    Parameters
+    ----------
+    document : the diagnosis
+    base : the recipe that the dwells were measured with; home : its folder
+    source : the dwells as they were named
+    """
+    from pipelines.archive import files
+    from pipelines.diagnosis.next_recipe import next_recipe, reasons
+    from pipelines.jobs.recipe_text import limits_from, recipe_text
+
+    out, rows = error_console(), document["next_measurements"]
+    if not reasons(rows):
+        out.print(f"next: no steps of the station are proposed; {path} is not written", markup=False, soft_wrap=True)
+        return
+    limits = limits_from(base.limits, home, path.parent)
+    recipe = next_recipe(base, rows, path.stem).model_copy(update={"limits": limits})
+    remarks = [f"Written by 'tumbleline diagnose --next' from {source}: recipe {base.name}, then", *reasons(rows)]
+    remarks += [f"without formula {formula.id}: name the model file with 'model'" for formula in base.formulas]
+    files.publish(path, recipe_text(recipe, remarks).encode(), "recipe", files.ELSEWHERE)
+    out.print(f"next: {path}; to see what it determines: tumbleline plan {path}", markup=False, soft_wrap=True)
 
 
 def write_report(path: Path, text: str) -> None:

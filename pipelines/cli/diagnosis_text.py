@@ -23,20 +23,22 @@ SMALL = 1.1
 """Errors below so many times the floor look like noise to whoever compares the two numbers."""
 
 
-def print_diagnosis(document: dict[str, Any], *, source: str, model: Path | None) -> None:
+def print_diagnosis(document: dict[str, Any], *, source: str, model: Path | None, next_command: bool = True) -> None:
     """Print a diagnosis.
 
     Parameters
     ----------
     source : the dwells as they were named on the command line
     model : the model file as it was given there
+    next_command : whether to print the commands that add the recommended effects
     """
     out = console()
     out.print(verdict(document), style=STYLE_OF[document["adequate"]], soft_wrap=True)
     print_evidence(document)
     print_findings(document)
     _unexplained(out, document, model)
-    _next_command(out, document, source, model)
+    if next_command:
+        _next_command(out, document, source, model)
     _unseen(document)
     from pipelines.cli.measurements_text import measurements_table
 
@@ -244,7 +246,7 @@ def _next_command(out: Console, document: dict[str, Any], source: str, model: Pa
         return
     from pipelines.jobs.model_files import STARTING_MODEL
 
-    file = str(model or _free_name())
+    file = str(model or free_name())
     judged = ",".join(document["effects"])
     start = "" if (model and model.exists()) or judged == ",".join(STARTING_MODEL) else f" --effects {judged}"
     history = f" --history {document['history']}" if document.get("history") else ""
@@ -266,7 +268,7 @@ def _next_command(out: Console, document: dict[str, Any], source: str, model: Pa
         )
 
 
-def _free_name() -> str:
+def free_name() -> str:
     """A name for a new model file: one that is there belongs to another model."""
     from pathlib import Path
 

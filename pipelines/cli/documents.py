@@ -7,7 +7,7 @@ from typing import Annotated, Any, Literal, NotRequired
 from typing_extensions import TypedDict
 
 from pipelines.capture.interruptions import Interruptions
-from pipelines.diagnosis.documents import LeaveOut, VerdictEvidence
+from pipelines.diagnosis.documents import DiagnosisDocument, LeaveOut, VerdictEvidence
 
 
 class FigureDocument(TypedDict):
@@ -73,6 +73,10 @@ class ListedRun(TypedDict):
     started: Annotated[str, "ISO date and time, UTC"]
     finished: bool
     stages: list[str]
+    station: NotRequired[Annotated[str, "its name; empty for an import"]]
+    rerun_of: NotRequired[Annotated[str, "the run that it computes again; empty for others"]]
+    passed: NotRequired[Annotated[int | None, "units that passed; null before the grades are there"]]
+    graded: NotRequired[Annotated[int | None, "units with a decision; null before the grades are there"]]
 
 
 class ListDocument(TypedDict):
@@ -80,6 +84,50 @@ class ListDocument(TypedDict):
 
     archive: str
     runs: list[ListedRun]
+
+
+class ImprovementChoice(TypedDict):
+    """The decision on one class of the diagnosis."""
+
+    effect: str
+    not_separated_from: Annotated[list[str], "effects of the class that these data do not separate from it"]
+    decided_by: Annotated[
+        Literal["question", "--effect", "--yes", "undecided"], "`undecided`: a class of several, without an answer"
+    ]
+    added: bool
+
+
+class LadderRow(TypedDict):
+    """The errors of one version of the model."""
+
+    version: int
+    added: list[str]
+    fitted_ug: Annotated[float, "residual of the fit, µg"]
+    heldout_ug: Annotated[float | None, "worst cross-validated error of poses, soaks and blocks of time, µg"]
+    fresh_ug: Annotated[float | None, "error on the fresh run, µg; null without `--fresh`"]
+    noise_ug: Annotated[float, "noise of the measurement by the last diagnosis, µg"]
+    fall_ug: Annotated[float | None, "decrease of the error by what was added, µg"]
+    fall_u_ug: Annotated[float | None, "standard uncertainty of the decrease, µg"]
+    confirmed: Annotated[bool | None, "whether data that were not fitted confirm the change; null: cannot be decided"]
+    text: Annotated[str, "`confirmed` as a sentence"]
+    warnings: list[str]
+
+
+class ImproveDocument(TypedDict):
+    """``improve --json``: diagnosis of a model, effects added to it, and the error of each version."""
+
+    data: str
+    file: Annotated[str | None, "the model file; null: none was given and none written"]
+    diagnosis: Annotated[DiagnosisDocument, "of the model to begin with"]
+    choices: Annotated[list[ImprovementChoice], "one per class with a recommended effect"]
+    added: list[str]
+    effects: Annotated[list[str], "the resulting model"]
+    after: Annotated[DiagnosisDocument | None, "of the resulting model; null: nothing was added"]
+    adequate: Annotated[bool | None, "whether the resulting model is adequate; null: cannot be judged"]
+    ladder: Annotated[list[LadderRow], "oldest version first; empty if no unit can be judged"]
+    refuted: Annotated[list[str], "added effects that the fresh run is evidence against"]
+    warnings: list[str]
+    next: Annotated[list[str], "commands to give next"]
 
 
 class RunProvenance(TypedDict):

@@ -13,6 +13,10 @@ from pipelines.cli.options import ArchiveOption, JsonOption, RunArgument, error_
 PART = "Results"
 ORDER = 340
 SUMMARY = "Write coefficients for firmware and autopilots."
+EXAMPLES = (
+    "tumbleline export latest --format c --output calibration.h",
+    "tumbleline export latest --format json --units SN1",
+)
 
 _FOLDER = Path(__file__).parent.parent / "export" / "formats"
 _NAMES = ", ".join(found.name for found in iter_modules([str(_FOLDER)]))  # their names, without importing them

@@ -1,18 +1,25 @@
-"""``tumbleline extend``: the next version of a model, with one more effect; it records who added it, when and why."""
+"""``tumbleline extend``: the next version of a model, one effect added or removed, and who changed it, when and why."""
 
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from pipelines.cli.options import EffectFileOption, JsonOption, console, print_json
 from schemas.errors import WrongUse
 
+if TYPE_CHECKING:
+    from pipelines.jobs.model_files import ModelStep
+
 PART = "Is the model good enough, and what is missing?"
 ORDER = 230
-SUMMARY = "Write the next version of a model with one more effect."
+SUMMARY = "Write the next version of a model: one effect more, or one removed."
+EXAMPLES = (
+    "tumbleline extend model.toml third_order --why 'the diagnosis names it'",
+    "tumbleline extend model.toml --remove third_order --why 'not seen in the fresh run'",
+)
 
 
 def command(
@@ -22,13 +29,21 @@ def command(
     effect: Annotated[
         str,
         typer.Argument(
-            metavar="EFFECT",
-            help="Id of an effect in the catalogue, covariate:<column>, or a formula in an effect file.",
+            metavar="[EFFECT]",
+            help="Effect to add: an id of the catalogue, covariate:<column>, or a formula of the file.",
         ),
-    ],
-    why: Annotated[str, typer.Option("--why", metavar="TEXT", help="Reason for the effect.")] = "",
-    by: Annotated[str, typer.Option("--by", metavar="NAME", help="Name of the author; default: the user's name.")] = "",
-    run: Annotated[str, typer.Option("--run", metavar="RUN", help="The run or file that shows the effect.")] = "",
+    ] = "",
+    remove: Annotated[
+        str,
+        typer.Option("--remove", metavar="EFFECT", help="Effect to remove instead; earlier versions stay in the file."),
+    ] = "",
+    why: Annotated[
+        str, typer.Option("--why", metavar="TEXT", help="Reason for the change; needed with --remove.")
+    ] = "",
+    by: Annotated[
+        str, typer.Option("--by", metavar="NAME", help="Author of the change; the user's name by default.")
+    ] = "",
+    run: Annotated[str, typer.Option("--run", metavar="RUN", help="The run or file that showed it.")] = "",
     output: Annotated[
         Path | None,
         typer.Option("--out", "-o", metavar="FILE", help="Write the new version to this file; MODEL is not changed."),
@@ -43,25 +58,28 @@ def command(
     *,
     as_json: JsonOption = False,
 ) -> None:
-    """Write the next version of a model with one more effect; it records who added it, when and why.
+    """Write the next version of a model with one effect more or less, and who changed it, when and why.
 
-    Where MODEL does not exist, it is created: version 1 has the starting model, version 2 the effect as well.
+    MODEL that is not there yet is begun: version 1 holds the starting model, version 2 the effect. A removed effect stays in the
+    history of the file, with the reason.
     """
     from pipelines.cli.inputs import add_effect_files
-    from pipelines.jobs.model_files import extended, publish_model
+    from pipelines.jobs.model_files import extended, publish_model, reduced
 
+    _refuse_contradiction(model, effect, remove, why)
     add_effect_files(effect_file)
-    step = _step(effect, why, by, run)
+    step = model_step(remove or effect, why, by, run)
     text, begun = _start(model, effects, step)
-    new, after = extended(text, step, f"model {model.name}")
+    new, after = (reduced if remove else extended)(text, step, f"model {model.name}")
     target = output or model
     publish_model(target, new)
-    document: dict[str, Any] = {
+    document = {
         "file": str(target),
         "model": after.model.name,
         "version": after.model.version,
         "effects": after.model.effects,
-        "added": effect,
+        "added": effect or None,
+        "removed": remove or None,
         "begun": begun,
         "by": step.by,
         "at": step.at.isoformat(),
@@ -74,11 +92,29 @@ def command(
     if begun:
         first = ", ".join(e for e in after.model.effects if e != effect)
         out.print(f"{target}: begun with version 1: {first}", markup=False, soft_wrap=True)
-    out.print(f"{target}: version {after.model.version} has {effect} ({step.why})", markup=False, soft_wrap=True)
+    change = f"is without {step.effect}" if remove else f"has {step.effect}"
+    out.print(f"{target}: version {after.model.version} {change} ({step.why})", markup=False, soft_wrap=True)
 
 
-def _step(effect: str, why: str, by: str, run: str) -> Any:
-    """The change to make; missing values are filled in from the run."""
+def _refuse_contradiction(model: Path, effect: str, remove: str, why: str) -> None:
+    """Refuse a change that is none, two, or a removal without a reason or a model."""
+    if bool(effect.strip()) == bool(remove.strip()):
+        found = "EFFECT and --remove are both given" if effect.strip() else "no effect is given"
+        raise WrongUse(
+            f"extend: {found}, one effect is needed; give 'extend {model} EFFECT' to add it, or 'extend {model} --remove EFFECT "
+            "--why TEXT' to remove it"
+        )
+    if remove and not why.strip():
+        raise WrongUse(
+            f"extend: --remove {remove} has no reason, the history needs one; add --why TEXT, such as the verdict of 'tumbleline "
+            f"history {model}'"
+        )
+    if remove and not model.exists():
+        raise WrongUse(f"extend: {model} does not exist, --remove needs a model file; correct the name")
+
+
+def model_step(effect: str, why: str, by: str, run: str) -> ModelStep:
+    """The change to make, missing values are filled in from the run."""
     import getpass
     from datetime import UTC, datetime
 
@@ -89,8 +125,8 @@ def _step(effect: str, why: str, by: str, run: str) -> Any:
     return ModelStep(effect.strip(), by.strip() or getpass.getuser(), at, reason, run)
 
 
-def _start(model: Path, effects: str, step: Any) -> tuple[str, bool]:
-    """The text to extend, and whether the file is new."""
+def _start(model: Path, effects: str, step: ModelStep) -> tuple[str, bool]:
+    """The text to extend, and whether it was begun just now."""
     from pipelines.jobs.model_files import STARTING_MODEL, model_text, new_model
 
     if model.exists():

@@ -20,6 +20,10 @@ from schemas.errors import WrongUse
 PART = "Old data, new models"
 ORDER = 510
 SUMMARY = "Fit archived data again, with another model or other limits."
+EXAMPLES = (
+    "tumbleline fit latest --effects bias,scale,misalignment,third_order",
+    "tumbleline fit latest --limits industrial",
+)
 
 
 def command(

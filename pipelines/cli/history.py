@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -24,6 +25,10 @@ from pipelines.cli.options import (
 PART = "Is the model good enough, and what is missing?"
 ORDER = 250
 SUMMARY = "Show the error of a model, version by version."
+EXAMPLES = (
+    "tumbleline history model.toml",
+    "tumbleline history model.toml --dwells dwells.csv --fresh fresh.csv --picture history.png",
+)
 
 
 def command(
@@ -70,7 +75,7 @@ def command(
     if as_json:
         print_json({"model": found.model.name, "file": str(model), "versions": rows})
     else:
-        _print(rows, found.model.name)
+        _print(rows, found.model.name, model)
 
 
 def _refuse_picture(picture: Path | None, dwells: str) -> None:
@@ -86,7 +91,7 @@ def _refuse_picture(picture: Path | None, dwells: str) -> None:
         )
 
 
-def _print(rows: list[dict[str, Any]], name: str) -> None:
+def _print(rows: list[dict[str, Any]], name: str, file: Path) -> None:
     out = console()
     changes = [
         [str(row["version"]), _change(row), row["by"], row["at"][:16].replace("T", " "), row["why"]] for row in rows
@@ -125,6 +130,14 @@ def _print(rows: list[dict[str, Any]], name: str) -> None:
             style="bold red",
             soft_wrap=True,
         )
+        for effect in (effect for effect in refuted if effect in rows[-1]["effects"]):
+            out.print(f"  {removal(file, effect)}", markup=False, soft_wrap=True)
+
+
+def removal(file: Path, effect: str) -> str:
+    """The command that removes an effect which a fresh run refutes."""
+    words = ["tumbleline", "extend", str(file), "--remove", effect, "--why", "the fresh run is evidence against it"]
+    return shlex.join(words)
 
 
 def _change(row: dict[str, Any]) -> str:

@@ -27,6 +27,10 @@ if TYPE_CHECKING:
 PART = "Measure"
 ORDER = 160
 SUMMARY = "Import recordings of other systems into the archive."
+EXAMPLES = (
+    "tumbleline import acc.csv --map time=t,x=ax,y=ay,z=az --units output=LSB --unit SN1",
+    "tumbleline import acc.csv --mapping columns.toml --fit norm",
+)
 
 METHODS = ("norm", "faces", "temperature")
 VERDICTS = {

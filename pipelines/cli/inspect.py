@@ -17,6 +17,10 @@ if TYPE_CHECKING:
 PART = "Measure"
 ORDER = 155
 SUMMARY = "Look at recordings of other systems and propose how to import them."
+EXAMPLES = (
+    "tumbleline inspect recording.csv",
+    "tumbleline inspect part-1.csv part-2.csv --join rows",
+)
 
 MOST_INTERVALS, MOST_FAULTS = 12, 6
 PICTURES = (".svg", ".png", ".pdf")

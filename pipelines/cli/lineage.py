@@ -13,6 +13,10 @@ from schemas.counts import number_of
 PART = "Certificates, trace, audit"
 ORDER = 430
 SUMMARY = "Show the origin of certificates, tables and samples, and the results made from them."
+EXAMPLES = (
+    "tumbleline lineage latest",
+    "tumbleline lineage SN1 --prov sn1.jsonld",
+)
 
 
 def command(

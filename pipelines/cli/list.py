@@ -3,12 +3,20 @@
 from __future__ import annotations
 
 from dataclasses import asdict
+from typing import TYPE_CHECKING
 
 from pipelines.cli.options import ArchiveOption, JsonOption, console, print_json, print_table
+
+if TYPE_CHECKING:
+    from pipelines.archive import RunInfo
 
 PART = "Results"
 ORDER = 310
 SUMMARY = "List the runs of the archive."
+EXAMPLES = (
+    "tumbleline list",
+    "tumbleline list --json",
+)
 
 
 def command(archive: ArchiveOption = None, *, as_json: JsonOption = False) -> None:
@@ -23,11 +31,29 @@ def command(archive: ArchiveOption = None, *, as_json: JsonOption = False) -> No
     if not infos:
         console().print(f"no run in {store.root}; make one with 'tumbleline run'", markup=False)
         return
-    lines = [
-        [i.id, i.started[:19].replace("T", " "), i.device, _units(i.units), "yes" if i.finished else "no"]
-        for i in infos
-    ]
-    print_table(["run", "started (UTC)", "device", "units", "finished"], lines, title=f"archive {store.root}")
+    out = console()
+    out.print(f"{plural(len(infos), 'run')} in archive {store.root}", markup=False, soft_wrap=True)
+    print_table(["run", "started (UTC)", "station", "passed", "units"], [_line(info) for info in infos])
+    for info in infos:
+        if info.rerun_of:
+            out.print(f"{info.id} is a re-run of {info.rerun_of}", markup=False, soft_wrap=True)
+
+
+def plural(count: int, noun: str) -> str:
+    """A number with its noun."""
+    return f"{count} {noun}" if count == 1 else f"{count} {noun}s"
+
+
+def _line(info: RunInfo) -> list[str]:
+    started = info.started[:16].replace("T", " ")
+    return [info.id, started, info.station or "import", _result(info), f"{_units(info.units)}, {info.device}"]
+
+
+def _result(info: RunInfo) -> str:
+    """The number of units that passed, or how far the run is."""
+    if info.graded is not None and info.finished:
+        return f"{info.passed} of {info.graded}"
+    return "not graded" if info.finished else "unfinished"
 
 
 def _units(units: tuple[str, ...]) -> str:

@@ -32,6 +32,10 @@ if TYPE_CHECKING:
 PART = "Measure"
 ORDER = 120
 SUMMARY = "Show what a recipe can and cannot determine, before anything is measured."
+EXAMPLES = (
+    "tumbleline plan my.toml",
+    "tumbleline plan optimise my.toml",
+)
 
 RAISED = 3.0
 """Factor by which 1/f and random walk must raise a floor to be listed."""

@@ -33,6 +33,10 @@ if TYPE_CHECKING:
 PART = "Results"
 ORDER = 375
 SUMMARY = "Compute the power spectral density of a record, and the Allan deviation from it."
+EXAMPLES = (
+    "tumbleline psd rest.csv --rate 100",
+    "tumbleline psd latest --plot psd.png",
+)
 
 SHORTEST_SEGMENT = 64
 SHORTEST_TAU = 8

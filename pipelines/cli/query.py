@@ -15,6 +15,10 @@ from schemas.errors import WrongUse
 PART = "Results"
 ORDER = 350
 SUMMARY = "Query the archive in SQL."
+EXAMPLES = (
+    "tumbleline query 'SELECT station, count(*) AS runs FROM runs GROUP BY station'",
+    "tumbleline query 'SELECT * FROM units' --csv",
+)
 
 MANY = 100
 

@@ -17,6 +17,10 @@ if TYPE_CHECKING:
 PART = "Old data, new models"
 ORDER = 550
 SUMMARY = "Release a model to the line from a date, or list the releases."
+EXAMPLES = (
+    "tumbleline release model.toml --from 2026-01-01 --reason 'the error on fresh runs falls'",
+    "tumbleline release --list",
+)
 
 
 def command(

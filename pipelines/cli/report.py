@@ -9,6 +9,10 @@ from pipelines.cli.options import ArchiveOption, JsonOption, RunArgument, print_
 PART = "Results"
 ORDER = 330
 SUMMARY = "Print the path of a run's report; write the report if it is missing."
+EXAMPLES = (
+    "tumbleline report latest",
+    "tumbleline report line-six --archive archive",
+)
 
 
 def command(run: RunArgument = "latest", archive: ArchiveOption = None, *, as_json: JsonOption = False) -> None:

@@ -35,6 +35,10 @@ if TYPE_CHECKING:
 PART = "Old data, new models"
 ORDER = 520
 SUMMARY = "Re-analyse archived runs with the present code, another model or other limits."
+EXAMPLES = (
+    "tumbleline rerun all --check",
+    "tumbleline rerun device:adxl355 since:2026-01-01 --model model.toml",
+)
 
 SHOWN = 40
 

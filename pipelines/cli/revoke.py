@@ -11,6 +11,10 @@ from pipelines.cli.options import ArchiveOption, JsonOption, console, print_json
 PART = "Certificates, trace, audit"
 ORDER = 420
 SUMMARY = "Revoke the calibration of a unit, with the reason."
+EXAMPLES = (
+    "tumbleline revoke SN1 --reason 'fell to the floor'",
+    "tumbleline revoke SN1 --certificate 2 --reason 'reference out of date'",
+)
 
 
 def command(

@@ -30,6 +30,10 @@ if TYPE_CHECKING:
 PART = "Measure"
 ORDER = 110
 SUMMARY = "Measure and calibrate a lot, from recipe to report: the main job."
+EXAMPLES = (
+    "tumbleline run my.toml --units SN1,SN2,SN3",
+    "tumbleline run my.toml --station line-1.toml --units lot-17.csv",
+)
 
 
 def command(

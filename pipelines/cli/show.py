@@ -25,6 +25,10 @@ if TYPE_CHECKING:
 PART = "Results"
 ORDER = 320
 SUMMARY = "Show a run, one of its tables, or the calibration of a unit that is valid on a date."
+EXAMPLES = (
+    "tumbleline show latest coefficients",
+    "tumbleline show SN1 --at 2026-03-01",
+)
 
 MANY = 40
 

@@ -21,6 +21,10 @@ if TYPE_CHECKING:
 PART = "Measure"
 ORDER = 150
 SUMMARY = "Show, check, serve and describe stations."
+EXAMPLES = (
+    "tumbleline station status --station line-1.toml",
+    "tumbleline station check --station line-1.toml",
+)
 
 SHORT = {"read": "r", "write": "w", "read_write": "rw"}
 

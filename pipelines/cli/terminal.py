@@ -49,17 +49,27 @@ def scanned(slots: int) -> Seating:
     return seating
 
 
-def agreed(question: str) -> bool:
-    """Whether the operator at the terminal answers yes; Enter alone is yes, after any other answer the question is repeated."""
+MEASURES = "y or Enter measures it, n leaves it; Ctrl-C stops, and the same command continues"
+UNATTENDED = (
+    "operator: standard input ended before an answer, a line is needed; run without an operator with --no-prompts"
+)
+
+
+def agreed(question: str, choices: str = MEASURES, unattended: str = UNATTENDED) -> bool:
+    """The answer at the terminal to a question: Enter alone is yes; an answer that is neither yes nor no repeats the question.
+
+    Parameters
+    ----------
+    choices : what the answers do
+    unattended : the error where standard input ends before an answer
+    """
     while True:
-        answer = _line(f"{question} [Y/n] ").lower()
+        answer = _line(f"{question} [Y/n] ", unattended).lower()
         if answer in YES:
             return True
         if answer in STOP:
             return False
-        message = (
-            f"'{answer}' is neither yes nor no: y or Enter measures it, n does not; Ctrl-C stops, the command continues"
-        )
+        message = f"'{answer}' is neither yes nor no: {choices}"
         error_console().print(message, style="yellow", markup=False, soft_wrap=True)
 
 
@@ -68,12 +78,10 @@ def attended() -> bool:
     return sys.stdin.isatty() and sys.stderr.isatty()
 
 
-def _line(question: str) -> str:
+def _line(question: str, unattended: str = UNATTENDED) -> str:
     """A line of standard input; its end is an error."""
-    error_console().print(question, end="", markup=False)
+    error_console().print(question, end="", markup=False, soft_wrap=True)
     line = sys.stdin.readline()
     if not line:
-        raise WrongUse(
-            "operator: standard input ended before an answer, a line is needed; run without an operator with --no-prompts"
-        )
+        raise WrongUse(unattended)
     return line.strip()

@@ -18,6 +18,10 @@ if TYPE_CHECKING:
 PART = "Certificates, trace, audit"
 ORDER = 440
 SUMMARY = "Check every hash of the archive: find changed, edited or missing files."
+EXAMPLES = (
+    "tumbleline verify",
+    "tumbleline verify latest",
+)
 
 
 def command(

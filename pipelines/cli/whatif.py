@@ -30,6 +30,10 @@ if TYPE_CHECKING:
 PART = "Old data, new models"
 ORDER = 540
 SUMMARY = "Show the effect of a model on the archive's lots before it is released."
+EXAMPLES = (
+    "tumbleline whatif model.toml",
+    "tumbleline whatif model.toml device:adxl355",
+)
 
 SHOWN = 12
 

@@ -14,6 +14,10 @@ from schemas.errors import WrongUse
 PART = "Is the model good enough, and what is missing?"
 ORDER = 205
 SUMMARY = "Show the archive, the model and what is missing in a browser."
+EXAMPLES = (
+    "tumbleline workbench",
+    "tumbleline workbench archive --port 8765",
+)
 
 PATIENCE_S = 2  # open streams would hold up the end of the server
 

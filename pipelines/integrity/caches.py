@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import astuple
 from typing import TYPE_CHECKING
 
 from pipelines.archive import Run, derived
-from pipelines.archive.listing import info_of, line_of, noted_lines, stamp_of
+from pipelines.archive.listing import agrees, info_of, noted_lines, stamp_of
 from pipelines.certificates.entries import FOLDER
 from pipelines.certificates.ledger_index import DIGITS, NOTED, all_read, noted_events, stamps_of
 from pipelines.integrity.findings import CHANGED
@@ -33,7 +32,7 @@ def check_list(archive: Archive, checked: CheckedPart) -> None:
             info = info_of(run)
         except (ArchiveUnusable, KeyError, TypeError):  # the check of the run reports it
             continue
-        if info is None or astuple(info) != astuple(line_of(line)):
+        if info is None or not agrees(info, line):
             checked.wrong(CHANGED, place, f"disagrees with the files of run {name}: {REMEDY}")
 
 

@@ -12,7 +12,7 @@ from inertial import effects
 from inertial.effects.formula import Formula
 from inertial.errors import InertialError, UnknownEffect
 from pipelines.archive import files
-from schemas.errors import RecipeInvalid, WrongUse, did_you_mean
+from schemas.errors import RecipeInvalid, WrongUse, close_matches, did_you_mean
 from schemas.foreign import foreign, shown
 from schemas.model import load_model, parse_model
 from schemas.recipe import FormulaSpec, read_text
@@ -33,7 +33,7 @@ STARTING_MODEL = ("bias", "scale", "misalignment", "bias_temperature", "scale_te
 
 @dataclass(frozen=True)
 class ModelStep:
-    """One more effect: author, time, reason, and the run or file that shows it."""
+    """One effect added or removed: author, time, reason, and the run or file that shows it."""
 
     effect: str
     by: str
@@ -168,12 +168,46 @@ def extended(text: str, step: ModelStep, source: str) -> tuple[str, ModelFile]:
             key="model.effects",
         )
     refuse_unknown_effects([step.effect], source)
+    return _next_version(text, model, step, source)
+
+
+def reduced(text: str, step: ModelStep, source: str) -> tuple[str, ModelFile]:
+    """The text of the next version of a model without an effect, its comments kept, and the model as it then is.
+
+    Raises
+    ------
+    RecipeInvalid
+        The text is no model, the effect is not in it, or it is the only one.
+    """
+    model = parse_model(text, source)
+    _use(model, source)
+    present = model.model.effects
+    if step.effect not in present:
+        raise RecipeInvalid(
+            f"{source}: '{shown(step.effect)}' is not in version {model.model.version}, only an effect of the model can be "
+            f"removed; {did_you_mean(step.effect, present)}",
+            key="model.effects",
+            close=close_matches(step.effect, present),
+        )
+    if len(present) == 1:
+        raise RecipeInvalid(
+            f"{source}: '{step.effect}' is the only effect of version {model.model.version}, a model needs one at least; "
+            "add another effect first",
+            key="model.effects",
+        )
+    return _next_version(text, model, step, source)
+
+
+def _next_version(text: str, model: ModelFile, step: ModelStep, source: str) -> tuple[str, ModelFile]:
+    """The next version: without the effect where the model has it, with it where it does not."""
     with foreign(f"{source}: not valid TOML", "correct the file", RecipeInvalid):
         document = tomlkit.parse(text)
     head = document["model"]
     version = model.model.version + 1
     head["version"] = version  # pyright: ignore[reportIndexIssue]
-    head["effects"].append(step.effect)  # pyright: ignore[reportIndexIssue, reportAttributeAccessIssue, reportUnknownMemberType]
+    listed = head["effects"]  # pyright: ignore[reportIndexIssue, reportUnknownVariableType]
+    change = listed.remove if step.effect in model.model.effects else listed.append  # pyright: ignore[reportAttributeAccessIssue, reportUnknownMemberType, reportUnknownVariableType]
+    change(step.effect)
     changes = document.setdefault("change", tomlkit.aot())
     if not model.change:
         known = {

@@ -1,6 +1,7 @@
 """Every command that is found: it is in the help, explains itself and its options, and is named in the documents."""
 
 import re
+import shlex
 from collections import Counter
 from collections.abc import Iterator
 from importlib import import_module
@@ -46,6 +47,31 @@ def test_a_command_explains_itself_and_every_option(name: str) -> None:
     for leaf in leaves(get_command(app).get_command(None, name)._load()):
         assert leaf.help, leaf.name
         assert [p.name for p in leaf.params if not getattr(p, "help", None)] == [], leaf.name
+
+
+@pytest.mark.parametrize("name", COMMANDS)
+def test_the_help_of_a_command_shows_two_examples_with_options_that_exist(name: str) -> None:
+    examples = import_module(f"pipelines.cli.{COMMANDS[name].module}").EXAMPLES
+    assert len(set(examples)) == 2
+    text = CliRunner().invoke(app, [name, "--help"], env={"COLUMNS": "160"}).stdout
+    for example in examples:
+        assert example in text
+        words = shlex.split(example)
+        assert words[:2] == ["tumbleline", name]
+        command, rest = meant(get_command(app).get_command(None, name)._load(), words[2:])
+        options = {option: p for p in command.params for option in (*p.opts, *p.secondary_opts)}
+        assert {word for word in rest if word.startswith("--")} <= set(options)
+        command.make_context(name, rest)  # parses: every argument and value is of its kind
+
+
+def meant(command: object, rest: list[str]) -> tuple[TyperCommand, list[str]]:
+    """The subcommand that words begin with, or the usual one of the group, and the words after it."""
+    below = getattr(command, "commands", {})
+    if not below:
+        return command, rest
+    if rest and rest[0] in below:
+        return below[rest[0]], rest[1:]
+    return below[command.usual], rest
 
 
 @pytest.mark.parametrize("name", COMMANDS)

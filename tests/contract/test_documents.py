@@ -24,6 +24,7 @@ CASES = {
     "plan --json": ["plan"],
     "station status --json": ["station", "status"],
     "diagnose --json": ["diagnose", "latest", "--effects", MODEL],
+    "improve --json": ["improve", "latest", "--effects", MODEL, "--out", "{folder}/new.toml", "--yes"],
     "compare --json": ["compare", "latest", "--fresh", "latest"],
     "history --json": ["history", "{folder}/model.toml", "--dwells", "latest"],
     "list --json": ["list"],

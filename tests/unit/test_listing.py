@@ -5,9 +5,11 @@ import os
 import time
 from pathlib import Path
 
+import pandas as pd
 import pytest
 
-from pipelines.archive import Archive, Run, RunInfo, listing
+from pipelines.archive import Archive, Run, RunInfo, derived, files, listing
+from pipelines.archive.keys import digest
 from pipelines.archive.run_files import stages_of
 
 LOTS = 40
@@ -18,7 +20,11 @@ def archive(tmp_path: Path) -> Archive:
     """An archive of runs that were begun long ago, one of them finished."""
     store = Archive(tmp_path / "archive")
     for n in range(LOTS):
-        about = {"recipe": {"name": "line"}, "lot": {"device": "ADXL355", "units": [{"serial": f"S{n}", "slot": 0}]}}
+        about = {
+            "station": {"name": "st-1"},
+            "recipe": {"name": "line"},
+            "lot": {"device": "ADXL355", "units": [{"serial": f"S{n}", "slot": 0}]},
+        }
         run = store.open_run("line", about, n)
     (run.path / "report.html").write_text("")
     for path in (tmp_path / "archive" / "runs").iterdir():
@@ -73,3 +79,29 @@ def test_a_sealed_run_tells_its_stages_from_one_file(tmp_path: Path, monkeypatch
     info = listing.info_of(run)
     assert isinstance(info, RunInfo)
     assert list(info.stages) == wanted
+
+
+def test_a_line_of_an_older_version_is_read_again_and_is_no_edit(archive: Archive) -> None:
+    archive.runs()
+    place = archive.root / "index" / "list.json"
+    content = json.loads(place.read_text())
+    older = {name: [stamp, line[:7]] for name, (stamp, line) in content["runs"].items()}
+    files.publish(place, files.json_bytes({"runs": older, "seal": derived.seal({"runs": digest(older)})}))
+    name, (_, line) = next(iter(older.items()))
+    info = listing.info_of(Run(archive, name))
+    assert info is not None
+    assert listing.agrees(info, line)
+    assert not listing.agrees(info, [*line[:2], "another device", *line[3:]])
+    assert all(info.station == "st-1" for info in archive.runs())  # not in the older lines
+
+
+def test_a_graded_run_tells_how_many_units_passed_and_a_spoilt_table_nothing(archive: Archive) -> None:
+    run = Run(archive, archive.runs()[0].id)
+    pd.DataFrame({"unit": ["A", "B", "C"], "outcome": ["pass", "fail", "pass"]}).to_parquet(run.path / "grades.parquet")
+    info = listing.info_of(run)
+    assert info is not None
+    assert (info.passed, info.graded) == (2, 3)
+    (run.path / "grades.parquet").write_bytes(b"PAR1 half")
+    info = listing.info_of(run)
+    assert info is not None
+    assert (info.passed, info.graded) == (None, None)
