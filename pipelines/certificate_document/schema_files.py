@@ -9,7 +9,7 @@ from typing import Any
 from pipelines.importers.library import library
 from schemas.errors import TumblelineError
 
-EXTRA, WHERE = "certificates", "certificate"
+EXTRA, WHERE = "pdf", "certificate"
 SI_ADDRESS = "https://ptb.de/si/v2.0.0/SI_Format.xsd"
 
 

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from io import BytesIO
 from typing import TYPE_CHECKING, Any
 
+from cryptography.hazmat.primitives.asymmetric import ec
 from cryptography.hazmat.primitives.serialization import (
     Encoding,
     NoEncryption,
@@ -96,7 +97,7 @@ def sign_xml(document: bytes, key: SigningKey) -> bytes:
     etree = library("lxml.etree", EXTRA, WHERE)
     chain = [one.public_bytes(Encoding.PEM).decode() for one in (key.certificate, *key.chain)]
     private = key.key.private_bytes(Encoding.PEM, PrivateFormat.PKCS8, NoEncryption())
-    algorithm = "ecdsa-sha256" if "EllipticCurve" in type(key.key).__name__ else "rsa-sha256"
+    algorithm = "ecdsa-sha256" if isinstance(key.key, ec.EllipticCurvePrivateKey) else "rsa-sha256"
     signer = signxml.XMLSigner(
         method=signxml.methods.enveloping, signature_algorithm=algorithm, digest_algorithm="sha256"
     )

@@ -31,6 +31,7 @@ from schemas.errors import RecipeInvalid, WrongUse
 etree = pytest.importorskip("lxml.etree")
 pytest.importorskip("typst")
 pikepdf = pytest.importorskip("pikepdf")
+pdfplumber = pytest.importorskip("pdfplumber")
 
 Typed = Callable[..., Result]
 NAMES = {"dcc": DCC, "si": SI}
@@ -94,8 +95,8 @@ def content(run: Run, serial: str = "A1", text: str = LABORATORY) -> Certificate
 
 def text_of(document: bytes) -> list[str]:
     """The text of every page, by a program that is not the one that wrote it."""
-    pymupdf = pytest.importorskip("pymupdf")
-    return [page.get_text() for page in pymupdf.open(stream=document, filetype="pdf")]
+    with pdfplumber.open(BytesIO(document)) as pages:
+        return [page.extract_text() for page in pages.pages]
 
 
 def test_a_run_gives_a_pdf_and_an_xml_per_certified_unit_and_names_those_without(
@@ -263,16 +264,14 @@ def test_a_long_serial_and_three_pages_of_coefficients_stay_on_the_paper(run: Ru
     c = content(run).model_copy(
         update={"serial": serial, "number": f"{serial}/1", "coefficients": rows, "references": (reference,)}
     )
-    document = pdf(c, dcc(c))
-    pymupdf = pytest.importorskip("pymupdf")
     with_heads = 0
-    for page in pymupdf.open(stream=document, filetype="pdf"):
-        words = page.get_text("words")
-        assert max(word[2] for word in words) < page.rect.width - 40.0  # nothing runs into the margin of 20 mm = 57 pt
-        assert f"{serial}/1" in page.get_text().replace("\n", "")
-        text = page.get_text()
-        if "bias temperature quadratic" in text:
-            with_heads += "standard uncertainty of noise" in " ".join(text.split())
+    with pdfplumber.open(BytesIO(pdf(c, dcc(c)))) as pages:
+        for page in pages.pages:
+            assert max(word["x1"] for word in page.extract_words()) < page.width - 40.0  # the margin is 20 mm = 57 pt
+            text = " ".join(page.extract_text().split())
+            assert f"{serial}/1" in text
+            if "bias temperature quadratic" in text:
+                with_heads += "standard uncertainty of noise" in text
     assert with_heads >= 3
 
 
@@ -333,3 +332,29 @@ def test_a_laboratory_file_with_a_slip_is_refused(laboratory: Path) -> None:
             read_laboratory(laboratory)
     with pytest.raises(WrongUse, match=r"is not there, one with \[laboratory\]"):
         read_laboratory(laboratory.parent / "none.toml")
+
+
+def test_certificates_are_signed_on_request_and_stay_valid(run: Run, typed: Typed, tmp_path: Path) -> None:
+    pytest.importorskip("pyhanko")
+    signxml = pytest.importorskip("signxml")
+    from cryptography.hazmat.primitives.asymmetric import ec
+    from cryptography.hazmat.primitives.serialization import Encoding
+    from signing_keys import made_key, pem
+
+    signing = made_key(ec.generate_private_key(ec.SECP256R1()))
+    (tmp_path / "key.pem").write_bytes(pem(signing))
+    assert (
+        typed("A1", "--sign-with", str(tmp_path / "key.pem"), "--address", "https://example.org/{number}").exit_code
+        == 0
+    )
+    own = signing.certificate.public_bytes(Encoding.PEM).decode()
+    out = tmp_path / "out"
+    signature = etree.fromstring((out / "A1_1.xml.sig").read_bytes())
+    configuration = signxml.SignatureConfiguration(location="./", require_x509=True)
+    good = signxml.XMLVerifier().verify(signature, x509_cert=own, expect_config=configuration)
+    assert good.signed_xml.xpath("//*[local-name()='uniqueIdentifier']/text()") == ["A1/1"]
+    with pikepdf.open(out / "A1_1.pdf") as document:
+        assert document.attachments["certificate.xml"].get_file().read_bytes() == (out / "A1_1.xml").read_bytes()
+        assert document.Root.AcroForm.Fields[0].V.SubFilter == pikepdf.Name("/ETSI.CAdES.detached")
+    refused = typed("A1", "--sign-with", str(tmp_path / "none.pem")).exception
+    assert isinstance(refused, WrongUse)
