@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -38,7 +38,7 @@ def adjustment(run: Run, calibration: Calibration, known: list[Calibration]) -> 
         return Adjustment(earlier="", earlier_date="", text="no earlier calibration of this unit is in the archive")
     last = before[-1]
     old = Run(run.archive, last.run)
-    head = {"earlier": last.certificate, "earlier_date": last.event.when[:10]}
+    head: dict[str, Any] = {"earlier": last.certificate, "earlier_date": last.event.when[:10]}
     try:
         if old.manifest("coefficients")["sha256"] != last.event.coefficients:
             return Adjustment(**head, text="not evaluated: the earlier coefficients are not those that were certified")

@@ -94,7 +94,7 @@ def compose(run: Run, calibration: Calibration, known: list[Calibration], who: L
         frame=FRAMES.get(budget["frame"], budget["frame"]),
         conditions=tuple(_conditions(run, serial, recipe)),
         references=references,
-        traceability=_traceability(budget),
+        traceability=_traceability(budget, {**(station.get("uncertainty") or {}), **(recipe.get("uncertainty") or {})}),
         results=tuple(_result(one, coefficients) for one in budget["quantities"]),
         budgets=tuple(_budget(one) for one in budget["quantities"] if one["quantity"] in BUDGETS),
         coefficients=tuple(coefficients),
@@ -198,16 +198,24 @@ def _reference(one: Any) -> ReferenceStandard:
     )  # fmt: skip
 
 
-def _traceability(budget: StatedBudget) -> str:
+def _traceability(budget: StatedBudget, stated_entries: dict[str, Any]) -> str:
+    """What is traceable and what is not: an entry of the budget that names no standard is said to rest on its source."""
+    source = budget["grade_source"].replace("_", " ")
     if not budget["references"]:
         return (
             "No reference standard with a certificate is stated for this calibration; metrological traceability to the SI is not "
-            f"claimed. The uncertainties of the references are taken from: {budget['grade_source'].replace('_', ' ')}."
+            f"claimed. The uncertainties of the references are taken from: {source}."
         )
-    return (
-        "The results are traceable to the SI through the calibration certificates of the reference standards listed; local "
-        "gravity is the reference of acceleration."
+    own = {name: entry for name, entry in stated_entries.items() if isinstance(entry, dict)}
+    traced = sorted(name for name, entry in own.items() if entry.get("reference"))
+    rest = sorted(set(own) - set(traced))
+    text = (
+        "Traceable to the SI through the calibration certificates of the standards listed: "
+        f"{', '.join(traced).replace('_', ' ') or 'no contribution names one of them'}."
     )
+    if not rest:
+        return text
+    return f"{text} Without a standard of their own, by the sources in the budgets ({source}): {', '.join(rest).replace('_', ' ')}."
 
 
 def _method(run: Run, recipe: dict[str, Any], who: LaboratoryFile) -> str:

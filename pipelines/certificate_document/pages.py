@@ -121,12 +121,14 @@ def _as_found(a: Adjustment) -> dict[str, Any]:
         earlier = f"Earlier certificate {a.earlier} of {a.earlier_date}: " if a.earlier else ""
         return {"title": "As found, as left", "before": [f"{earlier}{a.text}."]}
     rows = [
-        [f"as found, coefficients of certificate {a.earlier} of {a.earlier_date}", plain(a.found_rms_ug), plain(a.found_max_ug)],
+        ["as found, coefficients of the earlier certificate", plain(a.found_rms_ug), plain(a.found_max_ug)],
         ["as left, coefficients of this certificate", plain(a.left_rms_ug), plain(a.left_max_ug)],
-    ]  # fmt: skip
+    ]
     heads = ["state", "RMS error of |a|, µg", "largest error of |a|, µg"]
     text = f"{a.text[:1].upper()}{a.text[1:]}; {a.dwells} readings."
-    return {"title": "As found, as left", "before": [text], "tables": [_table("", heads, rows, ["auto", 1, 1], [1, 2])]}
+    table = _table("", heads, rows, [1, "auto", "auto"], [1, 2])
+    earlier = [["Earlier certificate", a.earlier, True], ["Date of it", a.earlier_date]]
+    return {"title": "As found, as left", "before": [text], "facts": earlier, "tables": [table]}
 
 
 def _results(c: CertificateContent) -> dict[str, Any]:

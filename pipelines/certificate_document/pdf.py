@@ -34,7 +34,7 @@ def pdf(content: CertificateContent, xml: bytes, address: str = "") -> bytes:
     typst = library("typst", EXTRA, WHERE)
     inputs: dict[str, Any] = page_content(content) | {"qr": _qr(address) if address else ""}
     compiler = typst.Compiler(
-        (files(__package__) / "certificate.typ").read_bytes(),
+        (files("pipelines.certificate_document") / "certificate.typ").read_bytes(),
         font_paths=typst.Fonts(include_system_fonts=False, include_embedded_fonts=True),
         sys_inputs={"content": json.dumps(inputs), "xml": xml.decode("utf-8")},
     )

@@ -21,7 +21,7 @@ class DocumentInvalid(TumblelineError):
 def schema() -> Any:
     """The XML schema of DCC 3.0.0 with D-SI 2.0.0, from the files beside this module."""
     etree = library("lxml.etree", EXTRA, WHERE)
-    folder = files(__package__) / "schemas"
+    folder = files("pipelines.certificate_document") / "schemas"
 
     class Local(etree.Resolver):
         """Gives the copy that is shipped for the address in the import, and nothing for any other."""

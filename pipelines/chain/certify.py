@@ -232,7 +232,8 @@ def refuse_unstated(run: Run) -> None:
     if terms is None and not run.about.get("capture"):
         raise WrongUse(
             f"certify: run {run.id} was imported: no station states the uncertainty of its references (noise only), a "
-            "certificate needs the whole budget; measure the units on a station whose file has [uncertainty], its results can be certified"
+            "certificate needs the whole budget; measure the units on a station whose file "
+            "has [uncertainty]"
         )
     if terms is None or terms.stated is None or "basis" not in grades or set(grades["basis"]) != {BUDGET}:
         raise WrongUse(

@@ -174,7 +174,7 @@ def test_samples_in_the_hand_become_dwells_that_agree_with_the_truth(tmp_path: P
         "--map",
         "time=time_s,x=x,y=y,z=z",
         "--units",
-        "output=V",
+        "output=LSB",
         "--unit",
         "H2",
         "--local-g",

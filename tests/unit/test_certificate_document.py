@@ -239,7 +239,7 @@ def test_as_found_is_what_the_earlier_coefficients_make_of_the_readings_of_today
         force = np.linalg.solve(k, np.array([row.out_x, row.out_y, row.out_z]) - b)
         errors.append(1e6 * (np.linalg.norm(force) - np.linalg.norm([row.force_x, row.force_y, row.force_z])))
     np.testing.assert_allclose(c.adjustment.found_rms_ug, np.sqrt(np.mean(np.square(errors))), rtol=1e-6)
-    assert "coefficients of certificate A1/1" in " ".join(" ".join(text_of(pdf(c, dcc(c)))).split())
+    assert "Earlier certificate A1/1" in " ".join(" ".join(text_of(pdf(c, dcc(c)))).split())
     statuses = etree.fromstring(dcc(c)).xpath("//dcc:status/text()", namespaces=NAMES)
     assert statuses == ["beforeAdjustment", "afterAdjustment"]
 
@@ -358,3 +358,13 @@ def test_certificates_are_signed_on_request_and_stay_valid(run: Run, typed: Type
         assert document.Root.AcroForm.Fields[0].V.SubFilter == pikepdf.Name("/ETSI.CAdES.detached")
     refused = typed("A1", "--sign-with", str(tmp_path / "none.pem")).exception
     assert isinstance(refused, WrongUse)
+
+
+def test_traceability_is_claimed_for_what_names_a_standard_only() -> None:
+    from pipelines.certificate_document.compose import _traceability
+
+    entries = {"grade_source": "certificates", "gravity": {"u_ppm": 1.0, "reference": "G-1"}, "seat": {"u_urad": 9.0}}
+    text = _traceability({"references": [{"id": "G-1"}], "grade_source": "certificates"}, entries)
+    assert "of the standards listed: gravity." in text
+    assert text.endswith("by the sources in the budgets (certificates): seat.")
+    assert "not claimed" in _traceability({"references": [], "grade_source": "data_sheet"}, entries)
