@@ -215,7 +215,8 @@ def _traceability(budget: StatedBudget, stated_entries: dict[str, Any]) -> str:
     )
     if not rest:
         return text
-    return f"{text} Without a standard of their own, by the sources in the budgets ({source}): {', '.join(rest).replace('_', ' ')}."
+    named = ", ".join(rest).replace("_", " ")
+    return f"{text} Without a standard of their own, by the sources in the budgets ({source}): {named}."
 
 
 def _method(run: Run, recipe: dict[str, Any], who: LaboratoryFile) -> str:
