@@ -76,8 +76,8 @@ $(CRATE)/.done: requirements-crate.lock | $(VENV)/bin/python
 
 locks:  ## resolve the locks anew (needs uv)
 	uv pip compile pyproject.toml --extra build --python-version 3.11 --generate-hashes --no-strip-extras --no-emit-index-url --no-annotate --no-header -o requirements-run.lock
-	uv pip compile pyproject.toml --extra build --extra dev --extra recordings --python-version 3.11 --generate-hashes --no-strip-extras --no-emit-index-url --no-annotate --no-header -o requirements-dev.lock
-	uv pip compile pyproject.toml --extra build --extra dev --extra recordings --extra bench --python-version 3.11 --generate-hashes --no-strip-extras --no-emit-index-url --no-annotate --no-header -o requirements-bench.lock
+	uv pip compile pyproject.toml --extra build --extra dev --extra pdf --extra recordings --extra signatures --python-version 3.11 --generate-hashes --no-strip-extras --no-emit-index-url --no-annotate --no-header -o requirements-dev.lock
+	uv pip compile pyproject.toml --extra build --extra dev --extra pdf --extra recordings --extra signatures --extra bench --python-version 3.11 --generate-hashes --no-strip-extras --no-emit-index-url --no-annotate --no-header -o requirements-bench.lock
 	echo 'roc-validator>=0.13' | uv pip compile - --python-version 3.11 --generate-hashes --no-strip-extras --no-emit-index-url --no-annotate --no-header -o requirements-crate.lock
 
 clean:  ## take away what was made here, but no archive: it holds measurements

@@ -229,6 +229,12 @@ def refuse_unstated(run: Run) -> None:
     A run that is made again from archived data keeps what its station stated when it measured: it states no more than before.
     """
     terms, grades = archived_terms(run.about), run.table("grades")
+    if terms is None and not run.about.get("capture"):
+        raise WrongUse(
+            f"certify: run {run.id} was imported: no station states the uncertainty of its references (noise only), a "
+            "certificate needs the whole budget; measure the units on a station whose file "
+            "has [uncertainty]"
+        )
     if terms is None or terms.stated is None or "basis" not in grades or set(grades["basis"]) != {BUDGET}:
         raise WrongUse(
             f"certify: run {run.id} states no uncertainty of its references (noise only), a certificate needs the whole budget; "

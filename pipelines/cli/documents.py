@@ -429,3 +429,21 @@ class StationLogDocument(TypedDict):
     """``station log --json``: what paused or ended runs, and what became of the stations, in order of time."""
 
     events: list[StationEvent]
+
+
+class CertificateFiles(TypedDict):
+    """The files of one certificate."""
+
+    certificate: str
+    serial: str
+    run: str
+    pdf: str
+    xml: str
+    signature: Annotated[str | None, "detached signature of the XML; null: not signed"]
+
+
+class CertificateDocument(TypedDict):
+    """``certificate --json``: the files of the certificates that were written."""
+
+    certificates: list[CertificateFiles]
+    left_out: Annotated[dict[str, str], "units of a run that have no certificate, with the reason"]

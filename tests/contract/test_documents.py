@@ -94,6 +94,7 @@ def test_a_command_prints_the_document_of_its_type(head: str, kept: Path, tmp_pa
 def test_every_typed_document_is_printed_by_a_test() -> None:
     # lots of other tests' runs; tests/e2e/test_inquiry.py and test_operator.py
     untested = {"run --json (several fillings)", "show RUN --json (no grades)", "investigate --json", "operator --json"}
+    untested |= {"certificate --json"}  # tests/unit/test_certificate_document.py
     untested |= {"fit --json (an import)"}  # tests/e2e/test_imported_recording.py
     assert set(BY_HEAD) - set(CASES) == untested
 

@@ -1,4 +1,4 @@
-"""A recording made elsewhere all the way, as commands: import, diagnose, extend, fit, history, export, report, certify."""
+"""A recording made elsewhere all the way, as commands: import, diagnose, extend, fit, history, export, report; no certificate."""
 
 import json
 from pathlib import Path
@@ -38,7 +38,18 @@ def imported(what: Recording, seed: int, folder: Path, *more: str) -> tuple[dict
     return document("import", path, *words, *more, archive=folder / "archive")
 
 
-def test_from_a_recording_of_unknown_poses_to_a_certificate(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def laboratory(folder: Path) -> Path:
+    """A laboratory's file."""
+    place = '{name = "L", address = "A", email = "a@b.c"'
+    text = f'laboratory = {place}, country = "DE"}}\ncustomer = {place}}}\n'
+    text += 'signatory = {name = "S", role = "R"}\nitem = {manufacturer = "M"}\n'
+    (folder / "laboratory.toml").write_text(text, encoding="utf-8")
+    return folder / "laboratory.toml"
+
+
+def test_from_a_recording_of_unknown_poses_to_a_report_and_no_certificate(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.chdir(tmp_path)
     archive, model = tmp_path / "archive", tmp_path / "model.toml"
     (tmp_path / "limits.toml").write_text(LIMITS, encoding="utf-8")
@@ -72,8 +83,12 @@ def test_from_a_recording_of_unknown_poses_to_a_certificate(tmp_path: Path, monk
     text = page.read_text(encoding="utf-8")
     assert "Coefficients" in text
     assert "degrees of freedom" in text
-    certified, status = document("certify", fitted["run"], archive=archive)
-    assert (len(certified["certified"]), status) == (1, 0)
+    problem = run("certify", fitted["run"], archive=archive).exception
+    assert isinstance(problem, WrongUse)
+    assert "was imported: no station states the uncertainty of its references (noise only)" in str(problem)
+    problem = run("certificate", "H1", "--laboratory", laboratory(tmp_path), archive=archive).exception
+    assert isinstance(problem, WrongUse)
+    assert "unit H1 has no certificate, one is needed" in str(problem)
     assert run("verify", archive=archive).exit_code == 0
 
 
@@ -159,7 +174,7 @@ def test_samples_in_the_hand_become_dwells_that_agree_with_the_truth(tmp_path: P
         "--map",
         "time=time_s,x=x,y=y,z=z",
         "--units",
-        "output=V",
+        "output=LSB",
         "--unit",
         "H2",
         "--local-g",

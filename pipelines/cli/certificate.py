@@ -1,0 +1,87 @@
+"""``tumbleline certificate``: the calibration certificate of a certified unit, as PDF for people and as XML for programs."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from pipelines.cli.options import ArchiveOption, JsonOption, console, error_console, print_json
+
+if TYPE_CHECKING:
+    from pipelines.certificate_document.issue import Issued
+
+PART = "Certificates, trace, audit"
+ORDER = 415
+SUMMARY = "Write the certificates of certified units: PDF with the XML (DCC) attached."
+EXAMPLES = (
+    "tumbleline certificate latest --laboratory laboratory.toml --output certificates",
+    "tumbleline certificate SN1 --laboratory laboratory.toml --output certificates --sign-with key.pem",
+)
+
+
+def command(
+    names: Annotated[
+        list[str], typer.Argument(metavar="RUN|UNIT…", help="Runs, serial numbers or numbers of certificates (A1/2).")
+    ],
+    laboratory: Annotated[
+        Path,
+        typer.Option("--laboratory", metavar="FILE.toml", help="Laboratory, customer, signatory and item; your file."),
+    ] = Path("laboratory.toml"),
+    output: Annotated[
+        Path, typer.Option("--output", "-o", metavar="DIR", help="Folder for the files; the current one.")
+    ] = Path(),
+    sign_with: Annotated[
+        Path | None,
+        typer.Option("--sign-with", metavar="KEY", help="Sign PDF and XML: PKCS#12, or PEM with key and certificates."),
+    ] = None,
+    password_file: Annotated[
+        Path | None, typer.Option("--password-file", metavar="FILE", help="Password of the key, on the first line.")
+    ] = None,
+    address: Annotated[
+        str, typer.Option("--address", metavar="URL", help="Print a QR code of this address; {number} is filled in.")
+    ] = "",
+    archive: ArchiveOption = None,
+    *,
+    as_json: JsonOption = False,
+) -> None:
+    """Write, for every certified unit, SERIAL_N.pdf and SERIAL_N.xml with the content of ISO/IEC 17025, 7.8.2 and 7.8.4.
+
+    A unit has to be certified before ('tumbleline certify'): the number of its certificate is the one in the ledger. The same
+    certificate gives the same bytes, unless it is signed. Exit status 1: some units of a run have no certificate.
+    """
+    from pipelines.archive import Archive
+    from pipelines.certificate_document.issue import issue
+    from pipelines.certificate_document.laboratory import read_laboratory
+    from pipelines.certificate_document.signing import read_key
+    from schemas.errors import DONE, PART_FAILED
+
+    who = read_laboratory(laboratory)
+    key = None if sign_with is None else read_key(sign_with, password_file)
+    done = issue(Archive(archive), names, who, output, key=key, address=address)
+    if as_json:
+        print_json(_document(done))
+    else:
+        for one in done.written:
+            console().print(f"certificate {one.number}: {one.pdf}, {one.xml}", markup=False, soft_wrap=True)
+    for serial, why in done.left_out.items():
+        error_console().print(f"certificate: {serial}: {why}", markup=False, soft_wrap=True)
+    raise typer.Exit(PART_FAILED if done.left_out else DONE)
+
+
+def _document(done: Issued) -> dict[str, Any]:
+    return {
+        "certificates": [
+            {
+                "certificate": one.number,
+                "serial": one.serial,
+                "run": one.run,
+                "pdf": str(one.pdf),
+                "xml": str(one.xml),
+                "signature": None if one.signature is None else str(one.signature),
+            }
+            for one in done.written
+        ],
+        "left_out": done.left_out,
+    }

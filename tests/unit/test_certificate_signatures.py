@@ -1,0 +1,113 @@
+"""Signed certificates, checked from the file alone: by the validators of pyHanko and signxml, and by ``openssl cms``."""
+
+import subprocess
+from io import BytesIO
+from pathlib import Path
+
+import pytest
+from cryptography.hazmat.primitives.asymmetric import ec, rsa
+from cryptography.hazmat.primitives.serialization import (
+    BestAvailableEncryption,
+    Encoding,
+    pkcs12,
+)
+from signing_keys import made_key, pem
+
+from pipelines.certificate_document.signing import SigningKey, read_key, sign_pdf, sign_xml
+from schemas.errors import WrongUse
+
+etree = pytest.importorskip("lxml.etree")
+typst = pytest.importorskip("typst")
+signxml = pytest.importorskip("signxml")
+pytest.importorskip("pyhanko")
+
+XML = b'<a xmlns="urn:example"><b>1.250</b></a>'
+
+
+@pytest.fixture(scope="module", params=["P-256", "RSA"])
+def signing(request: pytest.FixtureRequest) -> SigningKey:
+    private = (
+        ec.generate_private_key(ec.SECP256R1()) if request.param == "P-256" else rsa.generate_private_key(65537, 2048)
+    )
+    return made_key(private)
+
+
+def test_the_pdf_is_intact_and_trusted_and_an_altered_one_is_not(signing: SigningKey) -> None:
+    from pyhanko.keys import load_certs_from_pemder_data
+    from pyhanko.pdf_utils.reader import PdfFileReader
+    from pyhanko.sign.validation import validate_pdf_signature
+    from pyhanko_certvalidator import ValidationContext
+
+    document = typst.Compiler(b"certificate A1/1").compile(format="pdf", pdf_standards="a-3b", timestamp=0)
+    signed = sign_pdf(document, signing)
+    root = next(iter(load_certs_from_pemder_data(signing.certificate.public_bytes(Encoding.PEM))))
+    context = ValidationContext(trust_roots=[root])
+
+    def status(data: bytes) -> object:
+        return validate_pdf_signature(PdfFileReader(BytesIO(data)).embedded_signatures[0], context)
+
+    good = status(signed)
+    assert good.intact
+    assert good.valid
+    assert good.trusted
+    assert str(good.coverage).endswith("ENTIRE_FILE")
+    assert signed.startswith(document)  # an incremental update: what was typeset is in it unchanged
+    place = document.index(b"stream") + 20
+    altered = signed[:place] + bytes([signed[place] ^ 1]) + signed[place + 1 :]
+    assert not status(altered).intact
+
+
+def test_the_signature_of_the_pdf_is_good_for_openssl(signing: SigningKey, tmp_path: Path) -> None:
+    """The CMS in the file over the bytes that it names, by ``openssl cms``."""
+    signed = sign_pdf(typst.Compiler(b"x").compile(format="pdf", timestamp=0), signing)
+    head = signed.rindex(b"/ByteRange")
+    a, n, b, m = (int(part) for part in signed[head : head + 200].split(b"[", 1)[1].split(b"]", 1)[0].split())
+    (tmp_path / "data").write_bytes(signed[a : a + n] + signed[b : b + m])
+    (tmp_path / "cms").write_bytes(bytes.fromhex(signed[n + 1 : b - 1].decode()))
+    (tmp_path / "root.pem").write_bytes(signing.certificate.public_bytes(Encoding.PEM))
+    words = ["openssl", "cms", "-verify", "-binary", "-inform", "DER", "-in", "cms", "-content", "data", "-CAfile", "root.pem",
+             "-purpose", "any", "-out", "out"]  # fmt: skip
+    try:
+        done = subprocess.run(words, cwd=tmp_path, capture_output=True, check=False)
+    except FileNotFoundError:
+        pytest.skip("openssl is not installed")
+    assert done.returncode == 0, done.stderr
+    (tmp_path / "data").write_bytes((tmp_path / "data").read_bytes() + b" ")
+    assert subprocess.run(words, cwd=tmp_path, capture_output=True, check=False).returncode != 0
+
+
+def test_the_xml_is_in_its_signature_and_a_changed_digit_is_found(signing: SigningKey) -> None:
+    signature = sign_xml(XML, signing)
+    own = signing.certificate.public_bytes(Encoding.PEM).decode()
+    expected = signxml.SignatureConfiguration(location="./", require_x509=True)
+    good = signxml.XMLVerifier().verify(etree.fromstring(signature), x509_cert=own, expect_config=expected)
+    assert b"<b>1.250</b>" in good.signed_data
+    assert good.signed_xml is not None
+    with pytest.raises(signxml.exceptions.InvalidDigest):
+        signxml.XMLVerifier().verify(
+            etree.fromstring(signature.replace(b"1.250", b"1.251")), x509_cert=own, expect_config=expected
+        )
+
+
+def test_keys_are_read_from_pem_and_pkcs12_and_what_is_none_is_refused(signing: SigningKey, tmp_path: Path) -> None:
+    (tmp_path / "key.pem").write_bytes(pem(signing))
+    assert read_key(tmp_path / "key.pem").certificate == signing.certificate
+    data = pkcs12.serialize_key_and_certificates(
+        b"n", signing.key, signing.certificate, None, BestAvailableEncryption(b"pw")
+    )
+    (tmp_path / "key.p12").write_bytes(data)
+    (tmp_path / "password").write_text("pw\n")
+    assert read_key(tmp_path / "key.p12", tmp_path / "password").certificate == signing.certificate
+    foreign = made_key(ec.generate_private_key(ec.SECP256R1())).certificate
+    (tmp_path / "other.pem").write_bytes(pem(SigningKey(signing.key, foreign, ())))
+    (tmp_path / "bare.pem").write_bytes(pem(signing).split(b"-----BEGIN CERT", maxsplit=1)[0])
+    (tmp_path / "none.p12").write_text("nothing")
+    for name, why in (
+        ("key.p12", "is no key that can be used"),
+        ("other.pem", "the first certificate is not that of the key"),
+        ("bare.pem", "is no key that can be used"),
+        ("none.p12", "is no key that can be used"),
+        ("missing.pem", "cannot be read"),
+    ):
+        with pytest.raises(WrongUse, match=why):
+            read_key(tmp_path / name)
