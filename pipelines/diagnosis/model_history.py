@@ -88,7 +88,7 @@ def _by_fresh(progress: dict[str, Any], fall: str) -> str:
     if progress["confirmed"] is True:
         return f"confirmed: {came}; {fall}"
     if progress["confirmed"] is False:
-        return f"NOT there: {came}; {fall}"
+        return f"refuted: {came}; {fall}"
     if progress.get("rises"):
         return f"not decided: {came}, but {progress['rises']}; {fall}"
     return f"not decided: {came}; {fall}; one more run"

@@ -143,7 +143,7 @@ def test_an_effect_is_judged_against_the_version_before_it_and_refuted_only_by_e
     assert [row["confirmed"] for row in rows] == [None, True, False]
     assert [(rows[1][k], rows[2][k]) for k in ("fall_ug", "fall_u_ug")] == [(10.4, -0.02), (0.4, 0.4)]
     assert "confirmed: 0.98 ± 0.04" in rows[1]["text"]
-    assert rows[2]["text"].startswith("NOT there: -0.10 ± 0.20")
+    assert rows[2]["text"].startswith("refuted: -0.10 ± 0.20")
 
 
 def test_what_a_fresh_run_cannot_decide_asks_for_one_more_run_and_is_not_taken_out():
