@@ -61,7 +61,7 @@ def draw(place: Axes, rows: list[dict[str, Any]]) -> None:
     for k, row in enumerate(rows):
         if row["confirmed"] is False:
             place.axvspan(k - 0.4, k + 0.4, color="#c62828", alpha=0.08, linewidth=0)
-            place.annotate("not there", (k, 1.12 * top), ha="center", color="#c62828", fontsize=9)
+            place.annotate("refuted", (k, 1.12 * top), ha="center", color="#c62828", fontsize=9)
     place.set_xticks(at, [_label(row) for row in rows])
     place.set(ylabel="error / µg rms", ylim=(0.0, 1.42 * top), xlim=(-0.5, len(rows) - 0.5))
     place.grid(visible=False, axis="x")
