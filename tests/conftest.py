@@ -8,6 +8,8 @@ import numpy as np
 import pytest
 from orchestrator import LOG, errors_in
 
+from inertial import effects
+
 ROOT = Path(__file__).resolve().parent.parent
 FOLDERS = ("unit", "property", "contract", "reference", "faults", "e2e", "blind")
 
@@ -32,6 +34,13 @@ def shared_data() -> Path:
 def rng() -> np.random.Generator:
     """A seeded generator."""
     return np.random.default_rng(20260101)
+
+
+@pytest.fixture(autouse=True)
+def effects_of_one_test() -> Iterator[None]:
+    """Forgets effects that a test adds to the catalogue: the tests of a process come in any order."""
+    with effects.additions_forgotten():
+        yield
 
 
 @pytest.fixture(autouse=True)

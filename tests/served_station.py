@@ -27,7 +27,7 @@ QUICK = {
 def modbus_station(port: int, host: str = "127.0.0.1", **changes: dict[str, object]) -> StationConfig:
     """A station of kind modbus, all of whose devices answer at one port; with a safety that acts within a second or two."""
     content = station_of().model_dump(mode="json")
-    content |= {"kind": "modbus", "name": "served", "simulation": None}
+    content |= {"kind": "modbus", "name": "served", "simulation": None, "uncertainty": None}
     for device in content["devices"].values():
         device |= {"host": host, "port": port}
     for section in {**QUICK, **changes}:

@@ -116,8 +116,8 @@ def _toml_rows(content: str, path: Path) -> list[tuple[str, str]]:
         raise WrongUse(f'{where}: no table [slots], one with lines like 0 = "SN1" is needed; add it')
     for slot, serial in table.items():
         if not isinstance(serial, str):
-            entries, written = f"slot {shown(slot)}: entries {shown(serial)}", f'"{shown(serial)}"'
-            raise WrongUse(f"{where}: {entries}, a serial number in quotes is needed; write {written}")
+            entry, written = f"slot {shown(slot)}: found {shown(serial)}", f'"{shown(serial)}"'
+            raise WrongUse(f"{where}: {entry}, a serial number in quotes is needed; write {written}")
     return list(table.items())
 
 

@@ -131,7 +131,7 @@ def test_a_controller_set_up_for_less_refuses_before_anything_is_written():
     with opened() as (station, plant):
         bank = plant.banks[3]
         bank._sources["set_point_low"] = lambda: -10.0
-        with pytest.raises(StationRefused, match="set up for -10 to 180 °C"):
+        with pytest.raises(StationRefused, match="the controller allows -10 to 180 °C"):
             station.chamber.set_temperature(-20.0)
         assert plant.fixture.chamber.set_point == 23.0
 

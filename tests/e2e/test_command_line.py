@@ -52,7 +52,7 @@ def test_every_figure_has_value_uncertainty_limit_and_rule(archive: Path) -> Non
 def test_list_show_and_report_find_the_run(archive: Path) -> None:
     run = ask(archive, "list")["runs"][0]
     assert run["finished"]
-    assert ask(archive, "show", run["id"])["tables"][:2] == ["allan", "coefficients"]
+    assert ask(archive, "show", run["id"])["tables"][:3] == ["allan", "budget", "budget_covariance"]
     assert ask(archive, "report")["report"].endswith("report.html")
 
 

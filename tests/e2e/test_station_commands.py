@@ -110,7 +110,7 @@ def test_check_with_registers_only_moves_nothing():
         ({"kind": "door"}, "reader: door is open, closed is needed"),
         ({"kind": "emergency_stop"}, "reader: emergency stop is pressed, released is needed"),
         ({"kind": "vibration"}, "reader: vibration at rest 0.0"),
-        ({"kind": "dead", "serial": "SIM0001"}, "slot 1: the output on x stands still"),
+        ({"kind": "dead", "serial": "SIM0001"}, "slot 1: the output on x is constant"),
         ({"kind": "table_stall", "device": "inner", "at_s": 0.5}, "table: not at (10, 10) deg"),
     ],
 )

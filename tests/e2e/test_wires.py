@@ -23,7 +23,7 @@ def hardware(config, **carried) -> StationConfig:
     for place in config.devices.model_dump():
         device = tables["devices"][place]
         tables["devices"][place] = {k: device[k] for k in ("profile", "device_id")} | carried
-    tables |= {"kind": "modbus", "link": {"timeout_s": 1.0, "read_attempts": 2}}
+    tables |= {"kind": "modbus", "link": {"timeout_s": 1.0, "read_attempts": 2}, "uncertainty": None}
     return StationConfig.model_validate(tables)
 
 

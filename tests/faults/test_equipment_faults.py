@@ -100,7 +100,7 @@ def test_a_unit_whose_cable_is_off_has_no_figure(name: str, tmp_path: Path) -> N
     limits = limits_of({"name": "one", "figures": {figure[name]: {"max": 1e9, "unit": UNITS[figure[name]]}}}, UNITS)
     station = with_faults(load_station(), [FaultOrder(kind="cable_off", serial="F2")])
     runner = Runner(Job(recipe, limits, lot(), station), Archive(tmp_path / "archive"))
-    for stage in ("capture", "validate", "reduce", "fit", "verify", "noise", "procedures", "grade"):
+    for stage in ("capture", "validate", "reduce", "fit", "verify", "noise", "budget", "procedures", "grade"):
         runner.stage(stage)
     figures = runner.run.table("procedure_figures")
     own = figures[figures["figure"] == figure[name]].set_index("unit")
@@ -120,7 +120,7 @@ def test_a_shock_beyond_the_sheets_limit_changes_the_unit_for_good(tmp_path: Pat
     recipe = load_recipe(str(path))
     limits = limits_of({"name": "one", "figures": {"shock_bias_shift_ug": {"max": 5000.0, "unit": "µg"}}}, UNITS)
     runner = Runner(Job(recipe, limits, lot(), load_station()), Archive(tmp_path / "archive"))
-    for stage in ("capture", "validate", "reduce", "fit", "verify", "noise", "procedures", "grade"):
+    for stage in ("capture", "validate", "reduce", "fit", "verify", "noise", "budget", "procedures", "grade"):
         runner.stage(stage)
     figures = runner.run.table("procedure_figures").set_index(["unit", "figure"])
     assert abs(figures.loc[("F1", "shock_bias_shift_ug"), "value"]) == pytest.approx(250_000.0, rel=0.05)

@@ -62,6 +62,10 @@ CERTIFICATES = st.builds(
     frame=st.sampled_from(["fixture", "intrinsic"]),
 )
 
+PROCEDURES = st.fixed_dictionaries(
+    {"kind": st.just("tilt"), "about": st.sampled_from(["x", "y"]), "dwell_s": numbers(1.0, 100.0)}
+)
+
 
 @st.composite
 def soaks(draw, poses, verification):
@@ -119,6 +123,7 @@ def recipe_files(draw):
         uncertainty=draw(maybe(STATED)),
         stability=draw(maybe(STABILITY)),
         certificate=draw(maybe(CERTIFICATES)),
+        procedures=draw(st.lists(PROCEDURES, max_size=2)),
     )
 
 

@@ -28,7 +28,7 @@ def test_what_is_neither_is_asked_again_with_what_is_needed(typed, capsys):
     typed("maybe\nn\n")
     assert not agreed("Measure?")
     told = capsys.readouterr().err
-    assert "'maybe' is neither yes nor no: y or Enter measures it, n does not" in " ".join(told.split())
+    assert "'maybe' is neither yes nor no: y or Enter measures it, n leaves it" in " ".join(told.split())
     assert told.count("Measure? [Y/n]") == 2
 
 

@@ -111,7 +111,7 @@ def test_one_module_makes_links_and_hands_them_out_gated_alone():
 
 
 def test_links_lead_to_the_addresses_of_the_file_and_share_them():
-    tables = load_station().model_dump(exclude_unset=True) | {"kind": "modbus"}
+    tables = load_station().model_dump(exclude_unset=True) | {"kind": "modbus", "uncertainty": None}
     for place, host in (("outer", "10.0.0.1"), ("inner", "10.0.0.1"), ("chamber", "10.0.0.2")):
         tables["devices"][place]["host"] = host
     for place in ("reader", "slots"):
@@ -137,7 +137,7 @@ def test_links_lead_to_the_addresses_of_the_file_and_share_them():
     ],
 )
 def test_addresses_that_say_too_much_or_too_little_are_refused(changed, told):
-    tables = station_with().model_dump(exclude_unset=True) | {"kind": "modbus"}
+    tables = station_with().model_dump(exclude_unset=True) | {"kind": "modbus", "uncertainty": None}
     for place in tables["devices"].values():
         place["host"] = "10.0.0.1"
     tables["devices"]["chamber"] = {"profile": "watlow_f4t", "device_id": 3} | changed

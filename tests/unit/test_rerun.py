@@ -279,7 +279,6 @@ def test_says_why_a_selection_names_nothing(run: Run, words: list[str], message:
 def imported(tmp_path: Path) -> Run:
     """Six faces of one unit as another's recording, kept as an import."""
     from pipelines.cli.import_ import _import_one
-    from pipelines.importers import mapping
 
     rng = np.random.default_rng(3)
     faces = {"+x": (1, 0, 0), "-x": (-1, 0, 0), "+y": (0, 1, 0), "-y": (0, -1, 0), "+z": (0, 0, 1), "-z": (0, 0, -1)}
@@ -289,18 +288,15 @@ def imported(tmp_path: Path) -> Run:
     ]
     table = pd.concat(frames, ignore_index=True)
     table.assign(t=0.01 * table.index).to_csv(tmp_path / "six.csv", index=False)
-    how = mapping.build(
-        {
-            "columns": {"time": "t", "x": "x", "y": "y", "z": "z", "dwell": "face"},
-            "units": {"output": "g", "time": "s"},
-            "unit": "SN1",
-            "poses": {face: face for face in faces},
-            "local_gravity_m_s2": 9.80665,
-        },
-        "test",
-    )
+    how: dict[str, object] = {
+        "columns": {"time": "t", "x": "x", "y": "y", "z": "z", "dwell": "face"},
+        "units": {"output": "g", "time": "s"},
+        "unit": "SN1",
+        "poses": {face: face for face in faces},
+        "local_gravity_m_s2": 9.80665,
+    }
     archive = tmp_path / "imports"
-    return Archive(archive).run(_import_one(tmp_path / "six.csv", how, "", archive)["run"])
+    return Archive(archive).run(_import_one([tmp_path / "six.csv"], how, "test", "", str(archive))["run"])
 
 
 def test_imported_dwells_are_fitted_with_the_plain_model(imported: Run) -> None:
