@@ -74,7 +74,9 @@ def _sizes(field: Candidates, model: Model, spaces: tuple[Space, Space], name: s
             visible = seen > SEEN**2 * whole
             share = np.where(visible, seen / np.where(visible, whole, 1.0), 0.0)
             with np.errstate(over="ignore"):  # a column that shows next to nothing would need any size
-                each.append(np.where(visible, raw * np.sqrt(needed / np.where(visible, seen, 1.0)), np.inf))
+                factor = np.sqrt(needed / np.where(visible, seen, 1.0))
+            visible &= np.isfinite(factor)
+            each.append(np.where(visible, raw * np.where(visible, factor, 0.0), np.inf))
         material = least / np.sqrt(np.where(share > 0.0, share, 1.0))
         values.append(np.stack([np.min(np.maximum(each[0], material), axis=1), np.min(each[1], axis=1)]))
     return np.concatenate(values, axis=1)
