@@ -38,21 +38,31 @@ def modbus_station(port: int, host: str = "127.0.0.1", **changes: dict[str, obje
 @contextmanager
 def served(lot: Lot | None = None, silence_s: float = 0.0, **simulation: object) -> Generator[int, None, None]:
     """The simulated station served while the block lasts; gives its port."""
-    stop, listening, found = threading.Event(), threading.Event(), list[int]()
+    stop, listening, found, failed = threading.Event(), threading.Event(), list[int](), list[Exception]()
 
     def ready(_host: str, port: int) -> None:
         found.append(port)
         listening.set()
 
-    how = {"host": "127.0.0.1", "port": 0, "speed": 1.0, "stop": stop, "ready": ready, "silence_s": silence_s}
-    thread = threading.Thread(target=serve, args=(station_of(**simulation), lot or lot_of()), kwargs=how)
+    def run() -> None:
+        how = {"host": "127.0.0.1", "port": 0, "speed": 1.0, "stop": stop, "ready": ready, "silence_s": silence_s}
+        try:
+            serve(station_of(**simulation), lot or lot_of(), **how)
+        except Exception as e:  # noqa: BLE001 - raised again in the thread of the test
+            failed.append(e)
+            listening.set()
+
+    thread = threading.Thread(target=run)
     thread.start()
     try:
-        assert listening.wait(20.0)
-        yield found[0]
+        assert listening.wait(60.0), "the station did not listen within 60 s"
+        if not failed:
+            yield found[0]
     finally:
         stop.set()
         thread.join(20.0)
+        if failed:
+            raise failed[0]
 
 
 @contextmanager

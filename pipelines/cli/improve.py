@@ -35,7 +35,7 @@ EXAMPLES = (
 )
 
 CHOICES = "y or Enter adds it, n leaves it out; Ctrl-C stops, and nothing is written"
-UNATTENDED = "improve: standard input ended before an answer, a line is needed; give --yes where nobody answers"
+UNATTENDED = "improve: standard input ended before an answer, a line is needed; give --yes to run without an operator"
 
 
 def command(

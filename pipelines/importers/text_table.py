@@ -21,6 +21,9 @@ if TYPE_CHECKING:
 _MORE = "\0more"
 MOST_COLUMNS = 10_000
 _CONTROL = re.compile(r"[\x00-\x08\x0e-\x1f\x7f-\x9f]")
+_OPEN = re.compile(r'(?:^|[,;\t|]) *"[^"]*$')
+_MOST_LINES = 10
+"""Line breaks of a quoted field, at most: beyond them the quote is a sign such as that of inches."""
 _FORTRAN = re.compile(r"^\s*[+-]?\d*\.?\d+[dD][+-]?\d+\s*$")
 
 
@@ -45,7 +48,7 @@ def decoded(data: bytes, where: str) -> tuple[str, str]:
 
 def content(text: str, where: str, encoding: str = "UTF-8") -> Content:
     """The columns of a text, named as there ("1", "2", … without a header), and what was found about its layout."""
-    lines = text.splitlines()
+    lines = logical_lines(text)
     found = layout(lines)
     if found is None:
         raise DataRejected(f"{where}: no rows of data were found, at least one is needed; check the file")
@@ -57,6 +60,25 @@ def content(text: str, where: str, encoding: str = "UTF-8") -> Content:
     }
     units = {label: unit.strip("[]() ") for label, unit in units.items()}
     return Content(table, _remarks(found, lines, encoding), units)
+
+
+def logical_lines(text: str) -> list[str]:
+    """The rows of a text: a line break inside a quoted field is a part of the field, as in RFC 4180."""
+    rows: list[str] = []
+    waiting: list[str] = []  # lines from one that opens a field with a quote and does not close it
+    for line in text.splitlines():
+        if not waiting and '"' not in line:
+            rows.append(line)
+            continue
+        waiting.append(line)
+        together = "\n".join(waiting)
+        if together.count('"') % 2 == 0 or not _OPEN.search(together):
+            rows.append(together)
+            waiting = []
+        elif len(waiting) > _MOST_LINES:  # a quote that is no quotation
+            rows += waiting
+            waiting = []
+    return rows + waiting
 
 
 def _labels(found: Layout, where: str) -> list[str]:

@@ -25,7 +25,7 @@ from pipelines.procedures.base import (
 from pipelines.procedures.columns import points
 from schemas.bounds import Positive
 from schemas.recipe import Pose
-from schemas.units import AXES
+from schemas.units import AXES, MICRO
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -35,8 +35,6 @@ if TYPE_CHECKING:
 
     from schemas.recipe import Recipe
     from schemas.station import StationConfig
-
-MICRO = 1e6
 
 
 class BiasStabilityPart(NominalScale):

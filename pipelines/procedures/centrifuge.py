@@ -28,6 +28,7 @@ from pipelines.procedures.base import (
 from pipelines.procedures.columns import points as point_table
 from schemas.bounds import NotNegative, Positive
 from schemas.recipe import Pose
+from schemas.units import MICRO
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -38,7 +39,6 @@ if TYPE_CHECKING:
     from schemas.recipe import Recipe
     from schemas.station import StationConfig
 
-MICRO = 1e6
 INPUT = 2  # the input axis is z, radial
 NAMED_P = 1e-3
 

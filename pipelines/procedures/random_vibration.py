@@ -27,7 +27,7 @@ from pipelines.procedures.base import (
 from pipelines.procedures.columns import points as point_table
 from schemas.bounds import Positive
 from schemas.recipe import Pose
-from schemas.units import AXES
+from schemas.units import AXES, MICRO
 from schemas.vibration_profile import load_vibration_profile, vibration_profiles
 
 if TYPE_CHECKING:
@@ -39,7 +39,6 @@ if TYPE_CHECKING:
     from schemas.recipe import Recipe
     from schemas.station import StationConfig
 
-MICRO = 1e6
 REST_S = 0.8  # used of the second of rest before and after
 GUARD_S = 0.2  # left out at the ends of the vibration
 LINE_DB, OVERALL = 3.0, 0.10  # tolerances of IEC 60068-2-64

@@ -30,7 +30,7 @@ from pipelines.procedures.base import (
 from pipelines.procedures.columns import points as point_table
 from schemas.bounds import NotNegative, Positive, Wait
 from schemas.recipe import Pose
-from schemas.units import AXES
+from schemas.units import AXES, MICRO
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -41,7 +41,6 @@ if TYPE_CHECKING:
     from schemas.recipe import Recipe
     from schemas.station import StationConfig
 
-MICRO = 1e6
 BEFORE_S = 0.04
 DRAWN = 400  # points of a waveform that are kept for the picture
 CUT = 6.0  # corner of the equal low-pass of both channels, over 1/D

@@ -24,7 +24,7 @@ from pipelines.procedures.base import (
 from pipelines.procedures.columns import points
 from schemas.bounds import Positive, Wait
 from schemas.recipe import Pose
-from schemas.units import AXES
+from schemas.units import AXES, MICRO
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -34,8 +34,6 @@ if TYPE_CHECKING:
 
     from schemas.recipe import Recipe
     from schemas.station import StationConfig
-
-MICRO = 1e6
 
 
 class TurnOnPart(NominalScale):
