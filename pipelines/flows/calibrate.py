@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from contextlib import contextmanager
+from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -14,12 +15,14 @@ from prefect.client.schemas.filters import FlowRunFilter, FlowRunFilterId, FlowR
 from prefect.client.schemas.objects import FlowRun, StateType
 from prefect.client.schemas.sorting import FlowRunSort, TaskRunSort
 from prefect.runtime import flow_run
+from prefect.states import Cancelled
 
 from pipelines.chain.attendance import JUDGED, Attendance
 from pipelines.chain.chain import ORDER
 from pipelines.chain.runner import Done, Runner
 from pipelines.flows.operator import Paused
 from pipelines.flows.places import archive_of
+from pipelines.flows.policy import policy_of_tags
 from pipelines.jobs.job import Request
 from schemas.errors import LinkLost, NotReached, StationTimeout
 from schemas.progress import silent
@@ -27,10 +30,13 @@ from schemas.progress import silent
 if TYPE_CHECKING:
     from collections.abc import Callable, Generator
 
+    from prefect.states import State
+
     from pipelines.chain.attendance import Operator
     from schemas.progress import Progress
 
 HISTORY_S = 20.0
+AUTO = "auto-scheduled"  # tag of Prefect on the runs of a schedule
 MANY = 200  # largest page of the server
 FINAL = {StateType.COMPLETED, StateType.FAILED, StateType.CRASHED, StateType.CANCELLED}
 
@@ -90,13 +96,15 @@ def calibrate_lot(  # noqa: PLR0913 - the parameters of a flow are the form on t
     faults: list[str] | None = None,
     *,
     prompts: bool = False,
-) -> str:
-    """Measure and calibrate a lot; return the id of its run in the archive.
+) -> str | State[Any]:
+    """Measure and calibrate a lot; return the id of its run in the archive, or the state of a run that came too late.
 
     Without ``repeat`` every flow run measures the lot again, and a retry of the same flow run continues it. With
     ``prompts`` the flow run pauses for the operator: to load, to correct a fault, to unload. ``archive`` has no
     credentials, see :func:`pipelines.flows.places.archive_of`.
     """
+    if too_late := late_start():
+        return Cancelled(message=too_late)
     progress, report_stage, operator = _listeners[-1] if _listeners else (silent, lambda _done: None, None)
     store = archive_of(archive)
     job = requested(recipe, station, units, slots, seed, repeat, faults).job(store)
@@ -124,6 +132,25 @@ def requested(
     anew = int(str(flow_run.id).replace("-", "")[:7], 16) if repeat is None else repeat
     where = Path(station) if station else None
     return Request(recipe, where, tuple(units or ()), tuple(slots or ()), seed, anew, tuple(faults or ()))
+
+
+def late_start() -> str:
+    """Why a run of a schedule may not start any more; empty where it may.
+
+    The worker cancels such runs (:mod:`pipelines.flows.queue_rules`). One that started in between, for instance when a suspended
+    computer resumed, ends here, before anything moves.
+    """
+    tags: list[str] = list(flow_run.tags or ())
+    if AUTO not in tags or int(flow_run.run_count or 1) > 1:
+        return ""
+    policy = policy_of_tags(tags)
+    late = datetime.now(UTC) - flow_run.scheduled_start_time
+    if policy.missed == "latest" or late <= policy.latest_start:
+        return ""
+    return (
+        f"missed: it starts {late.total_seconds() / 60.0:.0f} min after its time, at most {policy.latest_start_min} min are "
+        "allowed; see latest_start_min of the deployment's policy"
+    )
 
 
 def _capture(runner: Runner, beside: Attendance | None) -> Done:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-from datetime import UTC, datetime, timedelta
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -20,7 +19,7 @@ from prefect.client.schemas.filters import (
 )
 from prefect.client.schemas.objects import StateType
 from prefect.client.schemas.sorting import FlowRunSort
-from prefect.states import Cancelled, Crashed
+from prefect.states import Crashed
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -30,9 +29,10 @@ if TYPE_CHECKING:
 MANY = 200  # largest page of the server
 WORKING = (StateType.PENDING, StateType.RUNNING, StateType.CANCELLING)
 SUSPENDED = "Suspended"  # such a run has no process and gets a new one when it is resumed
-LATE = timedelta(minutes=15)
+WORKER = "prefect.worker.name"
+"""Label that the worker of Prefect gives to the runs that it takes."""
+
 GONE = "its process has ended: it was killed, or its worker ended; give the same order again to continue"
-MISSED = "its start was at {when}, when no worker ran; a station does not make up for missed runs"
 
 
 def close_dead_runs(name: str) -> None:
@@ -46,39 +46,40 @@ def close_dead_runs(name: str) -> None:
                 client.set_flow_run_state(run.id, Crashed(message=message), force=True)
 
 
-def close_dead_runs_of_queue(pool: str, queue: str) -> list[str]:
-    """Mark the runs of a station's queue as crashed that began and have no process; return their names."""
+def close_dead_runs_of_queue(pool: str, queue: str, worker: str = "") -> list[str]:
+    """Mark the runs of a station's queue as crashed that began and have no process; return their names.
+
+    A run that another worker took is left alone, as its process may live on another computer: the server closes it when its
+    heartbeat stops (:mod:`pipelines.flows.heartbeat`).
+    """
     closed: list[str] = []
     with get_client(sync_client=True) as client:
         for run in runs_of_queue(client, pool, queue, (*WORKING, StateType.PAUSED)):
-            if (run.state and run.state.name == SUSPENDED) or _lives(run):
+            taken_by = run.labels.get(WORKER)
+            if (
+                (worker and taken_by and taken_by != worker)
+                or (run.state and run.state.name == SUSPENDED)
+                or _lives(run)
+            ):
                 continue
             client.set_flow_run_state(run.id, Crashed(message=GONE), force=True)
             closed.append(run.name)
     return closed
 
 
-def cancel_missed_runs(pool: str, queue: str) -> list[str]:
-    """Cancel the scheduled runs of a station's queue that were missed without a worker; return their names."""
-    cancelled: list[str] = []
-    now = datetime.now(UTC)
-    with get_client(sync_client=True) as client:
-        for run in runs_of_queue(client, pool, queue, (StateType.SCHEDULED,)):
-            when = run.expected_start_time
-            if run.auto_scheduled and run.run_count == 0 and when is not None and now - when > LATE:
-                message = MISSED.format(when=when.isoformat(timespec="minutes"))
-                client.set_flow_run_state(run.id, Cancelled(message=message), force=True)
-                cancelled.append(run.name)
-    return cancelled
-
-
-def runs_of_queue(client: SyncPrefectClient, pool: str, queue: str, states: Sequence[StateType]) -> list[FlowRun]:
+def runs_of_queue(
+    client: SyncPrefectClient,
+    pool: str,
+    queue: str,
+    states: Sequence[StateType],
+    sort: FlowRunSort = FlowRunSort.EXPECTED_START_TIME_ASC,
+) -> list[FlowRun]:
     """Flow runs of a work queue in one of the states, in the order of their start."""
     return client.read_flow_runs(
         flow_run_filter=FlowRunFilter(state=FlowRunFilterState(type=FlowRunFilterStateType(any_=list(states)))),
         work_pool_filter=WorkPoolFilter(name=WorkPoolFilterName(any_=[pool])),
         work_queue_filter=WorkQueueFilter(name=WorkQueueFilterName(any_=[queue])),
-        sort=FlowRunSort.EXPECTED_START_TIME_ASC,
+        sort=sort,
         limit=MANY,
     )
 

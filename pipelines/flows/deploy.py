@@ -1,7 +1,8 @@
 """Register the deployments of a ``prefect.yaml`` with their pools and queues: ``prefect deploy --all``, and the steps it omits.
 
 A work queue is a station (or another resource with one run at a time): its limit of one run is set here, as ``prefect.yaml``
-has no key for it. The limit of a deployment does not separate two deployments of one station.
+has no key for it. The limit of a deployment does not separate two deployments of one station. The policy of a deployment
+(:mod:`pipelines.flows.policy`) becomes its tags; an automation closes runs whose heartbeat stopped.
 
 The command of Prefect 3.8 ends with error 422 with FastAPI 0.151 and later: after each deployment it requests the workers of
 the pool with null for two numbers, and FastAPI now reads null as a value and not as a missing one.
@@ -18,6 +19,7 @@ import yaml
 
 from pipelines.flows.credentials import refuse_credentials
 from pipelines.flows.knock import knock
+from pipelines.flows.policy import policy_of
 from pipelines.flows.settings import CLIENT_KEY, use_key
 from schemas.errors import TumblelineError
 
@@ -32,18 +34,23 @@ def register(path: Path) -> list[str]:
     Raises
     ------
     WrongUse
-        The key is missing or wrong, or a parameter has credentials.
+        The key is missing or wrong, a parameter has credentials, or a policy has an unknown key or value.
     """
     use_key(CLIENT_KEY)
     knock()
     content = yaml.safe_load(path.read_text(encoding="utf-8"))
     for item in content["deployments"]:
         refuse_credentials(item["parameters"].get("archive"))
+        policy_of(item["name"], item.get("policy"))
     for pool in {item["work_pool"]["name"]: None for item in content["deployments"]}:
         _have_pool(pool)
     for item in content["deployments"]:
         _have_queue(item["work_pool"]["name"], item["work_pool"]["work_queue_name"])
-    return [_register(item) for item in content["deployments"]]
+    names = [_register(item) for item in content["deployments"]]
+    from pipelines.flows.heartbeat import have_automation
+
+    have_automation()
+    return names
 
 
 def _have_pool(name: str) -> None:
@@ -84,7 +91,7 @@ def _register(item: dict[str, Any]) -> str:
     deployment = getattr(import_module(module), name).to_deployment(
         name=item["name"],
         description=item["description"],
-        tags=item["tags"],
+        tags=[*item["tags"], *policy_of(item["name"], item.get("policy")).tags()],
         parameters=item["parameters"],
         concurrency_limit=item["concurrency_limit"],
         schedules=[CronSchedule(cron=s["cron"], timezone=s["timezone"]) for s in item["schedules"]],

@@ -18,7 +18,7 @@ import time
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from pipelines.flows.settings import LOOPBACK, SERVER_KEY, closed, origins, use_key
+from pipelines.flows.settings import LOOPBACK, SERVER_KEY, closed, kept, origins, use_key
 from schemas.errors import TumblelineError
 
 if TYPE_CHECKING:
@@ -46,6 +46,9 @@ def serve(host: str, port: int, names: Sequence[str], home: Path | None = None) 
     os.umask(PRIVATE)
     os.environ.update(closed(use_key(SERVER_KEY), origins(known, port)))
     os.environ.setdefault("PREFECT_SERVER_UI_API_URL", f"http://{LOOPBACK[0]}:{port}/api")
+    if home is None:
+        for name, value in kept().items():
+            os.environ.setdefault(name, value)
     folder = os.environ.get("PREFECT_HOME")
     if folder:
         private_folder(Path(folder))

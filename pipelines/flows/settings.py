@@ -21,6 +21,11 @@ SERVER_KEY, CLIENT_KEY = "PREFECT_SERVER_API_AUTH_STRING", "PREFECT_API_AUTH_STR
 CREDENTIAL = "prefect-auth"  # name in the systemd units (LoadCredential)
 KEY_FILE = "TUMBLELINE_ORCHESTRATOR_KEY"
 SHORTEST_KEY = 20
+DAY_S = 86400
+RETENTION_D = 90
+"""Days that the server of a line keeps its flow runs; longer than any lot and than the interval of audits."""
+
+EVENTS_D = 7
 LOOPBACK = ("127.0.0.1", "localhost")
 
 
@@ -50,6 +55,19 @@ def closed(key: str, allowed: Sequence[str]) -> dict[str, str]:
         ),
         "PREFECT_SERVER_ANALYTICS_ENABLED": "false",
         "DO_NOT_TRACK": "1",
+    }
+
+
+def kept() -> dict[str, str]:
+    """Environment of the server of a line: how long its history is kept, and what a restart must not lose.
+
+    The history is not needed for traceability, which is in the archive. Events are by far the largest part of it.
+    """
+    return {
+        "PREFECT_SERVER_SERVICES_DB_VACUUM_ENABLED": "events,flow_runs",
+        "PREFECT_SERVER_SERVICES_DB_VACUUM_RETENTION_PERIOD": str(RETENTION_D * DAY_S),
+        "PREFECT_SERVER_EVENTS_RETENTION_PERIOD": f"P{EVENTS_D}D",
+        "PREFECT_SERVER_CONCURRENCY_LEASE_STORAGE": "prefect.server.concurrency.lease_storage.filesystem",
     }
 
 

@@ -3,9 +3,9 @@
     python -m pipelines.flows.worker start --station line-1
     python -m pipelines.flows.worker stop --station line-1 --wait 60
 
-``start`` allows one worker at a time for a station on this computer, closes runs that died with the previous worker, and cancels
-scheduled runs that were missed. It ends when the worker has ended and the processes that a killed flow left (the watchdog of the
-station) have ended.
+``start`` allows one worker at a time for a station on this computer, closes runs that died with the previous worker, and applies
+the policies of the deployments (:mod:`pipelines.flows.queue_rules`) now and while it runs. It ends when the worker has ended and
+the processes that a killed flow left (the watchdog of the station) have ended.
 ``stop`` pauses the station's queue and waits for the run in progress; the next ``start`` resumes the queue.
 """
 
@@ -13,6 +13,8 @@ from __future__ import annotations
 
 import argparse
 import fcntl
+import os
+import platform
 import re
 import sys
 import time
@@ -32,8 +34,14 @@ if TYPE_CHECKING:
 NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]*")
 
 
-def start(pool: str, station: str, queues: Sequence[str], *, once: bool = False, healthcheck: bool = False) -> int:
+def start(
+    pool: str, station: str, queues: Sequence[str], host: str = "", *, once: bool = False, healthcheck: bool = False
+) -> int:
     """Run a worker for a station's queue and further queues, one run at a time; its exit status when all its processes ended.
+
+    Parameters
+    ----------
+    host : name of this computer, by which a worker knows the runs of its predecessor; that of the system where empty
 
     Raises
     ------
@@ -42,15 +50,19 @@ def start(pool: str, station: str, queues: Sequence[str], *, once: bool = False,
     WrongUse, LinkLost
         The orchestrator does not accept the key, or does not answer.
     """
-    from pipelines.flows.dead_runs import cancel_missed_runs, close_dead_runs_of_queue
+    from pipelines.flows.dead_runs import close_dead_runs_of_queue
+    from pipelines.flows.heartbeat import HEARTBEAT_S, VARIABLE
+    from pipelines.flows.queue_rules import applied, apply_rules
 
+    os.environ.setdefault(VARIABLE, str(HEARTBEAT_S))
+    name = f"{station} on {host or platform.node()}"
     with _alone(station):
         knock(STARTUP_S)
         for queue in (station, *queues):
-            for name in close_dead_runs_of_queue(pool, queue):
-                _tell(f"{queue}: run {name} is closed as crashed: its process has ended")
-            for name in cancel_missed_runs(pool, queue):
-                _tell(f"{queue}: run {name} is cancelled: it was missed")
+            for run in close_dead_runs_of_queue(pool, queue, name):
+                _tell(f"{queue}: run {run} is closed as crashed: its process has ended")
+            for text in apply_rules(pool, queue):
+                _tell(f"{queue}: {text}")
         if _marker(station).exists():
             _pause(pool, station, paused=False)
             _marker(station).unlink(missing_ok=True)
@@ -65,13 +77,14 @@ def start(pool: str, station: str, queues: Sequence[str], *, once: bool = False,
             "--limit",
             "1",
             "--name",
-            station,
+            name,
         ]
         for queue in (station, *queues):
             command += ["--work-queue", queue]
         command += ["--run-once"] if once else []
         command += ["--with-healthcheck"] if healthcheck else []
-        return attend(command)
+        with applied(pool, (station, *queues)):
+            return attend(command)
 
 
 def stop(pool: str, station: str, wait_s: float) -> list[str]:
@@ -147,6 +160,12 @@ def _parser() -> argparse.ArgumentParser:
     begin.add_argument(
         "--queue", action="append", default=[], help="A further queue of the same pool; may be repeated."
     )
+    begin.add_argument(
+        "--host",
+        default="",
+        metavar="NAME",
+        help="Name of this computer, where that of the system changes (containers).",
+    )
     begin.add_argument("--once", action="store_true", help="Run what is due, then end.")
     begin.add_argument(
         "--with-healthcheck", action="store_true", help="Answer at /health of PREFECT_WORKER_WEBSERVER_HOST and _PORT."
@@ -164,7 +183,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         use_key(CLIENT_KEY)
         if given.command == "start":
             healthcheck = given.with_healthcheck
-            return start(given.pool, given.station, given.queue, once=given.once, healthcheck=healthcheck)
+            return start(given.pool, given.station, given.queue, given.host, once=given.once, healthcheck=healthcheck)
         going = stop(given.pool, given.station, given.wait)
     except TumblelineError as problem:
         _tell(str(problem))

@@ -141,8 +141,9 @@ def test_flows_are_found_by_their_module_so_that_their_folder_hides_no_module_of
 
 CLOSING = """
 import json
-from pipelines.flows.dead_runs import cancel_missed_runs, close_dead_runs_of_queue
-print(json.dumps([close_dead_runs_of_queue("line", "line-1"), cancel_missed_runs("line", "line-1")]))
+from pipelines.flows.dead_runs import close_dead_runs_of_queue
+from pipelines.flows.queue_rules import apply_rules
+print(json.dumps([close_dead_runs_of_queue("line", "line-1", "line-1 on here"), apply_rules("line", "line-1")]))
 """
 
 
@@ -166,14 +167,19 @@ def test_runs_whose_process_is_gone_are_closed_and_others_left_alone(line: Orche
         "suspended": began("suspended", "PAUSED", state="Suspended"),
         "of-another-queue": began("of-another-queue", "RUNNING", elsewhere, infrastructure_pid=str(gone)),
         "ordered": began("ordered", "SCHEDULED"),
+        "of-this-worker": began("of-this-worker", "RUNNING", infrastructure_pid=str(gone)),
+        "on-another-computer": began("on-another-computer", "RUNNING", infrastructure_pid=str(gone)),
     }
+    for name, host in (("of-this-worker", "here"), ("on-another-computer", "there")):
+        label = {"prefect.worker.name": f"line-1 on {host}"}
+        assert line.ask(f"/api/flow_runs/{runs[name]}/labels", label, "PATCH")[0] == 204
     alive = began("alive", "RUNNING")
     environment = {**os.environ, "PREFECT__FLOW_RUN_ID": alive}
     with subprocess.Popen(["sleep", "600"], env=environment) as process:
         line.ask(f"/api/flow_runs/{alive}", {"infrastructure_pid": str(process.pid)}, "PATCH")
         closed, missed = json.loads(python(line.environment, "-c", CLOSING))
         process.kill()
-    assert sorted(closed) == ["another-process", "never-began", "power-cut", "waits-without-process"]
+    assert sorted(closed) == ["another-process", "never-began", "of-this-worker", "power-cut", "waits-without-process"]
     assert missed == []
     states = {name: line.ask(f"/api/flow_runs/{found}")[1]["state_type"] for name, found in runs.items()}
     assert {name for name, state in states.items() if state == "CRASHED"} == set(closed)

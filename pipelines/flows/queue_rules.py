@@ -1,0 +1,146 @@
+"""Rules for the runs in a station's queue: missed and skipped runs are cancelled, crashed runs continue where the policy says so.
+
+The queue of a station gives out one run at a time. The rest is the policy of the deployment (:mod:`pipelines.flows.policy`). The
+first process of a worker applies it when it starts and every ``EVERY_S`` seconds, also while its worker is busy or dead.
+"""
+
+from __future__ import annotations
+
+import sys
+import threading
+from collections import defaultdict
+from contextlib import contextmanager
+from datetime import UTC, datetime, timedelta
+from typing import TYPE_CHECKING
+
+from prefect.client.orchestration import SyncPrefectClient, get_client
+from prefect.client.schemas.objects import StateType
+from prefect.client.schemas.sorting import FlowRunSort
+from prefect.states import Cancelled, Scheduled
+
+from pipelines.flows.dead_runs import WORKING, runs_of_queue
+from pipelines.flows.policy import policy_of_tags
+
+if TYPE_CHECKING:
+    from collections.abc import Generator, Sequence
+
+    from prefect.client.schemas.objects import FlowRun
+
+EVERY_S = 10.0
+GRACE = timedelta(seconds=5)
+"""Time that a worker may need to take a run that is due; until then a busy station is no reason to skip it."""
+
+ATTEMPTS = 3
+CONTINUED_WITHIN = timedelta(hours=2)
+"""A crash that lies further back is left to a person: the lot may have been unloaded."""
+
+MISSED = "missed: its start was at {when}, and it could not start within {limit:.0f} min; policy missed={missed}"
+SKIPPED = "skipped: at {when} the station was busy with run {other}; policy busy=skip"
+CONTINUED = "continues from its checkpoint after a crash, attempt {attempt} of {attempts}; policy crashed=continue"
+
+
+def apply_rules(pool: str, queue: str, now: datetime | None = None) -> list[str]:
+    """Apply the policies to the runs of a queue; one sentence for each run that changed."""
+    at = now or datetime.now(UTC)
+    with get_client(sync_client=True) as client:
+        return [
+            *_continue_crashed(client, pool, queue, at),
+            *_cancel_missed(client, pool, queue, at),
+            *_skip_where_busy(client, pool, queue, at),
+        ]
+
+
+@contextmanager
+def applied(pool: str, queues: Sequence[str]) -> Generator[None]:
+    """A context in which the rules are applied to the queues every ``EVERY_S`` seconds, in a thread of this process."""
+    ended = threading.Event()
+    thread = threading.Thread(target=_repeat, args=(pool, tuple(queues), ended), name="queue rules", daemon=True)
+    thread.start()
+    try:
+        yield
+    finally:
+        ended.set()
+
+
+def _repeat(pool: str, queues: Sequence[str], ended: threading.Event) -> None:
+    fault = ""
+    while not ended.wait(EVERY_S):
+        try:
+            for queue in queues:
+                for text in apply_rules(pool, queue):
+                    _tell(f"{queue}: {text}")
+            if fault:
+                _tell("orchestrator: it answers again, the rules of the queues are applied")
+            fault = ""
+        except Exception as problem:  # noqa: BLE001 - without the server the worker waits; the rules wait with it
+            if not fault:
+                _tell(f"orchestrator: the rules of the queues are not applied ({type(problem).__name__}: {problem})")
+            fault = str(problem) or type(problem).__name__
+
+
+def _cancel_missed(client: SyncPrefectClient, pool: str, queue: str, now: datetime) -> list[str]:
+    """Cancel scheduled runs that are later than their policy allows, but the newest of a deployment with ``missed=latest``."""
+    late: dict[object, list[FlowRun]] = defaultdict(list)
+    for run in _due(client, pool, queue, now):
+        if now - _start(run) > policy_of_tags(run.tags).latest_start:
+            late[run.deployment_id].append(run)
+    texts: list[str] = []
+    for runs in late.values():
+        policy = policy_of_tags(runs[-1].tags)
+        for run in runs[:-1] if policy.missed == "latest" else runs:
+            message = MISSED.format(when=_text(_start(run)), limit=policy.latest_start_min, missed=policy.missed)
+            client.set_flow_run_state(run.id, Cancelled(message=message), force=True)
+            texts.append(f"run {run.name} is cancelled: {message}")
+    return texts
+
+
+def _skip_where_busy(client: SyncPrefectClient, pool: str, queue: str, now: datetime) -> list[str]:
+    """Cancel scheduled runs with ``busy=skip`` that are due while another run has the station."""
+    due = [run for run in _due(client, pool, queue, now - GRACE) if policy_of_tags(run.tags).busy == "skip"]
+    if not due:
+        return []
+    working = runs_of_queue(client, pool, queue, (*WORKING, StateType.PAUSED))
+    if not working:
+        return []
+    texts: list[str] = []
+    for run in due:
+        message = SKIPPED.format(when=_text(_start(run)), other=working[0].name)
+        client.set_flow_run_state(run.id, Cancelled(message=message), force=True)
+        texts.append(f"run {run.name} is cancelled: {message}")
+    return texts
+
+
+def _continue_crashed(client: SyncPrefectClient, pool: str, queue: str, now: datetime) -> list[str]:
+    """Schedule runs again that crashed, with the same id, so that they continue their capture in the archive."""
+    texts: list[str] = []
+    crashed = runs_of_queue(client, pool, queue, (StateType.CRASHED,), FlowRunSort.EXPECTED_START_TIME_DESC)
+    for run in crashed:
+        if policy_of_tags(run.tags).crashed != "continue" or not 0 < run.run_count < ATTEMPTS:
+            continue
+        if run.state is None or now - run.state.timestamp > CONTINUED_WITHIN:
+            continue
+        if client.read_flow_run(run.id).state_type != StateType.CRASHED:  # another worker was faster
+            continue
+        message = CONTINUED.format(attempt=run.run_count + 1, attempts=ATTEMPTS)
+        client.set_flow_run_state(run.id, Scheduled(scheduled_time=now, message=message), force=True)
+        texts.append(f"run {run.name} {message}")
+    return texts
+
+
+def _due(client: SyncPrefectClient, pool: str, queue: str, now: datetime) -> list[FlowRun]:
+    """Runs of a schedule that should have started and have not, in the order of their start; orders of persons never."""
+    runs = runs_of_queue(client, pool, queue, (StateType.SCHEDULED,))
+    return [run for run in runs if run.auto_scheduled and run.run_count == 0 and _start(run) <= now]
+
+
+def _start(run: FlowRun) -> datetime:
+    return run.expected_start_time or datetime.max.replace(tzinfo=UTC)
+
+
+def _text(when: datetime) -> str:
+    return when.isoformat(timespec="minutes")
+
+
+def _tell(text: str) -> None:
+    sys.stderr.write(f"tumbleline: {text}\n")
+    sys.stderr.flush()

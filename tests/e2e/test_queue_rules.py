@@ -1,0 +1,124 @@
+"""The policies of deployments on a real server: missed, skipped and continued runs, at times that the test chooses."""
+
+from collections.abc import Iterator
+from datetime import UTC, datetime, timedelta
+from pathlib import Path
+
+import pytest
+import yaml
+from orchestrator import Orchestrator, served
+from root_process import ROOT
+
+from pipelines.flows.deploy import register
+from pipelines.flows.heartbeat import have_automation
+from pipelines.flows.queue_rules import CONTINUED_WITHIN, apply_rules
+
+QUEUE = "line-7"
+
+
+def deployments(folder: Path) -> str:
+    """Deployments of one station with a run every minute, each with a policy of its own."""
+    content = yaml.safe_load((ROOT / "deploy" / "prefect.yaml").read_text(encoding="utf-8"))
+    base = content["deployments"][0] | {"work_pool": {"name": "line", "work_queue_name": QUEUE}}
+    minutely = [{"cron": "* * * * *", "timezone": "UTC"}]
+    policies = {
+        "cancels": {"latest_start_min": 5, "missed": "cancel"},
+        "latest": {"latest_start_min": 5, "missed": "latest", "crashed": "continue"},
+        "skips": {"latest_start_min": 60, "busy": "skip"},
+    }
+    own = [base | {"name": name, "policy": policy, "schedules": minutely} for name, policy in policies.items()]
+    path = folder / "prefect.yaml"
+    path.write_text(yaml.safe_dump(content | {"deployments": own}), encoding="utf-8")
+    return str(path)
+
+
+@pytest.fixture(scope="module")
+def line(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Orchestrator]:
+    """A server with the deployments, without a worker; this process is a client of it."""
+    home = tmp_path_factory.mktemp("rules")
+    with served(home) as found, pytest.MonkeyPatch.context() as patch:
+        own = {name: found.environment[name] for name in ("PREFECT_API_URL", "PREFECT_API_AUTH_STRING", "PREFECT_HOME")}
+        for name, value in own.items():
+            patch.setenv(name, value)
+        from prefect.settings import temporary_settings
+
+        with temporary_settings(updates=own):
+            register(Path(deployments(home)))
+            yield found
+
+
+def test_an_automation_closes_runs_without_a_heartbeat_and_is_there_once(line: Orchestrator) -> None:
+    have_automation()  # again, as with every registration
+    _, found = line.ask("/api/automations/filter", {})
+    [automation] = [one for one in found if one["name"] == "tumbleline: runs without a heartbeat"]
+    assert automation["enabled"]
+    trigger = automation["trigger"]
+    assert (trigger["posture"], trigger["within"]) == ("Proactive", 60)
+    assert "prefect.flow-run.Suspended" in trigger["expect"]
+    assert [action["state"] for action in automation["actions"]] == ["CRASHED"]
+
+
+def test_missed_runs_are_cancelled_or_run_once_and_a_busy_station_is_waited_for_or_not(line: Orchestrator) -> None:
+    names = ("cancels", "latest", "skips")
+    for name in names:
+        line.until(lambda name=name: len(line.runs(name, "SCHEDULED")) >= 30, f"scheduled runs of {name}", 60.0)
+    first = max(start(line.runs(name, "SCHEDULED")[0]) for name in names)
+    at = first + timedelta(minutes=20, seconds=30)
+    told = apply_rules("line", QUEUE, at)
+    limit = at - timedelta(minutes=5)
+
+    cancelled = line.runs("cancels", "CANCELLED")
+    assert cancelled
+    assert all(start(run) < limit for run in cancelled)
+    assert all(start(run) >= limit for run in line.runs("cancels", "SCHEDULED"))
+    assert "could not start within 5 min" in cancelled[0]["state"]["message"]
+
+    waiting = [start(run) for run in line.runs("latest", "SCHEDULED")]
+    before = [when for when in waiting if when < limit]
+    assert len(before) == 1, "of the missed runs one is run"
+    assert before[0] > max(start(run) for run in line.runs("latest", "CANCELLED"))
+
+    assert line.runs("skips", "CANCELLED") == []  # nothing has the station, and none is later than an hour
+    assert len(told) == len(cancelled) + len(line.runs("latest", "CANCELLED"))
+
+    busy = line.runs("latest", "SCHEDULED")[0]
+    force(line, busy, "RUNNING")
+    apply_rules("line", QUEUE, at)
+    skipped = line.runs("skips", "CANCELLED")
+    assert skipped
+    assert all(start(run) <= at for run in skipped)
+    assert f"busy with run {busy['name']}" in skipped[0]["state"]["message"]
+    assert all(start(run) > at - timedelta(seconds=10) for run in line.runs("skips", "SCHEDULED"))
+    assert line.runs("cancels", "SCHEDULED"), "with busy=wait a due run waits"
+
+    force(line, busy, "COMPLETED")
+    crashed_runs_continue_or_are_closed(line)
+
+
+def crashed_runs_continue_or_are_closed(line: Orchestrator) -> None:
+    """Once, as often as is allowed, and only soon after the crash; in one test with the rest, as all use the same runs."""
+    continued, often = line.runs("latest", "SCHEDULED")[-2:]
+    closed = line.runs("cancels", "SCHEDULED")[-1]
+    for run, count in ((continued, 1), (closed, 1), (often, 3)):
+        for _ in range(count):
+            force(line, run, "RUNNING")
+            force(line, run, "CRASHED")
+    now = datetime.now(UTC)
+    long_after = apply_rules("line", QUEUE, now + CONTINUED_WITHIN + timedelta(minutes=1))
+    assert not [text for text in long_after if "continues" in text], "an old crash is left to a person"
+    apply_rules("line", QUEUE, now)
+    states = {run["id"]: line.ask(f"/api/flow_runs/{run['id']}")[1] for run in (continued, closed, often)}
+    assert states[continued["id"]]["state_type"] == "SCHEDULED"
+    assert states[continued["id"]]["run_count"] == 1
+    assert "attempt 2 of 3" in states[continued["id"]]["state"]["message"]
+    assert states[closed["id"]]["state_type"] == "CRASHED"
+    assert states[often["id"]]["state_type"] == "CRASHED"
+
+
+def start(run: dict) -> datetime:
+    return datetime.fromisoformat(run["expected_start_time"])
+
+
+def force(line: Orchestrator, run: dict, kind: str) -> None:
+    state = {"state": {"type": kind, "name": kind.title()}, "force": True}
+    assert line.ask(f"/api/flow_runs/{run['id']}/set_state", state)[0] in {200, 201}
