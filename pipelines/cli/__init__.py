@@ -16,6 +16,8 @@ from inertial.errors import InertialError
 from pipelines.cli.discovery import find_commands
 from schemas.errors import UNEXPECTED, UNUSABLE, TumblelineError, WrongUse, did_you_mean
 from schemas.foreign import shown
+from schemas.log_lines import VARIABLE as LOG
+from schemas.log_lines import tell
 
 if TYPE_CHECKING:
     from typer._click import Command, Context
@@ -90,14 +92,34 @@ def _print_version(requested: bool) -> None:
         raise typer.Exit
 
 
+def _choose_log(form: str) -> str:
+    """Make messages text or JSON, before a command is looked for; without the option TUMBLELINE_LOG decides."""
+    if form not in {"", "text", "json"}:
+        raise WrongUse(f"--log is '{shown(form)}', text or json is needed; correct it")
+    if form:
+        os.environ[LOG] = form
+    return form
+
+
 @app.callback()
 def _product(
     *,
+    log: Annotated[
+        str,
+        typer.Option(
+            "--log",
+            metavar="text|json",
+            callback=_choose_log,
+            is_eager=True,
+            help="Form of messages on standard error.",
+        ),
+    ] = "",
     version: Annotated[
         bool, typer.Option("--version", callback=_print_version, is_eager=True, help="Show the version and exit.")
     ] = False,
 ) -> None:
     """Calibrate accelerometers in production: measure, fit, judge the model, grade, with traceable results."""
+    del log, version  # their callbacks have done it
 
 
 def main() -> None:
@@ -137,5 +159,5 @@ def _one_thread() -> None:
 
 def _leave(message: str, status: int) -> None:
     sys.stdout.flush()
-    sys.stderr.write(f"tumbleline: {message}\n")
+    tell(message, level="error", status=status)
     sys.exit(status)

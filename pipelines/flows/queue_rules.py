@@ -6,7 +6,6 @@ first process of a worker applies it when it starts and every ``EVERY_S`` second
 
 from __future__ import annotations
 
-import sys
 import threading
 from collections import defaultdict
 from contextlib import contextmanager
@@ -20,6 +19,7 @@ from prefect.states import Cancelled, Scheduled
 
 from pipelines.flows.dead_runs import WORKING, runs_of_queue
 from pipelines.flows.policy import policy_of_tags
+from schemas.log_lines import tell
 
 if TYPE_CHECKING:
     from collections.abc import Generator, Sequence
@@ -68,13 +68,14 @@ def _repeat(pool: str, queues: Sequence[str], ended: threading.Event) -> None:
         try:
             for queue in queues:
                 for text in apply_rules(pool, queue):
-                    _tell(f"{queue}: {text}")
+                    tell(f"{queue}: {text}", event="rule_applied", queue=queue)
             if fault:
-                _tell("orchestrator: it answers again, the rules of the queues are applied")
+                tell("orchestrator: it answers again, the rules of the queues are applied")
             fault = ""
         except Exception as problem:  # noqa: BLE001 - without the server the worker waits; the rules wait with it
             if not fault:
-                _tell(f"orchestrator: the rules of the queues are not applied ({type(problem).__name__}: {problem})")
+                text = f"orchestrator: the rules of the queues are not applied ({type(problem).__name__}: {problem})"
+                tell(text, level="error", event="rules_not_applied")
             fault = str(problem) or type(problem).__name__
 
 
@@ -139,8 +140,3 @@ def _start(run: FlowRun) -> datetime:
 
 def _text(when: datetime) -> str:
     return when.isoformat(timespec="minutes")
-
-
-def _tell(text: str) -> None:
-    sys.stderr.write(f"tumbleline: {text}\n")
-    sys.stderr.flush()

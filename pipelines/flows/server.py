@@ -18,8 +18,9 @@ import time
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from pipelines.flows.settings import LOOPBACK, SERVER_KEY, closed, kept, origins, use_key
+from pipelines.flows.settings import JSON_FORMAT, LOOPBACK, SERVER_KEY, closed, kept, origins, use_key
 from schemas.errors import TumblelineError
+from schemas.log_lines import JSON, tell, wants_json
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -46,6 +47,8 @@ def serve(host: str, port: int, names: Sequence[str], home: Path | None = None) 
     os.umask(PRIVATE)
     os.environ.update(closed(use_key(SERVER_KEY), origins(known, port)))
     os.environ.setdefault("PREFECT_SERVER_UI_API_URL", f"http://{LOOPBACK[0]}:{port}/api")
+    if wants_json():
+        os.environ.setdefault(JSON_FORMAT, JSON)
     if home is None:
         for name, value in kept().items():
             os.environ.setdefault(name, value)
@@ -133,7 +136,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     try:
         serve(given.host, given.port, given.name, given.until_unused)
     except TumblelineError as problem:
-        sys.stderr.write(f"tumbleline: {problem}\n")
+        tell(str(problem), level="error")
         sys.exit(problem.exit_status)
 
 

@@ -21,6 +21,7 @@ SERVER_KEY, CLIENT_KEY = "PREFECT_SERVER_API_AUTH_STRING", "PREFECT_API_AUTH_STR
 CREDENTIAL = "prefect-auth"  # name in the systemd units (LoadCredential)
 KEY_FILE = "TUMBLELINE_ORCHESTRATOR_KEY"
 SHORTEST_KEY = 20
+JSON_FORMAT = "PREFECT_LOGGING_HANDLERS_CONSOLE_FORMATTER"
 DAY_S = 86400
 RETENTION_D = 90
 """Days that the server of a line keeps its flow runs; longer than any lot and than the interval of audits."""

@@ -23,8 +23,9 @@ from typing import TYPE_CHECKING
 
 from pipelines.flows.attended import attend
 from pipelines.flows.knock import POLL_S, knock
-from pipelines.flows.settings import CLIENT_KEY, STARTUP_S, use_key
+from pipelines.flows.settings import CLIENT_KEY, JSON_FORMAT, STARTUP_S, use_key
 from schemas.errors import OperatorNeeded, TumblelineError, WrongUse
+from schemas.log_lines import JSON, tell, wants_json
 from stations.safety.folder import state_folder
 
 if TYPE_CHECKING:
@@ -55,14 +56,16 @@ def start(
     from pipelines.flows.queue_rules import applied, apply_rules
 
     os.environ.setdefault(VARIABLE, str(HEARTBEAT_S))
+    if wants_json():
+        os.environ.setdefault(JSON_FORMAT, JSON)
     name = f"{station} on {host or platform.node()}"
     with _alone(station):
         knock(STARTUP_S)
         for queue in (station, *queues):
             for run in close_dead_runs_of_queue(pool, queue, name):
-                _tell(f"{queue}: run {run} is closed as crashed: its process has ended")
+                tell(f"{queue}: run {run} is closed as crashed: its process has ended")
             for text in apply_rules(pool, queue):
-                _tell(f"{queue}: {text}")
+                tell(f"{queue}: {text}")
         if _marker(station).exists():
             _pause(pool, station, paused=False)
             _marker(station).unlink(missing_ok=True)
@@ -142,11 +145,6 @@ def _marker(station: str) -> Path:
     return state_folder() / f"worker-{station}.paused"
 
 
-def _tell(text: str) -> None:
-    sys.stderr.write(f"tumbleline: {text}\n")
-    sys.stderr.flush()
-
-
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
         prog="python -m pipelines.flows.worker", description="The worker beside a station."
@@ -186,9 +184,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
             return start(given.pool, given.station, given.queue, given.host, once=given.once, healthcheck=healthcheck)
         going = stop(given.pool, given.station, given.wait)
     except TumblelineError as problem:
-        _tell(str(problem))
+        tell(str(problem))
         return problem.exit_status
-    _tell(
+    tell(
         f"{given.station}: {'no run in progress' if not going else 'still in progress: ' + ', '.join(going)}; its queue is paused"
     )
     return 1 if going else 0

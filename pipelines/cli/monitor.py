@@ -1,0 +1,108 @@
+"""``tumbleline monitor``: whether the line is healthy, its numbers for Prometheus, and alerts to a web hook."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from pipelines.cli.options import ArchiveOption, JsonOption, console, print_json
+
+if TYPE_CHECKING:
+    from pipelines.monitoring.alerts import Poster
+    from pipelines.monitoring.snapshot import Monitor
+
+PART = "Measure"
+ORDER = 166
+SUMMARY = "Monitor the line: health, numbers for Prometheus, alerts to a web hook."
+EXAMPLES = (
+    "tumbleline monitor --queue line-1",
+    "tumbleline monitor --serve --port 9464 --webhook https://alerts.example/hook --audits audits",
+)
+
+PORT = 9464
+
+
+def command(
+    archive: ArchiveOption = None,
+    queue: Annotated[
+        list[str] | None,
+        typer.Option("--queue", metavar="NAME", help="A queue that must have a worker online; may be repeated."),
+    ] = None,
+    days: Annotated[int, typer.Option("--days", min=1, max=3650, help="Runs of so many days are counted.")] = 30,
+    free_gb: Annotated[
+        float, typer.Option("--free-gb", min=0.0, metavar="GB", help="Free space that the archive needs.")
+    ] = 1.0,
+    webhook: Annotated[
+        str, typer.Option("--webhook", metavar="ADDRESS", help="Post alerts to this address, with --serve.")
+    ] = "",
+    audits: Annotated[
+        Path | None,
+        typer.Option("--audits", metavar="DIR", help="Folder of audit documents whose findings are alerts too."),
+    ] = None,
+    host: Annotated[
+        str, typer.Option("--host", metavar="ADDRESS", help="Where it listens, with --serve.")
+    ] = "127.0.0.1",
+    port: Annotated[int, typer.Option("--port", min=0, max=65535, help="Port, with --serve; 0: a free one.")] = PORT,
+    *,
+    metrics: Annotated[
+        bool, typer.Option("--metrics", help="Print the numbers in the format of Prometheus, and end.")
+    ] = False,
+    serve: Annotated[bool, typer.Option("--serve", help="Serve /metrics, /healthz and /livez until stopped.")] = False,
+    as_json: JsonOption = False,
+) -> None:
+    """Say whether the line needs a person; exit 1 if it does.
+
+    Read are the archive, the orchestrator of PREFECT_API_URL, and the leases of the stations of this computer. Nothing is
+    changed. No serial number is among the numbers.
+    """
+    import os
+
+    from pipelines.archive import Archive
+    from pipelines.monitoring.exposition import text
+    from pipelines.monitoring.snapshot import Monitor
+    from schemas.errors import DONE, PART_FAILED, WrongUse
+
+    address = webhook or os.environ.get("TUMBLELINE_WEBHOOK", "")
+    if webhook and not serve:
+        raise WrongUse("monitor: --webhook posts while the service runs, --serve is needed; give it too")
+    monitor = Monitor(Archive(archive), days, free_gb, tuple(queue or ()))
+    if serve:
+        from pipelines.monitoring.alerts import Poster
+        from stations.safety.folder import state_folder
+
+        _serve(monitor, host, port, Poster(address, state_folder()) if address else None, audits)
+        return
+    snapshot = monitor.snapshot()
+    if metrics:
+        typer.echo(text(snapshot).decode(), nl=False)
+        return
+    document = snapshot.document()
+    if as_json:
+        print_json(document)
+    else:
+        for problem in document["problems"]:
+            console().print(problem, markup=False, soft_wrap=True)
+        console().print("healthy" if document["ok"] else f"{len(document['problems'])} problems", markup=False)
+    raise typer.Exit(DONE if document["ok"] else PART_FAILED)
+
+
+def _serve(monitor: Monitor, host: str, port: int, poster: Poster | None, audits: Path | None) -> None:
+    import socket
+    import sys
+    from contextlib import nullcontext
+
+    import uvicorn
+
+    from pipelines.monitoring.service import alerting, application
+
+    place = socket.create_server((host, port), family=socket.AF_INET6 if ":" in host else socket.AF_INET)
+    console().print(f"http://{host}:{place.getsockname()[1]}/healthz", soft_wrap=True)
+    sys.stdout.flush()  # a program that started it waits for the address
+    config = uvicorn.Config(
+        application(monitor), log_level="warning", access_log=False, server_header=False, ws="none",
+        timeout_graceful_shutdown=2,
+    )  # fmt: skip
+    with place, alerting(monitor, poster, audits) if poster is not None else nullcontext():
+        uvicorn.Server(config).run(sockets=[place])

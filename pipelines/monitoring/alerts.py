@@ -1,0 +1,140 @@
+"""Alerts to a web hook: runs that crashed, failed, were missed or are late, stations not left safe, findings of the audit.
+
+Each alert is posted until the receiver accepts it, and never again: its id is noted in the state folder, atomically and on disk,
+after it was accepted. A process that is killed in between posts an alert twice, with the same id.
+"""
+
+from __future__ import annotations
+
+import json
+import time
+import urllib.error
+import urllib.request
+from datetime import UTC, datetime, timedelta
+from hashlib import sha256
+from typing import TYPE_CHECKING, Any, cast
+
+from pipelines.archive.files import json_bytes, publish
+from schemas.errors import WrongUse
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+    from pathlib import Path
+
+    from pipelines.monitoring.documents import Alert
+    from pipelines.monitoring.snapshot import Snapshot
+
+TIMEOUT_S = 10.0
+NOTED = "alerts.json"
+REMEMBERED = 5000
+AUDIT_AGE = timedelta(days=10)
+"""The findings of an older audit are not sent: they were, or nobody receives alerts of it."""
+
+KINDS = {"CRASHED": "crashed", "FAILED": "failed", "CANCELLED": "missed"}
+
+
+def alerts_of(snapshot: Snapshot, audits: Path | None = None) -> list[Alert]:
+    """All alerts that the numbers and the newest audit give; the same ones as before among them.
+
+    Parameters
+    ----------
+    audits : folder of the documents of the audits (``pages`` of the deployment weekly-audit); none where None
+    """
+    found = [*_of_runs(snapshot), *_of_stations(snapshot)]
+    return [*found, *_of_audit(audits, snapshot.when)] if audits is not None else found
+
+
+class Poster:
+    """Posts alerts that were not accepted yet.
+
+    Parameters
+    ----------
+    address : of the web hook, http or https
+    folder : where the ids of accepted alerts are noted
+
+    Raises
+    ------
+    WrongUse
+        The address is of another kind.
+    """
+
+    def __init__(self, address: str, folder: Path) -> None:
+        if not address.startswith(("http://", "https://")):
+            raise WrongUse(f"alerts: web hook '{address}', an address such as https://host/path is needed; correct it")
+        self._address, self._place = address, folder / NOTED
+
+    def post(self, alerts: list[Alert]) -> tuple[int, str]:
+        """Number of alerts that were accepted now, and the first error; the rest is posted with the next call."""
+        accepted = self._accepted()
+        count = 0
+        for alert in alerts:
+            if alert["id"] in accepted:
+                continue
+            try:
+                self._send(alert)
+            except (urllib.error.URLError, TimeoutError, ConnectionError) as problem:
+                if isinstance(problem, urllib.error.HTTPError):
+                    problem.close()
+                return count, f"alerts: the web hook does not accept an alert ({problem}); it is posted again"
+            accepted[alert["id"]] = time.time()
+            newest = sorted(accepted.items(), key=lambda item: item[1])[-REMEMBERED:]
+            publish(self._place, json_bytes(dict(newest)))
+            count += 1
+        return count, ""
+
+    def _send(self, alert: Alert) -> None:
+        headers = {"Content-Type": "application/json", "User-Agent": "tumbleline"}
+        request = urllib.request.Request(self._address, json.dumps(alert).encode(), headers)  # noqa: S310 - checked above
+        with urllib.request.urlopen(request, timeout=TIMEOUT_S):  # noqa: S310
+            return
+
+    def _accepted(self) -> dict[str, float]:
+        try:
+            content = json.loads(self._place.read_text(encoding="utf-8"))
+        except (OSError, ValueError):
+            return {}
+        known = cast("dict[Any, Any]", content if isinstance(content, dict) else {})
+        return {str(key): float(value) for key, value in known.items() if isinstance(value, int | float)}
+
+
+def _of_runs(snapshot: Snapshot) -> Iterator[Alert]:
+    if snapshot.queues is None:
+        return
+    for run in snapshot.queues.ended:
+        kind = KINDS[run.state]
+        text = f"run {run.name} of queue {run.queue}: {kind}; {run.message or 'no message'}"
+        yield _alert(kind, f"{run.id} {run.count}", run.name, text, snapshot.when)
+    for run in snapshot.queues.late(snapshot.when):
+        text = f"run {run.name} of queue {run.queue} was due at {run.since:%Y-%m-%d %H:%M} UTC and has not started"
+        yield _alert("late", run.id, run.name, text, snapshot.when)
+
+
+def _of_stations(snapshot: Snapshot) -> Iterator[Alert]:
+    if snapshot.stations is None:
+        return
+    for name, run in sorted(snapshot.stations.unsafe.items()):
+        text = (
+            f"station {name} was not reported safe after {run}; check axes and chamber, see 'tumbleline station status'"
+        )
+        yield _alert("unsafe", f"{name} {run}", name, text, snapshot.when)
+
+
+def _of_audit(folder: Path, now: datetime) -> Iterator[Alert]:
+    """The findings of the newest document; a finding that stays is sent once."""
+    newest = max(folder.glob("audit-*.json"), key=lambda path: path.name, default=None)
+    if newest is None or now - datetime.fromtimestamp(newest.stat().st_mtime, UTC) > AUDIT_AGE:
+        return
+    try:
+        findings: list[dict[str, Any]] = json.loads(newest.read_text(encoding="utf-8"))["findings"]
+    except (OSError, ValueError, KeyError):
+        return
+    for finding in findings:
+        subject = str(finding.get("subject", ""))
+        text = f"audit, {finding.get('whose', 'audit')}: {finding.get('message', '')}"
+        yield _alert("audit", f"{finding.get('kind')} {subject} {finding.get('message')}", subject, text, now)
+
+
+def _alert(kind: str, identity: str, subject: str, text: str, when: datetime) -> Alert:
+    name = sha256(f"{kind} {identity}".encode()).hexdigest()[:24]
+    at = when.isoformat(timespec="seconds")
+    return {"source": "tumbleline", "kind": kind, "id": name, "subject": subject, "text": text, "when": at}

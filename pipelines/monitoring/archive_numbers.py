@@ -1,0 +1,151 @@
+"""Numbers of an archive: runs, yield, interruptions, station time, lag of the chain, and units that are due."""
+
+from __future__ import annotations
+
+import shutil
+from dataclasses import dataclass, field
+from datetime import UTC, datetime, timedelta
+from pathlib import Path
+from typing import TYPE_CHECKING, NamedTuple
+
+from pipelines.archive.run_files import SEALED
+from pipelines.capture.interruptions import interruptions
+from pipelines.certificates.days import today
+from pipelines.certificates.ledger import Ledger
+from schemas.errors import TumblelineError
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+
+    from pipelines.archive import Archive
+    from pipelines.archive.listing import RunInfo
+
+DUE_DAYS = (0, 30)
+"""A certificate counts as due when it ends within so many days."""
+
+IMPORTED = "(import)"  # in place of the station of a run that measured nothing
+
+
+class RunTime(NamedTuple):
+    """What a finished run took: time on the station's clock, s; pauses and their duration, s; repeated dwells; opened door."""
+
+    station_s: float = 0.0
+    pauses: int = 0
+    paused_s: float = 0.0
+    repeated: int = 0
+    door: int = 0
+
+
+@dataclass
+class LineNumbers:
+    """Sums over the runs of one station and recipe inside the window; ``last`` is the newest start of a finished run."""
+
+    finished: int = 0
+    unfinished: int = 0
+    passed: int = 0
+    failed: int = 0
+    last: datetime | None = None
+    station_s: float = 0.0
+    pauses: int = 0
+    paused_s: float = 0.0
+    repeated: int = 0
+    door: int = 0
+
+
+@dataclass
+class ArchiveNumbers:
+    """Everything that the archive says.
+
+    lag_s : age of the oldest finished run that is not in the chain yet, s; 0 without one
+    free_bytes : free space on its disk; None for an object store
+    due : number of units whose certificate ends within so many days, by these days
+    """
+
+    lines: dict[tuple[str, str], LineNumbers] = field(default_factory=dict[tuple[str, str], LineNumbers])
+    unsealed: int = 0
+    lag_s: float = 0.0
+    free_bytes: int | None = None
+    certified: int = 0
+    due: dict[int, int] = field(default_factory=dict[int, int])
+
+
+class ArchiveReader:
+    """Reads the numbers of an archive again and again; a finished run is read once."""
+
+    def __init__(self, archive: Archive, window_d: int) -> None:
+        self.archive, self.window_d = archive, window_d
+        self._times: dict[str, RunTime] = {}
+        self._sealed: set[str] = set()
+
+    def read(self, now: datetime | None = None) -> ArchiveNumbers:
+        """The numbers of the runs that started within the window, and of all certificates."""
+        at = now or datetime.now(UTC)
+        since = (at - timedelta(days=self.window_d)).isoformat()
+        numbers = ArchiveNumbers()
+        infos = [info for info in self.archive.runs() if info.started >= since and not info.rerun_of]
+        for info in infos:
+            key = (info.station or IMPORTED, info.recipe)
+            self._add(numbers.lines.setdefault(key, LineNumbers()), info)
+        self._lag([info for info in infos if info.finished], numbers, at)
+        root = self.archive.root
+        if isinstance(root, Path):
+            numbers.free_bytes = shutil.disk_usage(root).free
+        self._due(numbers)
+        self._times = {info.id: self._times[info.id] for info in infos if info.id in self._times}
+        return numbers
+
+    def _add(self, line: LineNumbers, info: RunInfo) -> None:
+        if not info.finished:
+            line.unfinished += 1
+            return
+        line.finished += 1
+        line.passed += info.passed or 0
+        line.failed += (info.graded or 0) - (info.passed or 0)
+        started = datetime.fromisoformat(info.started)
+        line.last = started if line.last is None else max(line.last, started)
+        if info.id not in self._times:
+            self._times[info.id] = self._time_of(info.id)
+        took = self._times[info.id]
+        line.station_s += took.station_s
+        line.pauses += took.pauses
+        line.paused_s += took.paused_s
+        line.repeated += took.repeated
+        line.door += took.door
+
+    def _time_of(self, run_id: str) -> RunTime:
+        run = self.archive.run(run_id)
+        try:
+            dwells = run.table("dwells") if "dwells" in run.tables() else None
+            found = interruptions(run)
+        except TumblelineError:  # 'tumbleline verify' says what is wrong with its files
+            return RunTime()
+        station_s = float(dwells["time_s"].max()) if dwells is not None and len(dwells) else 0.0
+        if found is None:
+            return RunTime(station_s)
+        repeated = sum(one["times"] for one in found["repeated_dwells"])
+        return RunTime(station_s, found["pauses"], found["paused_s"], repeated, found["door_opened"])
+
+    def _lag(self, finished: Iterable[RunInfo], numbers: ArchiveNumbers, at: datetime) -> None:
+        for info in finished:
+            path = self.archive.root / "runs" / info.id
+            if info.id in self._sealed or (path / SEALED).is_file():
+                self._sealed.add(info.id)
+                continue
+            numbers.unsealed += 1
+            numbers.lag_s = max(numbers.lag_s, (at - datetime.fromisoformat(info.started)).total_seconds())
+
+    def _due(self, numbers: ArchiveNumbers) -> None:
+        days = {within: _day_after(within) for within in DUE_DAYS}
+        numbers.due = dict.fromkeys(DUE_DAYS, 0)
+        last: dict[str, str] = {}
+        for calibration in Ledger(self.archive).all():
+            last[calibration.serial] = max(last.get(calibration.serial, ""), calibration.until)
+        numbers.certified = len(last)
+        for until in last.values():
+            for within, day in days.items():
+                numbers.due[within] += until <= day
+
+
+def _day_after(days: int) -> str:
+    """The day so many days after today, by the calendar of certificates."""
+    return (datetime.fromisoformat(today()) + timedelta(days=days)).date().isoformat()

@@ -1,0 +1,76 @@
+"""The service: ``/metrics`` for Prometheus, ``/healthz`` for health checks, and alerts to a web hook."""
+
+from __future__ import annotations
+
+import threading
+from contextlib import contextmanager
+from typing import TYPE_CHECKING
+
+from starlette.applications import Starlette
+from starlette.responses import JSONResponse, PlainTextResponse, Response
+from starlette.routing import Route
+
+from pipelines.monitoring.alerts import alerts_of
+from pipelines.monitoring.exposition import text
+from schemas.log_lines import tell
+
+if TYPE_CHECKING:
+    from collections.abc import Generator
+    from pathlib import Path
+
+    from starlette.requests import Request
+
+    from pipelines.monitoring.alerts import Poster
+    from pipelines.monitoring.snapshot import Monitor
+
+CONTENT_TYPE = "text/plain; version=0.0.4; charset=utf-8"
+EVERY_S = 15.0
+UNHEALTHY = 503
+
+
+def application(monitor: Monitor) -> Starlette:
+    """The application; its numbers hold no serial number, and nothing can be changed through it."""
+
+    def metrics(request: Request) -> Response:
+        del request
+        return Response(text(monitor.snapshot()), media_type=CONTENT_TYPE)
+
+    def health(request: Request) -> Response:
+        del request
+        document = monitor.snapshot().document()
+        return JSONResponse(dict(document), 200 if document["ok"] else UNHEALTHY)
+
+    def live(request: Request) -> Response:
+        del request
+        return PlainTextResponse("alive\n")
+
+    return Starlette(routes=[Route("/metrics", metrics), Route("/healthz", health), Route("/livez", live)])
+
+
+@contextmanager
+def alerting(monitor: Monitor, poster: Poster, audits: Path | None, every_s: float = EVERY_S) -> Generator[None]:
+    """A context in which alerts are posted every ``every_s`` seconds, in a thread of this process."""
+    ended = threading.Event()
+
+    def repeat() -> None:
+        before = ""
+        while True:
+            try:
+                count, fault = poster.post(alerts_of(monitor.snapshot(), audits))
+            except OSError as problem:  # the note could not be written: the alert is posted again
+                count, fault = 0, f"alerts: {problem}"
+            if count:
+                tell(f"alerts: {count} posted", event="alerts_posted", count=count)
+            if fault and fault != before:
+                tell(fault, level="error", event="alerts_failed")
+            before = fault
+            if ended.wait(every_s):
+                return
+
+    thread = threading.Thread(target=repeat, name="alerts", daemon=True)
+    thread.start()
+    try:
+        yield
+    finally:
+        ended.set()
+        thread.join(EVERY_S)

@@ -1,0 +1,152 @@
+"""All numbers at one time, and the verdict on them for health checks."""
+
+from __future__ import annotations
+
+import threading
+import time
+from dataclasses import dataclass, field
+from datetime import UTC, datetime
+from typing import TYPE_CHECKING
+
+from pipelines.monitoring.archive_numbers import ArchiveNumbers, ArchiveReader
+from pipelines.monitoring.queue_numbers import QueueNumbers, configured, read_queues
+from pipelines.monitoring.station_numbers import StationNumbers, read_stations
+from schemas.errors import TumblelineError
+from stations.safety.folder import state_folder
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from pipelines.archive import Archive
+    from pipelines.monitoring.documents import HealthDocument
+
+KEEP_S = 10.0
+"""A snapshot is used again for so long: several scrapers cost one reading."""
+
+LAG_S = 3600.0
+"""A finished run that is not in the chain for longer is a fault; its writer was killed, or still works."""
+
+
+@dataclass(frozen=True)
+class Snapshot:
+    """The numbers of each source; None where it could not be read or is not configured, with the reason in ``faults``."""
+
+    when: datetime
+    window_d: int
+    archive: ArchiveNumbers | None
+    queues: QueueNumbers | None
+    stations: StationNumbers | None
+    faults: dict[str, str] = field(default_factory=dict[str, str])
+    least_free_bytes: float = 0.0
+    expected: tuple[str, ...] = ()
+
+    @property
+    def problems(self) -> list[str]:
+        """What a person has to look after; empty where the line is healthy."""
+        out = [f"{source}: {fault}" for source, fault in self.faults.items() if fault]
+        if self.archive is not None:
+            out += self._of_archive(self.archive)
+        if self.queues is not None:
+            out += self._of_queues(self.queues)
+        if self.stations is not None:
+            out += [
+                f"station {name}: not reported safe after {run}; check axes and chamber, see 'tumbleline station status'"
+                for name, run in sorted(self.stations.unsafe.items())
+            ]
+        return out
+
+    @property
+    def ok(self) -> bool:
+        """Whether the line is healthy."""
+        return not self.problems
+
+    def document(self) -> HealthDocument:
+        """The verdict for JSON."""
+        return {"ok": self.ok, "when": self.when.isoformat(timespec="seconds"), "problems": self.problems,
+                "sources": {source: not fault for source, fault in self.faults.items()}}  # fmt: skip
+
+    def _of_archive(self, numbers: ArchiveNumbers) -> list[str]:
+        out: list[str] = []
+        if numbers.free_bytes is not None and numbers.free_bytes < self.least_free_bytes:
+            found, needed = numbers.free_bytes / 1e9, self.least_free_bytes / 1e9
+            out.append(f"archive: {found:.1f} GB are free, at least {needed:g} GB are needed; make room on its disk")
+        if numbers.lag_s > LAG_S:
+            text = f"archive: {numbers.unsealed} finished runs are not in the hash chain, the oldest for"
+            out.append(f"{text} {numbers.lag_s / 3600.0:.1f} h; run 'tumbleline archive clean'")
+        return out
+
+    def _of_queues(self, numbers: QueueNumbers) -> list[str]:
+        late = numbers.late(self.when)
+        out = [
+            f"queue {run.queue}: run {run.name} was due at {run.since:%H:%M} UTC and has not started; start its worker, or "
+            "resume its queue"
+            for run in late
+        ]
+        online = {name.partition(" on ")[0] for name, is_online in numbers.workers.items() if is_online}
+        out += [
+            f"queue {queue}: no worker is online, one is needed; start tumbleline-worker@{queue}"
+            for queue in self.expected
+            if queue not in online
+        ]
+        return out
+
+
+class Monitor:
+    """Takes snapshots of an archive, the orchestrator of the environment and the stations of this computer.
+
+    Parameters
+    ----------
+    window_d : runs of the last days are counted
+    free_gb : free space that the archive needs, GB
+    expected : queues that must have a worker online
+    """
+
+    def __init__(
+        self, archive: Archive, window_d: int = 30, free_gb: float = 1.0, expected: Sequence[str] = ()
+    ) -> None:
+        self._reader = ArchiveReader(archive, window_d)
+        self._free_bytes, self._expected = free_gb * 1e9, tuple(expected)
+        self._lock = threading.Lock()
+        self._last: tuple[float, Snapshot] | None = None
+
+    def snapshot(self) -> Snapshot:
+        """The numbers now, or those of the last ten seconds; a source that cannot be read is a fault, never an exception."""
+        with self._lock:
+            if self._last is not None and time.monotonic() - self._last[0] < KEEP_S:
+                return self._last[1]
+            taken = self._take()
+            self._last = (time.monotonic(), taken)
+            return taken
+
+    def _take(self) -> Snapshot:
+        faults: dict[str, str] = {}
+        archive: ArchiveNumbers | None = None
+        queues: QueueNumbers | None = None
+        stations: StationNumbers | None = None
+        faults["archive"] = ""
+        try:
+            self._reader.archive.refuse_none()
+            archive = self._reader.read()
+        except (TumblelineError, OSError) as problem:
+            faults["archive"] = str(problem).removeprefix("archive: ")
+        if configured():
+            faults["orchestrator"] = ""
+            try:
+                queues = read_queues()
+            except TumblelineError as problem:
+                faults["orchestrator"] = str(problem).removeprefix("orchestrator: ")
+        faults["stations"] = ""
+        try:
+            stations = read_stations(state_folder())
+        except (TumblelineError, OSError) as problem:
+            faults["stations"] = str(problem)
+        return Snapshot(
+            datetime.now(UTC),
+            self._reader.window_d,
+            archive,
+            queues,
+            stations,
+            faults,
+            self._free_bytes,
+            self._expected,
+        )

@@ -1,0 +1,42 @@
+"""Numbers of the stations of this computer: who drives them, which was not left safe, and what their watchdogs did."""
+
+from __future__ import annotations
+
+from collections import Counter
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+from stations.safety.folder import read_log
+from stations.safety.lease_files import read_holder
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+
+@dataclass
+class StationNumbers:
+    """Everything that the state folder says.
+
+    driven : stations with a live run · unsafe : stations that nobody drives and nobody reported safe, with the last run
+    events : number of events in the log, by station and event
+    """
+
+    driven: set[str] = field(default_factory=set[str])
+    unsafe: dict[str, str] = field(default_factory=dict[str, str])
+    events: Counter[tuple[str, str]] = field(default_factory=Counter[tuple[str, str]])
+
+
+def read_stations(folder: Path) -> StationNumbers:
+    """The numbers of the stations whose leases are in a folder."""
+    numbers = StationNumbers()
+    for path in sorted((folder / "leases").glob("*.json")):
+        holder = read_holder(path)
+        if holder is None:
+            continue
+        if holder.lives(path) and holder.role == "run" and not holder.tripped:
+            numbers.driven.add(holder.station)
+        else:
+            numbers.unsafe[holder.station] = f"{holder.run} (process {holder.pid} on {holder.host})"
+    for line in read_log(folder):
+        numbers.events[str(line.get("station", "")), str(line.get("event", ""))] += 1
+    return numbers
