@@ -1,4 +1,4 @@
-"""``tumbleline archive``: the signing key, and the temporary files of killed writers."""
+"""``tumbleline archive``: the signing key, the temporary files of killed writers, backup and restore."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ from schemas.counts import number_of
 
 PART = "Certificates, trace, audit"
 ORDER = 460
-SUMMARY = "Maintain the archive: the signing key, and leftovers of interrupted commands."
+SUMMARY = "Maintain the archive: signing key, leftovers of interrupted commands, backup, restore."
 EXAMPLES = (
     "tumbleline archive clean --dry-run",
-    "tumbleline archive key --output signing.key",
+    "tumbleline archive backup /mnt/copy --database /mnt/copies",
 )
 
 app = typer.Typer(
@@ -97,3 +97,81 @@ def key(
     out.print(f"private  {place}", markup=False, soft_wrap=True)
     if output is not None and not public:
         out.print(f"to sign with this key, set TUMBLELINE_SIGNING_KEY={place}", markup=False, soft_wrap=True)
+
+
+@app.command()
+def backup(
+    target: Annotated[
+        str, typer.Argument(metavar="COPY", help="Folder or address of the copy: empty, or an earlier copy.")
+    ],
+    archive: ArchiveOption = None,
+    database: Annotated[
+        Path | None,
+        typer.Option("--database", metavar="DIR", help="Also copy the database of the orchestrator into this folder."),
+    ] = None,
+    keep: Annotated[int, typer.Option("--keep", min=1, help="Copies of the database that are kept.")] = 14,
+    *,
+    as_json: JsonOption = False,
+) -> None:
+    """Copy the archive to another disk or store while runs go on; a further copy adds what is new.
+
+    The database of the orchestrator is that of PREFECT_SERVER_DATABASE_CONNECTION_URL (PostgreSQL), else prefect.db in
+    PREFECT_HOME. It holds the history of runs only; the archive does not need it.
+    """
+    from pipelines.archive import Archive
+    from pipelines.archive.backup import copy_archive
+    from pipelines.flows.database import copy_into
+
+    source, copy = Archive(archive), Archive(target)
+    made = copy_into(database, keep) if database is not None else None
+    done = copy_archive(source, copy)
+    if as_json:
+        file = None if made is None else str(made)
+        print_json({"archive": str(source.root), "copy": str(copy.root), "database": file, **asdict(done)})
+        return
+    out = console()
+    counted = f"{number_of(done.files, 'file')} copied ({number_of(done.bytes, 'byte')}), {done.present} already there"
+    out.print(counted, markup=False, soft_wrap=True)
+    if made is not None:
+        out.print(f"database  {made}", markup=False, soft_wrap=True)
+
+
+@app.command()
+def restore(
+    source: Annotated[str, typer.Argument(metavar="COPY", help="Folder or address of the copy.")],
+    archive: ArchiveOption = None,
+    database: Annotated[
+        Path | None,
+        typer.Option(
+            "--database", metavar="FILE", help="Also restore the database of the orchestrator from this file."
+        ),
+    ] = None,
+    *,
+    as_json: JsonOption = False,
+) -> None:
+    """Copy an archive back into an empty folder and verify it; exit 1 where the verification has findings.
+
+    Stop server and workers before. The key that signs the archive is not part of a copy: keep it elsewhere.
+    """
+    from pipelines.archive import Archive
+    from pipelines.archive.backup import copy_archive
+    from pipelines.archive.signatures import public_keys
+    from pipelines.flows.database import default_database, restore_database
+    from pipelines.integrity.archive import verify
+    from schemas.errors import DONE, PART_FAILED
+
+    copy, target = Archive(source), Archive(archive)
+    if database is not None:
+        restore_database(database, default_database())
+    done = copy_archive(copy, target)
+    report = verify(target, keys=public_keys(()))
+    if as_json:
+        place = {"archive": str(target.root), "copy": str(copy.root), "whole": report.whole, "head": report.head}
+        print_json({**place, **asdict(done)})
+    else:
+        out = console()
+        counted = f"{number_of(done.files, 'file')} copied ({number_of(done.bytes, 'byte')})"
+        out.print(f"{counted}, {done.present} already there", markup=False, soft_wrap=True)
+        state = "nothing is wrong" if report.whole else "run 'tumbleline verify' for the findings"
+        out.print(f"verified: {number_of(report.runs, 'run')}, {state}", markup=False)
+    raise typer.Exit(DONE if report.whole else PART_FAILED)

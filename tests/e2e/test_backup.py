@@ -1,0 +1,193 @@
+"""Backup and restore: an archive that grows, copies that are torn or of another archive, and the database of a server."""
+
+import shutil
+import sqlite3
+import stat
+import threading
+from contextlib import closing
+from pathlib import Path
+
+import pytest
+from capture_double import CaptureDouble, small_job
+from typer.testing import CliRunner
+
+from pipelines.archive import Archive, backup
+from pipelines.archive.backup import copy_archive
+from pipelines.chain.chain import ORDER
+from pipelines.chain.runner import Runner
+from pipelines.cli import app
+from pipelines.flows.database import copy_database, restore_database
+from pipelines.integrity.archive import verify
+from schemas.errors import ArchiveUnusable, WrongUse
+
+
+def measure(folder: Path, seed: int, stop: str = "") -> Runner:
+    """A run of another lot in the archive of a folder, up to a stage or complete."""
+    runner = Runner(small_job(folder, seed=seed), Archive(folder / "archive"), measure=CaptureDouble())
+    for stage in ORDER[: ORDER.index(stop)] if stop else ORDER[:-1]:
+        runner.stage(stage)
+    if not stop:
+        runner.run.save_report("key", "<html></html>", {})
+    return runner
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder with an archive of one finished run and one that was interrupted."""
+    folder = tmp_path_factory.mktemp("backup")
+    measure(folder, 1)
+    measure(folder, 2, "fit")
+    return folder
+
+
+def content(root: Path) -> dict[str, bytes]:
+    """Every file of an archive but the derived ones."""
+    found = {str(path.relative_to(root)): path.read_bytes() for path in root.rglob("*") if path.is_file()}
+    return {name: data for name, data in found.items() if not name.startswith("index/")}
+
+
+def test_a_copy_restored_is_the_archive_byte_for_byte(made: Path, tmp_path: Path) -> None:
+    root, copy, back = made / "archive", tmp_path / "copy", tmp_path / "back"
+    result = CliRunner().invoke(app, ["archive", "backup", str(copy), "--archive", str(root)])
+    assert result.exit_code == 0, result.output
+    result = CliRunner().invoke(app, ["archive", "restore", str(copy), "--archive", str(back)])
+    assert result.exit_code == 0, result.output
+    assert "nothing is wrong" in result.output
+    assert content(back) == content(root)
+    assert verify(Archive(back), keys={}).head == verify(Archive(root), keys={}).head
+
+
+def test_a_further_copy_adds_what_is_new_and_a_continued_run_is_complete_in_it(made: Path, tmp_path: Path) -> None:
+    shutil.copytree(made, tmp_path / "line")
+    archive, copy = Archive(tmp_path / "line" / "archive"), Archive(tmp_path / "copy")
+    first = copy_archive(archive, copy)
+    assert copy_archive(archive, copy).files == 0
+    measure(tmp_path / "line", 2)  # goes on with the run that was interrupted
+    again = copy_archive(archive, copy)
+    assert 0 < again.files < first.files
+    assert again.present >= first.files - 3  # a seal and a report may be written anew
+    assert content(copy.root) == content(archive.root)
+    assert verify(copy, keys={}).whole
+
+
+def test_a_copy_that_was_torn_is_completed_and_is_sound_at_any_point(
+    made: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    archive, copy = Archive(made / "archive"), Archive(tmp_path / "copy")
+    publish, left = backup.files.publish, [0]
+
+    def full(path: Path, data: bytes) -> None:
+        if left[0] == 0:
+            raise ArchiveUnusable("archive: disk full")
+        left[0] -= 1
+        publish(path, data)
+
+    number = len(content(archive.root))
+    for step in (number // 3, number // 3, 2):
+        left[0] = step
+        with monkeypatch.context() as patch:
+            patch.setattr(backup.files, "publish", full)
+            with pytest.raises(ArchiveUnusable, match="disk full"):
+                copy_archive(archive, copy)
+        named = {
+            place for entry in (copy.root / "chain").rglob("*.json") for place in backup.files.read_json(entry)["files"]
+        }
+        assert [place for place in named if not (copy.root / place).is_file()] == []
+    copy_archive(archive, copy)
+    assert content(copy.root) == content(archive.root)
+
+
+def test_a_copy_while_a_lot_is_measured_is_sound(made: Path, tmp_path: Path) -> None:
+    shutil.copytree(made, tmp_path / "line")
+    archive, copy = Archive(tmp_path / "line" / "archive"), Archive(tmp_path / "copy")
+    writer = threading.Thread(target=measure, args=(tmp_path / "line", 3))
+    writer.start()
+    while writer.is_alive():
+        copy_archive(archive, copy)
+    writer.join()
+    findings = verify(copy, keys={}).checked.findings
+    assert [one for one in findings if one.kind in {"missing", "changed", "edited"}] == []
+    copy_archive(archive, copy)
+    assert verify(copy, keys={}).whole
+
+
+def test_a_copy_of_another_archive_or_into_itself_is_refused(made: Path, tmp_path: Path) -> None:
+    archive = Archive(made / "archive")
+    measure(tmp_path, 7)
+    with pytest.raises(ArchiveUnusable, match=r"a chain that .* does not have, an earlier copy"):
+        copy_archive(archive, Archive(tmp_path / "archive"))
+    with pytest.raises(WrongUse, match="lies in the archive"):
+        copy_archive(archive, Archive(made / "archive" / "copy"))
+    (tmp_path / "other").mkdir()
+    (tmp_path / "other" / "file").touch()
+    with pytest.raises(ArchiveUnusable, match="holds other files and no archive"):
+        copy_archive(archive, Archive(tmp_path / "other"))
+    with pytest.raises(ArchiveUnusable, match="holds no archive"):
+        copy_archive(Archive(tmp_path / "none"), Archive(tmp_path / "copy"))
+
+
+def database(path: Path, rows: int) -> None:
+    """A database in SQLite's write-ahead mode, as that of a server, with its last rows in the log only."""
+    with closing(sqlite3.connect(path)) as made_database:
+        made_database.execute("pragma journal_mode=wal")
+        made_database.execute("create table if not exists flow_run (id integer)")
+        made_database.executemany("insert into flow_run values (?)", [(k,) for k in range(rows)])
+        made_database.commit()
+
+
+def rows_of(path: Path) -> int:
+    with closing(sqlite3.connect(path)) as opened:
+        return int(opened.execute("select count(*) from flow_run").fetchone()[0])
+
+
+def test_the_database_of_a_server_is_copied_while_it_is_open_and_restored(tmp_path: Path) -> None:
+    live = tmp_path / "prefect.db"
+    database(live, 100)
+    with closing(sqlite3.connect(live)) as server:  # holds the log open, and writes on
+        server.execute("insert into flow_run values (1)")
+        server.commit()
+        copy_database(str(live), tmp_path / "copies" / "one.db")
+    assert rows_of(tmp_path / "copies" / "one.db") == 101
+    assert stat.S_IMODE((tmp_path / "copies" / "one.db").stat().st_mode) == 0o600
+    database(live, 5)
+    restore_database(tmp_path / "copies" / "one.db", str(live))
+    assert rows_of(live) == 101
+    assert stat.S_IMODE(live.stat().st_mode) == 0o600
+
+
+def test_a_damaged_copy_of_a_database_is_refused_and_the_database_kept(tmp_path: Path) -> None:
+    live, torn = tmp_path / "prefect.db", tmp_path / "torn.db"
+    database(live, 5)
+    torn.write_bytes(b"SQLite format 3\0" + b"\xff" * 5000)
+    for wrong, told in ((torn, "no sound database"), (tmp_path / "none", "is not there")):
+        with pytest.raises(WrongUse, match=told):
+            restore_database(wrong, str(live))
+    assert rows_of(live) == 5
+    with pytest.raises(WrongUse, match="exists, a new file is needed"):
+        copy_database(str(live), torn)
+
+
+def test_the_command_keeps_the_newest_copies_of_the_database(
+    made: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("PREFECT_HOME", str(tmp_path))
+    monkeypatch.delenv("PREFECT_SERVER_DATABASE_CONNECTION_URL", raising=False)
+    database(tmp_path / "prefect.db", 3)
+    copies = tmp_path / "copies"
+    copies.mkdir()
+    for day in range(1, 6):
+        (copies / f"orchestrator-2026010{day}T000000.db").touch()
+    command = [
+        "archive",
+        "backup",
+        str(tmp_path / "copy"),
+        "--archive",
+        str(made / "archive"),
+        "--database",
+        str(copies),
+    ]
+    result = CliRunner().invoke(app, [*command, "--keep", "2"])
+    assert result.exit_code == 0, result.output
+    kept = sorted(path.name for path in copies.iterdir())
+    assert kept[0] == "orchestrator-20260105T000000.db"
+    assert rows_of(copies / kept[1]) == 3
