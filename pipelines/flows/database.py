@@ -11,16 +11,17 @@ from datetime import UTC, datetime
 from pathlib import Path
 from urllib.parse import unquote, urlsplit
 
+from pipelines.flows.settings import DATABASE, use_database
 from schemas.errors import WrongUse
 
-VARIABLE = "PREFECT_SERVER_DATABASE_CONNECTION_URL"
 POSTGRES = ("postgresql+asyncpg://", "postgresql://")
 PRIVATE = 0o600
 
 
 def default_database() -> str:
     """The database of this environment: the address of its server, else ``prefect.db`` in PREFECT_HOME."""
-    named = os.environ.get(VARIABLE, "")
+    use_database()
+    named = os.environ.get(DATABASE, "")
     home = os.environ.get("PREFECT_HOME") or str(Path.home() / ".prefect")
     return named if named.startswith(POSTGRES) else str(Path(home) / "prefect.db")
 

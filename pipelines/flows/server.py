@@ -18,8 +18,8 @@ import time
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from pipelines.flows.settings import JSON_FORMAT, LOOPBACK, SERVER_KEY, closed, kept, origins, use_key
-from schemas.errors import TumblelineError
+from pipelines.flows.settings import JSON_FORMAT, LOOPBACK, SERVER_KEY, closed, kept, origins, use_database, use_key
+from schemas.errors import TumblelineError, WrongUse
 from schemas.log_lines import JSON, tell, wants_json
 
 if TYPE_CHECKING:
@@ -34,7 +34,9 @@ ADDRESS = "server.json"
 PRIVATE = 0o077  # removed from the modes of all files of the server: its database has unencrypted parameters and logs
 
 
-def serve(host: str, port: int, names: Sequence[str], home: Path | None = None) -> None:
+def serve(
+    host: str, port: int, names: Sequence[str], home: Path | None = None, tls: tuple[Path, Path] | None = None
+) -> None:
     """Serve until the process is stopped, or, with a ``home``, until no client is left there.
 
     Parameters
@@ -42,11 +44,14 @@ def serve(host: str, port: int, names: Sequence[str], home: Path | None = None) 
     host, port : where to listen
     names : further names of this host; requests with other names are refused
     home : folder of the locks of the clients
+    tls : files of the certificate and of its key, for https; clients name the authority in PREFECT_API_SSL_CERT_FILE
     """
-    known = [*LOOPBACK, *names]
+    known, scheme = [*LOOPBACK, *names], "http" if tls is None else "https"
+    own = origins(known, port, scheme)
     os.umask(PRIVATE)
-    os.environ.update(closed(use_key(SERVER_KEY), origins(known, port)))
-    os.environ.setdefault("PREFECT_SERVER_UI_API_URL", f"http://{LOOPBACK[0]}:{port}/api")
+    os.environ.update(closed(use_key(SERVER_KEY), own))
+    use_database()
+    os.environ.setdefault("PREFECT_SERVER_UI_API_URL", f"{scheme}://{known[-1]}:{port}/api")
     if wants_json():
         os.environ.setdefault(JSON_FORMAT, JSON)
     if home is None:
@@ -60,12 +65,14 @@ def serve(host: str, port: int, names: Sequence[str], home: Path | None = None) 
     from pipelines.flows.application import application  # Prefect reads its settings when it is imported
 
     config = uvicorn.Config(
-        application(known, origins(known, port)),
+        application(known, own),
         host=host,
         port=port,
         log_config=None,  # in the format of Prefect's logging
         log_level="warning",
         timeout_graceful_shutdown=5,
+        ssl_certfile=tls[0] if tls else None,
+        ssl_keyfile=tls[1] if tls else None,
     )
     server = uvicorn.Server(config)
     if home is not None:
@@ -124,6 +131,8 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument(
         "--name", action="append", default=[], help="A further host name that clients use; may be repeated."
     )
+    parser.add_argument("--certificate", type=Path, metavar="FILE.pem", help="Certificate for https.")
+    parser.add_argument("--certificate-key", type=Path, metavar="FILE.pem", help="Private key of the certificate.")
     parser.add_argument(
         "--until-unused", type=Path, metavar="FOLDER", help="End when no client holds a lock in this folder."
     )
@@ -134,7 +143,10 @@ def main(arguments: Sequence[str] | None = None) -> None:
     """Serve with the options of the command line."""
     given = _parser().parse_args(arguments)
     try:
-        serve(given.host, given.port, given.name, given.until_unused)
+        if (given.certificate is None) != (given.certificate_key is None):
+            raise WrongUse("server: a certificate and its key are needed together; give both or neither")
+        tls = None if given.certificate is None else (given.certificate, given.certificate_key)
+        serve(given.host, given.port, given.name, given.until_unused, tls)
     except TumblelineError as problem:
         tell(str(problem), level="error")
         sys.exit(problem.exit_status)

@@ -20,6 +20,10 @@ STARTUP_S = 120
 SERVER_KEY, CLIENT_KEY = "PREFECT_SERVER_API_AUTH_STRING", "PREFECT_API_AUTH_STRING"
 CREDENTIAL = "prefect-auth"  # name in the systemd units (LoadCredential)
 KEY_FILE = "TUMBLELINE_ORCHESTRATOR_KEY"
+DATABASE = "PREFECT_SERVER_DATABASE_CONNECTION_URL"
+DATABASE_FILE, DATABASE_CREDENTIAL = "TUMBLELINE_ORCHESTRATOR_DATABASE", "prefect-database"
+"""File with the address of the database and its password; as a credential of a unit it has the second name."""
+
 SHORTEST_KEY = 20
 JSON_FORMAT = "PREFECT_LOGGING_HANDLERS_CONSOLE_FORMATTER"
 DAY_S = 86400
@@ -72,9 +76,9 @@ def kept() -> dict[str, str]:
     }
 
 
-def origins(names: Sequence[str], port: int) -> list[str]:
+def origins(names: Sequence[str], port: int, scheme: str = "http") -> list[str]:
     """Origins of the page of a server, for every name of its host."""
-    return [f"http://{name}:{port}" for name in names]
+    return [f"{scheme}://{name}:{port}" for name in names]
 
 
 def new_key() -> str:
@@ -104,9 +108,30 @@ def use_key(variable: str) -> str:
     return key
 
 
+def use_database() -> None:
+    """Put the address of the orchestrator's database into the environment of this process, where a private file has one.
+
+    Sources in this order: the environment, the file of TUMBLELINE_ORCHESTRATOR_DATABASE, and the credential
+    ``prefect-database`` of a systemd unit. Without one the database is SQLite in PREFECT_HOME.
+
+    Raises
+    ------
+    WrongUse
+        The file cannot be read, or other users may read it.
+    """
+    address = os.environ.get(DATABASE) or _secret(DATABASE_FILE, DATABASE_CREDENTIAL, "database file")
+    if address:
+        os.environ[DATABASE] = address
+
+
 def _key_of_file() -> str:
-    named, credentials = os.environ.get(KEY_FILE), os.environ.get("CREDENTIALS_DIRECTORY")
-    path = Path(named) if named else Path(credentials or "") / CREDENTIAL
+    return _secret(KEY_FILE, CREDENTIAL, "key file")
+
+
+def _secret(variable: str, credential: str, what: str) -> str:
+    """Content of the file that a variable names, or of a credential of a unit; empty where there is neither."""
+    named, credentials = os.environ.get(variable), os.environ.get("CREDENTIALS_DIRECTORY")
+    path = Path(named) if named else Path(credentials or "") / credential
     if not named and not (credentials and path.is_file()):
         return ""
     try:
@@ -115,10 +140,10 @@ def _key_of_file() -> str:
     except (OSError, UnicodeDecodeError) as problem:
         fault = type(problem).__name__
         raise WrongUse(
-            f"orchestrator: key file {path} cannot be read ({fault}), a text file is needed; correct {KEY_FILE}"
+            f"orchestrator: {what} {path} cannot be read ({fault}), a text file is needed; correct {variable}"
         ) from None
     if mode & 0o077:
         raise WrongUse(
-            f"orchestrator: key file {path} has mode {mode:04o}, 0600 or less is needed; run 'chmod 600 {path}'"
+            f"orchestrator: {what} {path} has mode {mode:04o}, 0600 or less is needed; run 'chmod 600 {path}'"
         )
     return text
