@@ -100,6 +100,10 @@ class SoakPart(Strict):
     settled: bool = True
 
 
+MOST_REPEATS = 2**28
+"""A deployed run takes seven hexadecimal digits of its id as its number: two runs of one lot must not have the same."""
+
+
 class Lot(Strict):
     """The units measured together, the kind of device they are, and the seed of a simulated station.
 
@@ -109,7 +113,7 @@ class Lot(Strict):
     units: Annotated[list[Unit], Field(min_length=1)]
     device: str
     seed: Seed = 0
-    repeat: Annotated[int, Field(ge=0, le=10**6)] = 0
+    repeat: Annotated[int, Field(ge=0, lt=MOST_REPEATS)] = 0
 
     @model_validator(mode="after")
     def _each_once(self) -> Lot:

@@ -39,12 +39,21 @@ SKIPPED = "skipped: at {when} the station was busy with run {other}; policy busy
 CONTINUED = "continues from its checkpoint after a crash, attempt {attempt} of {attempts}; policy crashed=continue"
 
 
-def apply_rules(pool: str, queue: str, now: datetime | None = None) -> list[str]:
-    """Apply the policies to the runs of a queue; one sentence for each run that changed."""
+SETTLED = timedelta(seconds=30)
+"""Until then the worker of Prefect may hold the place of a crashed run; it ends if the same run is given to it meanwhile."""
+
+
+def apply_rules(pool: str, queue: str, now: datetime | None = None, settled: timedelta = SETTLED) -> list[str]:
+    """Apply the policies to the runs of a queue; one sentence for each run that changed.
+
+    Parameters
+    ----------
+    settled : age of a crash from which its run may continue; zero where the worker has not started yet
+    """
     at = now or datetime.now(UTC)
     with get_client(sync_client=True) as client:
         return [
-            *_continue_crashed(client, pool, queue, at),
+            *_continue_crashed(client, pool, queue, at, settled),
             *_cancel_missed(client, pool, queue, at),
             *_skip_where_busy(client, pool, queue, at),
         ]
@@ -111,14 +120,14 @@ def _skip_where_busy(client: SyncPrefectClient, pool: str, queue: str, now: date
     return texts
 
 
-def _continue_crashed(client: SyncPrefectClient, pool: str, queue: str, now: datetime) -> list[str]:
+def _continue_crashed(client: SyncPrefectClient, pool: str, queue: str, now: datetime, settled: timedelta) -> list[str]:
     """Schedule runs again that crashed, with the same id, so that they continue their capture in the archive."""
     texts: list[str] = []
     crashed = runs_of_queue(client, pool, queue, (StateType.CRASHED,), FlowRunSort.EXPECTED_START_TIME_DESC)
     for run in crashed:
         if policy_of_tags(run.tags).crashed != "continue" or not 0 < run.run_count < ATTEMPTS:
             continue
-        if run.state is None or now - run.state.timestamp > CONTINUED_WITHIN:
+        if run.state is None or not settled <= now - run.state.timestamp <= CONTINUED_WITHIN:
             continue
         if client.read_flow_run(run.id).state_type != StateType.CRASHED:  # another worker was faster
             continue

@@ -19,6 +19,7 @@ import re
 import sys
 import time
 from contextlib import contextmanager
+from datetime import timedelta
 from typing import TYPE_CHECKING
 
 from pipelines.flows.attended import attend
@@ -64,7 +65,7 @@ def start(
         for queue in (station, *queues):
             for run in close_dead_runs_of_queue(pool, queue, name):
                 tell(f"{queue}: run {run} is closed as crashed: its process has ended")
-            for text in apply_rules(pool, queue):
+            for text in apply_rules(pool, queue, settled=timedelta(0)):
                 tell(f"{queue}: {text}")
         if _marker(station).exists():
             _pause(pool, station, paused=False)

@@ -37,7 +37,7 @@ def test_two_stations_measure_into_an_object_store_while_the_database_is_killed(
     with s3_bucket() as query:
         archive = f"s3://factory/archive?{query}"
         places = {"TUMBLELINE_ARCHIVE": archive, "TUMBLELINE_ORCHESTRATOR_DATABASE": str(address)}
-        with served(tmp_path / "orchestrator", **places) as line:
+        with served(tmp_path / "orchestrator", faultless=False, log_name="killed-database.log", **places) as line:
             recipe = recipe_file(tmp_path)
             stations = {"line-1": "simulated.toml", "line-2": "simulated-iai-espec.toml"}
             wanted = [

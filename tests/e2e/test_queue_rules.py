@@ -11,7 +11,7 @@ from root_process import ROOT
 
 from pipelines.flows.deploy import register
 from pipelines.flows.heartbeat import have_automation
-from pipelines.flows.queue_rules import CONTINUED_WITHIN, apply_rules
+from pipelines.flows.queue_rules import CONTINUED_WITHIN, SETTLED, apply_rules
 
 QUEUE = "line-7"
 
@@ -107,6 +107,10 @@ def crashed_runs_continue_or_are_closed(line: Orchestrator) -> None:
     long_after = apply_rules("line", QUEUE, now + CONTINUED_WITHIN + timedelta(minutes=1))
     assert not [text for text in long_after if "continues" in text], "an old crash is left to a person"
     apply_rules("line", QUEUE, now)
+    assert line.ask(f"/api/flow_runs/{continued['id']}")[1]["state_type"] == "CRASHED", (
+        "its worker may still hold its place"
+    )
+    apply_rules("line", QUEUE, now + SETTLED + timedelta(seconds=1))
     states = {run["id"]: line.ask(f"/api/flow_runs/{run['id']}")[1] for run in (continued, closed, often)}
     assert states[continued["id"]]["state_type"] == "SCHEDULED"
     assert states[continued["id"]]["run_count"] == 1

@@ -1,0 +1,45 @@
+"""The start of a deployed run: its own number in the archive, and runs of a schedule that come too late."""
+
+from datetime import UTC, datetime, timedelta
+from types import SimpleNamespace
+
+import pytest
+
+from pipelines.flows import calibrate
+
+
+def running(monkeypatch: pytest.MonkeyPatch, **about: object) -> None:
+    """A flow run with these properties, in place of Prefect's."""
+    base = {"id": "fffffff0-0000-4000-8000-000000000000", "tags": [], "run_count": 1, "scheduled_start_time": None}
+    monkeypatch.setattr(calibrate, "flow_run", SimpleNamespace(**base | about))
+
+
+@pytest.mark.parametrize(
+    ("id_", "number"), [("fffffff0-0000", 2**28 - 1), ("00000001-0000", 0), ("12345678-0", 0x1234567)]
+)
+def test_a_deployed_run_measures_anew_whatever_its_id_is(
+    monkeypatch: pytest.MonkeyPatch, id_: str, number: int
+) -> None:
+    running(monkeypatch, id=id_)
+    asked = calibrate.requested("production", None, ["A1"], None, None, None, None)
+    assert asked.repeat == number
+    assert asked.job().lot.repeat == number
+
+
+@pytest.mark.parametrize(
+    ("minutes", "tags", "count", "told"),
+    [
+        (16, ["auto-scheduled"], 1, "missed: it starts 16 min after its time, at most 15 min are allowed"),
+        (14, ["auto-scheduled"], 1, ""),
+        (600, [], 1, ""),  # an order of a person
+        (600, ["auto-scheduled"], 2, ""),  # continues after a crash
+        (600, ["auto-scheduled", "missed=latest"], 1, ""),
+        (40, ["auto-scheduled", "latest_start_min=30"], 1, "at most 30 min are allowed"),
+    ],
+)
+def test_a_run_of_a_schedule_that_comes_too_late_measures_nothing(
+    monkeypatch: pytest.MonkeyPatch, minutes: int, tags: list[str], count: int, told: str
+) -> None:
+    due = datetime.now(UTC) - timedelta(minutes=minutes)
+    running(monkeypatch, tags=tags, run_count=count, scheduled_start_time=due)
+    assert told in calibrate.late_start() if told else calibrate.late_start() == ""
