@@ -9,7 +9,7 @@ export OPENBLAS_NUM_THREADS ?= 1
 export PREFECT_SERVER_ANALYTICS_ENABLED = false
 export DO_NOT_TRACK = 1
 
-.PHONY: run test help check lint types layers pytest test-slow debian clean locks bench release
+.PHONY: run test help check lint types layers pytest test-slow debian clean locks bench release docs
 
 run: $(VENV)/.run  ## set up and run the main job on the simulated station
 	$(BIN)/tumbleline run || [ $$? -eq 1 ]  # 1: the run is done and a unit missed its limits, which is a result
@@ -43,6 +43,9 @@ bench: $(VENV)/.bench  ## figures of docs/reference/measured.md in a short form
 release: $(VENV)/.dev  ## wheel, source distribution, bill of materials and hashes, into dist/
 	$(BIN)/python -m deploy.release
 
+docs: $(VENV)/.docs  ## the documents as a site that is searched without a network, into build/site/
+	$(BIN)/python -m docs.build_site
+
 debian:  ## programs of other makers that tests talk to: mbpoll, chromium
 	@sh deploy/debian-packages.sh
 
@@ -67,6 +70,10 @@ $(VENV)/.dev: requirements-dev.lock pyproject.toml | $(VENV)/bin/python
 $(VENV)/.bench: requirements-bench.lock pyproject.toml | $(VENV)/bin/python
 	$(call install,requirements-bench.lock)
 	@touch $(VENV)/.run $(VENV)/.dev
+
+$(VENV)/.docs: pyproject.toml $(VENV)/.run
+	$(BIN)/pip install --quiet --disable-pip-version-check --no-build-isolation --editable '.[build,docs]'
+	@touch $@
 
 # a validator of another maker, in an environment of its own: it asks for older libraries than the product has
 $(CRATE)/.done: requirements-crate.lock | $(VENV)/bin/python

@@ -88,9 +88,8 @@ def fit_ellipsoid(
     temperature : (..., n), °C; adds an offset per °C and axis
     shape : "nine" for bias, scale and non-orthogonality, "six" for bias and scale
     time : (n,), s, of the dwells: what wanders between them is then estimated, the dwells are weighted by it, and the
-    covariance holds
-        under it (with Student's factor for k = 2). Without it, and beyond 1500 dwells, whose covariance would not fit, the
-        residuals are taken for white and alike
+        covariance holds under it (with Student's factor for k = 2). Without it, and beyond 1500 dwells, whose covariance
+        would not fit, the residuals are taken for white and alike
     error : (..., n), white standard error of the norm of each dwell, g; alike and not known where None
 
     Raises

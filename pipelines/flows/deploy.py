@@ -26,6 +26,7 @@ from schemas.errors import TumblelineError
 NOT_HERE = "deployments are registered from code that is not asynchronous"
 TREE = Path(__file__).resolve().parents[2]
 ONE_AT_A_TIME = 1
+PATIENCE_S = 60.0
 
 
 def register(path: Path) -> list[str]:
@@ -37,7 +38,7 @@ def register(path: Path) -> list[str]:
         The key is missing or wrong, a parameter has credentials, or a policy has an unknown key or value.
     """
     use_key(CLIENT_KEY)
-    knock()
+    knock(PATIENCE_S)
     content = yaml.safe_load(path.read_text(encoding="utf-8"))
     for item in content["deployments"]:
         refuse_credentials(item["parameters"].get("archive"))

@@ -1,0 +1,85 @@
+"""The site of the documents: every page is in it, links hold, nothing is loaded from elsewhere, a wrong link stops the build."""
+
+import json
+import re
+from importlib.util import find_spec
+from pathlib import Path
+
+import pytest
+import yaml
+
+from docs import build_site
+from docs.build_site import CONFIGURATION, LINK, NEEDED, ROOT, modules, navigation, stage
+
+ELSEWHERE = re.compile(r"<(?:script|img|link|iframe|source)\b[^>]*?\b(?:src|href)=[\"']?(?:https?:)?//[^>]*>")
+BUILT = pytest.mark.skipif(any(find_spec(name) is None for name in NEEDED), reason="the extra 'docs' is not installed")
+
+
+@pytest.fixture(scope="module")
+def staged(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("site")
+    stage(folder)
+    return folder
+
+
+def test_every_page_of_the_documents_is_in_the_navigation(staged: Path) -> None:
+    listed = re.findall(r"'([^']+\.md)'", str(navigation(staged)))
+    assert len(listed) == len(set(listed))
+    pages = [str(path.relative_to(ROOT)) for path in (*ROOT.glob("docs/**/*.md"), *ROOT.glob("deploy/*.md"))]
+    assert set(pages) <= set(listed)
+    assert [name for name in listed if not (staged / name).is_file()] == []
+
+
+def test_every_module_of_the_science_has_a_page(staged: Path) -> None:
+    found = {path.stem for path in (staged / "docs" / "reference" / "inertial").glob("inertial*.md")}
+    assert found == set(modules())
+    assert {"inertial.effects.third_order", "inertial.noise", "inertial.dynamics.second_order"} <= found
+
+
+def test_every_relative_link_of_a_staged_page_leads_to_a_file(staged: Path) -> None:
+    wrong = []
+    for page in staged.rglob("*.md"):
+        for _, address, _ in LINK.findall(re.sub(r"```.*?```", "", page.read_text(encoding="utf-8"), flags=re.DOTALL)):
+            plain = address.partition("#")[0]
+            if plain and "://" not in address and not (page.parent / plain).is_file():
+                wrong.append(f"{page.relative_to(staged)}: {address}")
+    assert wrong == []
+
+
+def test_the_site_loads_no_fonts_of_others_and_checks_its_links() -> None:
+    content = yaml.safe_load(CONFIGURATION.read_text(encoding="utf-8"))
+    assert content["theme"]["font"] is False
+    assert {"search", "offline"} <= {name for name in content["plugins"] if isinstance(name, str)}
+    assert set(content["validation"]["links"].values()) == {"warn"}  # an error with --strict
+
+
+@BUILT
+@pytest.mark.slow
+def test_the_site_is_built_is_searched_without_a_server_and_loads_nothing_from_elsewhere(tmp_path: Path) -> None:
+    assert build_site.build(tmp_path) == 0
+    pages = list(tmp_path.rglob("*.html"))
+    assert len(pages) > len(modules()) + 60
+    assert [str(page) for page in pages if ELSEWHERE.search(page.read_text(encoding="utf-8"))] == []
+    script = (tmp_path / "search" / "search_index.js").read_text(encoding="utf-8")
+    index = json.loads(script[script.index("{") : script.rindex("}") + 1])
+    words = " ".join(entry["text"] for entry in index["docs"])
+    assert "specific force" in words
+    effect = (tmp_path / "docs" / "reference" / "inertial" / "inertial.effects.third_order.html").read_text(
+        encoding="utf-8"
+    )
+    assert "doc-heading" in effect
+
+
+@BUILT
+@pytest.mark.slow
+@pytest.mark.parametrize("link", ["[gone](gone.md)", "[no anchor](units.md#gone)"])
+def test_a_link_that_leads_nowhere_stops_the_build(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, link: str) -> None:
+    linked = build_site._linked
+    wrong = {"docs/decisions/README.md": f"\n{link}\n"}
+    monkeypatch.setattr(
+        build_site,
+        "_linked",
+        lambda page, folder: linked(page, folder) + wrong.get(str(page.relative_to(ROOT)), ""),
+    )
+    monkeypatch.setattr(build_site, "modules", lambda: ["inertial.frames"])
+    assert build_site.build(tmp_path) != 0
