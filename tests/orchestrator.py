@@ -73,7 +73,9 @@ class Orchestrator:
         except urllib.error.HTTPError as problem:
             with problem:
                 return problem.code, _document(problem.read())
-        except TimeoutError:
+        except (TimeoutError, urllib.error.URLError) as problem:
+            if isinstance(problem, urllib.error.URLError) and not isinstance(problem.reason, TimeoutError):
+                raise
             return HTTPStatus.SERVICE_UNAVAILABLE, "no answer within 30 s"
 
     def runs(self, deployment: str, *states: str) -> list[dict]:

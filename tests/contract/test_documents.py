@@ -46,6 +46,7 @@ CASES = {
     "allan --json": ["allan", "{folder}/rest.csv", "--rate", "100"],
     "psd --json": ["psd", "{folder}/rest.csv", "--rate", "100"],
     "doctor --json": ["doctor"],
+    "monitor --json": ["monitor"],
 }
 WITHOUT_ARCHIVE = {"plan", "station", "inspect"}
 

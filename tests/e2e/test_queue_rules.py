@@ -12,6 +12,7 @@ from root_process import ROOT
 from pipelines.flows.deploy import register
 from pipelines.flows.heartbeat import have_automation
 from pipelines.flows.queue_rules import CONTINUED_WITHIN, SETTLED, apply_rules
+from pipelines.monitoring.queue_numbers import read_queues
 
 QUEUE = "line-7"
 
@@ -83,6 +84,7 @@ def test_missed_runs_are_cancelled_or_run_once_and_a_busy_station_is_waited_for_
 
     busy = line.runs("latest", "SCHEDULED")[0]
     force(line, busy, "RUNNING")
+    the_monitor_says_the_same(busy, at, len(cancelled) + len(line.runs("latest", "CANCELLED")))
     apply_rules("line", QUEUE, at)
     skipped = line.runs("skips", "CANCELLED")
     assert skipped
@@ -93,6 +95,20 @@ def test_missed_runs_are_cancelled_or_run_once_and_a_busy_station_is_waited_for_
 
     force(line, busy, "COMPLETED")
     crashed_runs_continue_or_are_closed(line)
+
+
+def the_monitor_says_the_same(busy: dict, at: datetime, missed: int) -> None:
+    """What monitoring reads over the interface of the server: open runs, missed runs, queues; and whom it calls late."""
+    numbers = read_queues(at)
+    assert {run.queue for run in numbers.open} == {QUEUE}
+    assert [run.name for run in numbers.open if run.state == "RUNNING"] == [busy["name"]]
+    assert len(numbers.ended) == missed
+    assert all(run.state == "CANCELLED" and run.message.startswith("missed:") for run in numbers.ended)
+    assert numbers.queues == {"default": False, QUEUE: False}
+    assert numbers.workers == {}
+    assert numbers.late(at) == [], "the station is busy, so nothing is late"
+    numbers.open = [run for run in numbers.open if run.state == "SCHEDULED"]
+    assert numbers.late(at), "without that run they are"
 
 
 def crashed_runs_continue_or_are_closed(line: Orchestrator) -> None:

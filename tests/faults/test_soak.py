@@ -1,0 +1,273 @@
+"""Shifts of orders at three stations with random faults: workers, server and disk fail, and nothing is lost, twice or unsafe.
+
+The number of shifts is that of TUMBLELINE_SOAK_SHIFTS (3): some ten minutes on two free cores; 90 is a month of one shift a day.
+"""
+
+import os
+import random
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from collections import Counter
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import psutil
+import pytest
+from capture_double import recipe_file
+from lines import deployments, kill_all, order, worker
+from orchestrator import Orchestrator
+from root_process import ROOT, python
+from served_station import modbus_station, station_file
+from served_station import served as station_served
+from small_station import lot_of
+
+from pipelines.archive import Archive
+from pipelines.flows.queue_rules import ATTEMPTS
+from pipelines.flows.settings import CLIENT_KEY, SERVER_KEY, new_key
+from pipelines.integrity.archive import verify
+from stations.opening import open_devices
+from stations.safety.folder import read_log
+
+SHIFTS = int(os.environ.get("TUMBLELINE_SOAK_SHIFTS", "3"))
+pytestmark = [pytest.mark.slow, pytest.mark.timeout(1200 + 600 * SHIFTS)]
+
+STATIONS = ("line-1", "line-2", "line-3")
+FAST = {"speed_deg_s": 90.0, "acceleration_deg_s2": 200.0}
+QUICK = (
+    ('units = ["A1", "A2", "A3"]', 'units = ["U000", "U001"]'),
+    ("temperatures_C = [0.0, 50.0]", "temperatures_C = [23.0]\nsoak_min_s = 1.0\nallow_short_soak = true"),
+    ("settle_s = 2.0", "settle_s = 0.2"),
+    ("static_record_s = 30.0", "static_record_s = 0.0"),
+    ('poses = "nine"', 'poses = "six"'),
+    ('limits = "consumer"', 'limits = "line-quick.limits.toml"'),
+    (', "bias_temperature", "scale_temperature"', ""),
+)
+SAFE_S = 90.0
+SHIFT_S = 900.0
+FULL_S = 5.0
+GROWTH_MB = 150.0
+GROWTH_FILES = 30
+
+
+@dataclass
+class Server:
+    """A server that is killed and comes back at the same address."""
+
+    home: Path
+    port: int
+    key: str = field(default_factory=new_key)
+    process: subprocess.Popen[bytes] | None = None
+
+    @property
+    def line(self) -> Orchestrator:
+        environment = {
+            **os.environ, "PREFECT_HOME": str(self.home), "PYTHONPATH": str(ROOT), CLIENT_KEY: self.key,
+            "PREFECT_API_URL": f"http://127.0.0.1:{self.port}/api", "PREFECT_SERVER_ALLOW_EPHEMERAL_MODE": "false",
+            "TUMBLELINE_ARCHIVE": str(self.home.parent / "disk" / "archive"),
+            "TUMBLELINE_STATE": str(self.home.parent / "state"),
+        }  # fmt: skip
+        return Orchestrator(self.home, self.port, self.key, environment)
+
+    def start(self) -> None:
+        command = [sys.executable, "-m", "pipelines.flows.server", "--port", str(self.port)]
+        with (self.home / "killed-server.log").open("ab") as log:
+            environment = {**self.line.environment, SERVER_KEY: self.key}
+            self.process = subprocess.Popen(command, cwd=ROOT, env=environment, stdout=log, stderr=log)
+        self.line.until(self._answers, "the server answers", 300.0)
+
+    def kill(self) -> None:
+        assert self.process is not None
+        self.process.send_signal(signal.SIGKILL)
+        self.process.wait(30)
+
+    def _answers(self) -> bool:
+        try:
+            return self.line.ask("/api/ready", key="")[0] == 200
+        except OSError:
+            return False
+
+
+@contextmanager
+def small_disk(place: Path) -> Iterator[bool]:
+    """A folder on a file system of its own of 256 MB; whether it is one (only root may mount)."""
+    place.mkdir()
+    mounted = (
+        os.geteuid() == 0
+        and not subprocess.run(
+            ["mount", "-t", "tmpfs", "-o", "size=256m", "tmpfs", str(place)], capture_output=True, check=False
+        ).returncode
+    )
+    try:
+        yield mounted
+    finally:
+        if mounted:
+            subprocess.run(["umount", "-l", str(place)], check=True)
+
+
+class Soak:
+    """Stations, workers and the server, with the faults that may happen to them."""
+
+    def __init__(self, folder: Path, server: Server, stack: ExitStack, *, disk: bool) -> None:
+        self.folder, self.server, self.line, self.stack = folder, server, server.line, stack
+        self.configurations: dict[str, Any] = {}
+        self.files: dict[str, str] = {}
+        self.workers: dict[str, tuple[ExitStack, subprocess.Popen[bytes]]] = {}
+        self.faults: dict[str, Callable[[random.Random], None]] = {
+            "worker": self.worker_dies,
+            "server": self.server_dies,
+        }
+        if disk:
+            self.faults["disk"] = self.disk_fills
+        self.happened: Counter[str] = Counter()
+
+    def set_up(self) -> None:
+        shutil.copy(ROOT / "deploy" / "recipes" / "line-quick.limits.toml", self.folder)
+        recipe = recipe_file(self.folder, *QUICK)
+        wanted = []
+        for name in STATIONS:
+            port = self.stack.enter_context(station_served(lot_of(2)))
+            config = modbus_station(port, limits=FAST).model_copy(update={"name": name})
+            self.configurations[name] = config
+            self.files[name] = str(station_file(self.folder, config, f"{name}.toml"))
+            queue = {"name": "line", "work_queue_name": name}
+            parameters = {"recipe": recipe, "station": self.files[name]}
+            policy = {"crashed": "continue"}
+            wanted.append({"name": name, "work_pool": queue, "parameters": parameters, "policy": policy})
+        python(self.line.environment, "-m", "pipelines.flows.deploy", deployments(self.folder, wanted))
+        for name in STATIONS:
+            self.start_worker(name)
+
+    def start_worker(self, name: str) -> None:
+        own = ExitStack()
+        process = own.enter_context(worker(self.line, self.folder / name, name, f"host-of-{name}"))
+        self.workers[name] = (own, process)
+
+    def worker_dies(self, chance: random.Random) -> None:
+        """The service of a worker is killed, with its flow; its station is safe before the service comes back."""
+        name = chance.choice(STATIONS)
+        own, process = self.workers[name]
+        if process.poll() is None:
+            kill_all(process)
+        own.close()
+        self.line.until(lambda: self.safe(name), f"{name} is safe", SAFE_S)
+        self.start_worker(name)
+
+    def server_dies(self, chance: random.Random) -> None:
+        """The server is killed and comes back after some seconds."""
+        self.server.kill()
+        time.sleep(chance.uniform(0.0, 5.0))
+        self.server.start()
+
+    def disk_fills(self, chance: random.Random) -> None:
+        """The disk of the archive is full for some seconds."""
+        del chance
+        filler = self.folder / "disk" / "filler"
+        with filler.open("wb") as file:
+            try:
+                while True:
+                    file.write(bytes(2**20))
+                    file.flush()
+            except OSError:
+                time.sleep(FULL_S)
+        filler.unlink()
+
+    def safe(self, name: str) -> bool:
+        with open_devices(self.configurations[name], ()) as devices:
+            return devices.chamber.set_point() == 25.0 and devices.reader.sampling() == "stopped"
+
+    def shift(self, number: int, chance: random.Random) -> None:
+        """A lot at each station, a fault meanwhile; what failed is ordered again until each lot is complete."""
+        for name in STATIONS:
+            self.order(name, number)
+        time.sleep(chance.uniform(5.0, 25.0))
+        fault = (
+            list(self.faults)[number % len(self.faults)] if number < len(self.faults) else chance.choice([*self.faults])
+        )
+        self.faults[fault](chance)
+        self.happened[fault] += 1
+        end = time.monotonic() + SHIFT_S
+        while left := [name for name in STATIONS if not self.complete(name, number)]:
+            assert time.monotonic() < end, f"shift {number} after '{fault}': {left} are not complete"
+            for name in left:
+                own, process = self.workers[name]
+                if process.poll() is not None:  # the service manager starts it again
+                    own.close()
+                    self.start_worker(name)
+                if not self.under_way(name, number):
+                    self.order(name, number)  # it failed (a full disk): a person orders the same again
+            time.sleep(2.0)
+        for name in STATIONS:
+            self.line.until(lambda name=name: self.safe(name), f"{name} is safe", SAFE_S)
+
+    def order(self, name: str, number: int) -> None:
+        order(self.line, name, repeat=number + 1)
+
+    def under_way(self, name: str, number: int) -> bool:
+        """Whether a run of the order waits, works, or continues by its policy."""
+        states = ("SCHEDULED", "PENDING", "RUNNING", "CRASHED")
+        runs = [run for run in self.line.runs(name, *states) if run["parameters"]["repeat"] == number + 1]
+        return any(run["state_type"] != "CRASHED" or run["run_count"] < ATTEMPTS for run in runs)
+
+    def complete(self, name: str, number: int) -> bool:
+        return sum(run["parameters"]["repeat"] == number + 1 for run in self.line.runs(name, "COMPLETED")) > 0
+
+    def size(self) -> dict[str, tuple[float, int]]:
+        """Memory, MB, and open files of the server and of the first process of each worker."""
+        assert self.server.process is not None
+        found = {"server": self.server.process.pid} | {name: p.pid for name, (_, p) in self.workers.items()}
+        out = {}
+        for name, pid in found.items():
+            process = psutil.Process(pid)
+            out[name] = (process.memory_info().rss / 1e6, process.num_fds())
+        return out
+
+
+def test_shifts_with_faults_lose_nothing_measure_nothing_twice_and_leave_every_station_safe(tmp_path: Path) -> None:
+    chance = random.Random(20261122)
+    with ExitStack() as stack:
+        disk = stack.enter_context(small_disk(tmp_path / "disk"))
+        home = tmp_path / "orchestrator"
+        home.mkdir(mode=0o700)
+        server = Server(home, free_port())
+        server.start()
+        stack.callback(server.kill)
+        soak = Soak(tmp_path, server, stack, disk=disk)
+        stack.callback(lambda: [own.close() for own, _ in soak.workers.values()])
+        soak.set_up()
+        sizes = []
+        for number in range(SHIFTS):
+            soak.shift(number, chance)
+            sizes.append(soak.size())
+        archive = Archive(tmp_path / "disk" / "archive")
+        infos = archive.runs()
+        assert Counter(info.station for info in infos if info.finished) == dict.fromkeys(STATIONS, SHIFTS)
+        assert len(infos) == SHIFTS * len(STATIONS), (
+            "an order has one run in the archive, however often it was interrupted"
+        )
+        records = [path.parent for path in (archive.root / "captures").glob("*/*/record.json")]
+        per_capture = Counter(path.parent.name for path in records)
+        assert len(per_capture) == len(infos)
+        assert set(per_capture.values()) == {8}, "six poses and two of verification, each once"
+        report = verify(archive, keys={})
+        assert report.whole, report.checked.findings
+        unsafe = [entry for entry in read_log(tmp_path / "state") if entry["event"] == "watchdog_failed"]
+        assert unsafe == []
+        for name in ("server", *STATIONS):
+            memory, files = zip(*(size[name] for size in sizes), strict=True)
+            assert memory[-1] - memory[0] < GROWTH_MB, f"{name}: {memory} MB"
+            assert files[-1] - files[0] < GROWTH_FILES, f"{name}: {files} open files"
+        assert soak.happened.total() == SHIFTS
+
+
+def free_port() -> int:
+    import socket
+
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        return int(probe.getsockname()[1])
