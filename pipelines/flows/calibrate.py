@@ -12,7 +12,7 @@ from prefect import flow, task
 from prefect.cache_policies import NO_CACHE
 from prefect.client.orchestration import SyncPrefectClient, get_client
 from prefect.client.schemas.filters import FlowRunFilter, FlowRunFilterId, FlowRunFilterName
-from prefect.client.schemas.objects import FlowRun, StateType
+from prefect.client.schemas.objects import FlowRun, State, StateType
 from prefect.client.schemas.sorting import FlowRunSort, TaskRunSort
 from prefect.runtime import flow_run
 from prefect.states import Cancelled
@@ -29,8 +29,6 @@ from schemas.progress import silent
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Generator
-
-    from prefect.states import State
 
     from pipelines.chain.attendance import Operator
     from schemas.progress import Progress

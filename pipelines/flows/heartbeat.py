@@ -10,7 +10,7 @@ from datetime import timedelta
 
 from prefect.client.orchestration import get_client
 from prefect.client.schemas.objects import StateType
-from prefect.events.actions import ChangeFlowRunState
+from prefect.events.actions import ActionTypes, ChangeFlowRunState
 from prefect.events.schemas.automations import AutomationCore, EventTrigger, Posture
 from prefect.events.schemas.events import ResourceSpecification
 
@@ -28,6 +28,9 @@ MESSAGE = f"no heartbeat for {SILENCE_S} s: its computer or its network is down"
 def have_automation() -> None:
     """Make or renew the automation of the server."""
     ends = {f"prefect.flow-run.{end}" for end in ENDS}
+    close: list[ActionTypes] = [
+        ChangeFlowRunState(state=StateType.CRASHED, name="Crashed", message=MESSAGE, force=False)
+    ]
     keep(
         AutomationCore(
             name=NAME,
@@ -42,7 +45,7 @@ def have_automation() -> None:
                 threshold=1,
                 within=timedelta(seconds=SILENCE_S),
             ),
-            actions=[ChangeFlowRunState(state=StateType.CRASHED, name="Crashed", message=MESSAGE)],
+            actions=close,
         )
     )
 
