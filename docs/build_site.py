@@ -85,18 +85,14 @@ def _reference(folder: Path) -> list[Path]:
 
 def navigation(folder: Path) -> list[dict[str, object]]:
     """The parts of the site: the kinds of documents, the decisions, deployment, and the reference of ``inertial``."""
-    parts: list[dict[str, object]] = [{"Tumbleline": "README.md"}, {"Documentation": "docs/README.md"}]
+    parts: list[dict[str, object]] = [{"Start": ["README.md", "docs/README.md", "CHANGELOG.md", "CONTRIBUTING.md"]}]
     for name, heading in HEADINGS.items():
         parts.append({heading: _names(folder, f"docs/{name}")})
     parts.append({"Decisions": _names(folder, "docs/decisions")})
     parts.append({"Deployment": _names(folder, "deploy")})
+    parts.append({"Benchmarks": ["benchmarks/README.md"]})
     parts.append({"Reference of inertial": _names(folder, f"docs/{API}")})
-    return [
-        *parts,
-        {"Contributing": "CONTRIBUTING.md"},
-        {"Changelog": "CHANGELOG.md"},
-        {"Benchmarks": "benchmarks/README.md"},
-    ]
+    return parts
 
 
 def _names(folder: Path, place: str) -> list[str]:

@@ -140,6 +140,8 @@ class Soak:
             policy = {"crashed": "continue"}
             wanted.append({"name": name, "work_pool": queue, "parameters": parameters, "policy": policy})
         python(self.line.environment, "-m", "pipelines.flows.deploy", deployments(self.folder, wanted))
+        # after the stations, so that they end before these: a watchdog waits for a station that is gone
+        self.stack.callback(lambda: [own.close() for own, _ in self.workers.values()])
         for name in STATIONS:
             self.start_worker(name)
 
@@ -238,7 +240,6 @@ def test_shifts_with_faults_lose_nothing_measure_nothing_twice_and_leave_every_s
         server.start()
         stack.callback(server.kill)
         soak = Soak(tmp_path, server, stack, disk=disk)
-        stack.callback(lambda: [own.close() for own, _ in soak.workers.values()])
         soak.set_up()
         sizes = []
         for number in range(SHIFTS):
