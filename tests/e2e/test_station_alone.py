@@ -50,11 +50,11 @@ def test_schedules_and_persons_on_two_computers_get_the_station_one_after_the_ot
     ):
         for _ in range(3):
             order(line, "hand", recipe=recipe["parameters"]["recipe"])
-        line.until(lambda: len(done(line)) >= 6 and len(line.runs("hand", "COMPLETED")) == 3, "six runs", 600.0)
+        line.until(lambda: len(done(line)) >= 4 and len(line.runs("hand", "COMPLETED")) == 3, "four runs", 800.0)
     spans = sorted(done(line))
     overlaps = [(one, other) for one, other in pairwise(spans) if other[0] < one[1]]
     assert overlaps == []
-    assert len(Archive(tmp_path / "archive").runs()) >= 6
+    assert len(Archive(tmp_path / "archive").runs()) >= 4
     assert "is driven by" not in (tmp_path / "a" / "worker.log").read_text(), (
         "the queue, not the lease, keeps them apart"
     )

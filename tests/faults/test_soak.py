@@ -153,6 +153,7 @@ class Soak:
     def worker_dies(self, chance: random.Random) -> None:
         """The service of a worker is killed, with its flow; its station is safe before the service comes back."""
         name = chance.choice(STATIONS)
+        self.line.until(lambda: self.sampling(name), f"{name} measures", SHIFT_S)
         own, process = self.workers[name]
         if process.poll() is None:
             kill_all(process)
@@ -178,6 +179,10 @@ class Soak:
             except OSError:
                 time.sleep(FULL_S)
         filler.unlink()
+
+    def sampling(self, name: str) -> bool:
+        with open_devices(self.configurations[name], ()) as devices:
+            return devices.reader.sampling() == "running"
 
     def safe(self, name: str) -> bool:
         with open_devices(self.configurations[name], ()) as devices:
