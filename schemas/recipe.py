@@ -343,7 +343,7 @@ class Recipe(_Measurement):
         return self
 
     @property
-    def wanted_records(self) -> int:
+    def planned_records(self) -> int:
         """The number of records that capture makes: the poses of every soak, and the static one."""
         soaks = range(len(self.temperatures_C))
         dwells = sum(len(self.poses_at(k)) + len(self.verification_at(k)) for k in soaks)

@@ -7,12 +7,12 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from inertial.criticism.decisions import TOLD_APART
+from inertial.criticism.decisions import CLASS_WIDTH
 from inertial.criticism.heldout import Fitting
 from inertial.criticism.model import Model, Term
 from inertial.criticism.penalty import freedom, price
 from inertial.criticism.problem import Lot, Problem
-from inertial.criticism.separation import Apart, Rivals, apart, left_of, predictions, separations, widened
+from inertial.criticism.separation import Apart, Rivals, apart, predictions, residual_squares, separations, widened
 from inertial.criticism.turn_on import with_turn_on
 from inertial.planning.sequences import SequenceStep, StationPace
 
@@ -132,7 +132,7 @@ class RivalDiscrimination:
         n = problem.n - len(grid)
         error = _error(problem, rivals)[:, n:, None]
 
-        def told_apart(train: NDArray[np.bool_]) -> Array:
+        def separation(train: NDArray[np.bool_]) -> Array:
             total = np.zeros(len(grid))
             for column, fit in enumerate(fits):
                 left = fit.left(truths, train)[:, n:] / error
@@ -141,7 +141,7 @@ class RivalDiscrimination:
                 total += np.minimum(gained / self.needed[:, column], 1.0) @ self.weight
             return total
 
-        return _greedy(grid, n, count, told_apart)
+        return _greedy(grid, n, count, separation)
 
     def effect_of_steps(
         self, already: Sequence[SequenceStep], steps: Sequence[SequenceStep], pace: StationPace
@@ -151,15 +151,15 @@ class RivalDiscrimination:
         after, needed = self.expected([*already, *steps], pace)
         names = self.rivals.ids
         sure = np.minimum(after / needed, (after / needed).T)[0, 1:]
-        parted = [k for k in range(1, len(names)) if sure[k - 1] >= 1.0]
-        other = parted[0] if parted else 1 + int(np.argmax(sure))
+        separable = [k for k in range(1, len(names)) if sure[k - 1] >= 1.0]
+        other = separable[0] if separable else 1 + int(np.argmax(sure))
         both = (names[0], float(after[0, other])), (names[other], float(after[other, 0]))
         return Promise(
             before=float(max(before[0, other], 0.0)),
             after=min(chi for _, chi in both),
             ids=(names[0], names[other]),
             if_true=both,
-            remaining=tuple(names[k] for k in range(1, len(names)) if k not in parted),
+            remaining=tuple(names[k] for k in range(1, len(names)) if k not in separable),
         )
 
 
@@ -192,8 +192,8 @@ class Sighting:
         problem = widened(rivals, steps, pace) if steps else Problem(rivals.lot)
         columns, sizes = _typical(problem, self.terms)
         rest = with_turn_on(problem.lot.state, rivals.rest)
-        noise = problem.covariance.taken(rivals.noise, rivals.covariance)
-        left = left_of(Model(problem, rest), columns, noise)
+        noise = problem.covariance.rescaled(rivals.noise, rivals.covariance)
+        left = residual_squares(Model(problem, rest), columns, noise)
         per_column = left * rivals.weight / rivals.variance / problem.blocks
         return np.array([float(np.mean(part)) for part in np.split(per_column, np.cumsum(sizes)[:-1])])
 
@@ -274,7 +274,7 @@ def _needed(rivals: Rivals, found: Apart) -> Array:
     paid = np.array([price(d, k) for d, k in zip(found.whole, counts, strict=True)])
     wrong = np.array([[price(max(d - lost, 0.0), k) for k, lost in zip(counts, row, strict=True)]
                       for d, row in zip(found.whole, found.left, strict=True)])  # fmt: skip
-    least = np.maximum(TOLD_APART + paid[:, None] - wrong, TOLD_APART)
+    least = np.maximum(CLASS_WIDTH + paid[:, None] - wrong, CLASS_WIDTH)
     return (UNLUCKY + np.sqrt(UNLUCKY**2 + least)) ** 2
 
 

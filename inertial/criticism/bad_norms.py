@@ -122,7 +122,7 @@ def _judged(model: Model, unit: int, dwells: tuple[int, ...]) -> Suspicion | Non
     rest = _without(model, unit, dwells)
     if rest.space.dof < FEWEST_DOF - len(dwells) or rest.space.local_rank < model.space.local_rank:
         return None
-    noise = model.problem.covariance.taken(rest.noise, rest.problem.covariance)
+    noise = model.problem.covariance.rescaled(rest.noise, rest.problem.covariance)
     p, py = _projector(model, noise, unit)
     own = p[np.ix_(dwells, dwells)]
     off = np.linalg.solve(own, py[list(dwells)])

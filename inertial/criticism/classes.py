@@ -3,14 +3,14 @@
 from dataclasses import dataclass
 
 from inertial.criticism import decisions
-from inertial.criticism.decisions import TOLD_APART
+from inertial.criticism.decisions import CLASS_WIDTH
 from inertial.criticism.field import Candidates
 from inertial.criticism.handling.base import Handling
 from inertial.criticism.model import Model, Term
 from inertial.criticism.refinement import refine
 from inertial.criticism.search import judge, ranked, scanned, size_of
 
-__all__ = ["TOLD_APART", "EffectClass", "Member", "class_of"]
+__all__ = ["CLASS_WIDTH", "EffectClass", "Member", "class_of"]
 
 
 _MOST = 9
@@ -69,5 +69,5 @@ def class_of(field: Candidates, model: Model, term: Term) -> EffectClass:
     judged = [judge(field, rest, refine(rest, t, model.noise)) for t in near]
     judged = ranked([judge(field, rest, term), *judged])
     best = judged[0]
-    members = tuple(Member(r.term, r.cost - best.cost) for r in judged if r.cost < best.cost + TOLD_APART)
+    members = tuple(Member(r.term, r.cost - best.cost) for r in judged if r.cost < best.cost + CLASS_WIDTH)
     return EffectClass(members, best.log_p, size_of(rest, best.term))

@@ -288,7 +288,7 @@ class Covariance:
         """White noise as the errors say."""
         return Noise(Shares(), np.ones(len(self.level)))
 
-    def taken(self, noise: Noise, other: "Covariance") -> Noise:
+    def rescaled(self, noise: Noise, other: "Covariance") -> Noise:
         """Noise of another covariance, of the same blocks, in the units of this one."""
         factor = other.white / self.white
         shares = Shares(noise.shares.flicker * factor, noise.shares.walk * factor * self.span / other.span)

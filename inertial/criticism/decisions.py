@@ -60,7 +60,7 @@ REMAINDER = 0.1
 The lag of a part, found as `thermal_rate` of 30 µg, left 2 µg of a `gain_step` in one unit, with a probability below 1e-8.
 """
 
-TOLD_APART = 15.0
+CLASS_WIDTH = 15.0
 """Difference of scores within which rivals stand in one class.
 
 Ten: the wrong one of two leads with probability Φ(−√10) = 8e-4. Five: room for drivers that are not read exactly.

@@ -91,10 +91,10 @@ def diagnose(lot: Lot, effects: Sequence[str], rng: Generator) -> Diagnosis:
     rng : draws the noise that adequacy is measured against
     """
     run, found = examined(lot, effects)
-    return _told(run, found, rng)
+    return _concluded(run, found, rng)
 
 
-def _told(run: Run, search_: Search, rng: Generator) -> Diagnosis:
+def _concluded(run: Run, search_: Search, rng: Generator) -> Diagnosis:
     """The diagnosis of what was searched."""
     base, fields, found = search_.base, search_.field, search_.found
     problem = base.problem

@@ -11,7 +11,7 @@ from inertial import effects as catalogue
 from inertial.criticism import decisions
 from inertial.criticism.bad_dwells import BadDwell, bad_dwells, without
 from inertial.criticism.classes import EffectClass, class_of
-from inertial.criticism.decisions import RISES, TOLD_APART
+from inertial.criticism.decisions import CLASS_WIDTH, RISES
 from inertial.criticism.drivers import varies
 from inertial.criticism.field import Candidates
 from inertial.criticism.handling import alternatives
@@ -43,7 +43,7 @@ class Named:
     """A class of effects that is missing, with the errors before and after it is added; g.
 
     heldout_before, heldout_after : on dwells left out, the worst of the kinds that can judge both; NaN where none can
-    units, dwells : that an alternative of scope "data" concerns, none for all units; told : what it did, in words
+    units, dwells : that an alternative of scope "data" concerns, none for all units; evidence : what it did, in words
     carried : the dwells that carry the verdict
     """
 
@@ -53,7 +53,7 @@ class Named:
     heldout_after: float
     units: tuple[int, ...] = ()
     dwells: tuple[int, ...] = ()
-    told: str = ""
+    evidence: str = ""
     carried: Carried = field(default_factory=Carried)
 
     @property
@@ -149,10 +149,10 @@ def _mend(run: Run, fields: Candidates, found: SearchResult, term: Term) -> None
         raise TypeError(term.effect.id)
     size = model.shared_sizes(term)
     units = (int(place["unit"]),) if "unit" in place else ()
-    told, dwells = _happened(fields, found.model, term, alternative, size)
+    evidence, dwells = _happened(fields, found.model, term, alternative, size)
     before, after = left_out(found.model), left_out(model)
     errors = fit_rms(problem, model.terms), *worst(before, after)
-    run.handled.append(Named(group, *errors, units, dwells, told, carried_by(found.model, term)))
+    run.handled.append(Named(group, *errors, units, dwells, evidence, carried_by(found.model, term)))
     lot = alternative.settled(run.lot, size, _misfit(found.model, model), **place)
     if lot is None:
         run.beside.append(term)
@@ -169,7 +169,7 @@ def _misfit(model: Model, richer: Model) -> Misfit:
         error = model.problem.lot.error[list(units)]
         problem = Problem(replace(lot, error=error))
         blocks = [3 * unit + axis for unit in units for axis in range(3)]
-        noise = problem.covariance.taken(richer.noise.pick(blocks), model.problem.covariance)
+        noise = problem.covariance.rescaled(richer.noise.pick(blocks), model.problem.covariance)
         return Model(problem, local).at(noise).rss
 
     return left
@@ -185,12 +185,12 @@ def _happened(
     dwells = list(alternative.dwells(lot, **place))
     for other in alternative.instead(lot, **place):
         rival = judge(fields, beside, Term(alternative, tuple(other.items())))
-        if rival.cost < best + TOLD_APART:
+        if rival.cost < best + CLASS_WIDTH:
             words.append(alternative.short(beside.with_term(rival.term).shared_sizes(rival.term), **other))
             dwells += alternative.dwells(lot, **other)
-    told = alternative.told(lot, size, **place)
-    told += f"; these dwells cannot tell it from {' or '.join(words)}" if words else ""
-    return told, tuple(sorted(dwells))
+    evidence = alternative.describe(lot, size, **place)
+    evidence += f"; these dwells cannot tell it from {' or '.join(words)}" if words else ""
+    return evidence, tuple(sorted(dwells))
 
 
 def candidates_of(base: Model, held: Sequence[str]) -> list[AnyEffect]:

@@ -202,7 +202,7 @@ class ProposalSearch:
             promised = self._promised([whole.course])
             if promised >= min(now, _ALL):
                 chosen, now = [whole.course], promised
-        return self._told(chosen, now) if chosen else None
+        return self._proposal(chosen, now) if chosen else None
 
     def _promised(self, chosen: Sequence[StepSequence]) -> float:
         """What is there after courses, with every rival fitted as it will be."""
@@ -243,7 +243,7 @@ class ProposalSearch:
         grid = pose_grid(self.reach, temperature)
         return self.aim.picks(held, grid, self.pace, _PICKS) if grid else []
 
-    def _told(self, chosen: Sequence[StepSequence], worth: float) -> Proposal:
+    def _proposal(self, chosen: Sequence[StepSequence], worth: float) -> Proposal:
         steps = [s for c in chosen for s in c.steps]
         promise = self.aim.effect_of_steps(self.already, steps, self.pace)
         whole, free = [*self.already, *steps], self.already

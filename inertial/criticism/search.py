@@ -84,7 +84,7 @@ def search(
         if len(chosen) > 1:
             model, chosen = _reexamine(field, base, model, chosen)
     if len(chosen) > len(start):
-        model, chosen = _taken_apart(field, base, model, chosen)
+        model, chosen = _replaced_by_two(field, base, model, chosen)
     return SearchResult(model, tuple(chosen), ladder)
 
 
@@ -235,7 +235,7 @@ def _reexamine(field: Candidates, base: Model, model: Model, chosen: list[Term])
     return model, chosen
 
 
-def _taken_apart(field: Candidates, base: Model, model: Model, chosen: list[Term]) -> tuple[Model, list[Term]]:
+def _replaced_by_two(field: Candidates, base: Model, model: Model, chosen: list[Term]) -> tuple[Model, list[Term]]:
     """Each effect of several columns once more against two simpler ones that together do what it does."""
     for term in tuple(chosen):
         columns = term.candidate(field.problem).columns.shape[-1]

@@ -128,7 +128,7 @@ def apart(
 ) -> Apart:
     """How far rivals lie apart with steps taken after what was measured; parameters as :func:`separations`."""
     problem = widened(rivals, steps, pace) if steps else Problem(rivals.lot)
-    noise = problem.covariance.taken(rivals.noise, rivals.covariance)
+    noise = problem.covariance.rescaled(rivals.noise, rivals.covariance)
     rest = Model(problem, with_turn_on(problem.lot.state, rivals.rest))
     to_lot = rivals.weight / rivals.variance
     profile = Profile(rest, predictions(rivals, problem), noise, AXES_DIFFER / to_lot)
@@ -142,7 +142,7 @@ def smallest(left: Array) -> Array:
     return np.minimum(left, left.T)
 
 
-def left_of(model: Model, targets: Array, noise: Noise) -> Array:
+def residual_squares(model: Model, targets: Array, noise: Noise) -> Array:
     """Whitened sums of squares (r,) that a model leaves of some series (blocks, n, r)."""
     space: Space = model.at(noise)
     free = space.project(space.whiten(targets))

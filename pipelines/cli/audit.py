@@ -60,21 +60,21 @@ def command(
     from pipelines.audit.findings import findings
     from pipelines.audit.period import scope_of
     from pipelines.audit.rules import load_rules
-    from pipelines.flows.spread import on_dask
+    from pipelines.flows.dask_cluster import on_dask
     from pipelines.parallel import processors
 
     store, scope = Archive(archive), scope_of(since, until, device, station)
     count = workers or processors()
-    found = audit(store, load_rules(rules), scope, spread=on_dask(dask, count), workers=count)
+    found = audit(store, load_rules(rules), scope, distribute=on_dask(dask, count), workers=count)
     _refuse_nothing(found, str(store.root))
-    told = findings(found)
+    audit_findings = findings(found)
     if page is not None:
-        _write_page(page, found, told, str(store.root))
+        _write_page(page, found, audit_findings, str(store.root))
     if as_json:
-        print_json(document(found, told, str(store.root)))
+        print_json(document(found, audit_findings, str(store.root)))
     else:
-        _show(found, told, page)
-    raise typer.Exit(PART_FAILED if told else DONE)
+        _show(found, audit_findings, page)
+    raise typer.Exit(PART_FAILED if audit_findings else DONE)
 
 
 def _refuse_nothing(found: Audit, root: str) -> None:
@@ -96,14 +96,14 @@ def _refuse_nothing(found: Audit, root: str) -> None:
         )
 
 
-def _write_page(page: Path, found: Audit, told: list[AuditFinding], root: str) -> None:
+def _write_page(page: Path, found: Audit, audit_findings: list[AuditFinding], root: str) -> None:
     from pipelines.archive.files import ELSEWHERE, publish
     from pipelines.audit.page import render
 
-    publish(page, render(found, told, root).encode(), "audit", ELSEWHERE)
+    publish(page, render(found, audit_findings, root).encode(), "audit", ELSEWHERE)
 
 
-def _show(found: Audit, told: list[AuditFinding], page: Path | None) -> None:
+def _show(found: Audit, audit_findings: list[AuditFinding], page: Path | None) -> None:
     from pipelines.audit.calibrations import date_of
     from pipelines.audit.document import counts
     from pipelines.audit.finding import WHO
@@ -119,12 +119,12 @@ def _show(found: Audit, told: list[AuditFinding], page: Path | None) -> None:
     _show_yield(found)
     out.print(_certificates(found), markup=False, soft_wrap=True)
     for who, words in WHO.items():
-        own = [finding for finding in told if finding.who == who]
+        own = [finding for finding in audit_findings if finding.who == who]
         if own:
             out.print(f"\n{words}", style="bold", soft_wrap=True)
         for kind in dict.fromkeys(finding.kind for finding in own):
             _show_kind([finding for finding in own if finding.kind == kind])
-    if not told:
+    if not audit_findings:
         out.print("nothing needs doing")
     if page is not None:
         error_console().print(f"page    {page}", markup=False, soft_wrap=True)

@@ -94,7 +94,7 @@ def command(
 
 def _print_run(run: Run) -> None:
     """Print on standard error which run will be certified."""
-    from pipelines.certificates.handed_out import library_remarks
+    from pipelines.certificates.coefficient_remarks import library_remarks
     from pipelines.certificates.measured import measured_on
 
     units = [str(unit["serial"]) for unit in run.about.get("lot", {}).get("units", [])]

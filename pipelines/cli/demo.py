@@ -83,10 +83,10 @@ def _bar() -> Generator[Progress]:
     with Bars(console=error_console(), transient=True) as bars:
         bar = bars.add_task("measuring the lot twice", total=None)
 
-        def told(done: int, total: int, note: str) -> None:
+        def show(done: int, total: int, note: str) -> None:
             bars.update(bar, completed=done, total=total, description=f"measuring  {note}")
 
-        yield told
+        yield show
 
 
 def _hand_over(folder: Path, hidden: Scene, *, as_json: bool) -> None:

@@ -121,7 +121,7 @@ def verdict(document: dict[str, Any]) -> str:
         return f"CANNOT BE JUDGED: {document.get('reason')}."
     if error["rms_ug"] < SMALL * error["floor_ug"]:
         left += "; the misfit is smaller than the noise, but significant"
-    spoilt = [told_of(group) for group in document["classes"] if group["scope"] == "data"]
+    spoilt = [class_text(group) for group in document["classes"] if group["scope"] == "data"]
     named = [" or ".join(group["effects"]) for group in document["classes"] if group["scope"] != "data"]
     if spoilt:
         rest = f"; also missing: {', and '.join(named)}" if named else ""
@@ -135,7 +135,7 @@ def verdict(document: dict[str, Any]) -> str:
     return f"NOT ADEQUATE: {left}; {rest}."
 
 
-def told_of(group: dict[str, Any]) -> str:
+def class_text(group: dict[str, Any]) -> str:
     """What handling did, with the unit and the first dwell that it concerns, and the effects that explain as much."""
     units, dwells = group.get("units") or [], group.get("dwells") or []
     where = f"{', '.join(units) or 'all units'}{f', dwell {dwells[0]}' if dwells else ''}"
@@ -262,9 +262,11 @@ def _next_command(out: Console, document: dict[str, Any], source: str, model: Pa
     added = set(document["recommended"])
     several = [g["effects"] for g in document["classes"] if len(g["effects"]) > 1 and added & set(g["effects"])]
     if several:
-        told = "; ".join(" or ".join(effects) for effects in several)
+        alternatives = "; ".join(" or ".join(effects) for effects in several)
         out.print(
-            f"These data do not tell apart: {told}. What is added is one of the class.", style="dim", soft_wrap=True
+            f"These data do not tell apart: {alternatives}. What is added is one of the class.",
+            style="dim",
+            soft_wrap=True,
         )
 
 

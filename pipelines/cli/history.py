@@ -53,7 +53,7 @@ def command(
     """
     from pipelines.cli.compare import compared
     from pipelines.cli.inputs import add_effect_files, both_runs
-    from pipelines.diagnosis.model_history import FIGURES, JUDGED, evolution, told
+    from pipelines.diagnosis.model_history import FIGURES, JUDGED, change_row, evolution
     from pipelines.jobs.model_files import read_model, versions
 
     add_effect_files(effect_file)
@@ -64,7 +64,7 @@ def command(
         rows = evolution(versions(found), lambda effects, before: compared(effects, *tables, before=before))
     else:
         rows = [
-            {**told(version), **dict.fromkeys([*FIGURES, *JUDGED]), "text": "", "warnings": []}
+            {**change_row(version), **dict.fromkeys([*FIGURES, *JUDGED]), "text": "", "warnings": []}
             for version in versions(found)
         ]
     if picture is not None:

@@ -60,10 +60,10 @@ def fit_document(done: Run, source: str) -> dict[str, Any]:
     past = done.table("history") if "history" in done.tables() else None
     effects = list(done.about["recipe"]["effects"])
     if has_poses(dwells):
-        told = _known_poses(dwells, past, effects)
+        fitted = _known_poses(dwells, past, effects)
     else:
         answer = fitted(dwells, past, effects, gravity_of_import(done.about), str(dwells["out_unit"].iloc[0]))
-        told = {**answer.document, "lines": list(answer.lines)}
+        fitted = {**answer.document, "lines": list(answer.lines)}
     grades = rows_of(done.table("grades")) if "grades" in done.tables() else []
     keys = ("adequate", "reason", "error", "evidence", "leave_out", "missing", "lines")
     return {
@@ -72,7 +72,7 @@ def fit_document(done: Run, source: str) -> dict[str, Any]:
         "effects": effects,
         "left_out": list(done.about.get("left_out", [])),
         "units": [{key: row[key] for key in ("unit", "outcome", "grade", "reasons")} for row in grades],
-        **{key: told[key] for key in keys},
+        **{key: fitted[key] for key in keys},
     }
 
 

@@ -114,7 +114,7 @@ def _mapped(
     """Results of a function for the runs, in their order, computed here or on a cluster."""
     from pathlib import Path as LocalPath
 
-    from pipelines.flows.spread import on_dask
+    from pipelines.flows.dask_cluster import on_dask
     from pipelines.parallel import map_partitions
     from pipelines.rerun.partition import parts
 

@@ -41,12 +41,12 @@ def _made(archive: Archive, valid: Calibration) -> dict[str, Any]:
     """The coefficients of a calibration, with the code, libraries and data that made them."""
     from pipelines.archive import Run
     from pipelines.certificates.certified_coefficients import coefficients_of
-    from pipelines.cli.remarks import tell_of
+    from pipelines.cli.remarks import print_remarks
 
     run = Run(archive, valid.run)
     if not (run.path / "run.json").is_file():
         return {"coefficients": None, "made": None}
-    tell_of(run, [valid.serial])
+    print_remarks(run, [valid.serial])
     manifest = run.manifest("coefficients")
     return {
         "coefficients": coefficients_of(run, valid),

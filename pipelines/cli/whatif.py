@@ -88,7 +88,7 @@ def _judged(
     """Every lot with both models, and the errors on later runs of units that were measured before."""
     from pathlib import Path as LocalPath
 
-    from pipelines.flows.spread import on_dask
+    from pipelines.flows.dask_cluster import on_dask
     from pipelines.parallel import map_partitions, processors
     from pipelines.rerun.lot_comparison import fresh, judged
     from pipelines.rerun.partition import parts
@@ -96,14 +96,14 @@ def _judged(
 
     count = max(1, min(workers or processors(), len(runs)))
     home = store.root.resolve() / "orchestrator" if isinstance(store.root, LocalPath) else None
-    spread = on_dask(dask, count, home)
+    distribute = on_dask(dask, count, home)
     with error_console().status(f"evaluating {number_of(len(runs), 'lot')}, {count} at a time"):
-        portions = map_partitions(judged, parts(store, runs, change, count), spread, workers=count, name="what if")
+        portions = map_partitions(judged, parts(store, runs, change, count), distribute, workers=count, name="what if")
         lots = [one for portion in portions for one in portion]
         tasks = fresh_tasks(lots, store.address, change)
         size = max(1, -(-len(tasks) // (4 * count)))
         chunks = [tasks[start : start + size] for start in range(0, len(tasks), size)]
-        done = map_partitions(fresh, chunks, spread, workers=count, name="what if, fresh runs")
+        done = map_partitions(fresh, chunks, distribute, workers=count, name="what if, fresh runs")
     return lots, [one for chunk in done for one in chunk]
 
 

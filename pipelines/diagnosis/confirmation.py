@@ -6,11 +6,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from inertial.criticism.came_again import came_again
 from inertial.criticism.comparison import estimate, residuals_of, rms
 from inertial.criticism.decisions import BLOCKS, LEFT_OUT, RISES
 from inertial.criticism.left_out import left_out
 from inertial.criticism.problem import Problem
+from inertial.criticism.reproduced_change import reproduced_change
 from pipelines.diagnosis.result_rows import known
 from schemas.units import MICRO
 
@@ -40,7 +40,7 @@ def progress(before: Model, after: Model, out: LeftOut, fresh: Lot | None) -> di
 
 def _by_fresh(before: Model, after: Model, out: LeftOut, fresh: Lot) -> dict[str, Any]:
     old, new = estimate(before), estimate(after)
-    found = came_again(fresh, old, new)
+    found = reproduced_change(fresh, old, new)
     problem = Problem(fresh)
     rises = None
     if found.confirmed is True:

@@ -47,8 +47,8 @@ def examination(
     """
     effects = list(judged) if judged else default_model(table)
     found, faults, diagnosis = examined(table, history, effects, left_out)
-    told = {**document(found, faults, diagnosis), **_extras(found.units, effects, diagnosis)}
-    return Examination(told, found, diagnosis)
+    whole = {**document(found, faults, diagnosis), **_extras(found.units, effects, diagnosis)}
+    return Examination(whole, found, diagnosis)
 
 
 def _extras(units: tuple[str, ...], effects: list[str], diagnosis: Diagnosis | None) -> dict[str, Any]:

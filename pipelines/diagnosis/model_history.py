@@ -41,7 +41,7 @@ def evolution(versions: Sequence[Version], compare: Compare) -> list[dict[str, A
         effects = list(version.effects)
         errors = compare(effects, before if version.added else None)
         progress = errors.get("progress")
-        row = {**told(version), **{name: errors[key] for name, key in FIGURES.items()}}
+        row = {**change_row(version), **{name: errors[key] for name, key in FIGURES.items()}}
         row |= {name: None if progress is None else progress[name] for name in JUDGED}
         text = text_of(row, progress) if before is not None else "the model to begin with"
         rows.append({**row, "text": text, "warnings": errors.get("warnings", [])})
@@ -49,7 +49,7 @@ def evolution(versions: Sequence[Version], compare: Compare) -> list[dict[str, A
     return rows
 
 
-def told(version: Version) -> dict[str, Any]:
+def change_row(version: Version) -> dict[str, Any]:
     """What changed in a version, by whom, when, why."""
     change = version.change
     return {

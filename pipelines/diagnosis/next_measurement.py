@@ -64,7 +64,7 @@ def proposed(diagnosis: Diagnosis, around: Circumstances | None = None) -> Propo
         if len(named.effects.members) > 1:
             # what handling did is not parted from physics by more poses, but by what its own words say
             handled = named.effects.of_data
-            wanted = None if handled else _parted(diagnosis, named.effects, around, already)
+            wanted = None if handled else _proposal_for(diagnosis, named.effects, around, already)
             already += wanted.steps if wanted is not None else ()
             parting.append((named.effects, wanted))
             twin.append(() if handled else _twins(diagnosis, named.effects, around))
@@ -78,7 +78,7 @@ def _twins(diagnosis: Diagnosis, group: EffectClass, around: Circumstances | Non
         return ()
 
 
-def _parted(
+def _proposal_for(
     diagnosis: Diagnosis, group: EffectClass, around: Circumstances | None, already: list[SequenceStep]
 ) -> Proposal | None:
     try:

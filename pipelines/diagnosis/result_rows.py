@@ -62,11 +62,11 @@ def _class(named: Named, names: Names) -> dict[str, Any]:
         "plausible": _plausible(group.size, simplest.effect.typical_ug),
     }
     row |= _carried(named.carried, names)
-    if named.told:
+    if named.evidence:
         row |= {
             "units": [names.units[u] for u in named.units],
             "dwells": [names.dwells[d] for d in named.dwells],
-            "evidence": named.told,
+            "evidence": named.evidence,
         }
     return row
 

@@ -217,11 +217,11 @@ def clock(numbers: NDArray[np.float64], name: str, claimed: str, stated: str, wh
     return Clock(
         seconds,
         unit,
-        _doubts(step, unit, found, column) if claimed else (_taken(column, unit, found, step, len(numbers)),),
+        _doubts(step, unit, found, column) if claimed else (_reading(column, unit, found, step, len(numbers)),),
     )
 
 
-def _taken(column: str, unit: str, found: Recognised, step: float, count: int) -> str:
+def _reading(column: str, unit: str, found: Recognised, step: float, count: int) -> str:
     """How time was read, for people."""
     seconds = step * TIME_UNITS[unit]
     rate = f", {1.0 / seconds:.4g} Hz for {seconds * (count - 1):.5g} s" if seconds > 0.0 else ""

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from pipelines.importers.documents import SampleFaultDocument
     from pipelines.importers.mapping import Mapping
 
-_MOST_TOLD = 5
+_MOST_LISTED = 5
 
 
 @dataclass(frozen=True)
@@ -40,9 +40,9 @@ class SampleFaults:
         """What was found, for people."""
         found = [
             f"axis {AXES[one.axis]} stands still for {one.count} samples from row {one.start + 1} on ({time[one.start]:.6g} s)"
-            for one in sorted(self.frozen, key=lambda one: -one.count)[:_MOST_TOLD]
+            for one in sorted(self.frozen, key=lambda one: -one.count)[:_MOST_LISTED]
         ]
-        more = len(self.frozen) - _MOST_TOLD
+        more = len(self.frozen) - _MOST_LISTED
         found += [f"and {more} more such stretches"] if more > 0 else []
         return found + [
             f"axis {AXES[one.axis]} has torn words: {100.0 * one.share:.3g} % of its resting samples are off by "
@@ -104,7 +104,7 @@ def without_short(found: Stretches, record: NDArray[np.int64]) -> tuple[Stretche
     return (
         fewer,
         numbers[record],
-        (f"dwells left out because most of their samples have faults: {', '.join(gone[:_MOST_TOLD])}",),
+        (f"dwells left out because most of their samples have faults: {', '.join(gone[:_MOST_LISTED])}",),
     )
 
 

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
     from pipelines.importers.mapping import Mapping
 
-_MOST_TOLD = 6
+_MOST_LISTED = 6
 
 
 @dataclass(frozen=True)

@@ -161,7 +161,7 @@ class Inquiry:
         if not affordable:
             proposals = proposed(diagnosis, circumstances(self.base, self.jobs[-1], float("inf"))).found
             if not proposals:
-                return Ending("nothing_parts", _not_parted(joint))
+                return Ending("nothing_parts", _no_follow_up(joint))
             needed = sum(p.minutes for p in proposals)
             text = (
                 f"discriminating between {_classes(joint)} needs {needed:.0f} min more station time, {max(left, 0.0):.0f} of "
@@ -299,10 +299,10 @@ def _ended(joint: JointDiagnosis) -> Ending | None:
         return None
     if not document["classes"]:
         return Ending("unexplained", "the model is not adequate, and no effect of the catalogue explains the residuals")
-    return Ending("told_apart", _told_apart(document))
+    return Ending("told_apart", _all_identified(document))
 
 
-def _told_apart(document: dict[str, Any]) -> str:
+def _all_identified(document: dict[str, Any]) -> str:
     """That every class has one effect, and which of them is not recommended as no dwells left out judge it."""
     groups = document["classes"]
     text = f"every class contains one effect: {', '.join(g['effects'][0] for g in groups)}"
@@ -312,7 +312,7 @@ def _told_apart(document: dict[str, Any]) -> str:
     return f"{text}; not recommended yet: {', '.join(unjudged)}, which no dwells left out can judge: confirm with a fresh run"
 
 
-def _not_parted(joint: JointDiagnosis) -> str:
+def _no_follow_up(joint: JointDiagnosis) -> str:
     """Why there is no follow-up: no measurement of the station parts a class, or none is sure enough to."""
     if any(joint.following.twins):
         return f"no measurement on this station discriminates between {_classes(joint)}"

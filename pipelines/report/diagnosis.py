@@ -10,7 +10,7 @@ from inertial import effects
 from inertial.criticism.handling import named as handled
 from pipelines.report.diagnosis_plots import driver_plots, model_plot, pose_maps
 from pipelines.report.numbers import plain
-from pipelines.report.residuals import drivers_shown, left_by
+from pipelines.report.residuals import drivers_shown, lot_residuals
 from pipelines.report.templates import template
 from schemas.units import MICRO
 
@@ -104,7 +104,7 @@ def _value(value: float | tuple[float, ...] | list[float] | None) -> str:
 
 def _pictures(diagnosis: Diagnosis, units: tuple[str, ...]) -> dict[str, Any]:
     lot = diagnosis.problem.lot
-    left = left_by(diagnosis, units)
+    left = lot_residuals(diagnosis, units)
     drivers = drivers_shown(diagnosis)
     return {
         "unit": left.unit,

@@ -29,7 +29,7 @@ _KNOTS = 5
 
 
 @dataclass(frozen=True)
-class Left:
+class LotResiduals:
     """Residuals of a lot in µg, (units, axes, n); NaN where a dwell is missing.
 
     axes : "x", "y", "z", or "norm" alone
@@ -57,7 +57,7 @@ class DriverValues:
     values: Array
 
 
-def left_by(diagnosis: Diagnosis, units: tuple[str, ...]) -> Left:
+def lot_residuals(diagnosis: Diagnosis, units: tuple[str, ...]) -> LotResiduals:
     """Residuals before and after, by generalised least squares with each model's own noise."""
     problem = diagnosis.problem
     axes = ("norm",) if problem.lot.radial else ("x", "y", "z")
@@ -66,7 +66,7 @@ def left_by(diagnosis: Diagnosis, units: tuple[str, ...]) -> Left:
     after = before if not added(diagnosis) else MICRO * residuals_of(problem, estimate(diagnosis.final)).reshape(shape)
     sizes = np.nanmean(before**2, axis=(1, 2))
     fallen = sizes - np.nanmean(after**2, axis=(1, 2)) if added(diagnosis) else sizes
-    return Left(units, axes, before, after, int(np.argmax(fallen)))
+    return LotResiduals(units, axes, before, after, int(np.argmax(fallen)))
 
 
 def added(diagnosis: Diagnosis) -> list[str]:
@@ -85,12 +85,12 @@ def drivers_shown(diagnosis: Diagnosis) -> list[DriverValues]:
     if "approach" in known:
         known["approach"] = state.force_step
     first = [] if diagnosis.unexplained is None else [diagnosis.unexplained.driver]
-    told = [*first, *(p.driver for p in diagnosis.where[:5])]
-    wanted = dict.fromkeys([*told, *ALWAYS])
+    names = [*first, *(p.driver for p in diagnosis.where[:5])]
+    wanted = dict.fromkeys([*names, *ALWAYS])
     found: list[DriverValues] = []
     for name in wanted:
         values = known.get(name)
-        still = name not in told and values is not None and float(np.ptp(values)) < STILL.get(name, 0.0)
+        still = name not in names and values is not None and float(np.ptp(values)) < STILL.get(name, 0.0)
         if values is not None and not still and not any(_alike(values, other.values) for other in found):
             found.append(DriverValues(name, LABELS.get(name, name), values * shown_factor(name)))
     return found[:_MOST]

@@ -67,7 +67,7 @@ def again(
                     new.flush()  # a run that was there goes on behind the last stage that was done
         else:
             archive.prepare()
-            new.begin(_told(old, plan, because))
+            new.begin(_about(old, plan, because))
             stages = _done(old, new, plan, raw=raw)
             with alone(new.path, wait=True):
                 files.sweep(new.path)
@@ -140,7 +140,12 @@ def changes(old: Run, plan: Plan, *, raw: bool) -> list[dict[str, str]]:
             found.append({"stage": step.name, "what": "code", "from": str(manifest.get("code", "")), "to": step.code})
         before = manifest.get("parameters", {})
         found += [
-            {"stage": step.name, "what": SAID.get(key, key), "from": _said(before[key]), "to": _said(value)}
+            {
+                "stage": step.name,
+                "what": PARAMETER_TITLES.get(key, key),
+                "from": _short_text(before[key]),
+                "to": _short_text(value),
+            }
             for key, value in step.parameters.items()
             if key in before and before[key] != value
         ]
@@ -150,10 +155,10 @@ def changes(old: Run, plan: Plan, *, raw: bool) -> list[dict[str, str]]:
     return found
 
 
-SAID = {"effects": "model", "formulas": "model", "lot": "lot", "limits": "limits"}
+PARAMETER_TITLES = {"effects": "model", "formulas": "model", "lot": "lot", "limits": "limits"}
 
 
-def _said(value: Any) -> str:
+def _short_text(value: Any) -> str:
     """A parameter in short."""
     if isinstance(value, dict):
         return str(value.get("name", "")) or "…"
@@ -164,11 +169,11 @@ def _said(value: Any) -> str:
     )
 
 
-def _told(old: Run, plan: Plan, because: list[dict[str, str]]) -> dict[str, Any]:
+def _about(old: Run, plan: Plan, because: list[dict[str, str]]) -> dict[str, Any]:
     """What a re-run is begun with."""
     about = old.about
-    told = {"rerun_of": old.id, "because": because, "measured": about.get("measured", about["when"])}
-    return {**provenance(), **plan.about, **told}
+    origin = {"rerun_of": old.id, "because": because, "measured": about.get("measured", about["when"])}
+    return {**provenance(), **plan.about, **origin}
 
 
 class StageRunner:

@@ -70,16 +70,16 @@ class Plan:
 class ArchivedJob(Job):
     """The job of an archived run, which opens no station: what the run tells of its capture and station stays as it is.
 
-    told : what ``run.json`` holds, without who made it, where and when
+    run_document : what ``run.json`` holds, without who made it, where and when
     """
 
-    told: dict[str, Any] = field(default_factory=dict[str, Any])
+    run_document: dict[str, Any] = field(default_factory=dict[str, Any])
 
     @property
     def about(self) -> dict[str, Any]:
         """What is kept beside the run for readers."""
         decided = {"recipe": self.recipe.model_dump(mode="json"), "limits": self.limits.model_dump(mode="json")}
-        return {**self.told, **decided, "lot": self.lot.model_dump(mode="json")}
+        return {**self.run_document, **decided, "lot": self.lot.model_dump(mode="json")}
 
 
 def plan_of(run: Run, wanted: ModelChange, left_out: Dwells = ()) -> Plan:
@@ -107,10 +107,12 @@ def archived_job(run: Run, wanted: ModelChange) -> ArchivedJob:
         raise explain(problem, f"run {run.id}", Recipe) from None
     if wanted.limits is not None:
         recipe = recipe.model_copy(update={"limits": wanted.limits_name})
-    told = {key: value for key, value in about.items() if key not in PROVENANCE}
+    run_document = {key: value for key, value in about.items() if key not in PROVENANCE}
     station = StationConfig.model_construct(**about.get("station", {}))
     capture = about["capture"]
-    job = ArchivedJob(recipe=recipe, limits=limits, lot=lot, station=station, captured=capture, told=told)
+    job = ArchivedJob(
+        recipe=recipe, limits=limits, lot=lot, station=station, captured=capture, run_document=run_document
+    )
     refuse_unknown_effects(recipe.effects, f"run {run.id}")
     refuse_limits_without_figures(limits, recipe)
     return job

@@ -54,7 +54,7 @@ class Coarse:
         return self.spread >= FINE * self.step
 
 
-def told(digits: Coarse) -> str:
+def remark(digits: Coarse) -> str:
     """What is said of N where the digits are coarse; empty elsewhere."""
     if not digits.matters:
         return ""

@@ -11,7 +11,7 @@ import pandas as pd
 from inertial.noise.allan import AllanCurve, overlapping
 from inertial.noise.terms import FLICKER_FLOOR, NoiseTerms, fit_terms, model_deviation
 from pipelines.stages.bias_stability import TERM, bias_stability
-from pipelines.stages.coarse_digits import Coarse, told, without_digits
+from pipelines.stages.coarse_digits import Coarse, remark, without_digits
 from pipelines.stages.static_record import Series, Warmed, warmed
 from pipelines.tables.calibration import read_calibration
 from pipelines.tables.frames import empty_table
@@ -210,7 +210,7 @@ def _term_rows(channel: _Channel, terms: NoiseTerms, place: int) -> list[tuple[o
     rows = list[tuple[object, ...]]()
     for symbol, term in terms.one(place).items():
         value = np.nan if term.value is None else term.value
-        note = "; ".join(filter(None, [channel.warmth, told(channel.digits) if symbol in {"Q", "N"} else ""]))
+        note = "; ".join(filter(None, [channel.warmth, remark(channel.digits) if symbol in {"Q", "N"} else ""]))
         text = term.unit.format("µg")
         where = (channel.unit, channel.axis)
         rows.append((*where, symbol, value, term.low, term.high, term.identified, text, note))

@@ -57,8 +57,8 @@ def dwells_of(
     means = summaries.loc[summaries["unit"].isin(accepted), ["unit", "record", *MEANS, *SPREADS, "n"]]
     static = readings[readings["unit"].isin(accepted) & ~readings["kind"].isin([STATIC, PROCEDURE])]
     # a covariate that a sensor has failed to tell once is of no use to any model, and stays in the readings
-    told = [column for column in covariates(readings) if static[column].notna().all()]
-    kept = [*KEPT, *(c for c in WHERE_THERE if c in static.columns), *told]
+    recorded = [column for column in covariates(readings) if static[column].notna().all()]
+    kept = [*KEPT, *(c for c in WHERE_THERE if c in static.columns), *recorded]
     columns = static[[*kept, "start_s"]].assign(time_s=static["start_s"] + 0.5 * static["duration_s"])
     dwells = columns.drop(columns="start_s").merge(means, on=["unit", "record"], validate="one_to_one")
     dwells = dwells.assign(

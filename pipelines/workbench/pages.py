@@ -32,7 +32,7 @@ if TYPE_CHECKING:
     from pipelines.workbench.state import PageState
 
 State = TypeVar("State", bound="PageState")
-Wanted = Annotated[dict[str, Any], Body()]
+RequestBody = Annotated[dict[str, Any], Body()]
 """What a change asks for, as JSON."""
 PARAMETER = {"json": "application/json", "csv": "text/csv; charset=utf-8", "png": "image/png"}
 

@@ -289,7 +289,7 @@ def read_recipe(path):
     for name in ("soak_min_s", "settle_s", "dwell_s", "static_record_s"):
         assert 0.0 <= getattr(recipe, name) <= LONGEST_WAIT_S
     assert all(COLDEST_C <= t <= HOTTEST_C for t in recipe.temperatures_C)
-    assert recipe.wanted_records < 1e8
+    assert recipe.planned_records < 1e8
 
 
 def read_slots(path):

@@ -13,8 +13,8 @@ from typer.testing import CliRunner, Result
 from pipelines.archive import Archive, Run, files
 from pipelines.archive.signatures import VARIABLE, make_key
 from pipelines.certificates import Ledger
+from pipelines.certificates.coefficient_remarks import library_remarks
 from pipelines.certificates.days import months_after
-from pipelines.certificates.handed_out import library_remarks
 from pipelines.certificates.measured import measured_on
 from pipelines.certificates.refusals import allowed_months
 from pipelines.chain import certify as certifying

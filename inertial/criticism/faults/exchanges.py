@@ -86,8 +86,8 @@ def wrong_poses(readings: Readings) -> Iterator[Fault]:
         turned = np.abs(np.linalg.norm(felt, axis=-1) - 1.0) < 0.02
         if not turned.any():
             continue
-        name, told = _which_pose(readings.force[unit], places[turned], felt[turned])
-        yield Fault(name, unit, dwells_of(places[turned]), told)
+        name, text = _which_pose(readings.force[unit], places[turned], felt[turned])
+        yield Fault(name, unit, dwells_of(places[turned]), text)
 
 
 def _felt(readings: Readings, unit: int, places: NDArray[np.intp]) -> Array:

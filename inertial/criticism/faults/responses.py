@@ -44,7 +44,7 @@ def flipped(readings: Readings) -> Iterator[Fault]:
         signs = np.sign(k[rows, columns])
         if np.min(np.abs(k[rows, columns])) < 0.6 or (np.array_equal(rows, columns) and np.all(signs > 0)):
             continue
-        told = ", ".join(
+        text = ", ".join(
             f"{'xyz'[i]} reads {'+' if s > 0 else '−'}{'xyz'[j]}" for i, j, s in zip(rows, columns, signs, strict=True)
         )
-        yield Fault("axis_flip", unit, (), told)
+        yield Fault("axis_flip", unit, (), text)

@@ -52,7 +52,7 @@ class Handling(Effect):
         """Columns of the units it concerns, (units or 1, n, 3, k), g per unit of the coefficient."""
 
     @abstractmethod
-    def told(self, lot: "Lot", size: Array, **place: float) -> str:
+    def describe(self, lot: "Lot", size: Array, **place: float) -> str:
         """What happened, for people; ``size`` (k,) are the coefficients."""
 
     def possible(self, size: Array) -> bool:

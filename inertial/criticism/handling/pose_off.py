@@ -32,7 +32,7 @@ class PoseOff(Handling):
         del slope
         return tilts(lot.state) * (_poses(lot) == int(place["pose"]))[:, None, None]
 
-    def told(self, lot: "Lot", size: Array, **place: float) -> str:
+    def describe(self, lot: "Lot", size: Array, **place: float) -> str:
         """The two angles."""
         del lot, place
         angles = np.degrees(size)

@@ -33,7 +33,7 @@ class SoakThermometer(Handling):
             return np.zeros((*lot.state.time.shape, 3, 1))
         return -(slope * (soaks(lot.state) == int(place["soak"]))[:, None])[..., None]
 
-    def told(self, lot: "Lot", size: Array, **place: float) -> str:
+    def describe(self, lot: "Lot", size: Array, **place: float) -> str:
         """The offset."""
         del lot
         return f"the thermometers read {self.short(size, **place)}; the readings are corrected by it"

@@ -26,7 +26,7 @@ class TableSlip(Handling):
         del slope
         return tilts(lot.state) * after(lot, place["dwell"])[:, None, None]
 
-    def told(self, lot: "Lot", size: Array, **place: float) -> str:
+    def describe(self, lot: "Lot", size: Array, **place: float) -> str:
         """The two angles."""
         del lot, place
         off = f"{1e3 * size[0]:+.3f} mrad (outer) and {1e3 * size[1]:+.3f} mrad (inner)"

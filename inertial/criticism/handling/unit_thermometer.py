@@ -34,7 +34,7 @@ class UnitThermometer(Handling):
         own = slope[int(place["unit"])]
         return -(own * (soaks(lot.state) == int(place["soak"]))[:, None])[None, ..., None]
 
-    def told(self, lot: "Lot", size: Array, **place: float) -> str:
+    def describe(self, lot: "Lot", size: Array, **place: float) -> str:
         """The offset."""
         del lot
         return f"the thermometer of the unit reads {self.short(size, **place)}; its readings are corrected by it"

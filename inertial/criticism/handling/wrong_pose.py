@@ -35,7 +35,7 @@ class WrongPose(Handling):
         """Errors of the two angles in each dwell."""
         return tilts(lot.state)
 
-    def told(self, lot: "Lot", size: Array, **place: float) -> str:
+    def describe(self, lot: "Lot", size: Array, **place: float) -> str:
         """The two angles."""
         del lot, place
         angles = np.degrees(size)

@@ -10,7 +10,7 @@ from starlette.responses import JSONResponse, Response
 
 from pipelines.diagnosis.inputs import use_written_formulas
 from pipelines.report.diagnosis import chance
-from pipelines.workbench.pages import Wanted, figure, page, run_table, state_of, table_csv, workbench_of
+from pipelines.workbench.pages import RequestBody, figure, page, run_table, state_of, table_csv, workbench_of
 from pipelines.workbench.services import models, requests, sources
 from pipelines.workbench.services.samples import samples_of
 from pipelines.workbench.state import MissingPage
@@ -71,7 +71,7 @@ def candidates(request: Request) -> Response:
 
 
 @router.post("/missing/save")
-def save(request: Request, wanted: Wanted) -> JSONResponse:
+def save(request: Request, wanted: RequestBody) -> JSONResponse:
     """Save the model of a page's address as the next version of a model file."""
     bench = workbench_of(request)
     state, _ = MissingPage.parse(_pairs(str(wanted.get("address", ""))))
@@ -86,7 +86,7 @@ def save(request: Request, wanted: Wanted) -> JSONResponse:
 
 
 @router.post("/missing/formula")
-def formula(wanted: Wanted) -> JSONResponse:
+def formula(wanted: RequestBody) -> JSONResponse:
     """The address of the page with a formula tried beside the model; refused where it is no formula."""
     from inertial import effects
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from fastapi import APIRouter, Request
 from starlette.responses import JSONResponse, Response
 
-from pipelines.workbench.pages import Wanted, page, state_of, workbench_of
+from pipelines.workbench.pages import RequestBody, page, state_of, workbench_of
 from pipelines.workbench.services import lots, requests
 from pipelines.workbench.state import OperatorPage
 from schemas.errors import WrongUse, did_you_mean
@@ -38,7 +38,7 @@ def operator(request: Request) -> Response:
 
 
 @router.post("/operator/start")
-def start(request: Request, wanted: Wanted) -> JSONResponse:
+def start(request: Request, wanted: RequestBody) -> JSONResponse:
     """Begin a lot from the serials that were scanned, slot by slot."""
     bench = workbench_of(request)
     known = requests.recipes(bench.settings)
@@ -60,7 +60,7 @@ def start(request: Request, wanted: Wanted) -> JSONResponse:
 
 
 @router.post("/operator/{name}/answer")
-def answer(request: Request, name: str, wanted: Wanted) -> JSONResponse:
+def answer(request: Request, name: str, wanted: RequestBody) -> JSONResponse:
     """The answer to the question that the page showed; refused where something else is asked by now."""
     number = str(wanted.get("number", ""))
     if not number.isdecimal():

@@ -8,7 +8,7 @@ from urllib.parse import parse_qsl, urlsplit
 from fastapi import APIRouter, Request
 from starlette.responses import JSONResponse, Response, StreamingResponse
 
-from pipelines.workbench.pages import Wanted, workbench_of
+from pipelines.workbench.pages import RequestBody, workbench_of
 from pipelines.workbench.services import lots, requests
 from pipelines.workbench.services.events import stream
 from schemas.errors import WrongUse
@@ -20,7 +20,7 @@ router = APIRouter()
 
 
 @router.post("/jobs")
-def start(request: Request, wanted: Wanted) -> JSONResponse:
+def start(request: Request, wanted: RequestBody) -> JSONResponse:
     """Begin the work that a page needs: ``kind`` and the page's ``address``; the job that does it."""
     bench = workbench_of(request)
     kind, address = str(wanted.get("kind", "")), urlsplit(str(wanted.get("address", "")))

@@ -49,8 +49,8 @@ def chosen_unit(table: ResidualTable, page: MissingPage) -> int:
 def chosen_driver(found: Diagnosed, page: MissingPage) -> str:
     """The quantity of the address, else the one along which the model fails most, else force."""
     known = {} if found.table is None else found.table.drivers
-    told = [str(place["driver"]) for place in found.document["where"]]
-    return next((name for name in (page.against, *told) if name in known), "force")
+    drivers = [str(place["driver"]) for place in found.document["where"]]
+    return next((name for name in (page.against, *drivers) if name in known), "force")
 
 
 def sphere_chart(found: Diagnosed, page: MissingPage) -> Chart | None:

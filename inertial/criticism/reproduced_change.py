@@ -28,7 +28,7 @@ _SPARE = 2.0
 
 
 @dataclass(frozen=True)
-class CameAgain:
+class ReproducedChange:
     """What a fresh run says of an effect.
 
     part : λ; error : of it, one standard deviation
@@ -58,7 +58,7 @@ class CameAgain:
         return False if self.part + 2.0 * self.error < REFUTED else None
 
 
-def came_again(lot: Lot, before: Estimate, after: Estimate) -> CameAgain:
+def reproduced_change(lot: Lot, before: Estimate, after: Estimate) -> ReproducedChange:
     """The part of a predicted change that came again.
 
     Parameters
@@ -86,9 +86,9 @@ def came_again(lot: Lot, before: Estimate, after: Estimate) -> CameAgain:
         along -= float(shared[-1, :-1] @ rest @ space.gram[1:-1, 0])
         own -= float(shared[-1, :-1] @ rest @ shared[:-1, -1])
     if own <= 1e-9 * max(float(np.sum(space.whiten(change[..., None]) ** 2)), 1e-300):
-        return CameAgain(float("nan"), float("nan"), *_falls(problem, base, left, change), again)
+        return ReproducedChange(float("nan"), float("nan"), *_falls(problem, base, left, change), again)
     wide = _together(Model(problem, after.terms, near=noise), space.targets[..., -1])
-    return CameAgain(along / own, float(np.sqrt(wide / own)), *_falls(problem, base, left, change), again)
+    return ReproducedChange(along / own, float(np.sqrt(wide / own)), *_falls(problem, base, left, change), again)
 
 
 def _base(problem: Problem, terms: tuple[Term, ...]) -> tuple[Model, str]:
