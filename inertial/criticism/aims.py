@@ -104,8 +104,8 @@ class RivalDiscrimination:
     def worth(self, steps: Sequence[SequenceStep], pace: StationPace, *, fine: bool = False) -> float:
         """Share of the separations wanted that is there after these steps."""
         gap, needed = self.expected(steps, pace, fine=fine)
-        wanted = self.weight[:, None] * ~self.never
-        return float(np.sum(wanted * np.clip(gap / needed, 0.0, 1.0)) / max(float(np.sum(wanted)), 1e-12))
+        open_pairs = self.weight[:, None] * ~self.never
+        return float(np.sum(open_pairs * np.clip(gap / needed, 0.0, 1.0)) / max(float(np.sum(open_pairs)), 1e-12))
 
     def expected(self, steps: Sequence[SequenceStep], pace: StationPace, *, fine: bool = True) -> tuple[Array, Array]:
         """Chi-square (r, r) expected for the truth of a row against that of a column, and how much is needed.

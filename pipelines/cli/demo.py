@@ -163,7 +163,7 @@ class _Game:
 
         self._step("2. What is missing?", _command("diagnose", self.folder, self.hidden.model))
         source = str(self.folder / "dwells.parquet")
-        document, report = diagnosed(self.lot.dwells, self.lot.history, self.model, source, wanted=True)
+        document, report = diagnosed(self.lot.dwells, self.lot.history, self.model, source, with_report=True)
         document["history"] = str(self.folder / "history.parquet")
         write_report(self.folder / "report.html", report)
         if not self.quiet:

@@ -88,7 +88,9 @@ def command(
     table, temperatures = dwells_and_history(dwells, history, archive)
     table, left_out = without_dwells(table, leave_out)
     beside = history or (history_beside(dwells) if is_file(dwells) else "")
-    document, report_text = diagnosed(table, temperatures, judged, dwells, wanted=report is not None, left_out=left_out)
+    document, report_text = diagnosed(
+        table, temperatures, judged, dwells, with_report=report is not None, left_out=left_out
+    )
     document["history"] = beside or None
     if report is not None:
         write_report(report, report_text)
@@ -109,7 +111,7 @@ def diagnosed(
     judged: list[str] | None,
     source: str,
     *,
-    wanted: bool,
+    with_report: bool,
     coefficients: list[dict[str, Any]] | None = None,
     left_out: Sequence[str] = (),
 ) -> tuple[dict[str, Any], str]:
@@ -120,7 +122,7 @@ def diagnosed(
         from pipelines.diagnosis.examination import examination  # loads scipy.stats: after the first line
 
         made = examination(table, history, judged, left_out)
-    if not wanted:
+    if not with_report:
         return made.document, ""
     with error_console().status("drawing the report"):
         from pipelines.report.diagnosis import render_diagnosis

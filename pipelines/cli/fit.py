@@ -54,8 +54,8 @@ def command(
         raise typer.Exit(fit_import(found, (effects, model, limits), leave_out, as_json=as_json))
     if leave_out:
         raise WrongUse(f"run {found.id}: --leave-out is for imports, this run was captured; measure the dwell again")
-    wanted = [name.strip() for name in effects.split(",")] if effects else []
-    job = job_of_run(store.run(run), effects=wanted, model=model, limits=limits)
+    listed = [name.strip() for name in effects.split(",")] if effects else []
+    job = job_of_run(store.run(run), effects=listed, model=model, limits=limits)
     runner = Runner(job, store)
     try:
         for done in runner.all():

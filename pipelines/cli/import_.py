@@ -148,10 +148,10 @@ def command(
         "signs": [part.strip() for part in signs.split(",")] if signs else None,
         "local_gravity_m_s2": local_g,
     }
-    wanted = given | {key: value for key, value in options.items() if value not in ("", None, {}, [])}  # 0 is a value
+    keys = given | {key: value for key, value in options.items() if value not in ("", None, {}, [])}  # 0 is a value
     _refuse_unknown_fit(fit)
-    sets = [files] if wanted.get("join") else [[path] for path in files]
-    imports = [_import_one(paths, wanted, str(mapping or "import"), fit, archive) for paths in sets]
+    sets = [files] if keys.get("join") else [[path] for path in files]
+    imports = [_import_one(paths, keys, str(mapping or "import"), fit, archive) for paths in sets]
     verdicts = [one["adequate"] for one in imports if one["fit"]]
     adequate = False if False in verdicts else None if None in verdicts else True
     if as_json:
@@ -187,19 +187,19 @@ def _transfer(files: list[Path], procedure: str, unit: str, effects: str, archiv
     return DONE if all(one["adequate"] is True for one in found) else PART_FAILED
 
 
-def _mapping(wanted: dict[str, Any], content: Content, where: str, name: str) -> Mapping:
+def _mapping(keys: dict[str, Any], content: Content, where: str, name: str) -> Mapping:
     """The mapping, with the unit that the file states where none was given; one without columns or unit is refused."""
     from pipelines.importers import mapping as mapped
     from pipelines.importers import stated_units
 
-    if "columns" not in wanted:
+    if "columns" not in keys:
         raise WrongUse(
             f"import: no column of {name} is mapped, x, y and z are needed at least (its columns: "
             f"{', '.join(map(str, content.table.columns))}); add --map time=…,x=…,y=…,z=… and --units output=…, or --mapping "
             f"FILE.toml; 'tumbleline inspect {name}' proposes a command"
         )
-    complete = stated_units.completed(wanted, content)
-    if "output" not in complete.get("units", {}) and all(axis in wanted["columns"] for axis in mapped.NEEDED):
+    complete = stated_units.completed(keys, content)
+    if "output" not in complete.get("units", {}) and all(axis in keys["columns"] for axis in mapped.NEEDED):
         raise WrongUse(
             f"import: the unit of the output is not given and {name} states none, one of {', '.join(mapped.OUTPUT_UNITS)} is "
             f"needed; add --units output=…; 'tumbleline inspect {name}' shows the size of the numbers"
@@ -216,22 +216,22 @@ def _refuse_unknown_fit(fit: str) -> None:
         )
 
 
-def _import_one(paths: list[Path], wanted: dict[str, Any], where: str, fit: str, archive: str | None) -> dict[str, Any]:
+def _import_one(paths: list[Path], keys: dict[str, Any], where: str, fit: str, archive: str | None) -> dict[str, Any]:
     """Read, judge and keep one recording; the document for JSON."""
     from pipelines.importers import keep, record, sources
     from pipelines.importers import mapping as mapped
     from pipelines.importers.dwell_list import dwell_rows
 
     name = " + ".join(path.name for path in paths)
-    columns, units = wanted.get("columns"), wanted.get("units")
+    columns, units = keys.get("columns"), keys.get("units")
     if isinstance(columns, dict) and isinstance(units, dict) and "output" in units:
-        mapped.build(wanted, where)  # a slip in the mapping is said before anything is read
+        mapped.build(keys, where)  # a slip in the mapping is said before anything is read
     with error_console().status(f"reading {name}"):
         time = str(columns.get("time", "")) if isinstance(columns, dict) else ""
         content, source, breaks = sources.read(
-            paths, join=str(wanted.get("join", "")), time=time, group=str(wanted.get("group", ""))
+            paths, join=str(keys.get("join", "")), time=time, group=str(keys.get("group", ""))
         )
-        how = _mapping(wanted, content, where, name)
+        how = _mapping(keys, content, where, name)
         data = record.imported(content.table, how, name, content, breaks)
     judged = None
     if fit:

@@ -28,7 +28,7 @@ def fit_import(run: Run, change: tuple[str, Path | None, str], leave_out: str, *
     leave_out : dwells as UNIT:DWELL,…
     """
     from pipelines.archive import Archive
-    from pipelines.jobs.model_change import wanted
+    from pipelines.jobs.model_change import change_from_options
     from pipelines.rerun.rerun import again
     from pipelines.tables.leave_out import named_dwells
 
@@ -37,7 +37,7 @@ def fit_import(run: Run, change: tuple[str, Path | None, str], leave_out: str, *
         outcome = again(
             Archive(run.archive.root),
             run.id,
-            wanted(effects, model, limits, where="fit"),
+            change_from_options(effects, model, limits, where="fit"),
             left_out=named_dwells(leave_out),
         )
         done = Archive(run.archive.root).run(outcome.new)

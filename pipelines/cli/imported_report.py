@@ -41,6 +41,6 @@ def make_imported_report(run: Run) -> bool:
         run.seal()
         return True
     rows = rows_of(run.table("coefficients"))
-    _, page = diagnosed(run.table("dwells"), past, effects, f"run {run.id}", wanted=True, coefficients=rows)
+    _, page = diagnosed(run.table("dwells"), past, effects, f"run {run.id}", with_report=True, coefficients=rows)
     run.save_report(key, page, {"inputs": inputs, "parameters": parameters, "code": code})
     return False

@@ -172,7 +172,7 @@ class _Improvement:
         from pipelines.cli.improve_text import print_verdict
 
         tables = self.tables
-        document, _ = diagnosed(tables.dwells, tables.history, effects, self.data, wanted=False)
+        document, _ = diagnosed(tables.dwells, tables.history, effects, self.data, with_report=False)
         document["history"] = self.used_history or None
         if not self.quiet:
             if full:

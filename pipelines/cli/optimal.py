@@ -267,7 +267,7 @@ class OptimiseOptions:
     """The options of the command."""
 
     see: str
-    wanted: tuple[str, ...]
+    required_errors: tuple[str, ...]
     factor: float
     temperatures: str
     poses: str
@@ -280,7 +280,7 @@ class OptimiseOptions:
     @property
     def errors_named(self) -> bool:
         """Whether required errors were given, in place of the textbook plan's."""
-        return bool(self.wanted) or self.factor != 1.0
+        return bool(self.required_errors) or self.factor != 1.0
 
 
 def requirement_of(
@@ -313,7 +313,7 @@ def _discriminates(options: OptimiseOptions) -> bool:
     """Whether the options require discrimination; options that do not go together are refused."""
     parts = options.criterion.upper() == "T"
     other = (
-        {"--wanted": options.wanted, "--factor": options.factor != 1.0}
+        {"--wanted": options.required_errors, "--factor": options.factor != 1.0}
         if parts
         else {
             "--part": options.part,
@@ -382,7 +382,7 @@ def _required_errors(
     refuse_unknown_effects(see, "plan: --see")
     errors = options.factor * reference_errors(against, base)
     names = [name for name, _ in local_names(split(base.effects)[0], 0)]
-    for effect, limit in _limits(options.wanted, names).items():
+    for effect, limit in _limits(options.required_errors, names).items():
         for column, name in enumerate(names):
             if name == effect:
                 errors[:, column] = limit / MICRO
@@ -396,10 +396,10 @@ def _required_errors(
     )
 
 
-def _limits(wanted: tuple[str, ...], model: list[str]) -> dict[str, float]:
+def _limits(required_errors: tuple[str, ...], model: list[str]) -> dict[str, float]:
     """Required errors by effect, µg per unit of the column."""
     limits: dict[str, float] = {}
-    for text in wanted:
+    for text in required_errors:
         effect, _, number = text.partition("=")
         try:
             limits[effect] = float(number)

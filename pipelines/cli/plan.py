@@ -162,7 +162,7 @@ def optimise(
             help="Further effects that must be visible; those of the textbook plan by default.",
         ),
     ] = "",
-    wanted: Annotated[
+    required_errors: Annotated[
         list[str] | None,
         typer.Option(
             "--wanted", metavar="EFFECT=µg", help="Required error (1σ) of an effect's coefficients; may be repeated."
@@ -237,7 +237,7 @@ def optimise(
     config = load_station(station)
     base = with_model(recipe, effects, model, archive, config.name)
     options = OptimiseOptions(
-        see, tuple(wanted or ()), factor, temperatures, poses, criterion, verification, part, size, separation
+        see, tuple(required_errors or ()), factor, temperatures, poses, criterion, verification, part, size, separation
     )
     optimum, document = cheapest_recipe(
         base, Path(recipe).name, config, noise_of(base, device or base.device, noise, wander), options

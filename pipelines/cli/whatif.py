@@ -58,12 +58,12 @@ def command(
     status 1: the model is not better.
     """
     from pipelines.archive import Archive
-    from pipelines.jobs.model_change import wanted
+    from pipelines.jobs.model_change import change_from_options
     from pipelines.jobs.releases import keep_evidence
     from pipelines.rerun.selection import selected
     from pipelines.rerun.whatif import BETTER, summary
 
-    change = wanted("", model, limits, effect_file, where="whatif")
+    change = change_from_options("", model, limits, effect_file, where="whatif")
     store = Archive(archive)
     runs = [entry.id for entry in selected(store, selection or ["all"])]
     judged, fresh = _judged(store, runs, change, dask, workers)

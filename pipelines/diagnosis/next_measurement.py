@@ -44,8 +44,8 @@ class Proposed:
         """All of it as rows, in the order in which it is to be measured."""
         rows: list[dict[str, Any]] = []
         twins = [*self.twins, *[()] * (len(self.parting) - len(self.twins))]
-        for (group, wanted), alike in zip(self.parting, twins, strict=True):
-            rows += rows_of(wanted) if wanted is not None else [] if alike else [_breaker(group)]
+        for (group, measurement), alike in zip(self.parting, twins, strict=True):
+            rows += rows_of(measurement) if measurement is not None else [] if alike else [_breaker(group)]
             rows += [_no_measurement(alike)] if alike else []
         return rows if self.showing is None else [*rows, *rows_of(self.showing)]
 
@@ -64,9 +64,9 @@ def proposed(diagnosis: Diagnosis, around: Circumstances | None = None) -> Propo
         if len(named.effects.members) > 1:
             # what handling did is not parted from physics by more poses, but by what its own words say
             handled = named.effects.of_data
-            wanted = None if handled else _proposal_for(diagnosis, named.effects, around, already)
-            already += wanted.steps if wanted is not None else ()
-            parting.append((named.effects, wanted))
+            measurement = None if handled else _proposal_for(diagnosis, named.effects, around, already)
+            already += measurement.steps if measurement is not None else ()
+            parting.append((named.effects, measurement))
             twin.append(() if handled else _twins(diagnosis, named.effects, around))
     return Proposed(tuple(parting), sighting(diagnosis.final, diagnosis.unseen, around, already), tuple(twin))
 

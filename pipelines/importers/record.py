@@ -113,11 +113,11 @@ def _columns(table: pd.DataFrame, mapping: Mapping, where: str) -> dict[str, pd.
     names = [str(name) for name in table.columns]
     named = table.set_axis(names, axis=1)
     found: dict[str, pd.Series] = {}
-    for meaning, wanted in mapping.columns.items():
-        column = column_name(names, wanted)
+    for meaning, source_column in mapping.columns.items():
+        column = column_name(names, source_column)
         if not column:
             raise DataRejected(
-                f"{where}: column '{shown(wanted)}' (for {meaning}) is not there; {did_you_mean(wanted, names)}"
+                f"{where}: column '{shown(source_column)}' (for {meaning}) is not there; {did_you_mean(source_column, names)}"
             )
         found[meaning] = pd.Series(named[column], name=column)
     meanings = [meaning for meaning in ("time", *AXES) if meaning in found]

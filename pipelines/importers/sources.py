@@ -121,9 +121,9 @@ def _beside(contents: list[Content], names: list[str], time: str) -> Content:
     return replace(first, table=pd.DataFrame(columns), units=units, remarks=tuple(remarks))
 
 
-def _at(wanted: pd.Series, own: pd.Series, data: pd.Series, where: str) -> NDArray[np.float64]:
+def _at(times: pd.Series, own: pd.Series, data: pd.Series, where: str) -> NDArray[np.float64]:
     """A column read at other times; not a number outside its own."""
-    at, given = _instants(wanted, where), _instants(own, where)
+    at, given = _instants(times, where), _instants(own, where)
     if np.any(np.diff(given) < 0.0):
         raise DataRejected(f"{where}: time runs back, it must not; sort the rows")
     numbers = values.as_numbers(data, where)

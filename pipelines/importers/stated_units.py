@@ -33,11 +33,15 @@ def output_unit(text: str) -> str:
     return OUTPUT.get(text.strip().lower(), "")
 
 
-def column_name(columns: list[str], wanted: str) -> str:
+def column_name(columns: list[str], name_or_number: str) -> str:
     """A column by its name, or by its number from 1; empty where there is neither."""
-    if wanted in columns:
-        return wanted
-    return columns[int(wanted) - 1] if wanted.isdecimal() and 1 <= int(wanted[:9]) <= len(columns) else ""
+    if name_or_number in columns:
+        return name_or_number
+    return (
+        columns[int(name_or_number) - 1]
+        if name_or_number.isdecimal() and 1 <= int(name_or_number[:9]) <= len(columns)
+        else ""
+    )
 
 
 def completed(given: dict[str, Any], content: Content) -> dict[str, Any]:

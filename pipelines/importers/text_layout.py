@@ -158,7 +158,7 @@ def _is_row(row: list[str], decimal: str, numeric: list[bool]) -> bool:
     """Whether a line is like the rows of the table: numbers, or gaps, where they have numbers, and one number at least."""
     if len(row) != len(numeric):
         return False
-    words = [word for wanted, word in zip(numeric, row, strict=True) if wanted]
+    words = [word for numeric_here, word in zip(numeric, row, strict=True) if numeric_here]
     numbers = [is_number(word, decimal) for word in words]
     return any(numbers) and all(known or word.lower() in _GAPS for known, word in zip(numbers, words, strict=True))
 

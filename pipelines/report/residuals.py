@@ -86,9 +86,9 @@ def drivers_shown(diagnosis: Diagnosis) -> list[DriverValues]:
         known["approach"] = state.force_step
     first = [] if diagnosis.unexplained is None else [diagnosis.unexplained.driver]
     names = [*first, *(p.driver for p in diagnosis.where[:5])]
-    wanted = dict.fromkeys([*names, *ALWAYS])
+    candidates = dict.fromkeys([*names, *ALWAYS])
     found: list[DriverValues] = []
-    for name in wanted:
+    for name in candidates:
         values = known.get(name)
         still = name not in names and values is not None and float(np.ptp(values)) < STILL.get(name, 0.0)
         if values is not None and not still and not any(_alike(values, other.values) for other in found):

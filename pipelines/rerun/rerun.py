@@ -41,7 +41,7 @@ class Outcome:
 
 
 def again(
-    archive: Archive, run_id: str, wanted: ModelChange, *, report: bool = False, left_out: Dwells = ()
+    archive: Archive, run_id: str, change: ModelChange, *, report: bool = False, left_out: Dwells = ()
 ) -> Outcome:
     """Run an archived run again. A new run is published when all of it is there: one that fails or is stopped leaves nothing.
 
@@ -51,9 +51,9 @@ def again(
         The run cannot be run again: its capture is not finished, or samples are needed that are not in the archive.
     """
     start = time.perf_counter()
-    wanted.use()
+    change.use()
     old = Run(archive, run_id)
-    plan = plan_of(old, wanted, left_out)
+    plan = plan_of(old, change, left_out)
     raw = raw_samples(old)
     because = changes(old, plan, raw=raw)
     new = BufferedRun(archive, archive.run_name(plan.name, plan.decisive) if because else old.id)

@@ -18,7 +18,7 @@ FALLS = 0.005
 BETTER, WORSE, EQUAL, NOTHING = "better", "worse", "no better", "nothing to judge"
 
 
-def fresh_tasks(lots: Sequence[LotComparison], archive: str, wanted: ModelChange) -> list[FreshTask]:
+def fresh_tasks(lots: Sequence[LotComparison], archive: str, change: ModelChange) -> list[FreshTask]:
     """For every run, the calibrations from the previous run of each of its units."""
     last: dict[str, LotComparison] = {}
     tasks: list[FreshTask] = []
@@ -33,7 +33,7 @@ def fresh_tasks(lots: Sequence[LotComparison], archive: str, wanted: ModelChange
             last[unit] = judged
         pairs = tuple((tuple(units), *_calibrations(runs[run])) for run, units in earlier.items())
         if pairs:
-            tasks.append(FreshTask(archive, judged.entry.id, wanted, pairs))
+            tasks.append(FreshTask(archive, judged.entry.id, change, pairs))
     return tasks
 
 

@@ -71,27 +71,27 @@ def candidates(request: Request) -> Response:
 
 
 @router.post("/missing/save")
-def save(request: Request, wanted: RequestBody) -> JSONResponse:
+def save(request: Request, body: RequestBody) -> JSONResponse:
     """Save the model of a page's address as the next version of a model file."""
     bench = workbench_of(request)
-    state, _ = MissingPage.parse(_pairs(str(wanted.get("address", ""))))
+    state, _ = MissingPage.parse(_pairs(str(body.get("address", ""))))
     found = _diagnosed(bench, state)
     if found is None:
         raise WrongUse("model: the diagnosis of this model is not done yet; wait for it, then save")
     added = list(state.added)
     start = [name for name in found.document["effects"] if name not in added]
-    name, why = str(wanted.get("name", "")), str(wanted.get("why", ""))
+    name, why = str(body.get("name", "")), str(body.get("why", ""))
     place, version = models.save(bench.settings, name, start, added, state.formula, why, state.source)
     return JSONResponse({"done": f"{place}: version {version} is saved"})
 
 
 @router.post("/missing/formula")
-def formula(wanted: RequestBody) -> JSONResponse:
+def formula(body: RequestBody) -> JSONResponse:
     """The address of the page with a formula tried beside the model; refused where it is no formula."""
     from inertial import effects
 
-    state, _ = MissingPage.parse(_pairs(str(wanted.get("address", ""))))
-    written = str(wanted.get("formula", "")).strip()
+    state, _ = MissingPage.parse(_pairs(str(body.get("address", ""))))
+    written = str(body.get("formula", "")).strip()
     with effects.additions_forgotten():
         (name,) = use_written_formulas([written], "formula")
     kept = tuple(text for text in state.formula if text.partition("=")[0].strip().lower() != name)

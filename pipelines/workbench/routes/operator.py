@@ -38,21 +38,21 @@ def operator(request: Request) -> Response:
 
 
 @router.post("/operator/start")
-def start(request: Request, wanted: RequestBody) -> JSONResponse:
+def start(request: Request, body: RequestBody) -> JSONResponse:
     """Begin a lot from the serials that were scanned, slot by slot."""
     bench = workbench_of(request)
     known = requests.recipes(bench.settings)
-    recipe = str(wanted.get("recipe", ""))
+    recipe = str(body.get("recipe", ""))
     if recipe not in known:
         raise WrongUse(f"lot: no recipe is called '{recipe[:60]}'; {did_you_mean(recipe, known)}")
     seats = {
-        int(key.removeprefix("slot-")): str(value).strip() for key, value in wanted.items() if key.startswith("slot-")
+        int(key.removeprefix("slot-")): str(value).strip() for key, value in body.items() if key.startswith("slot-")
     }
     filled = {slot: serial for slot, serial in sorted(seats.items()) if serial}
     if not filled:
         raise WrongUse("lot: no serial number was scanned, one at least is needed; scan a unit into its slot")
-    faults = [part.strip() for part in str(wanted.get("fault", "")).split() if part.strip()]
-    repeat = str(wanted.get("repeat", "0") or "0")
+    faults = [part.strip() for part in str(body.get("fault", "")).split() if part.strip()]
+    repeat = str(body.get("repeat", "0") or "0")
     if not repeat.isdecimal() or len(repeat) > 6:
         raise WrongUse(f"lot: repeat '{repeat[:20]}', a whole number from 0 on is needed; correct it")
     lot = lots.start(bench.settings, recipe, list(filled.values()), list(filled), faults, int(repeat))
@@ -60,12 +60,12 @@ def start(request: Request, wanted: RequestBody) -> JSONResponse:
 
 
 @router.post("/operator/{name}/answer")
-def answer(request: Request, name: str, wanted: RequestBody) -> JSONResponse:
+def answer(request: Request, name: str, body: RequestBody) -> JSONResponse:
     """The answer to the question that the page showed; refused where something else is asked by now."""
-    number = str(wanted.get("number", ""))
+    number = str(body.get("number", ""))
     if not number.isdecimal():
         raise WrongUse("lot: the number of the question is missing; fetch the page again")
-    lots.answer(workbench_of(request).settings, name, int(number), str(wanted.get("answer", "")))
+    lots.answer(workbench_of(request).settings, name, int(number), str(body.get("answer", "")))
     return JSONResponse({"address": OperatorPage(lot=name).address()})
 
 

@@ -20,10 +20,10 @@ router = APIRouter()
 
 
 @router.post("/jobs")
-def start(request: Request, wanted: RequestBody) -> JSONResponse:
+def start(request: Request, body: RequestBody) -> JSONResponse:
     """Begin the work that a page needs: ``kind`` and the page's ``address``; the job that does it."""
     bench = workbench_of(request)
-    kind, address = str(wanted.get("kind", "")), urlsplit(str(wanted.get("address", "")))
+    kind, address = str(body.get("kind", "")), urlsplit(str(body.get("address", "")))
     title, content = requests.of_address(
         bench.settings, kind, address.path, parse_qsl(address.query, keep_blank_values=True)
     )

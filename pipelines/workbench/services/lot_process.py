@@ -88,12 +88,12 @@ def measure(place: Path) -> str:
 
 def _measured(request: dict[str, Any], pages: Pages) -> None:
     keys = ("units", "slots", "faults")
-    wanted = Request(
+    lot_request = Request(
         recipe=request["recipe"], station=Path(request["station"]) if request["station"] else None, seed=request["seed"],
         repeat=int(request["repeat"]), **{key: tuple(request[key]) for key in keys},
     )  # fmt: skip
     archive = Archive(request["archive"])
-    job = wanted.job(archive)
+    job = lot_request.job(archive)
     runner = Runner(job, archive, pages.progress)
     pages.put(run=runner.run.id)
     beside = Attendance(pages, job, runner.run.id)

@@ -80,7 +80,7 @@ def start(
     if len(set(units)) < len(units):
         twice = next(unit for unit in units if list(units).count(unit) > 1)
         raise WrongUse(f"lot: serial '{twice}' is in two slots, each unit has one; scan the slots again")
-    wanted = Request(
+    lot_request = Request(
         recipe=recipe,
         station=settings.station,
         units=tuple(units),
@@ -88,8 +88,12 @@ def start(
         repeat=repeat,
         faults=tuple(faults),
     )
-    job = wanted.job(Archive(settings.archive))
-    content = {**wanted.parameters(), "archive": settings.archive, "seats": [[u.slot, u.serial] for u in job.lot.units]}
+    job = lot_request.job(Archive(settings.archive))
+    content = {
+        **lot_request.parameters(),
+        "archive": settings.archive,
+        "seats": [[u.slot, u.serial] for u in job.lot.units],
+    }
     name = digest(content)[:12]
     for other in lots(settings):
         if not other.ended and other.id != name:

@@ -140,16 +140,16 @@ def mapping_of(request: Mapped[str, Any]) -> Any:
     from pipelines.importers import mapping
 
     units = {"output": request["output"], "time": request["time"], "temperature": request["temperature"]}
-    wanted: dict[str, Any] = {
+    keys: dict[str, Any] = {
         "columns": mapping.pairs(",".join(request["columns"]), "columns"),
         "units": units,
         "rows": request["rows"],
     }
-    wanted |= {"unit": request["serial"]} if request["serial"] else {}
-    wanted |= {"rate_hz": request["rate"]} if request["rate"] else {}
-    wanted |= {"local_gravity_m_s2": request["gravity"]} if request["gravity"] else {}
-    wanted |= {"poses": mapping.pairs(request["poses"], "poses")} if request["poses"] else {}
-    return mapping.build(wanted, "upload")
+    keys |= {"unit": request["serial"]} if request["serial"] else {}
+    keys |= {"rate_hz": request["rate"]} if request["rate"] else {}
+    keys |= {"local_gravity_m_s2": request["gravity"]} if request["gravity"] else {}
+    keys |= {"poses": mapping.pairs(request["poses"], "poses")} if request["poses"] else {}
+    return mapping.build(keys, "upload")
 
 
 def imported(request: Mapped[str, Any]) -> dict[str, Any]:
