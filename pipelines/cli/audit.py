@@ -1,4 +1,4 @@
-"""``tumbleline audit``: what drifts, what is due, which station moved, how the population stands."""
+"""``tumbleline audit``: drift, calibrations due, changes of stations, and the population."""
 
 from __future__ import annotations
 
@@ -32,7 +32,8 @@ def command(
         typer.Option("--since", metavar="DATE", help="Changes, signals and figures from this day on; all by default."),
     ] = "",
     until: Annotated[
-        str, typer.Option("--until", metavar="DATE", help="As it was known at the end of this day; today by default.")
+        str,
+        typer.Option("--until", metavar="DATE", help="State of the archive at the end of this day; today by default."),
     ] = "",
     device: Annotated[str, typer.Option("--device", metavar="KIND", help="Only units of this kind.")] = "",
     station: Annotated[str, typer.Option("--station", metavar="NAME", help="Only what this station measured.")] = "",
@@ -53,7 +54,7 @@ def command(
     *,
     as_json: JsonOption = False,
 ) -> None:
-    """Audit the archive: re-calibrations due, drift, stations, check standards, population; leaves 1 where there is a finding."""
+    """Audit the archive: re-calibrations due, drift, stations, check standards, population. Exit status 1: there are findings."""
     from pipelines.archive import Archive
     from pipelines.audit.audit import audit
     from pipelines.audit.document import document
@@ -78,7 +79,7 @@ def command(
 
 
 def _refuse_nothing(found: Audit, root: str) -> None:
-    """Refuse an audit of nothing: a name that is not there, or an archive without calibrations before the day."""
+    """Refuse an unknown name, and an archive without calibrations before the day."""
     import numpy as np
 
     from schemas.errors import did_you_mean
@@ -125,7 +126,7 @@ def _show(found: Audit, audit_findings: list[AuditFinding], page: Path | None) -
         for kind in dict.fromkeys(finding.kind for finding in own):
             _show_kind([finding for finding in own if finding.kind == kind])
     if not audit_findings:
-        out.print("nothing needs doing")
+        out.print("no action is needed")
     if page is not None:
         error_console().print(f"page    {page}", markup=False, soft_wrap=True)
 
@@ -134,20 +135,18 @@ _BEGINNING = -700000.0  # days before any calibration
 
 
 def _certificates(found: Audit) -> str:
-    """What the ledger has, in one line."""
+    """The state of the ledger in one line."""
     if not len(found.certificates):
         return "ledger  nothing is certified: units are due an interval after their last pass"
-    return (
-        f"ledger  {len(found.certificates)} certificates; {int(found.due.valid.sum())} of {found.due.row.size} units have one "
-        f"that holds on {found.certificates.day}"
-    )
+    valid = f"{int(found.due.valid.sum())} of {found.due.row.size} units have one that is valid on {found.certificates.day}"
+    return f"ledger  {len(found.certificates)} certificates; {valid}"
 
 
 def _show_kind(own: list[AuditFinding]) -> None:
     for finding in own[:SHOWN]:
         console().print(f"  · {finding.message}", markup=False, soft_wrap=True)
     if len(own) > SHOWN:
-        console().print(f"  · … {len(own) - SHOWN} more of this kind; --json and --page tell all", style="dim")
+        console().print(f"  · … {len(own) - SHOWN} more of this kind; --json and --page list all", style="dim")
 
 
 def _show_yield(found: Audit) -> None:

@@ -36,7 +36,7 @@ def command(
     *,
     as_json: JsonOption = False,
 ) -> None:
-    """Fit a model to archived data again; the result is a run of its own beside the old one, on the same capture.
+    """Fit a model to archived data again; the result is a new run on the same capture; the old run is kept.
 
     An import is fitted with known poses or, without them, by the norm of gravity. Exit status 1: the model is not adequate, it
     cannot be judged, or a unit did not pass.

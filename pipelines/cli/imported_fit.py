@@ -1,4 +1,4 @@
-"""``tumbleline fit`` of an import: a model fitted to its dwells, with the verdict and what the verdict rests on."""
+"""``tumbleline fit`` of an import: a model fitted to its dwells, with the verdict and its basis."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ def fit_import(run: Run, change: tuple[str, Path | None, str], leave_out: str, *
 
     Parameters
     ----------
-    change : effects, model file and limits as they were given; empty or None where not
+    change : effects, model file and limits; empty or None if not given
     leave_out : dwells as UNIT:DWELL,…
     """
     from pipelines.archive import Archive
@@ -51,7 +51,7 @@ def fit_import(run: Run, change: tuple[str, Path | None, str], leave_out: str, *
 
 
 def fit_document(done: Run, source: str) -> dict[str, Any]:
-    """What is known of the fit of an import: verdict, evidence, and decisions where there are limits."""
+    """The result of the fit of an import: verdict, evidence, and decisions if there are limits."""
     from pipelines.diagnosis.imported_norms import fitted
     from pipelines.rerun.steps import gravity_of_import, has_poses
     from pipelines.tables.frames import rows_of
@@ -77,7 +77,7 @@ def fit_document(done: Run, source: str) -> dict[str, Any]:
 
 
 def _known_poses(dwells: Any, past: Any, effects: list[str]) -> dict[str, Any]:
-    """The verdict on a fit with commanded poses, and in lines what it rests on."""
+    """The verdict on a fit with commanded poses, and its basis as lines."""
     from pipelines.cli.diagnosis_text import verdict
     from pipelines.cli.evidence_text import evidence_text
     from pipelines.diagnosis.diagnose import diagnose

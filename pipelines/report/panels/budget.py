@@ -32,7 +32,7 @@ TEMPLATE = """\
 {% if not stated %}<p><b>Noise only:</b> the station states no [uncertainty]. Uncertainties are those of noise and fit; no grade above consumer, no certificate.</p>{% else %}
 <p>Frame {{ frame }}; figures of the references by {{ source }}. Unit {{ unit }}: share of each contribution in u².</p>
 {{ plot | safe }}
-{% for name, rules in missing.items() %}<p class="note">not stated: {{ name }} (rules {{ rules }})</p>{% endfor %}
+{% for name, rules in missing.items() %}<p class="note">not stated: {{ name }} (dominates {{ rules }})</p>{% endfor %}
 {% if references %}<table>
 <tr><th>reference standard</th><th>quantity</th><th>certificate</th><th>laboratory</th><th>due</th><th class="n">U</th><th class="n">k</th><th>unit</th></tr>
 {% for one in references %}<tr><td>{{ one.id }}</td><td>{{ one.what }}</td><td>{{ one.certificate }}</td><td>{{ one.laboratory }}</td><td>{{ one.due }}</td><td class="n">{{ one.U or "" }}</td><td class="n">{{ one.k or "" }}</td><td>{{ one.unit or "" }}</td></tr>{% endfor %}
