@@ -138,7 +138,9 @@ def _certificates(found: Audit) -> str:
     """The state of the ledger in one line."""
     if not len(found.certificates):
         return "ledger  nothing is certified: units are due an interval after their last pass"
-    valid = f"{int(found.due.valid.sum())} of {found.due.row.size} units have one that is valid on {found.certificates.day}"
+    valid = (
+        f"{int(found.due.valid.sum())} of {found.due.row.size} units have one that is valid on {found.certificates.day}"
+    )
     return f"ledger  {len(found.certificates)} certificates; {valid}"
 
 

@@ -31,7 +31,7 @@ MOST_POINTS = 600
 
 
 def model_plot(left: LotResiduals, state: State, output: Array, floor_ug: float) -> str:
-    """Output against force, measured against explained departure, and residuals against a normal distribution."""
+    """Output against force, measured against explained deviation, and residuals against a normal distribution."""
     explained = left.before - left.after
     something = bool(np.nanmax(np.abs(explained)) > 0.0)
     with mpl.rc_context(STYLE):
@@ -67,15 +67,15 @@ def _departure(place: Axes, left: LotResiduals, explained: Array) -> None:
         step = max(1, x.size // MOST_POINTS)
         place.plot(x[::step], y[::step], ".", color=AXIS_COLOURS[name], markersize=3, alpha=0.6, label=name)
     place.set(
-        xlabel="what the added effects explain / µg",
-        ylabel="what the model judged leaves / µg",
+        xlabel="contribution of the added effects / µg",
+        ylabel="residual of the judged model / µg",
         title="all units: measured and explained",
     )
     place.legend(frameon=False, handletextpad=0.1, markerscale=2.0)
 
 
 def _quantiles(place: Axes, left: LotResiduals, floor_ug: float, *, something: bool) -> None:
-    """Residuals in order, over the floor, against the normal distribution: the line is pure noise."""
+    """Ordered residuals over the noise floor against the normal distribution; the line is pure noise."""
     place.plot([-3.5, 3.5], [-3.5, 3.5], color="#999999", linewidth=1.0, zorder=1)
     shown = ((left.before, BEFORE, "before"), (left.after, AFTER, "after"))[: 2 if something else 1]
     for values, colour, label in shown:

@@ -46,7 +46,7 @@ def pictures(document: dict[str, Any], context: PlanContext) -> dict[str, str]:
 
 
 def _budget(found: dict[str, Any] | None) -> str:
-    """Shares of the contributions to what can be reached, of the worst axis of each quantity; empty where nothing is stated."""
+    """Shares of the contributions to the reachable uncertainty, of the worst axis of each quantity; empty if none is stated."""
     if found is None:
         return ""
     worst: dict[str, dict[str, Any]] = {}

@@ -1,4 +1,4 @@
-"""What a model leaves before and after the missing effects are added, laid out for pictures."""
+"""Residuals of a model before and after the missing effects are added, arranged for pictures."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ Array = NDArray[np.float64]
 
 ALWAYS = ("unit_C", "time_s", "temperature_rate", "since_move_s")
 STILL = {"unit_C": 1.0, "temperature_rate": 0.1, "since_move_s": 0.5}
-"""Ranges below which a driver is not worth a picture, unless the model fails along it."""
+"""Ranges below which a driver gets no picture, unless the residual follows it."""
 
 _MOST = 7
 _ALIKE = 0.995
@@ -33,7 +33,7 @@ class LotResiduals:
     """Residuals of a lot in µg, (units, axes, n); NaN where a dwell is missing.
 
     axes : "x", "y", "z", or "norm" alone
-    shown : place of the unit whose residuals fall most, or are largest where nothing was added
+    shown : place of the unit whose residuals fall most, or are largest if nothing was added
     """
 
     units: tuple[str, ...]
@@ -79,7 +79,7 @@ LABELS = axis_labels() | {"approach": "change of force at the move before / g"}
 
 
 def drivers_shown(diagnosis: Diagnosis) -> list[DriverValues]:
-    """Drivers worth a picture: those the model fails along, then temperature, time, rate and wait where they vary."""
+    """Drivers with a picture: those that the residual follows, then temperature, time, rate and wait if they vary."""
     state = diagnosis.problem.lot.state
     known = {d.name: d.values for d in drivers_of(diagnosis.problem)}
     if "approach" in known:
@@ -97,7 +97,7 @@ def drivers_shown(diagnosis: Diagnosis) -> list[DriverValues]:
 
 
 def _alike(one: Array, other: Array) -> bool:
-    """Whether two drivers tell the same: elapsed time and time since power-on often do."""
+    """Whether two drivers are equivalent, as elapsed time and time since power-on often are."""
     if one.shape != other.shape:
         return False
     return bool(abs(np.corrcoef(one.ravel(), other.ravel())[0, 1]) > _ALIKE)
@@ -121,7 +121,7 @@ def band(x: Array, y: Array) -> tuple[Array, Array, Array]:
 
 
 def _groups(values: Array) -> int:
-    """Number of groups that values fall into, parted by gaps of a twentieth of their range: soaks, mostly."""
+    """Number of groups that values fall into, separated by gaps of a twentieth of their range: usually soaks."""
     gaps = np.diff(np.sort(values))
     return 1 + int(np.count_nonzero(gaps > 0.05 * np.ptp(values)))
 
@@ -129,7 +129,7 @@ def _groups(values: Array) -> int:
 def _basis(values: Array, count: int, groups: int) -> Array:
     """Constant and smooth curve, knots from the first ``count`` values; a polynomial where values come in few groups.
 
-    Between groups nothing holds a spline.
+    Between groups a spline is not determined.
     """
     if groups > 2 * _KNOTS or groups == 1:
         return np.concatenate([np.ones((values.size, 1)), curve(values, _KNOTS)], axis=-1)
