@@ -1,4 +1,4 @@
-"""What is missing: is the model adequate, where does it fail, which effect explains it, what to measure next."""
+"""Missing effects: adequacy of the model, drivers of the residual, effects that explain it, the next measurement."""
 
 from __future__ import annotations
 
@@ -23,13 +23,13 @@ if TYPE_CHECKING:
     from pipelines.workbench.results import Diagnosed
 
 router = APIRouter()
-HEADING, ORDER, ADDRESS = "What is missing", 20, "/missing"
+HEADING, ORDER, ADDRESS = "Missing effects", 20, "/missing"
 CANDIDATES, INFLUENCE = 12, 12
 
 
 @router.get("/missing")
 def missing(request: Request) -> Response:
-    """The page; what is not computed yet is asked for by the page itself."""
+    """The page; the page itself requests missing results."""
     bench = workbench_of(request)
     state, problems = state_of(request, MissingPage)
     chosen, found, rows, work = sources.sources(bench.settings), None, None, {}
@@ -77,7 +77,7 @@ def save(request: Request, body: RequestBody) -> JSONResponse:
     state, _ = MissingPage.parse(_pairs(str(body.get("address", ""))))
     found = _diagnosed(bench, state)
     if found is None:
-        raise WrongUse("model: the diagnosis of this model is not done yet; wait for it, then save")
+        raise WrongUse("model: the diagnosis of this model is not finished; wait until it is done, then save")
     added = list(state.added)
     start = [name for name in found.document["effects"] if name not in added]
     name, why = str(body.get("name", "")), str(body.get("why", ""))
@@ -87,7 +87,7 @@ def save(request: Request, body: RequestBody) -> JSONResponse:
 
 @router.post("/missing/formula")
 def formula(body: RequestBody) -> JSONResponse:
-    """The address of the page with a formula tried beside the model; refused where it is no formula."""
+    """The address of the page with a formula added to the model; an invalid formula is refused."""
     from inertial import effects
 
     state, _ = MissingPage.parse(_pairs(str(body.get("address", ""))))

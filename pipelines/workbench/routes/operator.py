@@ -1,4 +1,4 @@
-"""Lots on the station: slots as tiles, serials scanned, questions answered, results before unloading."""
+"""Lots on the station: slots as tiles, scan of serials, answers to questions, results before unloading."""
 
 from __future__ import annotations
 
@@ -16,15 +16,15 @@ HEADING, ORDER, ADDRESS = "Operator", 40, "/operator"
 REMEDIES = {
     "load": "Seat each unit in its slot, then press Done.",
     "confirm": "Move the units to the slots of the list, then press Done.",
-    "trouble": "Put the station right as described, then press Done: the lot goes on after its last record.",
-    "unload": "Take the units out and sort them by result, then press Done.",
-    "approve": "Press Done to spend the extra station time, Stop to leave it.",
+    "trouble": "Correct the station as described, then press Done: the lot continues after its last record.",
+    "unload": "Remove the units and sort them by result, then press Done.",
+    "approve": "Press Done to approve the extra station time, Stop to decline it.",
 }
 
 
 @router.get("/operator")
 def operator(request: Request) -> Response:
-    """The newest lot as tiles, or the one of the address; seats to scan where none is under way."""
+    """The newest lot as tiles, or the one of the address; seats to scan if no lot is running."""
     bench = workbench_of(request)
     state, problems = state_of(request, OperatorPage)
     found = lots.lots(bench.settings)
@@ -39,7 +39,7 @@ def operator(request: Request) -> Response:
 
 @router.post("/operator/start")
 def start(request: Request, body: RequestBody) -> JSONResponse:
-    """Begin a lot from the serials that were scanned, slot by slot."""
+    """Start a lot with the scanned serials, slot by slot."""
     bench = workbench_of(request)
     known = requests.recipes(bench.settings)
     recipe = str(body.get("recipe", ""))
@@ -61,23 +61,23 @@ def start(request: Request, body: RequestBody) -> JSONResponse:
 
 @router.post("/operator/{name}/answer")
 def answer(request: Request, name: str, body: RequestBody) -> JSONResponse:
-    """The answer to the question that the page showed; refused where something else is asked by now."""
+    """The answer to the question on the page; refused if the question has changed."""
     number = str(body.get("number", ""))
     if not number.isdecimal():
-        raise WrongUse("lot: the number of the question is missing; fetch the page again")
+        raise WrongUse("lot: the number of the question is missing; reload the page")
     lots.answer(workbench_of(request).settings, name, int(number), str(body.get("answer", "")))
     return JSONResponse({"address": OperatorPage(lot=name).address()})
 
 
 @router.post("/operator/{name}/stop")
 def stop(request: Request, name: str) -> JSONResponse:
-    """Have the lot's process make the station safe and end."""
+    """Stop the lot's process after the safe state."""
     lots.stop(workbench_of(request).settings, name)
     return JSONResponse({"address": OperatorPage(lot=name).address()})
 
 
 @router.post("/operator/{name}/continue")
 def again(request: Request, name: str) -> JSONResponse:
-    """Go on with a lot that was stopped."""
+    """Continue a stopped lot."""
     lot = lots.again(workbench_of(request).settings, name)
     return JSONResponse({"address": OperatorPage(lot=lot.id).address()})

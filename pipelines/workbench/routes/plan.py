@@ -1,4 +1,4 @@
-"""The plan of a recipe: poses, temperatures, what is seen, what is not, and what it costs."""
+"""The plan of a recipe: poses, temperatures, visible effects, hidden effects, and station time."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ def drawn(request: Request, name: str, ending: str) -> Response:
 
 @router.get("/plan/effects.csv")
 def effects(request: Request) -> Response:
-    """What the plan sees, effect by effect."""
+    """Visibility of each effect under the plan."""
     bench = workbench_of(request)
     state, _ = state_of(request, PlanPage)
     found = bench.jobs.result("plan", requests.plan(bench.settings, state)[1])

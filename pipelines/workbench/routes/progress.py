@@ -1,4 +1,4 @@
-"""Jobs begun and stopped, and the stream that tells how far they are."""
+"""Start and stop of jobs, and the stream of their progress."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ router = APIRouter()
 
 @router.post("/jobs")
 def start(request: Request, body: RequestBody) -> JSONResponse:
-    """Begin the work that a page needs: ``kind`` and the page's ``address``; the job that does it."""
+    """Start the work that a page needs: ``kind`` and the page's ``address``; the job that does it."""
     bench = workbench_of(request)
     kind, address = str(body.get("kind", "")), urlsplit(str(body.get("address", "")))
     title, content = requests.of_address(
@@ -35,13 +35,13 @@ def stop(request: Request, name: str) -> JSONResponse:
     """End a job."""
     job = workbench_of(request).jobs.stop(name)
     if job is None:
-        raise WrongUse(f"jobs: none is called '{name[:40]}'; it may have been of a server before this one")
+        raise WrongUse(f"jobs: none is called '{name[:40]}'; it may belong to an earlier server process")
     return JSONResponse(job.document())
 
 
 @router.get("/jobs/{name}")
 def look(request: Request, name: str) -> JSONResponse:
-    """How far a job is."""
+    """Progress of a job."""
     job = workbench_of(request).jobs.get(name)
     if job is None:
         raise WrongUse(f"jobs: none is called '{name[:40]}'")

@@ -1,4 +1,4 @@
-"""The work of jobs, in a process of its own: each calls what a command calls. Results are plain and can be sent."""
+"""The work of jobs, in separate processes: each calls the functions of a command. Results can be pickled."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 
 def done_in_process(kind: str, request: Mapping[str, Any], report_progress: ReportProgress) -> tuple[str, Any]:
-    """What came of a request: ``done`` with the result, or ``failed`` with a sentence."""
+    """The result of a request: ``done`` with the result, or ``failed`` with a sentence."""
     from threadpoolctl import threadpool_limits
 
     from inertial import effects
@@ -66,10 +66,10 @@ def diagnose(request: Mapping[str, Any], report_progress: ReportProgress) -> Dia
     units = tuple(unit for unit in made.found.units if unit not in faulty)
     table, ladder, before = None, [], None
     if made.diagnosis is not None:
-        report_progress(2, steps, "laying out the residuals")
+        report_progress(2, steps, "computing the residuals")
         table, ladder = residual_table(made.found, made.diagnosis, units), ladder_of(made.diagnosis)
         if added:
-            report_progress(3, steps, "fitting the model before")
+            report_progress(3, steps, "fitting the model before the last step")
             before = residuals_of_model(condense(dwells), history, model[:-1], units)
     state = made.found.state
     known = {name: one for name, one in formula_names().items() if getattr(state, one[0]) is not None}
@@ -108,16 +108,16 @@ def ladder(request: Mapping[str, Any], report_progress: ReportProgress) -> list[
 
 
 def plan(request: Mapping[str, Any], report_progress: ReportProgress) -> dict[str, Any]:
-    """The plan of a recipe, and what its pictures are drawn from."""
+    """The plan of a recipe, and the data of its charts."""
     report_progress(0, 2, "reading the recipe")
     from pipelines.workbench.views.planned import planned
 
-    report_progress(1, 2, "what the plan sees")
+    report_progress(1, 2, "visibility of effects")
     return planned(request)
 
 
 def audit(request: Mapping[str, Any], report_progress: ReportProgress) -> dict[str, Any]:
-    """The audit of the archive, and what its pictures are drawn from."""
+    """The audit of the archive, and the data of its charts."""
     report_progress(0, 2, "reading the runs")
     from pipelines.workbench.views.audited import audited
 
@@ -125,7 +125,7 @@ def audit(request: Mapping[str, Any], report_progress: ReportProgress) -> dict[s
 
 
 def bring_in(request: Mapping[str, Any], report_progress: ReportProgress) -> dict[str, Any]:
-    """A file of somebody's own, in the archive."""
+    """The import of an uploaded file."""
     report_progress(0, 2, "reading the file")
     from pipelines.workbench.services.uploads import imported
 

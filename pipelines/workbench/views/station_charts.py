@@ -1,4 +1,4 @@
-"""Temperatures and angles of a run over the station's time, with what happened."""
+"""Temperatures and angles of a run over the station's time, with events."""
 
 from __future__ import annotations
 
