@@ -25,7 +25,8 @@ if TYPE_CHECKING:
 
     from pipelines.archive import Archive
     from pipelines.chain.runner import Done, Runner
-    from pipelines.inquiry.inquiry import FollowUp, Inquiry, JointDiagnosis
+    from pipelines.inquiry.inquiry import FollowUp, Inquiry
+    from pipelines.inquiry.joint_diagnosis import JointDiagnosis
     from pipelines.jobs.job import Request
 
 _participants: list[Participants] = []

@@ -11,7 +11,7 @@ import pandas as pd
 from pipelines.archive import Archive
 from pipelines.importers import files, values
 from pipelines.tables.dwell_columns import ANGLES, DEVIATIONS, FORCE, KNOWN, REQUIRED
-from schemas import tables
+from schemas import table_check, tables
 from schemas.errors import DataRejected, WrongUse, did_you_mean
 from schemas.foreign import is_file as is_there
 from schemas.foreign import shown
@@ -85,7 +85,7 @@ def checked(frame: pd.DataFrame, *, where: str, foreign: bool = False) -> pd.Dat
     _all_or_none(frame, ANGLES, where)
     _all_or_none(frame, DEVIATIONS, where)
     _plausible(frame, where)
-    frame = tables.check("dwells", frame, where=where)
+    frame = table_check.check("dwells", frame, where=where)
     return frame.sort_values(["unit", "dwell"], kind="stable").reset_index(drop=True)
 
 

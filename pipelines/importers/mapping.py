@@ -10,7 +10,7 @@ from inertial.quantities import FORCE_COLUMNS, LARGEST, OUTPUT_COLUMNS, RECORDED
 from schemas.bounds import FASTEST_HZ, LONGEST_WAIT_S
 from schemas.errors import RecipeInvalid, WrongUse, close_matches, did_you_mean
 from schemas.foreign import shown
-from schemas.recipe import parse_toml, read_text
+from schemas.toml_files import parse_toml, read_text
 from schemas.units import STANDARD_GRAVITY_M_S2
 
 if TYPE_CHECKING:

@@ -14,7 +14,7 @@ from pydantic import ValidationError
 
 from pipelines.procedures.base import FigureSpec, Part, Procedure, ProcedureStep
 from schemas.errors import RecipeInvalid, close_matches, did_you_mean
-from schemas.recipe import explain
+from schemas.toml_files import explain
 
 if TYPE_CHECKING:
     from collections.abc import Mapping

@@ -25,8 +25,9 @@ from pipelines.tables.frames import empty_table
 from pipelines.tables.leave_out import Dwells, leave_out
 from schemas.errors import DataRejected, WrongUse
 from schemas.limits import Limits, limits_of
-from schemas.recipe import FormulaSpec, Lot, Recipe, explain
+from schemas.recipe import FormulaSpec, Lot, Recipe
 from schemas.station import StationConfig
+from schemas.toml_files import explain
 from schemas.units import STANDARD_GRAVITY_M_S2
 
 if TYPE_CHECKING:

@@ -21,9 +21,9 @@ from pipelines.jobs.seating import read_seating
 from schemas.bounds import COLDEST_C, HOTTEST_C, LONGEST_WAIT_S
 from schemas.errors import TumblelineError
 from schemas.profile import parse_profile
-from schemas.recipe import read_text
 from schemas.serials import is_serial
 from schemas.station import load_station
+from schemas.toml_files import read_text
 
 ROOT = Path(__file__).resolve().parents[2]
 MODEL = """[model]

@@ -6,10 +6,11 @@ import numpy as np
 import pytest
 
 from pipelines.audit.calibrations import Calibrations, date_of, day_of
-from pipelines.audit.drifts import kind_drifts, pairs_of, unit_drifts
+from pipelines.audit.drifts import kind_drifts, unit_drifts
 from pipelines.audit.due import due
 from pipelines.audit.exchanged_serials import strangers
 from pipelines.audit.gauge_mounts import studies
+from pipelines.audit.pairs import pairs_of
 from pipelines.audit.parameters import NAMES, parameters_of
 from pipelines.audit.population import odd_ones, yields
 from pipelines.audit.rules import load_rules

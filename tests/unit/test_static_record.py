@@ -9,7 +9,7 @@ import pytest
 from pipelines.stages.coarse_digits import Coarse
 from pipelines.stages.fit import fit
 from pipelines.stages.noise import noise
-from schemas.tables import check
+from schemas.table_check import check
 
 RATE, N, WHITE = 10.0, 6000, 100.0
 EFFECTS = ["bias", "scale", "misalignment", "bias_temperature"]

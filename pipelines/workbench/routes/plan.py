@@ -5,7 +5,7 @@ from __future__ import annotations
 from fastapi import APIRouter, Request
 from starlette.responses import Response
 
-from pipelines.report.plan import scientific
+from pipelines.report.numbers import scientific
 from pipelines.workbench.pages import figure, page, state_of, table_csv, workbench_of
 from pipelines.workbench.services import requests
 from pipelines.workbench.state import PlanPage
