@@ -50,7 +50,7 @@ def test_level_and_the_offset_of_the_outer_encoder_get_a_sentence_and_no_steps(p
     assert proposal(model, group) is None
     rows = Proposed(((group, None),), None, (alike,)).rows()
     assert [row["measurable"] for row in rows] == [False]
-    assert "no measurement of this station parts them; needed: a level on the table" in rows[0]["why"]
+    assert "no measurement of this station separates them; needed: a level on the table" in rows[0]["why"]
 
 
 def test_rivals_that_poses_part_are_no_twins(part) -> None:
