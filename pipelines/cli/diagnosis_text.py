@@ -202,13 +202,13 @@ def _classes(document: dict[str, Any]) -> None:
         errors = short(group["rms_after_ug"]), short(group["heldout_after_ug"])
         text = group.get("evidence") or values
         lines.append([names, group["scope"], size, chance(group["p_value"]), *errors, text])
-    columns = ["effect", "scope", "size\nµg", "p", "residual\nµg", "left-out error\nµg", "parameters"]
+    columns = ["effect", "scope", "size\nµg", "p", "residual\nµg", "cross-validated\nµg", "parameters"]
     title = "Missing effects; these data cannot separate the effects of one row"
     print_table(columns, lines, title=title, whole=6)
     if any(not group["plausible"] for group in document["classes"]):
         console().print("(!) larger than the usual size of this effect: check other causes, too", markup=False)
     legend = (
-        "residual: with the effect added · left-out error: on dwells not fitted, the worst of poses, soaks, stretches of "
+        "residual: with the effect added · cross-validated: on dwells not fitted, the worst of poses, soaks, stretches of "
         "time"
     )
     console().print(legend, style="dim", markup=False)

@@ -103,7 +103,7 @@ def _print(rows: list[dict[str, Any]], name: str, file: Path) -> None:
     keys = ["fitted_ug", "heldout_ug", *(["fresh_ug"] if fresh else []), "floor_ug"]
     heads = {
         "fitted_ug": "fitted\nµg",
-        "heldout_ug": "left-out error\nµg",
+        "heldout_ug": "cross-validated\nµg",
         "fresh_ug": "fresh run\nµg",
         "floor_ug": "assumed noise\nµg",
     }
@@ -115,7 +115,7 @@ def _print(rows: list[dict[str, Any]], name: str, file: Path) -> None:
         whole=5,
     )
     out.print(
-        "left-out error: the worst of poses, soaks and stretches of time · fresh run: coefficients unchanged, the bias change "
+        "cross-validated: the worst of poses, soaks and stretches of time · fresh run: coefficients unchanged, the bias change "
         "of each unit included · assumed noise: of the fit of each version, missing effects included",
         style="dim",
         soft_wrap=True,
