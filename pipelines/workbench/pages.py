@@ -84,6 +84,16 @@ def page(
     return HTMLResponse(text, status)
 
 
+def part_of(request: Request) -> str:
+    """The part of a page that the browser replaces; empty where it needs the whole page."""
+    return request.headers.get("x-part", "")
+
+
+def page_part(request: Request, template: str, state: PageState, **values: Any) -> HTMLResponse:
+    """A part of a page, with the command line of its state: what a click changes, without the work of the whole page."""
+    return page(request, "part.html", state, inner=template, **values)
+
+
 def figure(chart: Chart | None, ending: str, name: str) -> Response:
     """A chart as a figure for the page, as its numbers, or as a picture."""
     if chart is None:

@@ -31,7 +31,9 @@ def test_an_effect_added_from_a_class_is_not_called_found(capsys: pytest.Capture
     }  # fmt: skip
     said = ending(capsys, next_measurements=[row])
     assert "Found in a class, not separated" in said
-    assert "the added effect, thermal_lag, is one of a class; these data fit equally well with aging_log, warm_up." in said
+    assert (
+        "the added effect, thermal_lag, is one of a class; these data fit equally well with aging_log, warm_up." in said
+    )
     assert "The measurement that separates them:" in said
     assert "expected 60 if aging_log is true, 75 if warm_up is true; not separated from the first: thermal_lag" in said
     assert "Found." not in said

@@ -13,7 +13,7 @@ from pipelines.audit.sql import ask
 from pipelines.certificates import Ledger
 from pipelines.stages.figures import FIGURES
 from pipelines.tables.frames import rows_of
-from pipelines.workbench.pages import figure, page, run_table, state_of, workbench_of
+from pipelines.workbench.pages import figure, page, page_part, part_of, run_table, state_of, workbench_of
 from pipelines.workbench.questions import history_question
 from pipelines.workbench.services.samples import samples_of
 from pipelines.workbench.state import UnitPage
@@ -40,6 +40,8 @@ def unit(request: Request) -> Response:
     state = state.model_copy(update={"run": run.id, "unit": state.unit or (units[0] if units else "")})
     if state.unit not in units:
         raise WrongUse(f"unit '{state.unit[:80]}' is not in run {run.id}; its units are {', '.join(units[:8])}")
+    if part_of(request) == "samples":
+        return page_part(request, "unit_samples.html", state)
     tables = run.tables()
     own = {
         name: _own(bench, state, name)
