@@ -72,7 +72,7 @@ def test_refuses_records_that_contradict_their_mapping(change: object, words: st
 
 
 def test_refuses_g_claimed_as_counts(rng: np.random.Generator) -> None:
-    with pytest.raises(DataRejected, match="no whole numbers"):
+    with pytest.raises(DataRejected, match="not whole numbers"):
         imported(table(rng), how(units={"output": "LSB"}), "file.csv")
 
 
