@@ -18,6 +18,7 @@ from starlette.responses import HTMLResponse, JSONResponse, Response
 from pipelines.archive import Archive
 from pipelines.report.charts import csv_text, plotly_figure, png_bytes
 from pipelines.report.numbers import plain
+from pipelines.workbench.services.index import RecentIndex
 from pipelines.workbench.services.jobs import Jobs
 from schemas.errors import WrongUse
 from schemas.units import MICRO
@@ -48,6 +49,11 @@ class Workbench:
     jobs: Jobs
     boot: str = field(default_factory=lambda: secrets.token_hex(8))
     navigation: list[tuple[str, str]] = field(default_factory=list[tuple[str, str]])
+    index: RecentIndex = field(init=False)
+
+    def __post_init__(self) -> None:
+        """The index is shared by all handlers."""
+        self.index = RecentIndex(self.settings.archive)
 
     @property
     def archive(self) -> Archive:

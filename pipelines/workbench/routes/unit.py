@@ -9,7 +9,6 @@ from fastapi import APIRouter, Request
 from starlette.responses import Response
 
 from pipelines.audit.calibrations import day_of
-from pipelines.audit.sql import ask
 from pipelines.certificates import Ledger
 from pipelines.stages.figures import FIGURES
 from pipelines.tables.frames import rows_of
@@ -100,7 +99,7 @@ def _own(bench: Workbench, state: UnitPage, name: str) -> list[dict[str, Any]]:
 
 def _history(bench: Workbench, serial: str) -> list[dict[str, Any]]:
     """The unit's coefficients in all its runs, with the day of each."""
-    answer = ask(bench.archive, history_question(serial))
+    answer = bench.index.ask(history_question(serial))
     rows = [dict(zip(answer.columns, row, strict=True)) for row in answer.rows]
     return [{**row, "day": day_of(str(row["measured"]))} for row in rows if row["measured"]]
 
