@@ -167,7 +167,7 @@ def _evidence_line(done: FittedNorms, smaller: FittedNorms | None, evidence: dic
         parts.append(f"condition {evidence['condition']:.2g}")
     if evidence["bias_jackknife_ug"] is not None:
         level = evidence["bias_jackknife_ug"] * float(np.mean(done.scale[0])) / MICRO
-        parts.append(f"bias ± {level:.2g} {out_unit} if single dwells are left out")
+        parts.append(f"bias ± {level:.2g} {out_unit} by leaving out single dwells")
     if smaller is not None:
         moved = float(np.max(np.abs((_bias(done) - _bias(smaller))[0])))
         parts.append(f"bias differs by up to {moved:.2g} {out_unit} from the fit with orthogonal axes")
