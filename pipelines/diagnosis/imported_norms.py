@@ -176,9 +176,9 @@ def _evidence_line(done: FittedNorms, smaller: FittedNorms | None, evidence: dic
 
 def _bad_line(out: dict[str, Any], verdict: dict[str, Any]) -> str:
     names = ",".join(f"{d['unit']}:{d['dwell']}" for d in out["dwells"])
-    judged = {True: "adequate", False: "not adequate", None: "cannot be judged"}[out["adequate_without"]]
+    judged = {True: "is adequate", False: "is not adequate", None: "cannot be judged"}[out["adequate_without"]]
     why = f" ({verdict['reason']})" if verdict["reason"] else ""
-    left = f"the residual is {verdict['error']['rms_ug']:.1f} µg and the model is {judged}{why}"
+    left = f"the residual is {verdict['error']['rms_ug']:.1f} µg and the model {judged}{why}"
     return f"bad dwells: {names}; without them {left}; to leave them out: tumbleline fit RUN --leave-out {names}"
 
 
