@@ -20,8 +20,8 @@ from prefect.states import Cancelled
 from pipelines.chain.attendance import JUDGED, Attendance
 from pipelines.chain.chain import ORDER
 from pipelines.chain.runner import Done, Runner
+from pipelines.flows.archive_address import archive_of
 from pipelines.flows.operator import Paused
-from pipelines.flows.places import archive_of
 from pipelines.flows.policy import policy_of_tags
 from pipelines.jobs.job import Request
 from schemas.errors import LinkLost, NotReached, StationTimeout
@@ -99,7 +99,7 @@ def calibrate_lot(  # noqa: PLR0913 - the parameters of a flow are the form on t
 
     Without ``repeat`` every flow run measures the lot again, and a retry of the same flow run continues it. With
     ``prompts`` the flow run pauses for the operator: to load, to correct a fault, to unload. ``archive`` has no
-    credentials, see :func:`pipelines.flows.places.archive_of`.
+    credentials, see :func:`pipelines.flows.archive_address.archive_of`.
     """
     if too_late := late_start():
         return Cancelled(message=too_late)

@@ -18,8 +18,8 @@ from typing import Any
 import yaml
 
 from pipelines.flows.credentials import refuse_credentials
-from pipelines.flows.knock import knock
 from pipelines.flows.policy import policy_of
+from pipelines.flows.server_check import check_server
 from pipelines.flows.settings import CLIENT_KEY, use_key
 from schemas.errors import TumblelineError
 
@@ -38,7 +38,7 @@ def register(path: Path) -> list[str]:
         The key is missing or wrong, a parameter has credentials, or a policy has an unknown key or value.
     """
     use_key(CLIENT_KEY)
-    knock(PATIENCE_S)
+    check_server(PATIENCE_S)
     content = yaml.safe_load(path.read_text(encoding="utf-8"))
     for item in content["deployments"]:
         refuse_credentials(item["parameters"].get("archive"))

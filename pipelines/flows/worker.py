@@ -22,8 +22,8 @@ from contextlib import contextmanager
 from datetime import timedelta
 from typing import TYPE_CHECKING
 
-from pipelines.flows.attended import attend
-from pipelines.flows.knock import POLL_S, knock
+from pipelines.flows.child_reaper import run_until_orphans_end
+from pipelines.flows.server_check import POLL_S, check_server
 from pipelines.flows.settings import CLIENT_KEY, JSON_FORMAT, STARTUP_S, use_key
 from schemas.errors import OperatorNeeded, TumblelineError, WrongUse
 from schemas.log_lines import JSON, tell, wants_json
@@ -61,7 +61,7 @@ def start(
         os.environ.setdefault(JSON_FORMAT, JSON)
     name = f"{station} on {host or platform.node()}"
     with _alone(station):
-        knock(STARTUP_S)
+        check_server(STARTUP_S)
         for queue in (station, *queues):
             for run in close_dead_runs_of_queue(pool, queue, name):
                 tell(f"{queue}: run {run} is closed as crashed: its process has ended")
@@ -88,7 +88,7 @@ def start(
         command += ["--run-once"] if once else []
         command += ["--with-healthcheck"] if healthcheck else []
         with applied(pool, (station, *queues)):
-            return attend(command)
+            return run_until_orphans_end(command)
 
 
 def stop(pool: str, station: str, wait_s: float) -> list[str]:
@@ -97,7 +97,7 @@ def stop(pool: str, station: str, wait_s: float) -> list[str]:
 
     from pipelines.flows.dead_runs import WORKING, runs_of_queue
 
-    knock()
+    check_server()
     if _pause(pool, station, paused=True):
         _marker(station).touch()
     end = time.monotonic() + wait_s
