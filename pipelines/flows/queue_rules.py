@@ -125,13 +125,17 @@ def _continue_crashed(client: SyncPrefectClient, pool: str, queue: str, now: dat
     texts: list[str] = []
     crashed = runs_of_queue(client, pool, queue, (StateType.CRASHED,), FlowRunSort.EXPECTED_START_TIME_DESC)
     for run in crashed:
-        if policy_of_tags(run.tags).crashed != "continue" or not 0 < run.run_count < ATTEMPTS:
+        if policy_of_tags(run.tags).crashed != "continue":
             continue
         if run.state is None or not settled <= now - run.state.timestamp <= CONTINUED_WITHIN:
             continue
+        # not run_count: a run whose process could not start has none
+        crashes = sum(state.type == StateType.CRASHED for state in client.read_flow_run_states(run.id))
+        if crashes >= ATTEMPTS:
+            continue
         if client.read_flow_run(run.id).state_type != StateType.CRASHED:  # another worker was faster
             continue
-        message = CONTINUED.format(attempt=run.run_count + 1, attempts=ATTEMPTS)
+        message = CONTINUED.format(attempt=crashes + 1, attempts=ATTEMPTS)
         client.set_flow_run_state(run.id, Scheduled(scheduled_time=now, message=message), force=True)
         texts.append(f"run {run.name} {message}")
     return texts

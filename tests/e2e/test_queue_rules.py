@@ -113,7 +113,8 @@ def the_monitor_says_the_same(busy: dict, at: datetime, missed: int) -> None:
 
 def crashed_runs_continue_or_are_closed(line: Orchestrator) -> None:
     """Once, as often as is allowed, and only soon after the crash; in one test with the rest, as all use the same runs."""
-    continued, often = line.runs("latest", "SCHEDULED")[-2:]
+    continued, often, unstarted = line.runs("latest", "SCHEDULED")[-3:]
+    force(line, unstarted, "CRASHED")  # its process could not start, so its count of runs is 0
     closed = line.runs("cancels", "SCHEDULED")[-1]
     for run, count in ((continued, 1), (closed, 1), (often, 3)):
         for _ in range(count):
@@ -127,10 +128,11 @@ def crashed_runs_continue_or_are_closed(line: Orchestrator) -> None:
         "its worker may still hold its place"
     )
     apply_rules("line", QUEUE, now + SETTLED + timedelta(seconds=1))
-    states = {run["id"]: line.ask(f"/api/flow_runs/{run['id']}")[1] for run in (continued, closed, often)}
+    states = {run["id"]: line.ask(f"/api/flow_runs/{run['id']}")[1] for run in (continued, closed, often, unstarted)}
     assert states[continued["id"]]["state_type"] == "SCHEDULED"
     assert states[continued["id"]]["run_count"] == 1
     assert "attempt 2 of 3" in states[continued["id"]]["state"]["message"]
+    assert (states[unstarted["id"]]["state_type"], states[unstarted["id"]]["run_count"]) == ("SCHEDULED", 0)
     assert states[closed["id"]]["state_type"] == "CRASHED"
     assert states[often["id"]]["state_type"] == "CRASHED"
 
