@@ -16,7 +16,6 @@ SUMMARY = "Write coefficients for firmware and autopilots."
 EXAMPLES = (
     "tumbleline export latest --format c --output calibration.h",
     "tumbleline export latest --format px4 --nominal 256000 --units SN1 --device-id 1310988 --output SN1.params",
-    "tumbleline export latest --format json --units SN1",
 )
 
 BINARY = ".mat"
