@@ -42,7 +42,7 @@ class BiasFilter:
         first = np.concatenate([model.sd**2, model.turn_on[:, None] ** 2], axis=1)
         self._x = np.zeros(AXES * width)
         self._p = np.diag(first.ravel())
-        self._sum = np.kron(np.eye(AXES), np.ones(width))
+        self._sum = np.kron(np.eye(AXES), np.ones(width)).astype(np.float64)
 
     @property
     def bias(self) -> Array:

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 import pandas as pd
+from scipy.linalg import block_diag
 
 from inertial import static_intervals
 from inertial.correction import correct, output_covariance
@@ -108,10 +109,7 @@ def fit_of_unit(run: Run, unit: str, *, failed: bool, revoked: bool) -> FitOfUni
     exported = unit_calibrations(run, (serial,), failed=failed, revoked=revoked)[0]
     u = calibration.units.index(serial)
     p = calibration.coefficients.shape[-1]
-    covariance = np.zeros((3, p, 3, p))
-    for axis in range(3):
-        covariance[axis, :, axis] = calibration.covariance[u, axis]
-    covariance = covariance.reshape(3 * p, 3 * p)
+    covariance = block_diag(*calibration.covariance[u])
     budget = _budget(run, serial, 3 * p)
     return FitOfUnit(
         run.id,
