@@ -3,6 +3,7 @@
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from capture_double import CaptureDouble, small_job
@@ -56,7 +57,7 @@ def keep_state(run: Run, job: Job, prepare: Callable[[Plant], None]) -> None:
     place.write_bytes(plant.journal.state(plant.now_us))
 
 
-def programmed(run: Run, serials: tuple[str, ...] = (), **choice: object) -> tuple[dict[str, Outcome], dict[str, str]]:
+def programmed(run: Run, serials: tuple[str, ...] = (), **choice: Any) -> tuple[dict[str, Outcome], dict[str, str]]:
     """The units written, by serial, and their certificates."""
     outcomes, given = program_run(run, chosen_units(run, serials), station_of(run), Choice(**choice), lambda text: None)
     return {one.serial: one for one in outcomes}, given

@@ -109,7 +109,7 @@ def fit_of_unit(run: Run, unit: str, *, failed: bool, revoked: bool) -> FitOfUni
     exported = unit_calibrations(run, (serial,), failed=failed, revoked=revoked)[0]
     u = calibration.units.index(serial)
     p = calibration.coefficients.shape[-1]
-    covariance = block_diag(*calibration.covariance[u])
+    covariance: Array = np.asarray(block_diag(*list(calibration.covariance[u])), dtype=np.float64)
     budget = _budget(run, serial, 3 * p)
     return FitOfUnit(
         run.id,

@@ -6,7 +6,7 @@ from contextlib import contextmanager
 from datetime import UTC, datetime
 from typing import TYPE_CHECKING, Any
 
-from pipelines.archive import files
+from pipelines.archive import Archive, files
 from pipelines.archive.locks import alone
 from pipelines.archive.signatures import public_keys
 from pipelines.certificates import Ledger
@@ -71,7 +71,7 @@ def program_run(
     The certificate of a unit ends before the first write to its device. A unit that was certified with these coefficients is
     certified again, to the same day, when its memory is proved.
     """
-    root, ledger, day = run.archive.root, Ledger(run.archive), today()
+    root, ledger, day = run.archive.root, Ledger(run.archive.root), today()
     serials = [unit.unit for _, unit in units]
     held = {serial: _held(ledger, serial, run.id, day) for serial in serials}
     numbers = {
@@ -115,10 +115,11 @@ def _ends(ledger: Ledger, serial: str, day: str) -> bool:
 def _station(run: Run, config: StationConfig) -> Generator[tuple[Any, Callable[[], None]]]:
     """The station, and what keeps the state of a simulated one, which goes on where the run or the last writing left it."""
     lot = Lot.model_validate(run.about["lot"])
-    place = run.archive.root / TOP / "station" / f"{run.about['capture']}.bin"
+    root = run.archive.root
+    place = root / TOP / "station" / f"{run.about['capture']}.bin"
     resume = None
     if config.kind == "simulated":
-        resume = place.read_bytes() if place.is_file() else run.archive.capture(run.about["capture"]).last_state()
+        resume = place.read_bytes() if place.is_file() else Archive(root).capture(run.about["capture"]).last_state()
     with open_station(config, lot, resume=resume, run=f"program {run.id}") as station:
 
         def saved() -> None:

@@ -24,11 +24,12 @@ from pipelines.certificates.programmed import programming, unproved
 from pipelines.chain.certify import certify
 from pipelines.cli import app
 from pipelines.export import UnitCalibration
-from pipelines.export.device_block import HEAD, LENGTH, block_of, pack, unpack
+from pipelines.export.device_block import HEAD, LENGTH, Form, block_of, pack, unpack
 from pipelines.integrity import verify
 from pipelines.jobs.job import Job
 from schemas.errors import StationRefused, StationTimeout, WrongUse
 from schemas.fault import FaultOrder
+from stations.codec import Value
 from stations.devices.memory import UnitMemory
 from stations.plant.plant import Plant
 
@@ -70,7 +71,7 @@ def with_fault(run: Run, kind: str, **figures: float) -> None:
 
 
 def test_a_lot_is_written_proved_and_certified_again(run: Run) -> None:
-    ledger, day = Ledger(run.archive), today()
+    ledger, day = Ledger(run.archive.root), today()
     first = certify(ledger, run, ["A1", "A2"]).events
     done, given = programmed(run)
     assert {one.outcome for one in done.values()} == {"proved"}, [one.reason for one in done.values()]
@@ -122,7 +123,7 @@ def test_the_older_copy_is_written_and_the_other_is_kept(run: Run) -> None:
 def test_a_fault_leaves_the_valid_copy_and_no_certificate(
     run: Run, kind: str, figures: dict[str, float], step: str, reason: str
 ) -> None:
-    certify(Ledger(run.archive), run, ["A1", "A2"])
+    certify(Ledger(run.archive.root), run, ["A1", "A2"])
     programmed(run)
     kept, plant = copies(run)[0], plant_of(run, job_of(run))
     plant.inject(FaultOrder(kind=kind, serial="A1", figures=figures, at_s=plant.now))
@@ -139,10 +140,10 @@ def test_a_fault_leaves_the_valid_copy_and_no_certificate(
         assert unproved(run.archive.root, "A1") == ""
         return
     assert "A1" not in given
-    assert Ledger(run.archive).valid_at("A1", today()) is None
+    assert Ledger(run.archive.root).valid_at("A1", today()) is None
     with pytest.raises(WrongUse, match="unit A1: the writing of its memory failed"):
-        certify(Ledger(run.archive), run, ["A1"])
-    assert "A1" in certify(Ledger(run.archive), run).left_out
+        certify(Ledger(run.archive.root), run, ["A1"])
+    assert "A1" in certify(Ledger(run.archive.root), run).left_out
     if kind == "memory_bad_block":
         assert done["A2"].outcome == "proved"  # the others go on
 
@@ -191,7 +192,7 @@ def test_a_block_is_what_its_layout_says() -> None:
 
 
 def test_a_calibration_that_was_revoked_is_not_written(run: Run) -> None:
-    ledger = Ledger(run.archive)
+    ledger = Ledger(run.archive.root)
     certify(ledger, run, ["A1"])
     ledger.revoke("A1", "fell to the floor", day=today())
     with pytest.raises(WrongUse, match="fell to the floor"):
@@ -200,7 +201,7 @@ def test_a_calibration_that_was_revoked_is_not_written(run: Run) -> None:
 
 
 @pytest.mark.parametrize("form", ["float32", "q24"])
-def test_a_block_corrects_as_the_calibration(form: str) -> None:
+def test_a_block_corrects_as_the_calibration(form: Form) -> None:
     unit = calibration()
     block = unpack(
         pack(block_of(unit, form, sequence=1, certificate=0, date=0, offsets=(0, 0, 0), step=0)) + b"\xff" * 76
@@ -233,7 +234,7 @@ def test_a_lost_answer_is_decided_by_the_counter_and_the_command_is_sent_once(ru
         registers = memory._registers
         plain = registers.write
 
-        def answer_lost(name: str, value: object) -> None:
+        def answer_lost(name: str, value: Value) -> None:
             plain(name, value)
             if name == "memory_command":
                 raise StationTimeout("slot 0: no answer within 1 s; check the cable")
@@ -295,7 +296,7 @@ program_run(run, chosen_units(run, ["A1"]), station_of(run), Choice(), report)
     ],
 )
 def test_a_process_that_is_killed_leaves_the_unit_not_certified_until_it_is_written_again(run: Run, step: str) -> None:
-    ledger = Ledger(run.archive)
+    ledger = Ledger(run.archive.root)
     certify(ledger, run, ["A1"])
     words = [sys.executable, "-c", KILLED, str(run.archive.root), step]
     done = subprocess.run(
@@ -336,7 +337,7 @@ def test_the_guide_prints_what_the_command_prints(run: Run, monkeypatch: pytest.
     command, _, printed = re.findall(r"```console\n\$ (.*?)```", guide, flags=re.DOTALL)[0].partition("\n")
     monkeypatch.setenv("TUMBLELINE_ARCHIVE", str(run.archive.root))
     monkeypatch.setenv("COLUMNS", "200")
-    certify(Ledger(run.archive), run, ["A1"])
+    certify(Ledger(run.archive.root), run, ["A1"])
     done = CliRunner().invoke(app, shlex.split(command)[1:])
     assert done.exit_code == 0, done.exception
     wanted = re.escape(words_of(printed)).replace("…", ".*?")

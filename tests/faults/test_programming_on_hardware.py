@@ -60,7 +60,7 @@ def test_killed_while_it_writes_the_watchdog_makes_the_station_safe_and_the_next
     monkeypatch.setenv("TUMBLELINE_STATE", str(tmp_path / "state"))
     shutil.copytree(measured, tmp_path / "copy")
     run: Run = Archive(tmp_path / "copy" / "archive").run("latest")
-    ledger = Ledger(run.archive)
+    ledger = Ledger(run.archive.root)
     certify(ledger, run, ["A1"])
     with served_plant(lot=Lot.model_validate(run.about["lot"])) as (port, plant):
         file = station_file(tmp_path, modbus_station(port))
