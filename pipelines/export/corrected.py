@@ -105,7 +105,7 @@ def fit_of_unit(run: Run, unit: str, *, failed: bool, revoked: bool) -> FitOfUni
             f"--calibration: run {run.id} has {len(calibration.units)} units, one is needed as RUN:UNIT; "
             f"{did_you_mean('', calibration.units)}"
         )
-    serial = unit or calibration.units[0]
+    serial = unit or next(iter(calibration.units))
     exported = unit_calibrations(run, (serial,), failed=failed, revoked=revoked)[0]
     u = calibration.units.index(serial)
     p = calibration.coefficients.shape[-1]
