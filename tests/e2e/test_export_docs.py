@@ -48,4 +48,6 @@ def test_files_of_several_units_need_a_folder(tmp_path: Path, monkeypatch: pytes
     done = CliRunner().invoke(app, words)
     assert "3 units, each needs a file of its own" in str(done.exception)
     assert "is not text" in str(CliRunner().invoke(app, ["export", "latest", "--format", "matlab"]).exception)
-    assert CliRunner().invoke(app, [*words, "--units", "A2"]).stdout.startswith("# accelerometer calibration of unit A2")
+    assert (
+        CliRunner().invoke(app, [*words, "--units", "A2"]).stdout.startswith("# accelerometer calibration of unit A2")
+    )
