@@ -59,6 +59,28 @@ def correct(effects: Sequence[str], state: State, output: Array, coefficients: A
     return force
 
 
+def output_covariance(
+    effects: Sequence[str], state: State, coefficients: Array, nonlinear: Values, covariance: Array
+) -> Array:
+    """Covariance (n, 3, 3) in g² of corrected outputs of one unit, from that of its coefficients: K⁻¹·(h_iᵀ·Σ_ij·h_j)·K⁻ᵀ.
+
+    Parameters
+    ----------
+    state : conditions of the readings, its force the corrected one
+    coefficients : (3, p)
+    covariance : (3p, 3p), of the coefficients of x, y and z in one vector
+    """
+    names = tuple(design.local_names(design.split(effects)[0], axis, nonlinear) for axis in range(3))
+    response = response_matrix(coefficients, names)
+    seen = replace(state, felt=_felt(response, state.force), memory={})
+    columns = design.local_columns(design.split(effects)[0], seen, nonlinear)
+    p = columns.shape[-1]
+    blocks = covariance.reshape(3, p, 3, p)
+    inner = np.einsum("inp,ipjq,jnq->nij", columns, blocks, columns, optimize=True)
+    inverse = np.linalg.inv(response)
+    return inverse @ inner @ inverse.T
+
+
 def _felt(response: Array, force: Array) -> Array:
     """Force along the sensor's own axes, (..., n, 3), g."""
     own = np.diagonal(response, axis1=-2, axis2=-1)

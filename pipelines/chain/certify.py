@@ -11,6 +11,7 @@ from pipelines.archive.signatures import public_keys
 from pipelines.certificates.days import day_of, months_after, today
 from pipelines.certificates.entries import FOLDER, LedgerEntry
 from pipelines.certificates.measured import END, measured_span
+from pipelines.certificates.programmed import refuse_unproved, unproved
 from pipelines.certificates.refusals import allowed_months, refuse_period
 from pipelines.integrity import verify
 from pipelines.jobs.terms import archived_terms
@@ -126,6 +127,12 @@ def _proposals(
         if serial not in grades:
             raise WrongUse(f"certify: no unit {serial!r} in run {run.id}; {did_you_mean(serial, grades)}")
         row = grades[serial]
+        half = unproved(run.archive.root, serial)
+        if half and units:
+            refuse_unproved(run.archive.root, serial)
+        if half:
+            result.left_out[serial] = half
+            continue
         if row["outcome"] == "pass":
             proposals.append(_blank(serial, grade=str(row["grade"]), **shared))
             continue

@@ -8,15 +8,17 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from pipelines.cli.options import ArchiveOption, JsonOption, RunArgument, error_console
+from pipelines.cli.options import ArchiveOption, JsonOption, RateOption, RunArgument, error_console
 
 PART = "Results"
 ORDER = 340
 SUMMARY = "Write coefficients for firmware and autopilots."
 EXAMPLES = (
     "tumbleline export latest --format c --output calibration.h",
-    "tumbleline export latest --format json --units SN1",
+    "tumbleline export latest --format px4 --nominal 256000 --units SN1 --device-id 1310988 --output SN1.params",
 )
+
+BINARY = ".mat"
 
 _FOLDER = Path(__file__).parent.parent / "export" / "formats"
 _NAMES = ", ".join(found.name for found in iter_modules([str(_FOLDER)]))  # their names, without importing them
@@ -35,11 +37,29 @@ def command(
         str, typer.Option("--units", metavar="SN,…", help="Export only these units; default: all that passed.")
     ] = "",
     output: Annotated[
-        Path | None, typer.Option("--output", "-o", metavar="FILE", help="Output file; default: standard output.")
+        Path | None,
+        typer.Option(
+            "--output",
+            "-o",
+            metavar="FILE|DIR",
+            help="Output file, or a folder where each unit has a file of its own; default: standard output.",
+        ),
     ] = None,
     nominal: Annotated[
         float | None, typer.Option("--nominal", help="Output per g that the driver of the autopilot assumes.")
     ] = None,
+    device_id: Annotated[
+        str,
+        typer.Option("--device-id", metavar="ID|SN=ID,…", help="Number of the sensor in the autopilot (CAL_ACC0_ID)."),
+    ] = "",
+    sensor: Annotated[
+        int, typer.Option("--sensor", metavar="0…3", help="Place of the accelerometer in the autopilot.")
+    ] = 0,
+    arithmetic: Annotated[
+        str, typer.Option("--arithmetic", metavar="double|float|q24", help="Arithmetic of exported C code.")
+    ] = "double",
+    rate: RateOption = None,
+    counts_per_g: Annotated[int, typer.Option("--counts-per-g", help="Counts of 1 g in Betaflight (acc_1G).")] = 2048,
     archive: ArchiveOption = None,
     *,
     failed: Annotated[bool, typer.Option("--failed", help="Also export units that failed their limits.")] = False,
@@ -48,10 +68,14 @@ def command(
     ] = False,
     as_json: JsonOption = False,
 ) -> None:
-    """Write coefficients: bias b and response K as polynomials in temperature, to apply as a = K⁻¹(ã − b)."""
+    """Write coefficients: bias b and response K as polynomials in temperature, to apply as a = K⁻¹(ã − b).
+
+    Files for autopilots hold one unit each, and state in µg what the format cannot hold. The rate (--rate) of
+    noise formats is that of the static record by default.
+    """
     from pipelines.archive import Archive
     from pipelines.certificates.coefficient_remarks import signature_remarks
-    from pipelines.export import FORMATS, export_text, unit_calibrations
+    from pipelines.export import FORMATS, ExportSettings, device_ids, export_files, unit_calibrations
     from pipelines.jobs.model_files import use_formulas_of
     from schemas.errors import WrongUse, did_you_mean
 
@@ -62,17 +86,40 @@ def command(
     use_formulas_of(source)
     serials = tuple(serial.strip() for serial in units.split(",")) if units else ()
     chosen = unit_calibrations(source, serials, failed=failed, revoked=revoked)
-    text = export_text(form, chosen, source.id, nominal)
+    ids = device_ids(device_id, [c.unit for c in chosen])
+    settings = ExportSettings(nominal, ids, sensor, arithmetic, rate, counts_per_g)
+    files = export_files(form, chosen, source.id, settings)
     _print_certificates(source, chosen, signature_remarks(source, [c.unit for c in chosen]))
+    _write(files, output)
+
+
+def _write(files: dict[str, bytes], output: Path | None) -> None:
+    """Write the files: one to standard output, a file or a folder, several to a folder only."""
+    from schemas.errors import WrongUse
+
+    (name, content), *others = files.items()
     if output is None:
-        typer.echo(text, nl=False)
+        if others:
+            raise WrongUse(
+                f"export: {len(files)} units, each needs a file of its own in this format; give a folder with --output, or "
+                "choose a unit with --units"
+            )
+        if name.endswith(BINARY):
+            raise WrongUse(f"export: {name} is not text and cannot be printed; give a file with --output")
+        typer.echo(content.decode(), nl=False)
         return
     try:
-        output.write_text(text, encoding="utf-8")
+        if others:
+            output.mkdir(parents=True, exist_ok=True)
+        folder = output.is_dir()
+        for file, data in files.items():
+            (output / file if folder else output).write_bytes(data)
     except OSError as problem:
         raise WrongUse(
             f"export: {output} cannot be written ({problem.strerror}); give another file with --output"
         ) from None
+    if folder:
+        error_console().print(f"export: {len(files)} files in {output}", markup=False, soft_wrap=True)
 
 
 def _print_certificates(run: Run, chosen: Sequence[UnitCalibration], signers: Sequence[str]) -> None:

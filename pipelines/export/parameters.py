@@ -1,58 +1,83 @@
-"""Parameters of autopilots: an offset in m/s² and a scale per axis at 25 °C, applied as (a − offset)·scale."""
+"""Parameters of autopilots: an offset in m/s² and a scale per axis, applied as (a − offset)·scale, and its temperature."""
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from pipelines.export.comments import comment
-from schemas.errors import WrongUse
+from pipelines.export.omissions import ACROSS, ACROSS_T, BIAS_T, SCALE_T, comment_lines, largest_error_ug, omitted
 from schemas.units import STANDARD_GRAVITY_M_S2
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from numpy.typing import NDArray
+
+    from pipelines.export.omissions import Applied
     from pipelines.export.polynomials import UnitCalibration
 
+    Array = NDArray[np.float64]
 
-def parameters(
-    units: Sequence[UnitCalibration], run: str, nominal: float | None, names: tuple[str, str], between: str
-) -> str:
-    """Lines of parameters for every unit, with comments on the terms that the format omits.
 
-    Parameters
-    ----------
-    nominal : output per g that the driver of the autopilot assumes
-    names : of the offset and of the scale, with a placeholder for the axis
-    between : text between name and value
+@dataclass(frozen=True)
+class Offsets:
+    """What an autopilot applies, as its parameters hold it (float32).
 
-    Raises
-    ------
-    WrongUse
-        The nominal output is not positive.
+    offset : (3,), m/s², at ``at_C``; scale : (3,)
+    thermal : (4, 3), m/s² per K^k, coefficients of (T − 25 °C)^k, zero where the format gets no temperature terms
+    at_C : °C; offset and thermal together are the bias there
     """
-    if nominal is None or nominal <= 0.0:
-        raise WrongUse(
-            f"export: nominal scale {nominal}, a positive output per g is needed for autopilot parameters (their driver "
-            "divides by it); give it with --nominal"
-        )
-    lines: list[str] = []
-    for c in units:
-        across = c.response[0] - np.diag(np.diag(c.response[0]))
-        coupling = 1e3 * float(np.max(np.abs(across))) / nominal
-        low, high = c.temperatures
-        lines += [
-            f"# unit {c.unit}, run {run}, at 25 °C; assumed output of the driver for 1 g: {nominal:g} {c.out_unit}",
-            f"# {comment(c.certified)}",
-            (
-                f"# not in these parameters: misalignment up to {coupling:.2g} mrad, "
-                f"temperature terms from {low:.0f} to {high:.0f} °C"
-            ),
-        ]
-        for i, axis in enumerate("XYZ"):
-            offset = STANDARD_GRAVITY_M_S2 * c.bias[0, i] / nominal
-            scale = nominal / c.response[0, i, i]
-            lines.append(f"{names[0].format(axis=axis)}{between}{offset:.6f}")
-            lines.append(f"{names[1].format(axis=axis)}{between}{scale:.6f}")
-    return "\n".join(lines) + "\n"
+
+    offset: Array
+    scale: Array
+    thermal: Array
+    at_C: float
+
+
+def bias_m_s2(unit: UnitCalibration, nominal: float) -> Array:
+    """The bias (4, 3) in the driver's m/s² per K^k."""
+    return STANDARD_GRAVITY_M_S2 * unit.bias / nominal
+
+
+def scales(unit: UnitCalibration, nominal: float) -> Array:
+    """The scale (3,) that the autopilot multiplies by."""
+    return nominal / np.diag(unit.response[0])
+
+
+def number(value: float) -> str:
+    """A number as an autopilot's float32 holds it, with the fewest digits that give it back."""
+    return np.format_float_positional(np.float32(value), unique=True, trim="0")
+
+
+def rounded(values: Array) -> Array:
+    """Values (...) as float32 holds them."""
+    return values.astype(np.float32).astype(np.float64)
+
+
+def heading(
+    unit: UnitCalibration, run: str, nominal: float, applied: Applied, *, thermal: bool, where: str
+) -> list[str]:
+    """Comment lines of a unit's file: what it is for, its certificate, and what it does not hold, in µg."""
+    low, high = unit.temperatures
+    parts: Sequence[str] = (ACROSS, ACROSS_T, SCALE_T) if thermal else (ACROSS, ACROSS_T, SCALE_T, BIAS_T)
+    lines = [
+        f"accelerometer calibration of unit {unit.unit}, run {run}, {low:.1f} to {high:.1f} °C",
+        unit.certified,
+        f"{where}; assumed output of the driver for 1 g: {nominal:g} {unit.out_unit}",
+        *comment_lines(omitted(unit, parts), largest_error_ug(unit, applied)),
+    ]
+    return [f"# {comment(line)}" for line in lines]
+
+
+def in_g(nominal: float, offsets: Offsets) -> Applied:
+    """Specific force in g as the autopilot computes it from outputs (n, 3) at a temperature inside the measured range."""
+
+    def applied(output: Array, temperature: float) -> Array:
+        raw = STANDARD_GRAVITY_M_S2 * output / nominal
+        thermal = (temperature - 25.0) ** np.arange(len(offsets.thermal)) @ offsets.thermal
+        return (raw - thermal - offsets.offset) * offsets.scale / STANDARD_GRAVITY_M_S2
+
+    return applied

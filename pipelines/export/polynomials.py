@@ -9,6 +9,7 @@ import numpy as np
 
 from inertial.state import T_REFERENCE
 from pipelines.certificates.statement import stated
+from pipelines.export.unit_noise import noise_of_units
 from pipelines.tables.calibration import read_calibration
 from schemas.errors import WrongUse
 
@@ -20,6 +21,7 @@ if TYPE_CHECKING:
 
     from pipelines.archive import Run
     from pipelines.certificates.statement import Stated
+    from pipelines.export.unit_noise import UnitNoise
     from pipelines.tables.calibration import Calibration
 
 BIAS = ("bias", "bias_temperature", "bias_temperature_quadratic", "bias_temperature_cubic")
@@ -37,6 +39,8 @@ class UnitCalibration:
     response : (4, 3, 3), output unit per g and K^k
     left_out : effects of the model that have no place in this form
     certificate : that the unit has for this run; None where it was not certified
+    noise : terms of its static record; None without one
+    full_scale : largest excursion of the output from 0 g, output unit; None where it is not recorded
     """
 
     unit: str
@@ -48,6 +52,8 @@ class UnitCalibration:
     temperatures: tuple[float, float]
     left_out: tuple[str, ...]
     certificate: Stated | None = None
+    noise: UnitNoise | None = None
+    full_scale: float | None = None
 
     @property
     def certified(self) -> str:
@@ -88,10 +94,13 @@ def unit_calibrations(
     calibration = read_calibration(run.table("coefficients"), run.table("covariance"))
     dwells = run.table("dwells")
     out_unit = str(dwells["out_unit"].iloc[0])
+    noise, full_scale = noise_of_units(run), _full_scales(run)
     return [
         replace(
             _one(calibration, unit, grades.loc[unit].to_dict(), out_unit, _temperatures(dwells, unit)),
             certificate=certificates.get(unit),
+            noise=noise.get(unit),
+            full_scale=full_scale.get(unit),
         )
         for unit in chosen
     ]
@@ -124,6 +133,15 @@ def _ungraded(run: Run, serials: tuple[str, ...]) -> list[UnitCalibration]:
         _one(calibration, unit, decided, out_unit, _temperatures(dwells, unit))
         for unit in (serials or calibration.units)
     ]
+
+
+def _full_scales(run: Run) -> dict[str, float]:
+    """Full scale of the outputs by unit, output unit; empty where the run has no readings of a capture."""
+    readings = run.table("readings") if "readings" in run.tables() else None
+    if readings is None or "full_scale" not in readings:
+        return {}
+    good = readings[readings["status"] == "ok"].groupby("unit")["full_scale"].first().dropna()
+    return {str(unit): float(value) for unit, value in good.items()}
 
 
 def _temperatures(dwells: pd.DataFrame, unit: str) -> tuple[float, float]:

@@ -35,7 +35,7 @@ def check_seals(root: Place, runs: Sequence[Run], chain: Chain, checked: Checked
     for run in runs:
         _check_run(run, chain, checked)
     if everything:
-        for top, pattern in (("calibrations", "*/*/*.json"), ("releases", "*.json")):
+        for top, pattern in (("calibrations", "*/*/*.json"), ("programming", "*/*/*.json"), ("releases", "*.json")):
             _check_named((root / top).glob(pattern) if (root / top).is_dir() else (), chain, checked)
         for place in sorted((root / "whatif").glob("*.json"), key=str) if (root / "whatif").is_dir() else ():
             _check_evidence(place, checked)

@@ -21,6 +21,7 @@ OURS = re.compile(
     r"archive\.json|(index|orchestrator)/.*|.*\.parquet"
     r"|captures/[^/]+/(lock|complete\.json|events/\d+\.json|state/\d+\.bin|\d+/record\.json)"
     r"|runs/[^/]+/(lock|report\.html|[^/.]+\.json)"
+    r"|programming/(lock|station/[0-9a-f]+\.bin|[0-9a-f]{2}/[0-9a-f]{16}/\d+\.json)"
     r"|calibrations/lock|calibrations/[0-9a-f]{2}/[0-9a-f]{16}/\d+\.json|chain/\d+/\d+\.json"
     r"|(releases|whatif)/(lock|[0-9a-f-]+\.json)"
 )

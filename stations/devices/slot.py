@@ -10,8 +10,10 @@ from numpy.typing import NDArray
 
 from schemas.errors import LinkLost, StationRefused, StationTimeout
 from stations.codec import SEQUENCE, WORDS_PER_SAMPLE, Packing, named, unpack_samples
+from stations.devices.memory import UnitMemory
 
 if TYPE_CHECKING:
+    from stations.clock import Clock
     from stations.codec import Value
     from stations.devices.registers import Registers
 
@@ -54,6 +56,10 @@ class Slot:
         self.name = registers.name
         self._identity: Identity | None = None
         self._acknowledged: int | None = None
+
+    def memory(self, clock: Clock) -> UnitMemory:
+        """The memory of the device in the slot."""
+        return UnitMemory(self._registers, clock)
 
     def begin(self) -> None:
         """Sampling starts again: no sample has been read."""

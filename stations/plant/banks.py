@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 from stations.codec import NotEncodable, Value
 from stations.plant.bank import Bank, Busy, number
+from stations.plant.memory_bank import MemoryBank
 from stations.plant.simulations import axis_bank, chamber_bank, chamber_line_device
 from stations.profile_files import profile_of
 
@@ -80,10 +81,16 @@ def _reader(world: World, profile: Profile, slots: int) -> Bank:
 
 def _slot(world: World, unit: int, profile: Profile) -> Bank:
     sampler, preset = world.sampler, world.preset
+    memory = MemoryBank(world, unit)
     bits = profile.register("flags").bits
 
     def flags() -> Value:
         return (sampler.running << bits["running"]) | (sampler.overflow[unit] << bits["overflow"])
+
+    def commanded(values: dict[str, Value]) -> None:
+        if "tail" in values:
+            taken(values)
+        memory.write({name: value for name, value in values.items() if name != "tail"})
 
     def taken(values: dict[str, Value]) -> None:
         tail = int(number(values, "tail"))
@@ -101,5 +108,6 @@ def _slot(world: World, unit: int, profile: Profile) -> Bank:
         "head": lambda: sampler.head,
         "tail": lambda: sampler.tail[unit],
         "flags": flags,
+        **memory.sources(),
     }
-    return Bank(profile, sources, taken, lambda first, count: sampler.words(world.seats[unit], first, count))
+    return Bank(profile, sources, commanded, lambda first, count: sampler.words(world.seats[unit], first, count))

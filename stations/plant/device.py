@@ -101,6 +101,7 @@ class Devices:
         self._ratio = np.array([t.supply_ratio for t in truths])[:, None]
         self._gain = self._ratio
         self._shift = np.zeros((len(truths), 1))
+        self._offset_counts = np.zeros((len(truths), 3))
 
     def output(self, force: Array, temperature: Array) -> Array:
         """Output without noise, (n, s, 3) in g, under force (n, s, 3) in g at ``temperature`` (n, s) in °C."""
@@ -127,6 +128,11 @@ class Devices:
         self._first_bias[unit] += step_g
         self._bias[unit] = self._bias[unit] + (step_g if self._bias is not self._first_bias else 0.0)
 
+    def set_offsets(self, unit: int, steps: Sequence[int]) -> None:
+        """Offset registers of a unit (3,), which add to its counts."""
+        self._offset_counts = self._offset_counts.copy()
+        self._offset_counts[unit] = float(self._preset.offset_step) * np.asarray(steps, dtype=np.float64)
+
     def supply(self, part: Array) -> None:
         """Supplies at ``part`` (s,) of what they were: ratiometric outputs follow, the bias of others moves."""
         if self._preset.ratiometric:
@@ -139,6 +145,7 @@ class Devices:
         preset = self._preset
         inside = np.clip(output + self._shift, -preset.range_g, preset.range_g)
         raw = np.rint(self._gain * (preset.zero_level + preset.scale * inside) / self._lsb)
+        raw = raw + self._offset_counts
         return np.clip(raw, -preset.largest_count - 1, preset.largest_count).astype(np.int64)
 
 

@@ -21,7 +21,10 @@ NotNegative = Annotated[FiniteFloat, Field(ge=0.0)]
 
 
 class Preset(Strict):
-    """A kind of device. Standard deviations are those between units; densities are one-sided."""
+    """A kind of device. Standard deviations are those between units; densities are one-sided.
+
+    offset_step : counts of the output per step of its offset registers; 0 for a device without them
+    """
 
     name: str
     description: str
@@ -51,6 +54,7 @@ class Preset(Strict):
     supply_V: Positive
     thermometer_resolution_K: Positive
     thermometer_noise_K: NotNegative
+    offset_step: Annotated[int, Field(ge=0)] = 0
     stability: Stability | None = None
 
     @property

@@ -19,6 +19,7 @@ from stations.plant.bench import Bench
 from stations.plant.device import Devices, Truth, draw_truth, rotation, stream
 from stations.plant.dynamics import Dynamics
 from stations.plant.fixture import Fixture
+from stations.plant.flash import Flash
 from stations.plant.hidden import hidden_effect
 from stations.plant.keyed import keyed_normal
 from stations.plant.moisture import Moisture
@@ -44,6 +45,7 @@ AIR_NOISE_K = 0.01
 SUPPLY_NOISE = 2e-5
 VIBRATION_NOISE = 0.02
 HUMIDITY_NOISE_PCT = 0.1
+OUTAGE_S = 1.0
 
 
 class World:
@@ -89,6 +91,7 @@ class World:
             sim.local_gravity_m_s2 / STANDARD_G,
         )
         self.physics.orthogonality = 0.0 if self.station_errors is None else self.station_errors.orthogonality
+        self.flash = [Flash() for _ in self.serials]  # by unit, wherever it sits
         self.bench = Bench(
             self.preset,
             self._truths,
@@ -150,12 +153,30 @@ class World:
         if on == self.powered:
             return
         self.powered, self._switched_us = on, self.now_us
+        if not on:
+            for unit, flash in enumerate(self.flash):
+                flash.power_off(self.now_us)
+                self.physics.devices.set_offsets(unit, flash.offsets)
         self.physics.power(on=on, now=self.now)
 
     @property
     def since_power(self) -> float:
         """Seconds since the devices were powered; 0 while they are off."""
         return (self.now_us - self._switched_us) * 1e-6 if self.powered else 0.0
+
+    def program_memory(self, unit: int, copy: int) -> None:
+        """Programs the buffer of a unit into one of its copies; the supply may fail meanwhile, if a fault says so."""
+        flash = self.flash[unit]
+        flash.program(copy, self.now_us)
+        if flash.lose_power_s is not None:
+            at, flash.lose_power_s = self.now + flash.lose_power_s, None
+            self.schedule(at, -2 * unit - 2, lambda world: world.switch(on=False))
+            self.schedule(at + OUTAGE_S, -2 * unit - 1, lambda world: world.switch(on=True))
+
+    def set_offsets(self, unit: int, steps: Sequence[int]) -> None:
+        """Sets the offset registers of a unit."""
+        self.flash[unit].offsets = list(steps)
+        self.physics.devices.set_offsets(unit, steps)
 
     def scale_supply(self, units: Sequence[int], factor: float) -> None:
         """Sets the supplies of some units to ``factor`` times their nominal voltage."""

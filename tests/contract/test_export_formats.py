@@ -7,8 +7,9 @@ import pytest
 from typer.testing import CliRunner
 
 from pipelines.cli import app
-from pipelines.export import FORMATS, UnitCalibration, export_text
+from pipelines.export import FORMATS, ExportSettings, UnitCalibration, export_files
 from pipelines.export.polynomials import ORDER
+from pipelines.export.unit_noise import TERMS, UnitNoise
 from schemas.errors import WrongUse
 
 GUIDE = Path(__file__).resolve().parents[2] / "docs" / "how-to" / "export.md"
@@ -17,25 +18,45 @@ GUIDE = Path(__file__).resolve().parents[2] / "docs" / "how-to" / "export.md"
 def calibration(unit: str, left_out: tuple[str, ...] = ()) -> UnitCalibration:
     bias, response = np.zeros((ORDER, 3)), np.zeros((ORDER, 3, 3))
     bias[0], response[0] = (100.0, -50.0, 25.0), 256000.0 * np.eye(3)
-    return UnitCalibration(unit, "pass", "industrial", "LSB", bias, response, (-10.0, 60.0), left_out)
+    noise = UnitNoise(
+        dict.fromkeys(TERMS, np.array([16.0, 17.0, 18.0])), dict.fromkeys(TERMS, np.array([True, True, False])), 100.0
+    )
+    return UnitCalibration(
+        unit, "pass", "industrial", "LSB", bias, response, (-10.0, 60.0), left_out, None, noise, 524287.0
+    )
+
+
+SETTINGS = ExportSettings(nominal=256000.0, device_ids={"SN1": 1310988, "SN2": 1310996})
+
+
+def written(name: str, units: list[UnitCalibration]) -> dict[str, bytes]:
+    return export_files(name, units, "run-1", SETTINGS)
 
 
 @pytest.mark.parametrize("name", FORMATS)
 def test_a_format_names_every_unit_and_ends_its_last_line(name: str) -> None:
-    text = export_text(name, [calibration("SN1"), calibration("SN2")], "run-1", 256000.0)
-    assert "SN1" in text
-    assert "SN2" in text
-    assert text.endswith("\n")
+    files = written(name, [calibration("SN1"), calibration("SN2")])
+    for unit in ("SN1", "SN2"):
+        assert any(unit.encode() in content for content in files.values())
+    assert all(file.endswith(FORMATS[name].SUFFIX) for file in files)
+    if getattr(FORMATS[name], "ONE_UNIT", False):
+        assert len(files) == 2
+    assert all(content.endswith(b"\n") for file, content in files.items() if not file.endswith(".mat"))
+
+
+@pytest.mark.parametrize("name", FORMATS)
+def test_a_format_has_the_same_bytes_each_time(name: str) -> None:
+    assert written(name, [calibration("SN1")]) == written(name, [calibration("SN1")])
 
 
 @pytest.mark.parametrize("name", FORMATS)
 def test_an_effect_without_a_place_is_named_or_refused(name: str) -> None:
     units = [calibration("SN1", ("third_order",))]
     if getattr(FORMATS[name], "COMPLETE", False):
-        assert "third_order" in export_text(name, units, "run-1", 256000.0)
+        assert any(b"third_order" in content for content in written(name, units).values())
     else:
         with pytest.raises(WrongUse, match="third_order"):
-            export_text(name, units, "run-1", 256000.0)
+            written(name, units)
 
 
 @pytest.mark.parametrize("name", FORMATS)

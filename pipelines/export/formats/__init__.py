@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import re
 from importlib import import_module
 from pkgutil import iter_modules
 from typing import TYPE_CHECKING, Protocol, cast
 
+from pipelines.export.settings import ExportSettings
 from schemas.errors import WrongUse
 
 if TYPE_CHECKING:
@@ -15,12 +17,16 @@ if TYPE_CHECKING:
 
 
 class Format(Protocol):
-    """A module that writes calibrations in one format; COMPLETE where it names effects that have no polynomial."""
+    """A module that writes calibrations in one format.
+
+    SUFFIX : of the file's name; ONE_UNIT where a file holds one unit; COMPLETE where it names effects that have no polynomial
+    """
 
     NAME: str
+    SUFFIX: str
 
-    def write(self, units: Sequence[UnitCalibration], run: str, nominal: float | None) -> str:
-        """The calibrations as text; ``nominal`` is the output per g that the receiver assumes, where the format needs it."""
+    def write(self, units: Sequence[UnitCalibration], run: str, settings: ExportSettings) -> str | bytes:
+        """The calibrations as the content of a file."""
         ...
 
 
@@ -32,22 +38,36 @@ def _found() -> dict[str, Format]:
 FORMATS: dict[str, Format] = _found()
 
 
-def export_text(name: str, units: Sequence[UnitCalibration], run: str, nominal: float | None = None) -> str:
-    """The calibrations in one of :data:`FORMATS`.
-
-    Parameters
-    ----------
-    nominal : output per g that the autopilot's driver assumes; only for parameters.
+def export_files(
+    name: str, units: Sequence[UnitCalibration], run: str, settings: ExportSettings | None = None
+) -> dict[str, bytes]:
+    """Files by name with the calibrations in one of :data:`FORMATS`: one for each unit where the format holds one only.
 
     Raises
     ------
     WrongUse
-        The model has an effect that the format cannot hold, or the format needs a nominal scale.
+        The model has an effect that the format cannot hold, or the format needs a setting that is missing.
     """
-    form = FORMATS[name]
+    form, chosen = FORMATS[name], settings or ExportSettings()
     if not getattr(form, "COMPLETE", False):
         _refuse_left_out(name, units)
-    return form.write(units, run, nominal)
+    groups = [[unit] for unit in units] if getattr(form, "ONE_UNIT", False) else [list(units)]
+    files: dict[str, bytes] = {}
+    for group in groups:
+        content = form.write(group, run, chosen)
+        stem = re.sub(r"[^\w.-]", "_", group[0].unit) if len(groups) > 1 else "calibration"
+        if f"{stem}{form.SUFFIX}" in files:
+            raise WrongUse(
+                f"export: two units have the file name {stem}{form.SUFFIX}, one each is needed; export them one by one "
+                "with --units"
+            )
+        files[f"{stem}{form.SUFFIX}"] = content if isinstance(content, bytes) else content.encode()
+    return files
+
+
+def export_text(name: str, units: Sequence[UnitCalibration], run: str, settings: ExportSettings | None = None) -> str:
+    """The calibrations in a format of text, the files of several units one after another; see :func:`export_files`."""
+    return b"".join(export_files(name, units, run, settings).values()).decode()
 
 
 def _refuse_left_out(name: str, units: Sequence[UnitCalibration]) -> None:

@@ -1,81 +1,103 @@
-"""C: a header with the coefficients of every unit and the function that applies them."""
+"""C: a C99 header with the coefficients of every unit, a checksum of each, and the function that applies them."""
 
 from __future__ import annotations
 
 import re
+import struct
+import zlib
+from importlib.resources import files
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from pipelines.export.comments import comment
+from pipelines.export.fixed_point import ONE, fixed_point
+from pipelines.export.omissions import largest_error_ug
 from pipelines.export.polynomials import ORDER
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from pipelines.export.polynomials import UnitCalibration
+    from pipelines.export.settings import ExportSettings
 
 
 NAME = "c"
+SUFFIX = ".h"
 
-C_HEAD = """\
-/* Accelerometer calibration, run {run}.
- * specific force in g = inverse(K(t)) * (output - b(t)), t = temperature - 25 degrees Celsius,
- * b(t) = sum of bias[k] * t^k, K(t) = sum of response[k] * t^k; output in {out_unit}. */
-#ifndef TUMBLELINE_CALIBRATION_H
-#define TUMBLELINE_CALIBRATION_H
-
-typedef struct {{
-    const char *unit;
-    double low_C, high_C; /* temperatures that were measured */
-    double bias[{order}][3];
-    double response[{order}][3][3];
-}} tumbleline_calibration;
-"""
-
-C_TAIL = """
-/* Writes the specific force in g to force[3]; returns 0, or -1 where the response cannot be inverted. */
-static inline int tumbleline_correct(const tumbleline_calibration *c, const double output[3], double temperature_C,
-                                     double force[3])
-{
-    double t = temperature_C - 25.0, power = 1.0, k[3][3] = {{0}}, d[3];
-    for (int i = 0; i < 3; i++) d[i] = output[i];
-    for (int n = 0; n < ORDER; n++, power *= t)
-        for (int i = 0; i < 3; i++) {
-            d[i] -= c->bias[n][i] * power;
-            for (int j = 0; j < 3; j++) k[i][j] += c->response[n][i][j] * power;
-        }
-    double m[3][3];
-    for (int i = 0; i < 3; i++)
-        for (int j = 0; j < 3; j++)
-            m[j][i] = k[(i + 1) % 3][(j + 1) % 3] * k[(i + 2) % 3][(j + 2) % 3]
-                    - k[(i + 1) % 3][(j + 2) % 3] * k[(i + 2) % 3][(j + 1) % 3];
-    double det = k[0][0] * m[0][0] + k[0][1] * m[1][0] + k[0][2] * m[2][0];
-    if (det == 0.0) return -1;
-    for (int i = 0; i < 3; i++) force[i] = (m[i][0] * d[0] + m[i][1] * d[1] + m[i][2] * d[2]) / det;
-    return 0;
-}
-
-#endif
-""".replace("ORDER", str(ORDER))
+_PACKED = {"double": "d", "float": "f", "q24": "i"}
+_COUNTS_BITS = 48  # of the factor from counts to fixed point
 
 
-def write(units: Sequence[UnitCalibration], run: str, nominal: float | None) -> str:
-    """The header as text."""
-    del nominal
-    parts = [C_HEAD.format(run=run, out_unit=units[0].out_unit, order=ORDER)]
-    for c in units:
-        symbol = re.sub(r"\W", "_", c.unit)
-        low, high = c.temperatures
-        parts.append(
-            f"\n/* {c.unit}: {comment(c.certified)} */\n"
-            f"static const tumbleline_calibration tumbleline_{symbol} = {{\n"
-            f'    "{c.unit}", {low:.2f}, {high:.2f},\n    {_braces(c.bias)},\n    {_braces(c.response)}\n}};\n'
-        )
-    return "".join(parts) + C_TAIL
+def write(units: Sequence[UnitCalibration], run: str, settings: ExportSettings) -> str:
+    """The header as text, in double or single precision or in fixed point (``--arithmetic``)."""
+    kind = settings.arithmetic
+    template = (
+        files("pipelines.export").joinpath(f"templates/{'q24' if kind == 'q24' else 'real'}.h").read_text("utf-8")
+    )
+    real, suffix = ("float", "f") if kind == "float" else ("double", "")
+    head, tail = template.split("@UNITS@\n")
+    blocks = [_fixed_unit(unit) if kind == "q24" else _real_unit(unit, kind) for unit in units]
+    names = {"RUN": run, "OUT_UNIT": units[0].out_unit, "ORDER": str(ORDER), "REAL": real, "F": suffix}
+    names["BYTES"] = str(struct.calcsize(_PACKED[kind]))
+    names["BITS"] = "uint64_t" if kind == "double" else "uint32_t"
+    return _filled(head, names) + "\n".join(blocks) + _filled(tail, names)
 
 
-def _braces(values: Any) -> str:
+def _filled(text: str, names: dict[str, str]) -> str:
+    for name, value in names.items():
+        text = text.replace(f"@{name}@", value)
+    return text
+
+
+def _real_unit(unit: UnitCalibration, kind: str) -> str:
+    exact = np.float32 if kind == "float" else np.float64
+    bias, response = unit.bias.astype(exact), unit.response.astype(exact)
+    limits = np.array(unit.temperatures, dtype=exact)
+    suffix = "f" if kind == "float" else ""
+
+    def literal(value: Any) -> str:
+        text = str(exact(value))
+        return (text if any(mark in text for mark in ".en") else text + ".0") + suffix
+
+    crc = checksum(unit.unit, _PACKED[kind], [*limits, *bias.ravel(), *response.ravel()])
+    low, high = (literal(value) for value in limits)
+    return (
+        f"/* {comment(unit.unit)}: {comment(unit.certified)} */\n"
+        f"static const tumbleline_calibration tumbleline_{_symbol(unit)} = {{\n"
+        f'    "{unit.unit}", {low}, {high},\n    {_braces(bias, literal)},\n    {_braces(response, literal)},\n'
+        f"    0x{crc:08X}u\n}};\n"
+    )
+
+
+def _fixed_unit(unit: UnitCalibration) -> str:
+    own = fixed_point(unit)
+    error = largest_error_ug(unit, own.correct)
+    factor = round(2.0**_COUNTS_BITS / own.scale) if unit.out_unit == "LSB" else 0
+    low, high = (round(1000.0 * value) for value in unit.temperatures)
+    crc = checksum(unit.unit, "i", [low, high, *own.bias.ravel(), *own.inverse.ravel()])
+    counts = (
+        f"{factor} counts factor" if factor else f"output[] = value in {unit.out_unit} / {own.scale!r} * {ONE}, rounded"
+    )
+    return (
+        f"/* {comment(unit.unit)}: {comment(unit.certified)}\n"
+        f" * largest error against the full calibration, at 1 g: {error:.3g} ug; {counts} */\n"
+        f"static const tumbleline_calibration tumbleline_{_symbol(unit)} = {{\n"
+        f'    "{unit.unit}", {low}, {high}, INT64_C({factor}),\n    {_braces(own.bias, str)},\n    {_braces(own.inverse, str)},\n'
+        f"    0x{crc:08X}u\n}};\n"
+    )
+
+
+def checksum(unit: str, packing: str, values: Sequence[Any]) -> int:
+    """CRC-32 (ISO-HDLC, as zlib's) of the unit's name and the numbers, each with its lowest byte first."""
+    return zlib.crc32(unit.encode() + struct.pack(f"<{len(values)}{packing}", *values))
+
+
+def _symbol(unit: UnitCalibration) -> str:
+    return re.sub(r"\W", "_", unit.unit, flags=re.ASCII)
+
+
+def _braces(values: Any, literal: Any) -> str:
     if np.ndim(values) == 0:
-        return repr(float(values))
-    return "{" + ", ".join(_braces(value) for value in values) + "}"
+        return literal(values)
+    return "{" + ", ".join(_braces(value, literal) for value in values) + "}"

@@ -13,14 +13,16 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from pipelines.export.polynomials import UnitCalibration
+    from pipelines.export.settings import ExportSettings
 
 
 NAME = "csv"
+SUFFIX = ".csv"
 
 
-def write(units: Sequence[UnitCalibration], run: str, nominal: float | None) -> str:
+def write(units: Sequence[UnitCalibration], run: str, settings: ExportSettings) -> str:
     """The table as text."""
-    del run, nominal
+    del run, settings
     sink = io.StringIO()
     writer = csv.writer(sink, lineterminator="\n")
     writer.writerow(["unit", "quantity", "power_of_theta", "row", "column", "value", "unit_text", "certificate"])

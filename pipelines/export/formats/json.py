@@ -9,15 +9,17 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from pipelines.export.polynomials import UnitCalibration
+    from pipelines.export.settings import ExportSettings
 
 
 NAME = "json"
+SUFFIX = ".json"
 COMPLETE = True  # effects that have no polynomial are named in it
 
 
-def write(units: Sequence[UnitCalibration], run: str, nominal: float | None) -> str:
+def write(units: Sequence[UnitCalibration], run: str, settings: ExportSettings) -> str:
     """The document as text, with a line end."""
-    del nominal
+    del settings
     document = {
         "run": run,
         "correction": "a = inverse(sum response[k] θ^k) · (output − sum bias[k] θ^k), θ = T − 25 °C, a in g",

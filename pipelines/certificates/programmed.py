@@ -1,0 +1,87 @@
+"""Journal of the writing of coefficients into devices: for each unit what was begun, and how it ended.
+
+``programming/<aa>/<hash of the serial>/<sequence>.json``, created once each and named in the chain of the archive. An entry
+``begun`` is written before the first write to the device, so that a process that was killed leaves a beginning without an end:
+its unit is not certified until it is programmed again.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, Literal
+
+from pipelines.archive import files, hash_chain
+from pipelines.archive.provenance import provenance
+from pipelines.certificates.entries import folder_of
+from schemas.errors import ArchiveUnusable, WrongUse
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from pipelines.archive.store import Place
+
+TOP = "programming"
+SCHEMA = 1
+Event = Literal["begun", "failed", "proved"]
+
+
+def place_of_unit(serial: str) -> str:
+    """Folder of a unit's journal below the archive's root."""
+    return TOP + folder_of(serial).removeprefix("calibrations")
+
+
+def programming(root: Place, serial: str) -> list[dict[str, Any]]:
+    """The journal of a unit, in order; empty for a unit whose memory was never written.
+
+    Raises
+    ------
+    ArchiveUnusable
+        An entry is missing or belongs to another unit.
+    """
+    folder = root / place_of_unit(serial)
+    if not folder.is_dir():
+        return []
+    numbered = [place.name.removesuffix(".json") for place in folder.iterdir() if place.name.endswith(".json")]
+    names = sorted(name for name in numbered if hash_chain.is_number(name))
+    found = [files.read_json(folder / f"{name}.json") for name in names]
+    for count, (name, entry) in enumerate(zip(names, found, strict=True), 1):
+        if name != f"{count:06d}" or entry.get("serial") != serial:
+            raise ArchiveUnusable(
+                f"programming: {folder} has entry {name} of unit {entry.get('serial')!r} where entry {count} of {serial!r} is "
+                "needed; restore it from a copy"
+            )
+    return found
+
+
+def add(root: Place, serial: str, event: Event, content: Mapping[str, Any]) -> dict[str, Any]:
+    """The next entry of a unit's journal, written durably and named in the chain."""
+    by = provenance()
+    while True:
+        known = programming(root, serial)
+        number = len(known) + 1
+        stamp = {key: by[key] for key in ("who", "where", "when")}
+        entry = {**content, "serial": serial, "sequence": number, "event": event, **stamp, "schema": SCHEMA}
+        name = f"{place_of_unit(serial)}/{number:06d}.json"
+        if files.publish_first(root / name, files.manifest_bytes(entry)):
+            sealed = {name: files.sha256(root / name)}
+            hash_chain.append(root, TOP, sealed, {**by, "run": str(content.get("run", ""))})
+            return entry
+
+
+def unproved(root: Place, serial: str) -> str:
+    """Why the memory of a unit is not proved; empty where it is, or was never written."""
+    known = programming(root, serial)
+    if not known or known[-1]["event"] == "proved":
+        return ""
+    last = known[-1]
+    if last["event"] == "begun":
+        return f"the writing of its memory, begun on {last['when']} by {last['who']} on {last['where']}, has no end"
+    return f"the writing of its memory failed on {last['when']}: {last.get('step')}, {last.get('reason')}"
+
+
+def refuse_unproved(root: Place, serial: str) -> None:
+    """Refuse a unit whose memory may hold something else than its coefficients."""
+    why = unproved(root, serial)
+    if why:
+        raise WrongUse(
+            f"certify: unit {serial}: {why}; write it again with 'tumbleline program', which proves what it holds"
+        )

@@ -1,0 +1,258 @@
+"""``tumbleline correct``: apply a calibration to a recording, and track the bias where the force is known."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from pipelines.cli.options import (
+    ArchiveOption,
+    JsonOption,
+    RateOption,
+    TimeColumnOption,
+    console,
+    error_console,
+    print_json,
+    short,
+)
+
+if TYPE_CHECKING:
+    from pipelines.archive import Run
+    from pipelines.export.corrected import Corrected, FitOfUnit, Tracking
+    from pipelines.export.recording import Recording
+
+PART = "Results"
+ORDER = 345
+SUMMARY = "Correct a recording with a calibration, and track the bias."
+EXAMPLES = (
+    "tumbleline correct flight.csv --calibration latest:SN1 --output corrected.csv",
+    "tumbleline correct bench.csv --calibration latest:SN1 --at-rest --turn-on 300 --output corrected.parquet",
+)
+
+
+def command(
+    file: Annotated[Path, typer.Argument(metavar="FILE", help="Raw output over time, with a column of temperature.")],
+    calibration: Annotated[
+        str, typer.Option("--calibration", metavar="RUN:UNIT", help="The calibration: a run and one of its units.")
+    ] = "latest",
+    output: Annotated[
+        Path | None, typer.Option("--output", "-o", metavar="FILE", help="Corrected samples, as .csv or .parquet.")
+    ] = None,
+    columns: Annotated[
+        str, typer.Option("--columns", metavar="x,y,z", help="Columns of the output; x,y,z or out_x,… by default.")
+    ] = "",
+    time: TimeColumnOption = "",
+    rate: RateOption = None,
+    force: Annotated[
+        str, typer.Option("--force", metavar="X,Y,Z", help="True specific force, g, the same for all samples.")
+    ] = "",
+    gravity: Annotated[
+        float | None,
+        typer.Option(
+            "--gravity", metavar="M_S2", help="Local gravity with --at-rest, m/s²; that of the run by default."
+        ),
+    ] = None,
+    turn_on: Annotated[
+        float | None,
+        typer.Option(
+            "--turn-on",
+            metavar="UG",
+            min=0.0,
+            help="Change of the bias from switch-on to switch-on, µg (standard deviation).",
+        ),
+    ] = None,
+    step: Annotated[
+        float, typer.Option("--step", metavar="S", min=1e-3, help="Time between updates of the bias.")
+    ] = 1.0,
+    archive: ArchiveOption = None,
+    *,
+    at_rest: Annotated[
+        bool, typer.Option("--at-rest", help="Find where the unit is at rest and use the magnitude of gravity there.")
+    ] = False,
+    failed: Annotated[bool, typer.Option("--failed", help="Also use a unit that failed its limits.")] = False,
+    revoked: Annotated[bool, typer.Option("--revoked", help="Also use a revoked calibration.")] = False,
+    as_json: JsonOption = False,
+) -> None:
+    """Correct a recording: a = K⁻¹(ã − b) with all effects of the model, and the covariance of each sample.
+
+    The bias is tracked where the specific force is known (--force, or columns force_x, force_y, force_z) or the unit is at rest
+    (--at-rest); between updates its standard deviation grows as the noise of the unit says. Exit status 1: the updates
+    contradict the stated noise.
+    """
+    from pipelines.archive import Archive
+    from pipelines.export.corrected import corrected, fit_of_unit
+    from pipelines.export.recording import read_recording
+    from pipelines.jobs.model_files import use_formulas_of
+    from schemas.errors import DONE, PART_FAILED
+
+    name, _, unit = calibration.partition(":")
+    run = Archive(archive).run(name)
+    use_formulas_of(run)
+    fit = fit_of_unit(run, unit, failed=failed, revoked=revoked)
+    with error_console().status(f"reading {file.name}"):
+        recording = read_recording(file, [c.strip() for c in columns.split(",") if c.strip()], time=time, rate_hz=rate)
+    done = corrected(recording, fit, _tracking(run, recording, force, gravity, turn_on, step, at_rest=at_rest))
+    if output is not None:
+        _write(recording, done, output)
+    document = _document(recording, fit, done, output)
+    if as_json:
+        print_json(document)
+    else:
+        _print(document)
+    consistent = document["bias"] is None or document["bias"]["stated_uncertainty"] != "too small"
+    raise typer.Exit(DONE if consistent else PART_FAILED)
+
+
+def _tracking(
+    run: Run,
+    recording: Recording,
+    force: str,
+    gravity: float | None,
+    turn_on: float | None,
+    step: float,
+    *,
+    at_rest: bool,
+) -> Tracking | None:
+    """How the bias is tracked; None where nothing is known of the force."""
+    import numpy as np
+
+    from pipelines.export.corrected import Tracking
+    from pipelines.jobs.terms import archived_terms
+    from schemas.errors import WrongUse
+    from schemas.foreign import shown
+    from schemas.units import STANDARD_GRAVITY_M_S2
+
+    if not (force or at_rest or bool(np.isfinite(recording.known).all(axis=1).any())):
+        return None
+    known = None
+    if force:
+        try:
+            known = np.array([float(part) for part in force.split(",")])
+        except ValueError:
+            known = np.array([])
+        if known.shape != (3,) or not np.isfinite(known).all():
+            raise WrongUse(f"--force: found '{shown(force)}', three numbers X,Y,Z in g are needed; correct it")
+    terms = archived_terms(run.about)
+    if turn_on is None and terms is not None and terms.stability is not None:
+        turn_on = terms.stability.switch_on_ug
+    if turn_on is None:
+        raise WrongUse(
+            f"correct: run {run.id} states no change of the bias from switch-on to switch-on, it is needed to weigh the first "
+            "updates; give it with --turn-on UG (data sheet, or the power cycles of a run)"
+        )
+    local = gravity if gravity is not None else run.about.get("recipe", {}).get("local_gravity_m_s2")
+    if at_rest and (not isinstance(local, int | float) or not 9.7 < local < 9.9):
+        raise WrongUse(
+            f"correct: local gravity {local}, 9.7 to 9.9 m/s² is needed with --at-rest; give it with --gravity"
+        )
+    magnitude = float(local) / STANDARD_GRAVITY_M_S2 if at_rest and isinstance(local, int | float) else None
+    return Tracking(known, magnitude, turn_on, step)
+
+
+def _write(recording: Recording, done: Corrected, output: Path) -> None:
+    import io
+
+    from pipelines.archive import files
+    from pipelines.export.corrected import table_of
+    from schemas.errors import WrongUse
+
+    table = table_of(recording, done)
+    if output.suffix == ".parquet":
+        sink = io.BytesIO()
+        table.to_parquet(sink, index=False)
+        data = sink.getvalue()
+    elif output.suffix == ".csv":
+        data = table.to_csv(index=False, lineterminator="\n", float_format="%.10g").encode()
+    else:
+        raise WrongUse(f"--output: found '{output.name}', a name that ends in .csv or .parquet is needed; correct it")
+    files.publish(output, data, "correct", files.ELSEWHERE)
+
+
+def _document(recording: Recording, fit: FitOfUnit, done: Corrected, output: Path | None) -> dict[str, Any]:
+    import numpy as np
+
+    from schemas.units import AXES, MICRO
+
+    sd = MICRO * np.sqrt(np.diagonal(done.covariance, axis1=1, axis2=2))
+    certificate = fit.exported.certificate
+    document: dict[str, Any] = {
+        "file": recording.name,
+        "run": fit.run,
+        "unit": fit.exported.unit,
+        "certificate": None if certificate is None else certificate.document(),
+        "samples": len(recording.time),
+        "outside_temperature": done.outside,
+        "temperatures_C": list(fit.exported.temperatures),
+        "u_ug": dict(zip(AXES, np.sqrt(np.mean(sd**2, axis=0)).tolist(), strict=True)),
+        "u_contains": [
+            "references and noise of the calibration" if fit.budget else "noise of the calibration only",
+            *(["bias", "white noise of a sample"] if done.track is not None else []),
+        ],
+        "output": None if output is None else str(output),
+        "bias": None,
+    }
+    if done.track is None or done.flicker is None:
+        return document
+    track, check = done.track, done.track.consistency
+    end = np.sqrt(np.diagonal(track.covariance[-1]))
+    document["bias"] = {
+        "last_ug": dict(zip(AXES, (MICRO * track.bias[-1]).tolist(), strict=True)),
+        "u_last_ug": dict(zip(AXES, (MICRO * end).tolist(), strict=True)),
+        "updates": int(track.updated.sum()),
+        "steps": len(track.updated),
+        "rejected": track.rejected,
+        "nis": check.nis,
+        "nis_bounds": [check.low, check.high],
+        "lag_1": check.lag_1,
+        "lag_1_bound": check.lag_1_bound,
+        "stated_uncertainty": "too small" if _many(track.rejected, check.count) else check.stated,
+        "processes_s": done.flicker.correlation_s.tolist(),
+        "processes_flat": done.flicker.flatness,
+    }
+    return document
+
+
+def _many(rejected: int, used: int) -> bool:
+    """More than a hundredth of the updates beyond five sigma."""
+    return rejected > 1 + 0.01 * used
+
+
+def _print(document: dict[str, Any]) -> None:
+    out = console()
+
+    def line(text: str, style: str = "") -> None:
+        out.print(text, style=style or None, markup=False, soft_wrap=True)
+
+    def axes(values: dict[str, float]) -> str:
+        return ", ".join(f"{axis} {short(value)}" for axis, value in values.items())
+
+    certificate = document["certificate"]
+    line(
+        f"{document['file']}: {document['samples']} samples corrected with unit {document['unit']} of run {document['run']}"
+    )
+    line(f"certificate {certificate['certificate']}" if certificate else "not certified")
+    line(f"standard uncertainty of a sample, µg: {axes(document['u_ug'])} ({', '.join(document['u_contains'])})")
+    if document["outside_temperature"]:
+        low, high = document["temperatures_C"]
+        line(f"{document['outside_temperature']} samples are outside the measured {low:.1f} to {high:.1f} °C", "yellow")
+    bias = document["bias"]
+    if bias is not None:
+        line(f"bias at the end, µg: {axes(bias['last_ug'])}; standard uncertainty: {axes(bias['u_last_ug'])}")
+        low, high = bias["nis_bounds"]
+        line(f"updates: {bias['updates']} of {bias['steps']} steps, {bias['rejected']} beyond 5 σ rejected")
+        verdict = {
+            "consistent": "the stated uncertainty agrees with the innovations",
+            "too large": "the stated uncertainty is larger than needed",
+            "too small": "the stated uncertainty is TOO SMALL: the noise of the unit or the stated force is wrong",
+        }
+        nis = f"NIS {short(bias['nis'])} ({short(low)} to {short(high)})"
+        figures = f"{nis}, lag 1 {short(bias['lag_1'])} (± {short(bias['lag_1_bound'])})"
+        if bias["stated_uncertainty"] is None:
+            line("too few updates to judge the noise of the unit", "yellow")
+        else:
+            stated = bias["stated_uncertainty"]
+            line(f"{figures}: {verdict[stated]}", "yellow" if stated == "too small" else "")
+    if document["output"]:
+        line(f"written: {document['output']}")

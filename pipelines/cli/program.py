@@ -1,0 +1,119 @@
+"""``tumbleline program``: write the coefficients of a run into its devices, and prove that they are there."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from pipelines.cli.options import (
+    ArchiveOption,
+    JsonOption,
+    RunArgument,
+    StationOption,
+    console,
+    error_console,
+    print_json,
+    print_table,
+)
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from pipelines.export import UnitCalibration
+
+PART = "Certificates, trace, audit"
+ORDER = 417
+SUMMARY = "Write coefficients into the memory of the devices, and prove it."
+EXAMPLES = (
+    "tumbleline program latest --units SN1,SN2",
+    "tumbleline program latest --station line-1.toml --form q24 --yes",
+)
+UNATTENDED = "program: standard input ended before an answer, a line is needed; give --yes to write without an operator"
+
+
+def command(
+    run: RunArgument = "latest",
+    station: StationOption = None,
+    units: Annotated[
+        str, typer.Option("--units", metavar="SN,…", help="Write only these units; default: all that passed.")
+    ] = "",
+    form: Annotated[str, typer.Option("--form", metavar="float32|q24", help="Form of the coefficients.")] = "float32",
+    tolerance: Annotated[
+        float, typer.Option("--tolerance", metavar="UG", min=1.0, help="Largest error in the two poses, µg.")
+    ] = 3000.0,
+    archive: ArchiveOption = None,
+    *,
+    offset_registers: Annotated[
+        bool, typer.Option("--offset-registers", help="Also write the offset registers of an ADXL355.")
+    ] = False,
+    yes: Annotated[bool, typer.Option("--yes", "-y", help="Write without a question.")] = False,
+    as_json: JsonOption = False,
+) -> None:
+    """Write the coefficients of a run into the memory of its devices, which are in the slots of the run.
+
+    For each unit: archive what the memory holds, write the older of its two copies, read it back, power cycle, read it back, and
+    verify in two poses. A certificate ends before the first write; when all is proved, it is given again. A step that fails
+    leaves the unit not certified and the copy that was valid before untouched. Exit status 1: a unit failed.
+    """
+    from pipelines.archive import Archive
+    from pipelines.programming.job import chosen_units, document, program_run, station_of
+    from pipelines.programming.outcome import Choice
+    from schemas.errors import DONE, PART_FAILED, WrongUse, did_you_mean
+    from schemas.foreign import shown
+    from schemas.station import load_station
+
+    if form not in ("float32", "q24"):
+        raise WrongUse(f"--form: found '{shown(form)}'; {did_you_mean(form, ('float32', 'q24'))}")
+    source = Archive(archive).run(run)
+    chosen = chosen_units(source, [serial.strip() for serial in units.split(",") if serial.strip()])
+    config = load_station(station) if station is not None else station_of(source)
+    if not yes and not _agreed(source.id, config.name, chosen):
+        console().print("nothing was written", markup=False)
+        raise typer.Exit(DONE)
+    out = error_console()
+    outcomes, given = program_run(
+        source,
+        chosen,
+        config,
+        Choice(form, offset_registers, tolerance),
+        lambda text: out.print(f"program: {text}", markup=False, soft_wrap=True),
+    )
+    result = document(source, outcomes, given)
+    if as_json:
+        print_json(result)
+    else:
+        _print(result)
+    raise typer.Exit(PART_FAILED if any(one.outcome != "proved" for one in outcomes) else DONE)
+
+
+def _agreed(run: str, station: str, chosen: Sequence[tuple[int, UnitCalibration]]) -> bool:
+    from pipelines.cli.terminal import agreed
+
+    out = error_console()
+    for slot, unit in chosen:
+        out.print(f"  slot {slot:>2}  {unit.unit}  {unit.certified}", markup=False, soft_wrap=True)
+    question = f"Write the coefficients of run {run} into {len(chosen)} devices on station {station}?"
+    return agreed(question, "y or Enter writes, n writes nothing", UNATTENDED)
+
+
+def _print(result: dict[str, Any]) -> None:
+    rows = []
+    for one in result["units"]:
+        worst = max((abs(error) for pose in one["poses"] for error in pose["error_ug"]), default=None)
+        rows.append(
+            [
+                one["unit"],
+                one["outcome"],
+                one["copy"] if one["sequence"] else "",
+                "" if one["sequence"] is None else str(one["sequence"]),
+                one["crc32"] if one["sequence"] else "",
+                "" if worst is None else f"{worst:.0f}",
+                one["certificate"] or "not certified",
+            ]
+        )
+    heads = ["unit", "outcome", "copy", "sequence", "CRC-32", "largest error, µg", "certificate"]
+    print_table(heads, rows, title=f"run {result['run']}")
+    for one in result["units"]:
+        if one["outcome"] == "failed":
+            console().print(f"  {one['unit']} failed at '{one['step']}': {one['reason']}", markup=False, soft_wrap=True)

@@ -1,0 +1,230 @@
+"""A recording corrected with a calibration: specific force, its covariance, and the bias where the force is known."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pandas as pd
+from scipy.linalg import block_diag
+
+from inertial import static_intervals
+from inertial.correction import correct, output_covariance
+from inertial.noise.bias_filter import Track, track
+from inertial.noise.gauss_markov import bias_model, flicker_terms
+from pipelines.export.polynomials import unit_calibrations
+from pipelines.export.unit_noise import required_noise
+from pipelines.tables.calibration import read_calibration
+from schemas.errors import DataRejected, WrongUse, did_you_mean
+from schemas.units import AXES, MICRO
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+    from typing import Any
+
+    from numpy.typing import NDArray
+
+    from inertial.noise.gauss_markov import FlickerTerms
+    from pipelines.archive import Run
+    from pipelines.export.polynomials import UnitCalibration
+    from pipelines.export.recording import Recording
+
+    Array = NDArray[np.float64]
+
+PAIRS = ((0, 1), (0, 2), (1, 2))
+LONGEST_STEPS = 200_000
+
+
+@dataclass(frozen=True)
+class FitOfUnit:
+    """Coefficients of one unit.
+
+    coefficients : (3, p); covariance : (3p, 3p), of x before y before z; budget : whether it holds the stated references too
+    """
+
+    run: str
+    exported: UnitCalibration
+    effects: tuple[str, ...]
+    coefficients: Array
+    covariance: Array
+    nonlinear: Mapping[str, Mapping[str, Any]]
+    budget: bool
+
+
+@dataclass(frozen=True)
+class Tracking:
+    """How the bias is tracked.
+
+    force : (3,), g, where the recording states none for a sample; None: the force is not known
+    magnitude : g, of the force of a unit at rest; None: rest is not looked for
+    turn_on_ug : standard deviation of the bias from one switch-on to the next
+    step_s : time between updates
+    """
+
+    force: Array | None
+    magnitude: float | None
+    turn_on_ug: float
+    step_s: float = 1.0
+
+
+@dataclass(frozen=True)
+class Corrected:
+    """A corrected recording.
+
+    force : (n, 3), g; covariance : (n, 3, 3), g², of the calibration; with a track also of the bias and of noise
+    bias, bias_covariance : at the samples; None without tracking
+    outside : samples beyond the temperatures that were measured
+    """
+
+    force: Array
+    covariance: Array
+    track: Track | None
+    bias: Array | None
+    bias_covariance: Array | None
+    updated: NDArray[np.bool_] | None
+    outside: int
+    flicker: FlickerTerms | None = None
+
+
+def fit_of_unit(run: Run, unit: str, *, failed: bool, revoked: bool) -> FitOfUnit:
+    """The fitted coefficients of one unit, under the rules of the export: one that failed or was revoked is refused.
+
+    Parameters
+    ----------
+    unit : may be empty where the run has one unit
+    """
+    missing = [name for name in ("coefficients", "covariance") if name not in run.tables()]
+    if missing:
+        raise WrongUse(
+            f"run {run.id}: it has no {' and no '.join(missing)}, a fitted run is needed; give its 'tumbleline run' again"
+        )
+    calibration = read_calibration(run.table("coefficients"), run.table("covariance"))
+    if not unit and len(calibration.units) > 1:
+        raise WrongUse(
+            f"--calibration: run {run.id} has {len(calibration.units)} units, one is needed as RUN:UNIT; "
+            f"{did_you_mean('', calibration.units)}"
+        )
+    serial = unit or next(iter(calibration.units))
+    exported = unit_calibrations(run, (serial,), failed=failed, revoked=revoked)[0]
+    u = calibration.units.index(serial)
+    p = calibration.coefficients.shape[-1]
+    covariance: Array = np.asarray(block_diag(*list(calibration.covariance[u])), dtype=np.float64)
+    budget = _budget(run, serial, 3 * p)
+    return FitOfUnit(
+        run.id,
+        exported,
+        calibration.effects,
+        calibration.coefficients[u],
+        covariance if budget is None else budget,
+        calibration.nonlinear,
+        budget is not None,
+    )
+
+
+def _budget(run: Run, unit: str, size: int) -> Array | None:
+    """Covariance of the coefficients by the uncertainty budget; None where no references are stated."""
+    if "budget_covariance" not in run.tables():
+        return None
+    own = run.table("budget_covariance")
+    own = own[own["unit"] == unit]
+    if len(own) != size * (size + 1) // 2:
+        return None
+    matrix = np.zeros((size, size))
+    row, column, value = (own[name].to_numpy() for name in ("row", "column", "value"))
+    matrix[row, column] = value
+    matrix[column, row] = value
+    return matrix
+
+
+def corrected(recording: Recording, fit: FitOfUnit, tracking: Tracking | None) -> Corrected:
+    """The specific force of a recording, its covariance and, if wanted, the bias.
+
+    Raises
+    ------
+    DataRejected
+        The model needs a quantity that the recording does not have, or there is nothing to update the bias with.
+    """
+    own = (fit.effects, recording.state)
+    force = correct(*own, recording.output, fit.coefficients, fit.nonlinear)
+    covariance = output_covariance(
+        fit.effects, replace(recording.state, force=force, memory={}), fit.coefficients, fit.nonlinear, fit.covariance
+    )
+    temperature = recording.state.temperature
+    low, high = fit.exported.temperatures
+    outside = 0 if temperature is None else int(np.sum((temperature < low - 0.5) | (temperature > high + 0.5)))
+    if tracking is None:
+        return Corrected(force, covariance, None, None, None, None, outside)
+    return _tracked(recording, fit, tracking, Corrected(force, covariance, None, None, None, None, outside))
+
+
+def _tracked(recording: Recording, fit: FitOfUnit, tracking: Tracking, plain: Corrected) -> Corrected:
+    noise = required_noise(fit.exported.noise, fit.exported.unit, fit.run, "of the bias")
+    if not np.all(np.isfinite(noise.value["B"])):
+        raise DataRejected(
+            f"run {fit.run}: B of unit {fit.exported.unit} is not known; record the unit at rest for longer"
+        )
+    time, rate = recording.time, (len(recording.time) - 1) / (recording.time[-1] - recording.time[0])
+    per = max(1, round(tracking.step_s * rate))
+    steps = len(time) // per
+    if not 2 <= steps <= LONGEST_STEPS:
+        raise DataRejected(
+            f"{recording.name}: {steps} steps of {tracking.step_s:g} s, 2 to {LONGEST_STEPS} are needed to track the bias; "
+            "change --step"
+        )
+    middle, force = (_means(values, per) for values in (time, plain.force))
+    known, magnitude = _references(recording, tracking, plain.force, per, rate)
+    if not (np.all(np.isfinite(known), axis=1) | np.isfinite(magnitude)).any():
+        raise DataRejected(
+            f"{recording.name}: nowhere is the force known or the unit at rest, so nothing tells its bias from the force; give "
+            "--force, columns force_x, force_y, force_z, or record it at rest"
+        )
+    flicker = flicker_terms(per / rate, max(1000.0 * per / rate, float(time[-1] - time[0])))
+    terms = {symbol: values / MICRO for symbol, values in noise.value.items()}
+    model = bias_model(terms["N"], terms["B"], terms["K"], tracking.turn_on_ug / MICRO, flicker)
+    found = track(model, middle, force, known, magnitude, per / rate)
+    last = np.minimum(np.arange(len(time)) // per, steps - 1)
+    bias, own = found.expected[last], found.expected_covariance[last]
+    white = np.diag(model.white**2 * rate)
+    covariance = plain.covariance + own + white
+    return replace(
+        plain, force=plain.force - bias, covariance=covariance, track=found, bias=bias, bias_covariance=own,
+        updated=found.updated[last], flicker=flicker,
+    )  # fmt: skip
+
+
+def _references(recording: Recording, tracking: Tracking, force: Array, per: int, rate: float) -> tuple[Array, Array]:
+    """True force (m, 3) and its magnitude (m,) at the steps, g; NaN where they are not known."""
+    known = recording.known.copy()
+    if tracking.force is not None:
+        known[~np.isfinite(known).all(axis=1)] = tracking.force
+    stated = _means(known, per)  # a step with a sample of unknown force is unknown
+    magnitude = np.full(len(stated), np.nan)
+    if tracking.magnitude is not None:
+        rest = np.zeros(len(force))
+        found = static_intervals.find(force, rate)
+        for start, stop in zip(found.start, found.stop, strict=True):
+            rest[start:stop] = 1.0
+        magnitude[_means(rest, per) == 1.0] = tracking.magnitude
+    return stated, magnitude
+
+
+def _means(values: Array, per: int) -> Array:
+    """Means of ``per`` samples each, (n // per, …)."""
+    steps = len(values) // per
+    return values[: steps * per].reshape(steps, per, *values.shape[1:]).mean(axis=1)
+
+
+def table_of(recording: Recording, done: Corrected) -> pd.DataFrame:
+    """One row per sample: time, force in g, standard uncertainties and covariances, and the bias where it is tracked, in µg."""
+    columns: dict[str, Array] = {"time_s": recording.time}
+    columns |= {f"force_{axis}_g": done.force[:, i] for i, axis in enumerate(AXES)}
+    sd = np.sqrt(np.maximum(np.diagonal(done.covariance, axis1=1, axis2=2), 0.0))
+    columns |= {f"u_{axis}_ug": MICRO * sd[:, i] for i, axis in enumerate(AXES)}
+    columns |= {f"cov_{AXES[i]}{AXES[j]}_ug2": MICRO**2 * done.covariance[:, i, j] for i, j in PAIRS}
+    if done.bias is not None and done.bias_covariance is not None and done.updated is not None:
+        own = np.sqrt(np.diagonal(done.bias_covariance, axis1=1, axis2=2))
+        columns |= {f"bias_{axis}_ug": MICRO * done.bias[:, i] for i, axis in enumerate(AXES)}
+        columns |= {f"u_bias_{axis}_ug": MICRO * own[:, i] for i, axis in enumerate(AXES)}
+        columns["updated"] = done.updated.astype(np.float64)
+    return pd.DataFrame(columns)

@@ -1,0 +1,91 @@
+"""Calibration in fixed point: a = M(x)·(u − β(x)), u the output over a nominal scale, x = θ/64 K, in units of 2⁻²⁴."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from pipelines.export.polynomials import ORDER
+from schemas.errors import WrongUse
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from pipelines.export.polynomials import UnitCalibration
+
+    Array = NDArray[np.float64]
+    Integers = NDArray[np.int64]
+
+BITS = 24
+ONE = 1 << BITS
+TEMPERATURE_SPAN_K = 64.0
+_NODES = 33
+_LARGEST = 2**31 - 1
+
+
+@dataclass(frozen=True)
+class FixedPoint:
+    """Coefficients as 32-bit integers, units of 2⁻²⁴.
+
+    scale : output per g by which the output is divided
+    bias : (4, 3), g, of x⁰ … x³; inverse : (4, 3, 3), of x⁰ … x³
+    """
+
+    scale: float
+    bias: Integers
+    inverse: Integers
+
+    def correct(self, output: Array, temperature: float) -> Array:
+        """Specific force (n, 3) in g of outputs (n, 3) in the unit of the output, digit by digit as the C code computes it."""
+        u = np.rint(output / self.scale * ONE).astype(np.int64)
+        x = np.int64(_truncated(round(1000.0 * (temperature - 25.0)) * 32768, 125))
+        d = u - _horner(self.bias, x)
+        return _shifted((_horner(self.inverse, x) * d[:, None, :]).sum(axis=-1)) / ONE
+
+
+def fixed_point(unit: UnitCalibration) -> FixedPoint:
+    """The calibration of a unit in fixed point; K⁻¹ over temperature is a polynomial fitted over the measured range.
+
+    Raises
+    ------
+    WrongUse
+        A coefficient is beyond ±128.
+    """
+    scale = float(np.mean(np.diag(unit.response[0])))
+    span = TEMPERATURE_SPAN_K ** np.arange(ORDER)
+    low, high = unit.temperatures
+    middle, half = 0.5 * (low + high) - 25.0, 0.5 * (high - low)
+    order = ORDER if half > 0.0 and np.any(unit.response[1:]) else 1
+    theta = middle + half * np.cos(np.pi * (np.arange(_NODES) + 0.5) / _NODES)
+    response = np.einsum("tk,kij->tij", theta[:, None] ** np.arange(ORDER), unit.response) / scale
+    inverse = np.zeros((ORDER, 9))
+    powers = (theta[:, None] / TEMPERATURE_SPAN_K) ** np.arange(order)
+    inverse[:order] = np.linalg.lstsq(powers, np.linalg.inv(response).reshape(_NODES, 9), rcond=None)[0]
+    values = np.rint(unit.bias / scale * span[:, None] * ONE), np.rint(inverse.reshape(ORDER, 3, 3) * ONE)
+    largest = max(float(np.max(np.abs(v))) for v in values)
+    if not largest <= _LARGEST:
+        raise WrongUse(
+            f"export: a coefficient of unit {unit.unit} is {largest / ONE:.4g} in fixed point, ±{_LARGEST / ONE:.0f} is the "
+            "range; export with --arithmetic float"
+        )
+    bias, matrix = (v.astype(np.int64) for v in values)
+    return FixedPoint(scale, bias, matrix)
+
+
+def _horner(coefficients: Integers, x: np.int64) -> Integers:
+    value = coefficients[-1]
+    for lower in coefficients[-2::-1]:
+        value = lower + _shifted(value * x)
+    return value
+
+
+def _shifted(product: Integers) -> Integers:
+    """A product of two numbers in units of 2⁻²⁴, rounded to units of 2⁻²⁴."""
+    return (product + (ONE >> 1)) >> BITS
+
+
+def _truncated(value: int, divisor: int) -> int:
+    """Division of integers as C does it, towards zero."""
+    return value // divisor if value >= 0 else -(-value // divisor)

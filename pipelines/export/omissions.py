@@ -1,0 +1,73 @@
+"""What a format cannot hold, in µg: the error of the corrected output at 1 g over the temperatures that were measured."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from itertools import product
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from schemas.units import MICRO
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+
+    from numpy.typing import NDArray
+
+    from pipelines.export.polynomials import UnitCalibration
+
+    Array = NDArray[np.float64]
+    Applied = Callable[[Array, float], Array]
+
+TEMPERATURES = 9
+LEAST_UG = 1e-3
+_CUBE = np.array([corner for corner in product((-1.0, 0.0, 1.0), repeat=3) if any(corner)])
+DIRECTIONS = _CUBE / np.linalg.norm(_CUBE, axis=1)[:, None]
+"""The 26 directions (26, 3) of faces, edges and corners of a cube: specific forces of 1 g."""
+
+_OFF = 1.0 - np.eye(3)
+BIAS, BIAS_T = "bias", "temperature dependence of the bias"
+SCALE, SCALE_T = "scale", "temperature dependence of the scale"
+ACROSS, ACROSS_T = "misalignment", "temperature dependence of the misalignment"
+
+
+def outputs(unit: UnitCalibration, temperature: float) -> Array:
+    """Output (26, 3) of the unit by its full calibration, under 1 g in :data:`DIRECTIONS`."""
+    powers = (temperature - 25.0) ** np.arange(len(unit.bias))
+    return np.einsum("k,ki->i", powers, unit.bias) + DIRECTIONS @ np.einsum("k,kij->ij", powers, unit.response).T
+
+
+def largest_error_ug(unit: UnitCalibration, applied: Applied) -> float:
+    """Largest error of an axis, µg, of ``applied(output (n, 3), temperature)`` in g against the full calibration."""
+    grid = np.linspace(*unit.temperatures, TEMPERATURES)
+    return max(float(np.abs(applied(outputs(unit, t), t) - DIRECTIONS).max()) for t in grid) * MICRO
+
+
+def omitted(unit: UnitCalibration, parts: Sequence[str], nominal: float = 0.0) -> list[tuple[str, float]]:
+    """Each part that a format does not hold and the error without it, µg; only those that the calibration has."""
+    sizes = [(part, largest_error_ug(unit, _without(unit, part, nominal).correct)) for part in parts]
+    return [(part, size) for part, size in sizes if size >= LEAST_UG]
+
+
+def _without(unit: UnitCalibration, part: str, nominal: float) -> UnitCalibration:
+    bias, response = unit.bias.copy(), unit.response.copy()
+    if part == BIAS:
+        bias[0] = 0.0
+    elif part == BIAS_T:
+        bias[1:] = 0.0
+    elif part == SCALE:
+        response[0] += np.diag((nominal or float(np.mean(np.diag(response[0])))) - np.diag(response[0]))
+    elif part == SCALE_T:
+        response[1:] *= _OFF
+    elif part == ACROSS:
+        response[0] *= np.eye(3)
+    else:
+        response[1:] *= np.eye(3)
+    return replace(unit, bias=bias, response=response)
+
+
+def comment_lines(parts: Sequence[tuple[str, float]], total_ug: float) -> list[str]:
+    """Lines of a comment: what is not in the file, and the error that remains, µg."""
+    lines = [f"not in this file: {part}, up to {size:.3g} µg" for part, size in parts]
+    return [*lines, f"largest error of this file against the full calibration, at 1 g: {total_ug:.3g} µg"]

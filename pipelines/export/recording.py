@@ -1,0 +1,115 @@
+"""A recording of raw output as the science sees it: times, outputs, conditions and, where it is known, the true force."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pandas as pd
+
+from inertial.quantities import BY_COLUMN, FORCE_COLUMNS, LARGEST
+from inertial.state import State
+from pipelines.importers import files
+from schemas.errors import DataRejected, WrongUse, did_you_mean
+from schemas.foreign import shown
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+    from pathlib import Path
+
+    from numpy.typing import NDArray
+
+    Array = NDArray[np.float64]
+
+TIME = "time_s"
+USUAL = (("x", "y", "z"), ("out_x", "out_y", "out_z"))
+
+
+@dataclass(frozen=True)
+class Recording:
+    """Samples in order of time.
+
+    time : (n,), s; output : (n, 3), output unit
+    state : conditions of the samples; its force is zero
+    known : (n, 3), g, the true force; NaN where it is not known
+    name : of the file, for messages
+    """
+
+    time: Array
+    output: Array
+    state: State
+    known: Array
+    name: str
+
+
+def read_recording(path: Path, columns: Sequence[str], *, time: str = "", rate_hz: float | None = None) -> Recording:
+    """The recording of a file of samples.
+
+    Parameters
+    ----------
+    columns : of the output x, y, z; by default x, y, z or out_x, out_y, out_z
+    time : column of the time in s, ``time_s`` by default; rate_hz : instead of a column
+
+    Raises
+    ------
+    DataRejected
+        A column is missing, a value is not finite, or the time does not run forward.
+    """
+    table, _ = files.read(path)
+    table = table.set_axis([str(name) for name in table.columns], axis=1)
+    there, where = list(table.columns), path.name
+    chosen = list(columns) or next((list(names) for names in USUAL if set(names) <= set(there)), [])
+    if len(chosen) != 3:
+        raise WrongUse(
+            f"{where}: columns {', '.join(shown(name) for name in there[:8])}, three columns of output are needed; name "
+            "them with --columns x,y,z"
+        )
+    output = np.stack([_finite(table, name, where) for name in chosen], axis=1)
+    n = len(output)
+    if rate_hz is not None and time:
+        raise WrongUse(f"{where}: --time and --rate are both given, one is needed; leave one out")
+    moments = np.arange(n) / rate_hz if rate_hz is not None else _finite(table, time or TIME, where)
+    if n < 2 or not np.all(np.diff(moments) > 0.0):
+        raise DataRejected(
+            f"{where}: {n} samples whose time does not always run forward, two or more in order are needed; sort the "
+            "file, or cut it where its clock begins anew"
+        )
+    known = np.full((n, 3), np.nan)
+    if set(FORCE_COLUMNS) <= set(there):
+        known = np.stack([_numbers(table[name]) for name in FORCE_COLUMNS], axis=1)
+    return Recording(moments, output, _state(table, moments, {*chosen, time or TIME}, where), known, where)
+
+
+def _state(table: pd.DataFrame, time: Array, used: set[str], where: str) -> State:
+    """Conditions by the names of recorded quantities; any other column of numbers is a covariate."""
+    known: dict[str, Any] = {}
+    covariates: dict[str, Array] = {}
+    for name in table.columns:
+        column = str(name)
+        if column in used or column in FORCE_COLUMNS or not pd.api.types.is_numeric_dtype(table[name]):
+            continue
+        row = BY_COLUMN.get(column)
+        if row is not None and row.attribute and not row.once:
+            known[row.attribute] = row.factor * _finite(table, column, where)
+        elif row is None or not row.attribute:
+            covariates[column] = _numbers(table[name])
+    known["time"] = time
+    return State(force=np.zeros((len(time), 3)), **known, covariates=covariates)
+
+
+def _numbers(column: pd.Series) -> Array:
+    return pd.to_numeric(column, errors="coerce").to_numpy(dtype=np.float64)
+
+
+def _finite(table: pd.DataFrame, name: str, where: str) -> Array:
+    if name not in table.columns:
+        raise DataRejected(f"{where}: column '{shown(name)}' is not there; {did_you_mean(name, list(table.columns))}")
+    values = _numbers(table[name])
+    bad = np.flatnonzero(~(np.abs(values) < LARGEST))
+    if bad.size:
+        raise DataRejected(
+            f"{where}: row {bad[0] + 1}, column '{shown(name)}': found {shown(str(table[name].iloc[bad[0]]))}, a finite number "
+            "is needed; remove the gap, or cut the recording there"
+        )
+    return values

@@ -1,0 +1,83 @@
+/* Accelerometer calibration in fixed point, run @RUN@. Every number is an integer in units of 2^-24.
+ * specific force in g = M(x) * (u - b(x)), u = output / nominal scale (g), x = (temperature - 25 degrees Celsius) / 64,
+ * b(x) = sum of bias[k] * x^k, M(x) = sum of inverse[k] * x^k: a polynomial fitted between low_mC and high_mC.
+ * Right shifts of negative numbers are taken to be arithmetic, as every common compiler does. */
+#ifndef TUMBLELINE_CALIBRATION_H
+#define TUMBLELINE_CALIBRATION_H
+
+#include <stddef.h>
+#include <stdint.h>
+#include <string.h>
+
+typedef struct {
+    const char *unit;
+    int32_t low_mC, high_mC; /* temperatures that were measured, thousandths of a degree Celsius */
+    int64_t per_count;       /* 2^48 g per count; 0 where the output is not in counts */
+    int32_t bias[@ORDER@][3];
+    int32_t inverse[@ORDER@][3][3];
+    uint32_t crc32; /* of unit, low_mC, high_mC, bias and inverse, lowest byte first */
+} tumbleline_calibration;
+
+@UNITS@
+
+/* CRC-32 (ISO-HDLC): 0xCBF43926 for "123456789"; begin with crc = 0. */
+static inline uint32_t tumbleline_crc32(uint32_t crc, const unsigned char *data, size_t length)
+{
+    crc = ~crc;
+    while (length--) {
+        crc ^= *data++;
+        for (int bit = 0; bit < 8; bit++) crc = (crc >> 1) ^ (0xEDB88320u & (0u - (crc & 1u)));
+    }
+    return ~crc;
+}
+
+static inline uint32_t tumbleline_crc32_number(uint32_t crc, int32_t value)
+{
+    unsigned char data[4];
+    for (int i = 0; i < 4; i++) data[i] = (unsigned char)((uint32_t)value >> (8 * i));
+    return tumbleline_crc32(crc, data, sizeof data);
+}
+
+/* 1 where the coefficients are those that were exported, else 0. */
+static inline int tumbleline_intact(const tumbleline_calibration *c)
+{
+    uint32_t crc = tumbleline_crc32(0, (const unsigned char *)c->unit, strlen(c->unit));
+    crc = tumbleline_crc32_number(tumbleline_crc32_number(crc, c->low_mC), c->high_mC);
+    for (int n = 0; n < @ORDER@; n++)
+        for (int i = 0; i < 3; i++) crc = tumbleline_crc32_number(crc, c->bias[n][i]);
+    for (int n = 0; n < @ORDER@; n++)
+        for (int i = 0; i < 3; i++)
+            for (int j = 0; j < 3; j++) crc = tumbleline_crc32_number(crc, c->inverse[n][i][j]);
+    return crc == c->crc32;
+}
+
+/* The output in units of 2^-24 g, for a device whose output is in counts (@OUT_UNIT@). */
+static inline int32_t tumbleline_from_counts(const tumbleline_calibration *c, int32_t counts)
+{
+    return (int32_t)(((int64_t)counts * c->per_count + ((int64_t)1 << 23)) >> 24);
+}
+
+static inline int64_t tumbleline_product(int64_t a, int64_t b) { return (a * b + ((int64_t)1 << 23)) >> 24; }
+
+/* Writes the specific force in units of 2^-24 g to force[3]; output in the same units, temperature in thousandths of a degree. */
+static inline void tumbleline_correct(const tumbleline_calibration *c, const int32_t output[3], int32_t temperature_mC,
+                                      int32_t force[3])
+{
+    int64_t x = ((int64_t)temperature_mC - 25000) * 32768 / 125, d[3];
+    for (int i = 0; i < 3; i++) {
+        int64_t b = c->bias[@ORDER@ - 1][i];
+        for (int n = @ORDER@ - 2; n >= 0; n--) b = c->bias[n][i] + tumbleline_product(b, x);
+        d[i] = output[i] - b;
+    }
+    for (int i = 0; i < 3; i++) {
+        int64_t sum = 0;
+        for (int j = 0; j < 3; j++) {
+            int64_t m = c->inverse[@ORDER@ - 1][i][j];
+            for (int n = @ORDER@ - 2; n >= 0; n--) m = c->inverse[n][i][j] + tumbleline_product(m, x);
+            sum += m * d[j];
+        }
+        force[i] = (int32_t)((sum + ((int64_t)1 << 23)) >> 24);
+    }
+}
+
+#endif

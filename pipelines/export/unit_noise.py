@@ -1,0 +1,68 @@
+"""Noise of a unit for export: the terms N, B and K of its static record by axis."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from pipelines.tables.frames import rows_of
+from schemas.errors import WrongUse
+from schemas.units import AXES
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from numpy.typing import NDArray
+
+    from pipelines.archive import Run
+
+TERMS = ("N", "B", "K")
+
+
+@dataclass(frozen=True)
+class UnitNoise:
+    """Terms of IEEE Std 952 of x, y and z: the value where it is identified, else its upper limit (95 %).
+
+    value : (3,) by symbol: N in µg/√Hz (two-sided: σ(τ) = N/√τ), B in µg, K in µg/√s; NaN for an axis without noise
+    identified : (3,) by symbol
+    rate_hz : of the static record
+    """
+
+    value: Mapping[str, NDArray[np.float64]]
+    identified: Mapping[str, NDArray[np.bool_]]
+    rate_hz: float
+
+    def remark(self, symbol: str) -> str:
+        """Which axes have an upper limit in place of a value; empty where none has."""
+        limits = [axis for axis, known in zip(AXES, self.identified[symbol], strict=True) if not known]
+        return f"upper limit (95 %), not identified: {', '.join(limits)}" if limits else ""
+
+
+def noise_of_units(run: Run) -> dict[str, UnitNoise]:
+    """Noise of the units of a run by serial; empty where the run has no static record."""
+    if not {"noise", "readings"} <= set(run.tables()):
+        return {}
+    table, readings = run.table("noise"), run.table("readings")
+    rates = readings.loc[readings["kind"] == "allan", "rate_hz"]
+    if table.empty or rates.empty:
+        return {}
+    rows = {(str(r["unit"]), str(r["term"]), str(r["axis"])): r for r in rows_of(table)}
+    found: dict[str, UnitNoise] = {}
+    for unit in dict.fromkeys(key[0] for key in rows):
+        own = {symbol: [rows[unit, symbol, axis] for axis in AXES] for symbol in TERMS}
+        value = {s: np.array([float(r["value"] if r["identified"] else r["high"]) for r in own[s]]) for s in TERMS}
+        identified = {s: np.array([bool(r["identified"]) for r in own[s]]) for s in TERMS}
+        found[unit] = UnitNoise(value, identified, float(rates.iloc[0]))
+    return found
+
+
+def required_noise(noise: UnitNoise | None, unit: str, run: str, form: str) -> UnitNoise:
+    """The noise of a unit, refused where it is not known."""
+    if noise is None or not all(np.all(np.isfinite(noise.value[s])) for s in ("N", "K")):
+        raise WrongUse(
+            f"export: run {run} has no noise terms of unit {unit}, format {form} needs them; run a recipe with static_record_s "
+            "above 0"
+        )
+    return noise

@@ -1,0 +1,1 @@
+"""Writing of coefficients into the memory of devices, and the proof that they are there."""

@@ -1,0 +1,137 @@
+"""The programming of a run: which units, on which station, what their certificates become."""
+
+from __future__ import annotations
+
+from contextlib import contextmanager
+from datetime import UTC, datetime
+from typing import TYPE_CHECKING, Any
+
+from pipelines.archive import Archive, files
+from pipelines.archive.locks import alone
+from pipelines.archive.signatures import public_keys
+from pipelines.certificates import Ledger
+from pipelines.certificates.days import today
+from pipelines.certificates.programmed import TOP
+from pipelines.chain.certify import certify
+from pipelines.export import unit_calibrations
+from pipelines.programming.outcome import Choice, Outcome
+from pipelines.programming.process import Programmer
+from schemas.errors import WrongUse
+from schemas.recipe import Lot, Recipe
+from schemas.station import StationConfig
+from stations import open_station
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Generator, Mapping, Sequence
+
+    from pipelines.archive import Run
+    from pipelines.certificates.validity import Calibration
+    from pipelines.export import UnitCalibration
+
+REASON = "coefficients are written into the device"
+
+
+def chosen_units(run: Run, serials: Sequence[str]) -> list[tuple[int, UnitCalibration]]:
+    """Slots and calibrations of the units of a run that passed, or of those named; the rules of an export hold."""
+    if not run.about.get("capture"):
+        raise WrongUse(
+            f"program: run {run.id} is an import, a run on a station is needed; measure the units on a station"
+        )
+    slots = {unit["serial"]: int(unit["slot"]) for unit in run.about["lot"]["units"]}
+    found = unit_calibrations(run, tuple(serials), failed=False, revoked=True)
+    allowed = [unit for unit in found if not _revoked(unit)]
+    gone = [unit for unit in found if _revoked(unit)]
+    if gone and (serials or not allowed):
+        raise WrongUse(
+            f"program: unit {gone[0].unit}: {gone[0].certified}, a calibration that was not revoked is needed; measure it again"
+        )
+    return [(slots[unit.unit], unit) for unit in allowed]
+
+
+def _revoked(unit: UnitCalibration) -> bool:
+    """Whether a calibration was revoked for another reason than that it was being written into the device."""
+    one = unit.certificate
+    return one is not None and one.state == "revoked" and one.reason != REASON
+
+
+def station_of(run: Run) -> StationConfig:
+    """The station that measured a run."""
+    return StationConfig.model_validate(run.about["station"])
+
+
+def program_run(
+    run: Run,
+    units: Sequence[tuple[int, UnitCalibration]],
+    config: StationConfig,
+    choice: Choice,
+    report: Callable[[str], None],
+) -> tuple[list[Outcome], dict[str, str]]:
+    """What became of each unit, and the certificates that were given again, by serial.
+
+    The certificate of a unit ends before the first write to its device. A unit that was certified with these coefficients is
+    certified again, to the same day, when its memory is proved.
+    """
+    root, ledger, day = run.archive.root, Ledger(run.archive.root), today()
+    serials = [unit.unit for _, unit in units]
+    held = {serial: _held(ledger, serial, run.id, day) for serial in serials}
+    numbers = {
+        # the end of a certificate that is valid is the next event, and the new certificate comes after it
+        serial: len(ledger.events(serial)) + 1 + _ends(ledger, serial, day) if held[serial] is not None else 0
+        for serial in serials
+    }
+
+    def end_certificate(serial: str) -> None:
+        if _ends(ledger, serial, day):
+            ledger.revoke(serial, REASON, day=day)
+
+    choice = Choice(choice.form, choice.with_offsets, choice.tolerance_ug, int(datetime.now(UTC).strftime("%Y%m%d")))
+    with _station(run, config) as (station, saved), alone(root / TOP, wait=True):
+        recipe = Recipe.model_validate(run.about["recipe"])
+        worker = Programmer(station, root, run.id, recipe, choice, numbers, end_certificate, report, saved)
+        outcomes = worker.program(units)
+    given: dict[str, str] = {}
+    for one in outcomes:
+        old = held[one.serial]
+        if one.outcome == "proved" and old is not None:
+            reason = f"written into the device, copy {one.copy.upper()}, sequence {one.document()['sequence']}"
+            done = certify(ledger, run, [one.serial], day, old.stated_until, reason=reason, keys=public_keys())
+            given[one.serial] = done.events[0].certificate
+    return outcomes, given
+
+
+def _held(ledger: Ledger, serial: str, run: str, day: str) -> Calibration | None:
+    """The calibration of this run that a unit has today, or had until a writing that was not completed."""
+    own = [one for one in ledger.calibrations(serial) if one.run == run and one.stated_until > day >= one.start]
+    found = [one for one in own if one.holds(day) or (one.ended_by is not None and one.ended_by.reason == REASON)]
+    return found[-1] if found else None
+
+
+def _ends(ledger: Ledger, serial: str, day: str) -> bool:
+    """Whether a unit has a certificate that the writing ends."""
+    return any(one.until > day and one.start < one.until for one in ledger.calibrations(serial))
+
+
+@contextmanager
+def _station(run: Run, config: StationConfig) -> Generator[tuple[Any, Callable[[], None]]]:
+    """The station, and what keeps the state of a simulated one, which goes on where the run or the last writing left it."""
+    lot = Lot.model_validate(run.about["lot"])
+    root = run.archive.root
+    place = root / TOP / "station" / f"{run.about['capture']}.bin"
+    resume = None
+    if config.kind == "simulated":
+        resume = place.read_bytes() if place.is_file() else Archive(root).capture(run.about["capture"]).last_state()
+    with open_station(config, lot, resume=resume, run=f"program {run.id}") as station:
+
+        def saved() -> None:
+            if config.kind == "simulated":
+                files.publish(place, station.state())
+
+        yield station, saved
+
+
+def document(run: Run, outcomes: Sequence[Outcome], given: Mapping[str, str]) -> dict[str, Any]:
+    """The result for JSON."""
+    return {
+        "run": run.id,
+        "units": [{**one.document(), "certificate": given.get(one.serial)} for one in outcomes],
+    }

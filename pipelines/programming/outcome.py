@@ -1,0 +1,61 @@
+"""What is written into devices, and what became of each unit."""
+
+from __future__ import annotations
+
+import zlib
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from pipelines.export.device_block import Block, Form
+    from pipelines.export.polynomials import UnitCalibration
+    from stations.devices.memory import Copy, UnitMemory
+
+
+@dataclass(frozen=True)
+class Choice:
+    """What is written.
+
+    form : of the coefficients; with_offsets : also the offset registers of an ADXL355
+    tolerance_ug : largest error of an axis in the two poses; it finds wrong coefficients and is no statement of accuracy
+    date : yyyymmdd
+    """
+
+    form: Form = "float32"
+    with_offsets: bool = False
+    tolerance_ug: float = 3000.0
+    date: int = 0
+
+
+@dataclass
+class Outcome:
+    """What became of a unit: ``proved``, or ``failed`` at a step for a reason."""
+
+    serial: str
+    slot: int
+    unit: UnitCalibration
+    certificate: int
+    memory: UnitMemory
+    outcome: str = "begun"
+    step: str = ""
+    reason: str = ""
+    copy: Copy = "a"
+    block: Block | None = None
+    content: bytes = b""
+    step_counts: int = 0
+    poses: list[dict[str, Any]] = field(default_factory=list[dict[str, Any]])
+
+    @property
+    def open(self) -> bool:
+        """Whether nothing has failed and nothing is proved yet."""
+        return self.outcome == "begun"
+
+    def document(self) -> dict[str, Any]:
+        """The outcome for JSON."""
+        block = self.block
+        return {
+            "unit": self.serial, "outcome": self.outcome, "step": self.step, "reason": self.reason, "copy": self.copy.upper(),
+            "sequence": None if block is None else block.sequence, "form": None if block is None else block.form,
+            "crc32": f"{zlib.crc32(self.content[:-4]):08X}", "bytes": len(self.content),
+            "offsets": None if block is None else list(block.offsets), "poses": self.poses,
+        }  # fmt: skip

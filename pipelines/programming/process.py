@@ -1,0 +1,265 @@
+"""The writing of coefficients into devices: archive what was there, write, read back, power cycle, read back, verify.
+
+A step that fails leaves its unit not certified, and the copy that was valid before untouched: the older of the two copies is
+written, and its sequence number makes it count only when it is complete.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from inertial.frames import force_from_angles
+from pipelines.certificates.programmed import add
+from pipelines.export.device_block import block_of, pack, unpack
+from pipelines.programming.checks import InPose, require_in_pose, require_moved, write_offsets_again
+from pipelines.programming.outcome import Choice, Outcome
+from schemas.errors import OperatorNeeded, StationError, StationRefused, WrongUse
+from schemas.units import STANDARD_GRAVITY_M_S2
+from stations.devices.memory import COPIES
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping, Sequence
+
+    from numpy.typing import NDArray
+
+    from pipelines.archive.store import Place
+    from pipelines.export.polynomials import UnitCalibration
+    from schemas.recipe import Recipe
+    from stations.devices.memory import UnitMemory
+    from stations.station import Station
+
+    Array = NDArray[np.float64]
+
+OFF_S, BOOT_S = 2.0, 1.0
+POSES = 2
+LARGEST_STEP = 2**15 - 1
+
+
+@dataclass
+class Programmer:
+    """The writing of the devices of one run.
+
+    run : its name; recipe : whose poses, dwell and gravity the verification uses
+    certificates : number behind the serial that the block names; 0 without one
+    before_first_write : ends the certificate of a unit, as its device is about to change
+    saved : called after every step, so that a simulated station can be continued
+    """
+
+    station: Station
+    root: Place
+    run: str
+    recipe: Recipe
+    choice: Choice
+    certificates: Mapping[str, int]
+    before_first_write: Callable[[str], None]
+    report: Callable[[str], None]
+    saved: Callable[[], None]
+
+    def program(self, units: Sequence[tuple[int, UnitCalibration]]) -> list[Outcome]:
+        """Writes units (slot, calibration) and gives what became of each.
+
+        Raises
+        ------
+        StationError, LeaseLost
+            The station fails for all; every unit that was begun is journalled as failed.
+        """
+        outcomes = [
+            Outcome(unit.unit, slot, unit, self.certificates.get(unit.unit, 0), self._memory(slot))
+            for slot, unit in units
+        ]
+        self._check(outcomes)
+        step = "archive what was there"
+        try:
+            for step, act in (
+                ("archive what was there", self._archive), ("write", self._write), ("read back", self._read_back),
+            ):  # fmt: skip
+                self._each(outcomes, step, act)
+            if any(one.open for one in outcomes):
+                step = "power cycle"
+                self._power_cycle()
+            self._each(outcomes, "read back after the power cycle", self._after_power)
+            step = "verify"
+            self._verify(outcomes)
+        except BaseException as problem:
+            for one in outcomes:
+                if one.open and one.block is not None:
+                    self._failed(one, step, str(problem) or type(problem).__name__)
+            raise
+        for one in outcomes:
+            if one.open:
+                one.outcome = "proved"
+                add(self.root, one.serial, "proved", {"run": self.run, **one.document()})
+        self.saved()
+        return outcomes
+
+    def _memory(self, slot: int) -> UnitMemory:
+        return self.station.reader.slots[slot].memory(self.station.clock)
+
+    def _check(self, outcomes: Sequence[Outcome]) -> None:
+        """Refuses, before anything is written, what cannot end in a proof."""
+        reader = self.station.reader
+        reader.require_switch()
+        for pose in self._poses():
+            self.station.table.check(pose.outer_deg, pose.inner_deg)
+        if not reader.powered():
+            reader.switch("on")
+            self.station.clock.sleep(BOOT_S)
+        if reader.sampling() == "running":
+            reader.stop()
+        for one in outcomes:
+            one.memory.require()
+            if not reader.slots[one.slot].holds(one.serial):
+                raise OperatorNeeded(
+                    f"slot {one.slot}: unit {one.serial} is not in it; seat the unit, or correct the lot"
+                )
+            one.step_counts = one.memory.offset_step if self.choice.with_offsets else 0
+            if self.choice.with_offsets and not one.step_counts:
+                raise WrongUse(
+                    f"program: unit {one.serial} has no offset registers, an ADXL355 has; leave --offset-registers out"
+                )
+
+    def _each(self, outcomes: Sequence[Outcome], step: str, act: Callable[[Outcome], None]) -> None:
+        """A step for every unit that has not failed; a unit that fails does not stop the others."""
+        for one in outcomes:
+            if not one.open:
+                continue
+            self.report(f"{one.serial}: {step}")
+            self.station.require()
+            try:
+                act(one)
+            except (StationError, WrongUse) as problem:
+                if one.block is None:  # nothing has been written
+                    one.outcome, one.step, one.reason = "failed", step, str(problem)
+                else:
+                    self._failed(one, step, str(problem))
+            self.saved()
+
+    def _failed(self, one: Outcome, step: str, reason: str) -> None:
+        one.outcome, one.step, one.reason = "failed", step, reason
+        add(self.root, one.serial, "failed", {"run": self.run, "step": step, "reason": reason, **one.document()})
+
+    def _archive(self, one: Outcome) -> None:
+        """Keeps what the memory holds, chooses the copy to write and journals the beginning."""
+        memory, status = one.memory, one.memory.wait()
+        there = {copy: memory.read(copy) for copy in COPIES}
+        valid = {copy: block for copy in COPIES if (block := unpack(there[copy])) is not None}
+        newest = max(valid, key=lambda copy: valid[copy].sequence, default=None)
+        one.copy = "b" if newest == "a" else "a"
+        if status.erases[one.copy] >= status.endurance:
+            raise StationRefused(
+                f"{memory.name}: copy {one.copy.upper()} has {status.erases[one.copy]} erasures, {status.endurance} are "
+                "specified; it is worn out: replace the device"
+            )
+        offsets = self._offsets(one)
+        block = block_of(
+            one.unit, self.choice.form, sequence=valid[newest].sequence + 1 if newest else 1, certificate=one.certificate,
+            date=self.choice.date, offsets=offsets, step=one.step_counts,
+        )  # fmt: skip
+        one.content = pack(block)
+        before = {
+            "copies": {copy.upper(): content.hex() for copy, content in there.items()},
+            "erasures": {copy.upper(): status.erases[copy] for copy in COPIES},
+            "offsets": list(memory.offsets()) if memory.offset_step else None,
+        }
+        self.before_first_write(one.serial)
+        one.block = block
+        add(self.root, one.serial, "begun", {
+            "run": self.run, "station": self.station.name, "slot": one.slot, "before": before, **one.document(),
+            "content": one.content.hex(),
+        })  # fmt: skip
+
+    def _offsets(self, one: Outcome) -> tuple[int, int, int]:
+        """Steps that bring the output at 25 °C nearest to zero: the registers add, so they get the bias with its sign changed."""
+        if not one.step_counts:
+            return 0, 0, 0
+        x, y, z = (
+            int(np.clip(round(-float(b) / one.step_counts), -LARGEST_STEP, LARGEST_STEP)) for b in one.unit.bias[0]
+        )
+        return x, y, z
+
+    def _write(self, one: Outcome) -> None:
+        one.memory.program(one.copy, one.content)
+        if one.block is not None and one.step_counts:
+            one.memory.set_offsets(one.block.offsets)
+
+    def _read_back(self, one: Outcome) -> None:
+        """Refuses where the copy is not, bit by bit, what was written."""
+        found = one.memory.read(one.copy)[: len(one.content)]
+        if found != one.content:
+            place = next(i for i, (a, b) in enumerate(zip(found, one.content, strict=True)) if a != b)
+            raise StationRefused(
+                f"{one.memory.name}: copy {one.copy.upper()} differs from what was written from byte {place} on "
+                f"({found[place]:#04x}, {one.content[place]:#04x} is needed); replace the device"
+            )
+
+    def _power_cycle(self) -> None:
+        reader, clock = self.station.reader, self.station.clock
+        self.report("power cycle")
+        self.station.require()
+        reader.switch("off")
+        try:
+            clock.sleep(OFF_S)
+        finally:
+            reader.switch("on")
+        clock.sleep(BOOT_S)
+
+    def _after_power(self, one: Outcome) -> None:
+        """The copy is still there, and of the valid copies it is the one that counts."""
+        self._read_back(one)
+        valid = [(block.sequence, copy) for copy in COPIES if (block := unpack(one.memory.read(copy))) is not None]
+        if max(valid)[1] != one.copy:
+            raise StationRefused(
+                f"{one.memory.name}: copy {max(valid)[1].upper()} counts after the power cycle, copy {one.copy.upper()} is "
+                "needed; replace the device"
+            )
+
+    def _poses(self) -> list[Any]:
+        poses = list({(p.outer_deg, p.inner_deg): p for p in (*self.recipe.verification, *self.recipe.poses)}.values())
+        if len(poses) < POSES:
+            raise WrongUse(
+                f"program: recipe {self.recipe.name} has {len(poses)} poses, {POSES} are needed to verify; add some"
+            )
+        return poses[:POSES]
+
+    def _verify(self, outcomes: Sequence[Outcome]) -> None:
+        """Two poses: the coefficients in the device, applied to its output, give the force of the pose."""
+        for number, pose in enumerate(self._poses()):
+            if not any(one.open for one in outcomes):
+                return
+            self.report(f"verify in pose {pose.name}")
+            self.station.table.move(pose.outer_deg, pose.inner_deg)
+            plain = self._means(outcomes)
+            if number == 0 and self.choice.with_offsets:
+                self._each(outcomes, "write offset registers", write_offsets_again)
+                moved = self._means(outcomes)
+                self._each(
+                    outcomes,
+                    "verify offset registers",
+                    lambda one, a=plain, b=moved: require_moved(
+                        one, a[one.slot], b[one.slot], self.choice.tolerance_ug
+                    ),
+                )
+                plain = moved
+            outer, inner = self.station.table.angles()
+            force = force_from_angles(np.radians(outer), np.radians(inner))
+            force = force * self.recipe.local_gravity_m_s2 / STANDARD_GRAVITY_M_S2
+            temperatures = self.station.reader.instruments().temperature_C
+            self._each(
+                outcomes,
+                "verify",
+                lambda one, f=force, m=plain, t=temperatures, p=pose.name: require_in_pose(
+                    one, InPose(p, f, m[one.slot], t[one.slot]), self.choice.tolerance_ug
+                ),
+            )
+
+    def _means(self, outcomes: Sequence[Outcome]) -> dict[int, Array]:
+        """Mean outputs (3,) by slot, over a dwell of the recipe."""
+        reader, clock, recipe = self.station.reader, self.station.clock, self.recipe
+        clock.sleep(recipe.settle_s)
+        reader.start(recipe.rate_hz)
+        clock.sleep(recipe.dwell_s + 2.0 / recipe.rate_hz)
+        reader.stop()
+        return {one.slot: reader.slots[one.slot].take().outputs.mean(axis=0) for one in outcomes if one.open}

@@ -1,0 +1,350 @@
+"""Coefficients in the memory of devices: they are proved, or the unit is not certified and its valid copy is untouched."""
+
+import os
+import re
+import shlex
+import shutil
+import signal
+import struct
+import subprocess
+import sys
+import zlib
+from pathlib import Path
+
+import numpy as np
+import pytest
+from programmed_lot import keep_state, lot_run, plant_of, programmed
+from typer.testing import CliRunner
+
+from pipelines.archive import Archive, Run
+from pipelines.archive.signatures import VARIABLE
+from pipelines.certificates import Ledger
+from pipelines.certificates.days import today
+from pipelines.certificates.programmed import programming, unproved
+from pipelines.chain.certify import certify
+from pipelines.cli import app
+from pipelines.export import UnitCalibration
+from pipelines.export.device_block import HEAD, LENGTH, Form, block_of, pack, unpack
+from pipelines.integrity import verify
+from pipelines.jobs.job import Job
+from schemas.errors import StationRefused, StationTimeout, WrongUse
+from schemas.fault import FaultOrder
+from stations.codec import Value
+from stations.devices.memory import UnitMemory
+from stations.plant.plant import Plant
+
+ROOT = Path(__file__).resolve().parents[2]
+
+
+@pytest.fixture(scope="module")
+def measured(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("measured")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv(VARIABLE, "")
+        lot_run(folder)
+    return folder
+
+
+@pytest.fixture
+def run(measured: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Run:
+    monkeypatch.setenv(VARIABLE, "")
+    shutil.copytree(measured, tmp_path / "copy")
+    return Archive(tmp_path / "copy" / "archive").run("latest")
+
+
+def job_of(run: Run) -> Job:
+    from capture_double import small_job
+
+    return small_job(Path(str(run.archive.root)).parent)
+
+
+def copies(run: Run, unit: int = 0) -> list[bytes]:
+    plant = plant_of(run, job_of(run))
+    return [struct.pack(">192H", *plant.flash[unit].read(copy, plant.now_us)) for copy in (0, 1)]
+
+
+def with_fault(run: Run, kind: str, **figures: float) -> None:
+    def prepare(plant: Plant) -> None:
+        plant.inject(FaultOrder(kind=kind, serial="A1", figures=figures, at_s=0.0))
+
+    keep_state(run, job_of(run), prepare)
+
+
+def test_a_lot_is_written_proved_and_certified_again(run: Run) -> None:
+    ledger, day = Ledger(run.archive.root), today()
+    first = certify(ledger, run, ["A1", "A2"]).events
+    done, given = programmed(run)
+    assert {one.outcome for one in done.values()} == {"proved"}, [one.reason for one in done.values()]
+    held = ledger.valid_at("A1", day)
+    assert held is not None
+    assert held.certificate == given["A1"] == "A1/3"  # certified, ended, certified again
+    assert held.until == first[0].until
+    assert set(given) == {"A1", "A2"}  # A3 was not certified, and is not by this
+    assert ledger.valid_at("A3", day) is None
+    block = unpack(copies(run)[0])
+    assert block is not None
+    assert (block.unit, block.sequence, block.certificate) == ("A1", 1, 3)
+    for one in done.values():
+        assert len(one.poses) == 2
+        assert all(pose["from_archive_ug"] < 0.5 for pose in one.poses)
+        assert all(abs(pose["magnitude_g"] - 9.8123 / 9.80665) < 3e-3 for pose in one.poses)
+    events = programming(run.archive.root, "A1")
+    assert [entry["event"] for entry in events] == ["begun", "proved"]
+    assert events[0]["before"]["copies"]["A"] == "ff" * 384
+    findings = verify(Archive(run.archive.root), [], keys={}).checked.findings
+    assert findings == []
+
+
+def test_the_older_copy_is_written_and_the_other_is_kept(run: Run) -> None:
+    programmed(run, ("A1",))
+    kept = copies(run)[0]
+    done, _ = programmed(run, ("A1",), form="q24")
+    now = copies(run)
+    assert now[0] == kept
+    second = unpack(now[1])
+    assert second is not None
+    assert (done["A1"].copy, second.sequence, second.form) == ("b", 2, "q24")
+    third, _ = programmed(run, ("A1",))
+    assert third["A1"].copy == "a"
+    assert programming(run.archive.root, "A1")[4]["before"]["copies"]["B"] == now[1].hex()
+
+
+@pytest.mark.parametrize(
+    ("kind", "figures", "step", "reason"),
+    [
+        ("memory_bad_block", {"copy": 1, "word": 40}, "read back", "differs from what was written from byte 80"),
+        ("memory_worn", {}, "archive what was there", "worn out"),
+        ("memory_power_lost", {"after_s": 0.45}, "read back", "differs from what was written"),
+        pytest.param(
+            "memory_power_lost", {"after_s": 0.1}, "read back", "differs from what was written", marks=pytest.mark.slow
+        ),
+    ],
+)
+def test_a_fault_leaves_the_valid_copy_and_no_certificate(
+    run: Run, kind: str, figures: dict[str, float], step: str, reason: str
+) -> None:
+    certify(Ledger(run.archive.root), run, ["A1", "A2"])
+    programmed(run)
+    kept, plant = copies(run)[0], plant_of(run, job_of(run))
+    plant.inject(FaultOrder(kind=kind, serial="A1", figures=figures, at_s=plant.now))
+    place = run.archive.root / "programming" / "station" / f"{run.about['capture']}.bin"
+    Path(str(place)).write_bytes(plant.journal.state(plant.now_us))
+    done, given = programmed(run)
+    one = done["A1"]
+    assert (one.outcome, one.step) == ("failed", step), one.reason
+    assert reason in one.reason
+    newest = [block for content in copies(run) if (block := unpack(content)) is not None]
+    assert [block.sequence for block in newest] == [1]  # never half written: the copy of the first time counts
+    assert copies(run)[0] == kept
+    if kind == "memory_worn":  # nothing was written, so the certificate stays
+        assert unproved(run.archive.root, "A1") == ""
+        return
+    assert "A1" not in given
+    assert Ledger(run.archive.root).valid_at("A1", today()) is None
+    with pytest.raises(WrongUse, match="unit A1: the writing of its memory failed"):
+        certify(Ledger(run.archive.root), run, ["A1"])
+    assert "A1" in certify(Ledger(run.archive.root), run).left_out
+    if kind == "memory_bad_block":
+        assert done["A2"].outcome == "proved"  # the others go on
+
+
+def test_coefficients_that_do_not_fit_the_unit_are_found_in_the_poses(run: Run) -> None:
+    done, _ = programmed(run, ("A1",), tolerance_ug=1.0)
+    assert (done["A1"].outcome, done["A1"].step) == ("failed", "verify")
+    assert "µg from its force" in done["A1"].reason
+
+
+def test_offset_registers_move_the_output_and_are_written_after_each_power_on(run: Run) -> None:
+    done, _ = programmed(run, ("A1",), with_offsets=True)
+    one = done["A1"]
+    assert one.outcome == "proved", one.reason
+    assert one.block is not None
+    bias_ug = one.unit.bias[0] / 256000.0 * 1e6
+    left = bias_ug + np.array(one.block.offsets) * 62.5
+    assert np.max(np.abs(left)) <= 31.3  # half a step of 62.5 µg
+    plant = plant_of(run, job_of(run))
+    assert plant.flash[0].offsets == list(one.block.offsets)
+    plant.switch(on=False)
+    assert plant.flash[0].offsets == [0, 0, 0]
+
+
+def calibration() -> UnitCalibration:
+    bias, response = np.zeros((4, 3)), np.zeros((4, 3, 3))
+    bias[0], bias[1], response[0] = (5120.0, -2560.0, 100.0), (12.8, 0.0, -3.0), 256000.0 * np.eye(3) + 700.0
+    return UnitCalibration("SN-1", "pass", "industrial", "LSB", bias, response, (-10.0, 60.0), ())
+
+
+def test_a_block_is_what_its_layout_says() -> None:
+    """Read by the table of the layout, not by the module that wrote it."""
+    block = block_of(calibration(), "float32", sequence=7, certificate=3, date=20261122, offsets=(2, -1, 0), step=16)
+    content = pack(block)
+    assert len(content) == LENGTH == 308
+    assert struct.calcsize(HEAD) == 112
+    assert content[:4] == b"TLCB"
+    assert struct.unpack_from("<HHH", content, 4) == (1, 1, 308)
+    assert struct.unpack_from("<I", content, 12)[0] == 7
+    assert content[16:80].rstrip(b"\0") == b"SN-1"
+    assert struct.unpack_from("<II", content, 80) == (3, 20261122)
+    assert struct.unpack_from("<ff", content, 88) == (-10.0, 60.0)
+    assert struct.unpack_from("<hhh", content, 104) == (2, -1, 0)
+    assert struct.unpack_from("<3f", content, 112) == (5120.0 + 32.0, -2560.0 - 16.0, 100.0)
+    assert struct.unpack_from("<I", content, 304)[0] == zlib.crc32(content[:304])
+
+
+def test_a_calibration_that_was_revoked_is_not_written(run: Run) -> None:
+    ledger = Ledger(run.archive.root)
+    certify(ledger, run, ["A1"])
+    ledger.revoke("A1", "fell to the floor", day=today())
+    with pytest.raises(WrongUse, match="fell to the floor"):
+        programmed(run, ("A1",))
+    assert programming(run.archive.root, "A1") == []
+
+
+@pytest.mark.parametrize("form", ["float32", "q24"])
+def test_a_block_corrects_as_the_calibration(form: Form) -> None:
+    unit = calibration()
+    block = unpack(
+        pack(block_of(unit, form, sequence=1, certificate=0, date=0, offsets=(0, 0, 0), step=0)) + b"\xff" * 76
+    )
+    assert block is not None
+    output = np.array([[250000.0, -3000.0, 120000.0]])
+    for t in (-10.0, 25.0, 60.0):
+        np.testing.assert_allclose(block.correct(output, t), unit.correct(output, t), atol=5e-7)
+
+
+def test_an_erased_a_zero_and_a_damaged_memory_hold_no_block() -> None:
+    content = pack(block_of(calibration(), "float32", sequence=1, certificate=0, date=0, offsets=(0, 0, 0), step=0))
+    assert unpack(b"\xff" * 384) is None
+    assert unpack(b"\0" * 384) is None
+    assert unpack(content[:200]) is None
+    for place in (5, 20, 90, 150, 305):
+        spoilt = bytearray(content)
+        spoilt[place] ^= 0x10
+        assert unpack(bytes(spoilt)) is None
+
+
+def test_a_lost_answer_is_decided_by_the_counter_and_the_command_is_sent_once(run: Run) -> None:
+    from stations.opening import serve_plant
+
+    job = job_of(run)
+    plant = plant_of(run, job)
+    command = next(r for r in _slot_profile().registers if r.name == "memory_command").address
+    with serve_plant(job.station, job.lot, plant) as station:
+        memory = station.reader.slots[0].memory(station.clock)
+        registers = memory._registers
+        plain = registers.write
+
+        def answer_lost(name: str, value: Value) -> None:
+            plain(name, value)
+            if name == "memory_command":
+                raise StationTimeout("slot 0: no answer within 1 s; check the cable")
+
+        registers.write = answer_lost
+        memory.program("a", b"\x12\x34" * 100)
+        registers.write = lambda name, value: (_ for _ in ()).throw(StationTimeout("slot 0: no answer"))
+        with pytest.raises(StationTimeout):
+            UnitMemory(registers, station.clock).program("a", b"\x12\x34" * 100)
+    orders = [e for e in plant.journal.events() if getattr(e, "address", -1) == command]
+    assert len(orders) == 1
+    assert plant.flash[0].erases == [1, 0]
+    assert plant.flash[0].read(0, plant.now_us)[0] == 0x1234
+
+
+def _slot_profile():
+    from stations.profile_files import load_profile
+
+    return load_profile("tumbleline_slot")
+
+
+def test_a_memory_that_samples_or_has_no_power_refuses(run: Run) -> None:
+    from stations.opening import serve_plant
+
+    job = job_of(run)
+    plant = plant_of(run, job)
+    with serve_plant(job.station, job.lot, plant) as station:
+        memory = station.reader.slots[0].memory(station.clock)
+        station.reader.start(100.0)
+        with pytest.raises((StationRefused, StationTimeout)):
+            memory.set_offsets((1, 1, 1))
+        station.reader.stop()
+        memory.set_offsets((1, 1, 1))
+        assert memory.offsets() == (1, 1, 1)
+
+
+KILLED = """
+import os, signal, sys
+sys.path.insert(0, "tests")
+from pathlib import Path
+from pipelines.archive import Archive
+from pipelines.programming.job import chosen_units, program_run, station_of
+from pipelines.programming.outcome import Choice
+run = Archive(sys.argv[1]).run("latest")
+
+def report(text):
+    if sys.argv[2] in text:
+        os.kill(os.getpid(), signal.SIGKILL)
+
+program_run(run, chosen_units(run, ["A1"]), station_of(run), Choice(), report)
+"""
+
+
+@pytest.mark.parametrize(
+    "step",
+    [
+        "A1: write",
+        *(pytest.param(s, marks=pytest.mark.slow) for s in ("A1: read back", "power cycle", "verify in pose")),
+    ],
+)
+def test_a_process_that_is_killed_leaves_the_unit_not_certified_until_it_is_written_again(run: Run, step: str) -> None:
+    ledger = Ledger(run.archive.root)
+    certify(ledger, run, ["A1"])
+    words = [sys.executable, "-c", KILLED, str(run.archive.root), step]
+    done = subprocess.run(
+        words, cwd=ROOT, check=False, capture_output=True, text=True, env={**os.environ, VARIABLE: ""}
+    )
+    assert done.returncode == -signal.SIGKILL, done.stderr
+    assert ledger.valid_at("A1", today()) is None
+    assert "has no end" in unproved(run.archive.root, "A1")
+    with pytest.raises(WrongUse, match="has no end"):
+        certify(ledger, run, ["A1"])
+    again, given = programmed(run, ("A1",))
+    assert again["A1"].outcome == "proved", again["A1"].reason
+    held = ledger.valid_at("A1", today())
+    assert held is not None
+    assert held.certificate == given["A1"] == "A1/3"
+    written = again["A1"].block
+    assert written is not None
+    assert written.certificate == 3
+    assert [entry["event"] for entry in programming(run.archive.root, "A1")] == ["begun", "begun", "proved"]
+
+
+def test_the_command_asks_before_it_writes(run: Run) -> None:
+    words = ["program", "latest", "--archive", str(run.archive.root), "--units", "A2"]
+    refused = CliRunner().invoke(app, words, input="")
+    assert isinstance(refused.exception, WrongUse)
+    no = CliRunner().invoke(app, words, input="n\n")
+    assert "nothing was written" in no.stdout
+    assert programming(run.archive.root, "A2") == []
+    yes = CliRunner().invoke(app, [*words, "--yes"])
+    assert yes.exit_code == 0, yes.exception
+    assert "proved" in yes.stdout
+    with pytest.raises(WrongUse, match="no unit B9"):
+        raise CliRunner().invoke(app, [*words[:-1], "B9", "--yes"]).exception or AssertionError
+
+
+def test_the_guide_prints_what_the_command_prints(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
+    guide = (ROOT / "docs" / "how-to" / "program-the-device.md").read_text(encoding="utf-8")
+    command, _, printed = re.findall(r"```console\n\$ (.*?)```", guide, flags=re.DOTALL)[0].partition("\n")
+    monkeypatch.setenv("TUMBLELINE_ARCHIVE", str(run.archive.root))
+    monkeypatch.setenv("COLUMNS", "200")
+    certify(Ledger(run.archive.root), run, ["A1"])
+    done = CliRunner().invoke(app, shlex.split(command)[1:])
+    assert done.exit_code == 0, done.exception
+    wanted = re.escape(words_of(printed)).replace("…", ".*?")
+    assert re.fullmatch(wanted, words_of(done.stdout)), done.stdout
+    assert str(LENGTH) in guide
+
+
+def words_of(text: str) -> str:
+    """The text with every run of blanks and of table lines as one blank."""
+    return " ".join(re.sub(r"[─\s]+", " ", text).split())

@@ -1,0 +1,94 @@
+"""The writing of devices through real sockets, with lease and watchdog; and a process that is killed in the middle."""
+
+import os
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+from programmed_lot import lot_run
+from served_station import modbus_station, served_plant, station_file
+
+from pipelines.archive import Archive, Run
+from pipelines.archive.signatures import VARIABLE
+from pipelines.certificates import Ledger
+from pipelines.certificates.days import today
+from pipelines.certificates.programmed import unproved
+from pipelines.chain.certify import certify
+from pipelines.export.device_block import unpack
+from schemas.recipe import Lot
+from stations.profile_files import load_profile
+
+ROOT = Path(__file__).resolve().parents[2]
+
+CLIENT = """
+import os, signal, sys
+from pathlib import Path
+from pipelines.archive import Archive
+from pipelines.programming.job import chosen_units, program_run
+from pipelines.programming.outcome import Choice
+from schemas.station import load_station
+run = Archive(sys.argv[1]).run("latest")
+
+def report(text):
+    print(text, flush=True)
+    if sys.argv[3] in text:
+        os.kill(os.getpid(), signal.SIGKILL)
+
+done, given = program_run(run, chosen_units(run, ["A1"]), load_station(Path(sys.argv[2])), Choice(tolerance_ug=5000.0), report)
+assert [one.outcome for one in done] == ["proved"], [one.reason for one in done]
+"""
+
+
+@pytest.fixture(scope="module")
+def measured(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("measured")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv(VARIABLE, "")
+        lot_run(folder)
+    return folder
+
+
+@pytest.mark.slow
+def test_killed_while_it_writes_the_watchdog_makes_the_station_safe_and_the_next_writing_proves(
+    measured: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv(VARIABLE, "")
+    monkeypatch.setenv("TUMBLELINE_STATE", str(tmp_path / "state"))
+    shutil.copytree(measured, tmp_path / "copy")
+    run: Run = Archive(tmp_path / "copy" / "archive").run("latest")
+    ledger = Ledger(run.archive.root)
+    certify(ledger, run, ["A1"])
+    with served_plant(lot=Lot.model_validate(run.about["lot"])) as (port, plant):
+        file = station_file(tmp_path, modbus_station(port))
+
+        def client(step: str) -> subprocess.CompletedProcess[str]:
+            words = [sys.executable, "-c", CLIENT, str(run.archive.root), str(file), step]
+            return subprocess.run(words, cwd=ROOT, check=False, capture_output=True, text=True, env={**os.environ})
+
+        killed = client("A1: read back")
+        assert killed.returncode == -signal.SIGKILL, killed.stderr
+        assert ledger.valid_at("A1", today()) is None
+        assert "has no end" in unproved(run.archive.root, "A1")
+        end = time.monotonic() + 60.0
+        while "watchdog_safe" not in _log(tmp_path / "state"):
+            assert time.monotonic() < end, _log(tmp_path / "state")
+            time.sleep(0.2)
+        again = client("never")
+        assert again.returncode == 0, again.stderr
+        with plant.lock:
+            held = [
+                unpack(b"".join(w.to_bytes(2, "big") for w in plant.flash[0].read(c, plant.now_us))) for c in (0, 1)
+            ]
+            command = next(r for r in load_profile("tumbleline_slot").registers if r.name == "memory_command").address
+            orders = [e for e in plant.journal.events() if getattr(e, "address", -1) == command]
+    assert sorted(block.sequence for block in held if block is not None) in ([1], [1, 2])
+    assert len(orders) == 2  # once for each writing
+    assert unproved(run.archive.root, "A1") == ""
+
+
+def _log(folder: Path) -> str:
+    return "\n".join(path.read_text(encoding="utf-8", errors="replace") for path in folder.rglob("*") if path.is_file())

@@ -1,0 +1,69 @@
+"""A run whose samples are those of the simulated station's own units, made in a second, to be written into these units."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from capture_double import CaptureDouble, small_job
+
+from pipelines.archive import Archive, Run
+from pipelines.certificates.programmed import TOP
+from pipelines.chain.runner import Runner
+from pipelines.jobs.job import Job
+from pipelines.programming.job import chosen_units, program_run, station_of
+from pipelines.programming.outcome import Choice, Outcome
+from stations.opening import make_plant
+from stations.plant.plant import Plant
+
+
+@dataclass
+class PlantDouble(CaptureDouble):
+    """The double with the physics of a plant's units, by their true parameters."""
+
+    plant: Plant | None = None
+    noise_g: float = 2e-5
+    slots: dict[int, int] = field(default_factory=dict)
+
+    def output(
+        self, slot: int, force: np.ndarray, temperature: float, shape: tuple[int, int], rng: np.random.Generator
+    ) -> np.ndarray:
+        """Counts of one unit."""
+        assert self.plant is not None
+        t = self.plant.truth(self.plant.serials[self.plant.slots.index(slot)])
+        theta = temperature - 25.0
+        scale = (1.0 + 1e-6 * t.scale_ppm) * (1.0 + theta * t.scale_tempco)
+        mean = t.bias_g + theta * t.bias_tempco + scale * (t.misalignment @ t.slot_rotation @ force)
+        return np.round(t.output_scale * (mean + self.noise_g * rng.normal(size=shape)))
+
+
+def lot_run(folder: Path) -> Run:
+    """A finished run of three units in an archive in a folder; its station continues from its beginning."""
+    job = small_job(folder)
+    plant = make_plant(job.station, job.lot)
+    runner = Runner(job, Archive(folder / "archive"), measure=PlantDouble(plant=plant))
+    list(runner.all())
+    keep_state(runner.run, job, lambda _plant: None)
+    return runner.run
+
+
+def keep_state(run: Run, job: Job, prepare: Callable[[Plant], None]) -> None:
+    """Let the station of a run begin anew, after ``prepare`` has changed it (by faults, which are journalled)."""
+    plant = make_plant(job.station, job.lot)
+    prepare(plant)
+    place = run.archive.root / TOP / "station" / f"{run.about['capture']}.bin"
+    place.parent.mkdir(parents=True, exist_ok=True)
+    place.write_bytes(plant.journal.state(plant.now_us))
+
+
+def programmed(run: Run, serials: tuple[str, ...] = (), **choice: Any) -> tuple[dict[str, Outcome], dict[str, str]]:
+    """The units written, by serial, and their certificates."""
+    outcomes, given = program_run(run, chosen_units(run, serials), station_of(run), Choice(**choice), lambda text: None)
+    return {one.serial: one for one in outcomes}, given
+
+
+def plant_of(run: Run, job: Job) -> Plant:
+    """The simulated station as the last command left it."""
+    state = (run.archive.root / TOP / "station" / f"{run.about['capture']}.bin").read_bytes()
+    return make_plant(job.station, job.lot, state)
