@@ -11,7 +11,7 @@ from inertial.criticism import variance
 from inertial.criticism.covariance import Noise, Shares
 from inertial.criticism.handling.base import Handling
 from inertial.criticism.problem import SHARED, Problem
-from inertial.criticism.shares import best_shares
+from inertial.criticism.shares import best_shares, plausible_shares
 from inertial.criticism.space import Candidate, Space
 from inertial.effects.base import AnyEffect
 from inertial.errors import NotIdentified
@@ -116,6 +116,10 @@ class Model:
         """Shares of wander by restricted likelihood, pooled over the blocks, and variances of the blocks."""
         near = None if self._near is None else self._near.shares
         return self.noise_at(best_shares(self._restricted, near, finest=4 if self.problem.n > _LONG else 2))
+
+    def plausible_shares(self) -> list[tuple[Shares, float]]:
+        """Shares that the residuals do not rule out, with weights that add up to one."""
+        return plausible_shares(self._restricted, self.noise.shares)
 
     def noise_at(self, shares: Shares) -> Noise:
         """The noise at given shares: each block's variance drawn together with the others' as far as they are alike."""

@@ -66,6 +66,12 @@ def command(
     poses: Annotated[
         str, typer.Option("--poses", metavar="LABEL=+x,…", help="Dwells to keep by label, with the face that is up.")
     ] = "",
+    headings: Annotated[
+        str,
+        typer.Option(
+            "--headings", metavar="LABEL=deg,…", help="Direction of x in each pose, degrees (of y where x is vertical)."
+        ),
+    ] = "",
     face: Annotated[str, typer.Option("--face", metavar="+x|…|-z", help="The face that is up all the time.")] = "",
     blocks: Annotated[
         float | None, typer.Option("--blocks", metavar="S", help="Dwells of this length, for a record in one pose.")
@@ -131,6 +137,7 @@ def command(
         "columns": mapped.pairs(columns, "--map"),
         "units": mapped.pairs(units, "--units"),
         "poses": mapped.pairs(poses, "--poses"),
+        "headings": mapped.pairs(headings, "--headings"),
         "unit": unit,
         "face": face,
         "block_s": blocks,

@@ -273,4 +273,6 @@ def _finished(frame: pd.DataFrame, mapping: Mapping) -> pd.DataFrame:
         raise WrongUse("import: poses are named, but not how strong gravity is, which is needed; give --local-g M/S2")
     up = [mapping.poses.get(label, mapping.face) for label in frame["pose"]]
     frame[["force_x", "force_y", "force_z"]] = np.array([FACES[face] for face in up]) * mapping.norm_g
+    if mapping.headings:
+        frame["heading_deg"] = [mapping.headings[label] for label in frame["pose"]]
     return frame
