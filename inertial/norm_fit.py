@@ -63,7 +63,7 @@ class NormFit:
     nonlinear_error: dict[str, dict[str, float]]
 
 
-def fit_norms(
+def fit_norms(  # noqa: PLR0913 - what a fit needs, and what its errors are averaged over
     effects: Sequence[str],
     state: State,
     output: Array,
@@ -131,7 +131,7 @@ class _Work:
         self.values = values
         self.sensor = design.split(effects)[0]
         self.names = tuple(design.local_names(self.sensor, axis, values) for axis in range(3))
-        self.free = np.array([[_is_free(axis, pair) for pair in self.names[axis]] for axis in range(3)])
+        self.free = np.array([[is_free(axis, pair) for pair in self.names[axis]] for axis in range(3)])
 
     def begun(self, bias: Array, response: Array) -> Array:
         """Coefficients (units, 3, p) of the start: everything but bias and response is zero."""
@@ -327,7 +327,7 @@ class _Solved:
         self.gain = self.inverse @ (unit.T * whiten if whiten.ndim == 1 else unit.T @ whiten) / self.size[:, None]
 
     def covariance(self, dof: int) -> Array:
-        """Second moment (k, k) about the solution: what the noise does, with Student's factor for k = 2, and the step to the fit."""
+        """Second moment (k, k) about the solution: of the noise, with Student's factor for k = 2, and the step to the fit."""
         found = student(dof) ** 2 * self.chi2 / dof * self.inverse + np.outer(self.step, self.step)
         return found / np.outer(self.size, self.size)
 
@@ -358,7 +358,7 @@ class _Solved:
         return found
 
 
-def _is_free(axis: int, pair: tuple[str, str]) -> bool:
+def is_free(axis: int, pair: tuple[str, str]) -> bool:
     """Whether a coefficient is fitted: those of K below the diagonal are a rotation, and zero."""
     effect, name = pair
     return effect not in {"misalignment", "misalignment_temperature"} or "xyz".index(name[2]) > axis

@@ -23,6 +23,7 @@ from schemas.foreign import shown
 if TYPE_CHECKING:
     from pipelines.importers.content import Content
     from pipelines.importers.mapping import Mapping
+    from schemas.import_references import ImportReferences
 
 PART = "Measure"
 ORDER = 160
@@ -111,6 +112,17 @@ def command(
     local_g: Annotated[
         float | None, typer.Option("--local-g", metavar="M/S2", help="Gravity where it was measured, m/s².")
     ] = None,
+    verify: Annotated[
+        str, typer.Option("--verify", metavar="N|N%", help="Dwells that the fit does not use; they verify it.")
+    ] = "",
+    references: Annotated[
+        Path | None,
+        typer.Option("--references", metavar="TOML", help="Uncertainty of the references; a certificate needs it."),
+    ] = None,
+    measured: Annotated[str, typer.Option("--measured", metavar="DATE", help="Day of the measurement.")] = "",
+    zero_output: Annotated[
+        float | None, typer.Option("--zero-output", metavar="VALUE", help="Nominal output at 0 g; 0.")
+    ] = None,
     fit: Annotated[str, typer.Option("--fit", metavar="norm|faces|temperature", help="Fit and judge at once.")] = "",
     procedure: Annotated[
         str,
@@ -154,11 +166,19 @@ def command(
         "axes": [part.strip() for part in axes.split(",")] if axes else None,
         "signs": [part.strip() for part in signs.split(",")] if signs else None,
         "local_gravity_m_s2": local_g,
+        "verify": verify,
+        "measured": measured,
+        "zero_output": zero_output,
     }
     wanted = given | {key: value for key, value in options.items() if value not in ("", None, {}, [])}  # 0 is a value
     _refuse_unknown_fit(fit)
+    stated = None
+    if references is not None:
+        from pipelines.importers.stated_references import stated_references
+
+        stated = stated_references(references, wanted)
     sets = [files] if wanted.get("join") else [[path] for path in files]
-    imports = [_import_one(paths, wanted, str(mapping or "import"), fit, archive) for paths in sets]
+    imports = [_import_one(paths, wanted, str(mapping or "import"), fit, archive, stated) for paths in sets]
     verdicts = [one["adequate"] for one in imports if one["fit"]]
     adequate = False if False in verdicts else None if None in verdicts else True
     if as_json:
@@ -223,7 +243,14 @@ def _refuse_unknown_fit(fit: str) -> None:
         )
 
 
-def _import_one(paths: list[Path], wanted: dict[str, Any], where: str, fit: str, archive: str | None) -> dict[str, Any]:
+def _import_one(
+    paths: list[Path],
+    wanted: dict[str, Any],
+    where: str,
+    fit: str,
+    archive: str | None,
+    stated: ImportReferences | None,
+) -> dict[str, Any]:
     """Read, judge and keep one recording; the document for JSON."""
     from pipelines.importers import keep, record, sources
     from pipelines.importers import mapping as mapped
@@ -246,7 +273,7 @@ def _import_one(paths: list[Path], wanted: dict[str, Any], where: str, fit: str,
 
         with error_console().status("fitting and judging"):
             judged = judge(fit, data, how)
-    run = keep.keep(data, source, how, judged, archive)
+    run = keep.keep(data, source, how, judged, archive, stated)
     return {
         "run": run.id,
         "source": source.as_dict(),

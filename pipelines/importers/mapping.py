@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from datetime import date
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator, model_validator
@@ -94,7 +95,13 @@ class Mapping(BaseModel):
     poses: dict[str, str] = Field(default_factory=dict)
     """Label of a dwell → face up, as +x … -z; with any given, dwells with other labels are left out."""
     headings: dict[str, Annotated[float, Field(ge=-360.0, le=360.0)]] = Field(default_factory=dict)
-    """Label of a dwell → heading of its placement, degrees: direction of the x axis about the vertical, of y where x is up or down."""
+    """Label of a dwell → heading of its placement, degrees: direction of x about the vertical, of y where x is up or down."""
+    verify: str = ""
+    """Dwells of a unit that are held out to verify the fit: a number, or a share such as 20%."""
+    measured: date | None = None
+    """Day of the measurement."""
+    zero_output: Annotated[float, Field(ge=-LARGEST, le=LARGEST)] = 0.0
+    """Nominal output at 0 g, in the output's unit."""
     face: Literal["", "+x", "+y", "+z", "-x", "-y", "-z"] = ""
     """The face that is up all the time, for a record in one pose."""
     block_s: Annotated[float, Field(ge=SHORTEST_BLOCK_S, le=LONGEST_WAIT_S)] | None = None

@@ -16,12 +16,13 @@ from pipelines.chain.runner import captured_tables
 from pipelines.diagnosis.diagnose import default_model
 from pipelines.jobs.job import Job
 from pipelines.jobs.model_files import refuse_unknown_effects, use_formulas
+from pipelines.jobs.terms import archived_terms
+from pipelines.rerun.import_steps import StageCall, budget_step, history_of, no_noise, verify_norms_step
 from pipelines.stages.figures import UNITS
 from pipelines.stages.fit import fit
 from pipelines.stages.grade import Evidence, grade, refuse_limits_without_figures
 from pipelines.stages.norm_fit import fit_of_norms
-from pipelines.stages.verify import nothing_verified, verify
-from pipelines.tables.frames import empty_table
+from pipelines.stages.verify import verify
 from pipelines.tables.leave_out import Dwells, leave_out
 from schemas.errors import DataRejected, WrongUse
 from schemas.limits import Limits, limits_of
@@ -39,18 +40,6 @@ CAPTURED = ("readings", "history")
 RAW = ("validate", "reduce", "noise")
 """Stages that read the raw samples."""
 PROVENANCE = ("who", "where", "when", "software", "libraries", ENTRY, "rerun_of", "because", "measured")
-
-
-@dataclass(frozen=True)
-class StageCall:
-    """One stage for one run: as :class:`pipelines.chain.chain.Stage`, with everything that the job decides filled in."""
-
-    name: str
-    inputs: tuple[str, ...]
-    outputs: tuple[str, ...]
-    parameters: dict[str, Any]
-    code: str
-    call: Callable[[Run], Tables]
 
 
 @dataclass(frozen=True)
@@ -162,8 +151,11 @@ def _imported(run: Run, wanted: ModelChange, left_out: Dwells) -> Plan:
     history = "history" in run.tables()
     gravity = gravity_of_import(about)
     steps = [_import_step(history, left_out, run), _fit_step(model, history, None if known else gravity)]
-    steps += [_verify_step(history)] if known else [_no_verification()]
-    steps += [_grade_step(limits)] if limits else []
+    steps += [_verify_step(history)] if known else [verify_norms_step(gravity, history=history)]
+    terms = archived_terms({**about, "limits": limits.model_dump(mode="json") if limits else about.get("limits")})
+    steps += [budget_step(terms, history=history, known=known)] if terms else []
+    zero = float((about.get("mapping") or {}).get("zero_output", 0.0))
+    steps += [_grade_step(limits, zero, budgeted=terms is not None)] if limits else []
     recipe = {**about.get("recipe", {}), "name": "import", **model}
     recipe |= {"limits": wanted.limits_name} if wanted.limits else {}
     kept = {key: value for key, value in about.items() if key not in PROVENANCE}
@@ -235,10 +227,6 @@ def _import_step(history: bool, left_out: Dwells, old: Run) -> StageCall:  # noq
     return StageCall("import", (), names, {}, "", lambda run: {name: run.table(name) for name in names})
 
 
-def _history(run: Run) -> pd.DataFrame:
-    return run.table("history") if "history" in run.tables() else empty_table(texts="unit", numbers="time_s unit_C")
-
-
 def _fit_step(model: dict[str, Any], history: bool, gravity: float | None) -> StageCall:  # noqa: FBT001
     """The fit of the chain; by the norm of gravity alone where its size is given."""
     stage = BY_NAME["fit"]
@@ -255,15 +243,9 @@ def _fit_step(model: dict[str, Any], history: bool, gravity: float | None) -> St
         return StageCall("fit", inputs, stage.outputs, {**parameters, "gravity_g": gravity}, code, of_norms)
 
     def call(run: Run) -> Tables:
-        return fit(run.table("dwells"), _history(run), model["effects"])
+        return fit(run.table("dwells"), history_of(run), model["effects"])
 
     return StageCall("fit", inputs, stage.outputs, parameters, code_hash(stage.modules), call)
-
-
-def _no_verification() -> StageCall:
-    """The tables of a verification without a row: dwells of unknown orientation have no pose that was kept for it."""
-    stage = BY_NAME["verify"]
-    return StageCall("verify", (), stage.outputs, {}, code_hash(stage.modules), lambda _: nothing_verified())
 
 
 def _verify_step(history: bool) -> StageCall:  # noqa: FBT001
@@ -272,22 +254,21 @@ def _verify_step(history: bool) -> StageCall:  # noqa: FBT001
 
     def call(run: Run) -> Tables:
         names = ("coefficients", "covariance", "predictions")
-        return verify(run.table("dwells"), _history(run), *(run.table(name) for name in names))
+        return verify(run.table("dwells"), history_of(run), *(run.table(name) for name in names))
 
     return StageCall("verify", inputs, stage.outputs, {}, code_hash(stage.modules), call)
 
 
-def _grade_step(limits: Limits) -> StageCall:
+def _grade_step(limits: Limits, zero: float, *, budgeted: bool) -> StageCall:
     stage = BY_NAME["grade"]
     names = ("coefficients", "covariance", "residuals", "verification", "verification_poses")
+    names = (*names, "uncertainties", "budget_covariance") if budgeted else names
 
     def call(run: Run) -> Tables:
         tables: dict[str, Any] = {name: run.table(name) for name in names}
         units = list(dict.fromkeys(tables["coefficients"]["unit"].astype(str)))
         sound = {"unit": units, "slot": range(len(units)), "refused": False, "fault": "", "reason": ""}
-        noise = empty_table(texts="unit axis term unit_text", numbers="value low high", flags="identified")
-        return grade(Evidence(verdicts=pd.DataFrame(sound), **tables, noise=noise), limits)
+        return grade(Evidence(verdicts=pd.DataFrame(sound), **tables, noise=no_noise()), limits, zero)
 
-    return StageCall(
-        "grade", names, stage.outputs, {"limits": limits.model_dump(mode="json")}, code_hash(stage.modules), call
-    )
+    parameters = {"limits": limits.model_dump(mode="json"), **({"zero_output": zero} if zero else {})}
+    return StageCall("grade", names, stage.outputs, parameters, code_hash(stage.modules), call)

@@ -79,7 +79,7 @@ def norms_fitted(
         The dwells do not determine the model, or lack a quantity that it needs.
     """
     try:
-        found = measured(dwells, history)
+        found = measured(fitted_dwells(dwells), history)
         lot = lot_of(found, square="misalignment" not in effects)
         problem = Problem(lot)
         model = Model(problem, terms_of(catalogue.get_all(effects), problem))
@@ -122,6 +122,11 @@ def whitener(model: Model) -> Array:
         return np.where(np.isfinite(error), 1.0 / np.where(np.isfinite(error), error, 1.0), 0.0)
     eye = np.broadcast_to(np.eye(n), (model.problem.blocks, n, n))
     return covariance.whiten(eye, noise.shares) / noise.scale[:, None, None]
+
+
+def fitted_dwells(dwells: pd.DataFrame) -> pd.DataFrame:
+    """The dwells without those that are held out for verification."""
+    return dwells[dwells["kind"] == "dwell"] if "kind" in dwells.columns else dwells
 
 
 def plausible_noises(model: Model) -> Iterator[PlausibleNoise]:
