@@ -15,7 +15,7 @@ from pipelines.stages.budget import conditions, with_device_temperature
 from pipelines.stages.budget_rows import covariance_rows, empty, rows_of_quantities
 from pipelines.stages.contributions import influences, sources
 from pipelines.stages.norm_dwells import NormDwells, norm_dwells
-from pipelines.stages.quantities import Split, quantities_of
+from pipelines.stages.quantities import Quantity, Split, quantities_of
 
 if TYPE_CHECKING:
     from pipelines.stages.budget_terms import BudgetTables, BudgetTerms
@@ -67,11 +67,16 @@ def _of_unit(one: NormDwells, tables: BudgetTables, terms: BudgetTerms, stated: 
         verification_poses=_of(tables.verification_poses, unit),
         noise=_of(tables.noise, unit),
     )
-    quantities = list(quantities_of(lot, one.calibration, part, terms, found))
+    quantities = [q for q in quantities_of(lot, one.calibration, part, terms, found) if not _is_rotation(q)]
     return {
         **rows_of_quantities((unit,), quantities, found, terms, sources(stated)),
         "budget_covariance": covariance_rows((unit,), found.fit.covariance()),
     }
+
+
+def _is_rotation(quantity: Quantity) -> bool:
+    """Whether it is a coefficient of K below the diagonal: a rotation of the whole unit, zero by definition."""
+    return quantity.name == "misalignment" and quantity.axis in {"yx", "zx", "zy"}
 
 
 def _of(table: pd.DataFrame, unit: str) -> pd.DataFrame:

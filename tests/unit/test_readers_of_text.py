@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from pipelines.importers import files
+from pipelines.importers.text_table import content
 from schemas.errors import DataRejected
 
 SPLIT = "t;ax;ay;az\n0,01;0,1;0,2;9,8\n0,02;0,1;0,2;9,7\n0,03;0,1;0,2;9,8\n"
@@ -65,3 +66,13 @@ def test_rows_of_another_width_are_refused_below_a_preamble_too(tmp_path) -> Non
     (tmp_path / "a.csv").write_text("logger\nt,x,y\n1,2,3\n2,3,4\n3,4,5,6\n4,5,6\n", encoding="utf-8")
     with pytest.raises(DataRejected, match="rows from line 3 on do not have the 3 columns"):
         files.read(tmp_path / "a.csv")
+
+
+@pytest.mark.parametrize("text", ['a,b\n1,2"x\n3,4"\n5,6\n7,8\n', 'a;b\n"1;2\r\n3";4 "5\n6" 7\n8;9\n10;11\n'])
+def test_a_quote_in_the_middle_of_a_field_ends_in_no_traceback(text: str) -> None:
+    try:
+        found = content(text, "x.csv")
+    except DataRejected as problem:
+        assert "x.csv" in str(problem)
+    else:
+        assert len(found.table.columns) >= 1
