@@ -153,6 +153,8 @@ def _grades(run: Run) -> Any:
 def _how_to_grade(run: Run) -> str:
     if run.about.get("capture"):
         return "it is not finished: give its 'tumbleline run' again and it goes on"
+    if axis := run.about.get("plane_across"):
+        return f"it was turned about {axis} alone, the scale of {axis} is not known: measure other orientations"
     again = f"'tumbleline fit {run.id} --limits FILE'"
     return f"it was imported: fit it against limits with {again} and certify the run that this makes"
 
@@ -236,8 +238,8 @@ def refuse_unstated(run: Run) -> None:
     terms, grades = archived_terms(run.about), run.table("grades")
     if terms is None and not run.about.get("capture"):
         raise WrongUse(
-            f"certify: run {run.id} was imported without a statement of its references (noise only), a certificate needs the whole "
-            "budget; import the recording again with --references FILE, a TOML with [uncertainty] as in a station's file"
+            f"certify: run {run.id} was imported without a statement of its references (noise only), a certificate needs the "
+            "whole budget; import the recording again with --references FILE, a TOML with [uncertainty] as in a station's file"
         )
     if terms is None or terms.stated is None or "basis" not in grades or set(grades["basis"]) != {BUDGET}:
         raise WrongUse(

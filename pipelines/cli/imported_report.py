@@ -30,6 +30,11 @@ def make_imported_report(run: Run) -> bool:
 
     effects = list((run.about.get("recipe") or {}).get("effects", ()))
     names = ("dwells", "coefficients")
+    if axis := run.about.get("plane_across"):
+        raise WrongUse(
+            f"report: run {run.id} was turned about {axis} alone and has coefficients of the axes in the plane only; "
+            f"'tumbleline fit {run.id}' prints them"
+        )
     if not effects or not set(names) <= set(run.tables()):
         raise WrongUse(
             f"report: run {run.id} was imported and not fitted, coefficients are needed; fit it with 'tumbleline fit {run.id} "

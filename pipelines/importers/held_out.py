@@ -40,8 +40,8 @@ def held_out_count(text: str, dwells: int) -> int:
 def with_held_out(dwells: pd.DataFrame, text: str, where: str) -> tuple[pd.DataFrame, str]:
     """The dwells with kind ``verification`` for those that are held out, and a remark that names them.
 
-    Of each unit one dwell is drawn from each of so many stretches of equal length; the first and the last dwell stay in the fit, so
-    that it does not extrapolate in time. The draw depends on the number of dwells only.
+    Of each unit one dwell is drawn from each of so many stretches of equal length; the first and the last dwell stay in the fit,
+    so that it does not extrapolate in time. The draw depends on the number of dwells only.
 
     Raises
     ------
@@ -55,7 +55,7 @@ def with_held_out(dwells: pd.DataFrame, text: str, where: str) -> tuple[pd.DataF
         if len(places) - count < FEWEST_FITTED:
             raise DataRejected(
                 f"{where}: {len(places)} dwells of unit {unit}, --verify {shown(text)} leaves {max(len(places) - count, 0)} "
-                f"for the fit, {FEWEST_FITTED} are needed at least; hold out fewer, or measure more positions"
+                f"of them, {FEWEST_FITTED} are needed for the fit at least; hold out fewer, or measure more positions"
             )
         chosen = places[_drawn(len(places), count)]
         kinds[chosen] = "verification"

@@ -43,6 +43,8 @@ def keep(
     if judged is not None and judged.effects:
         model = {"effects": list(judged.effects), "formulas": [], "model_name": "", "model_version": 0}
         about["recipe"] = {"name": "import", **model}
+    if judged is not None and "across" in judged.document:
+        about["plane_across"] = judged.document["across"]
     if how.measured is not None:
         about["measured"] = how.measured.isoformat()
     if references is not None:

@@ -39,8 +39,8 @@ def stated_references(path: Path, wanted: dict[str, Any]) -> ImportReferences:
     u = gravity.relative().u
     if abs(apart) > GRAVITY_SIGMAS * u:
         raise RecipeInvalid(
-            f"{where}: key 'uncertainty.gravity': {gravity.value:.8g} m/s² ± {2e6 * u:.2g} ppm (k = 2), "
-            f"--local-g is {float(given):.8g}, they differ by {1e6 * apart:.0f} ppm; leave --local-g out, or correct one of the two",
+            f"{where}: key 'uncertainty.gravity': {gravity.value:.8g} m/s² ± {2e6 * u:.2g} ppm (k = 2), --local-g is "
+            f"{float(given):.8g}, they differ by {1e6 * apart:.0f} ppm; leave --local-g out, or correct one of the two",
             key="uncertainty.gravity",
         )
     return found

@@ -5,8 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
+import pandas as pd
+
 from pipelines.archive import code_hash
 from pipelines.chain.chain import BY_NAME, Tables
+from pipelines.importers.plane import plane_answer
 from pipelines.stages.budget import budget
 from pipelines.stages.budget_terms import BudgetTables
 from pipelines.stages.norm_budget import norm_budget
@@ -15,8 +18,6 @@ from pipelines.tables.frames import empty_table
 
 if TYPE_CHECKING:
     from collections.abc import Callable
-
-    import pandas as pd
 
     from pipelines.archive import Run
     from pipelines.stages.budget_terms import BudgetTerms
@@ -56,6 +57,18 @@ def verify_norms_step(gravity: float, *, history: bool) -> StageCall:
     code = code_hash(("pipelines.stages.norm_verify", "schemas.tables"))
     inputs = (*names, "history") if history else names
     return StageCall("verify", inputs, stage.outputs, {"gravity_g": gravity}, code, call)
+
+
+def plane_step(across: int, gravity: float) -> StageCall:
+    """The fit of the two axes in the plane across an axis; gravity, g, is read where the poses are not known."""
+
+    def call(run: Run) -> Tables:
+        dwells = run.table("dwells")
+        answer = plane_answer(dwells, across, gravity, str(dwells["out_unit"].iloc[0]))
+        return {"coefficients": pd.DataFrame(answer.coefficients)}
+
+    code = code_hash(("pipelines.importers.plane", "schemas.tables"))
+    return StageCall("fit", ("dwells",), ("coefficients",), {"plane_across": across, "gravity_g": gravity}, code, call)
 
 
 def budget_step(terms: BudgetTerms, *, history: bool, known: bool) -> StageCall:

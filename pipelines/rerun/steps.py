@@ -14,10 +14,11 @@ from pipelines.archive.signatures import ENTRY
 from pipelines.chain.chain import BY_NAME, RECORDS, STAGES, Tables
 from pipelines.chain.runner import captured_tables
 from pipelines.diagnosis.diagnose import default_model
+from pipelines.importers.plane import axis_of_plane
 from pipelines.jobs.job import Job
 from pipelines.jobs.model_files import refuse_unknown_effects, use_formulas
 from pipelines.jobs.terms import archived_terms
-from pipelines.rerun.import_steps import StageCall, budget_step, history_of, no_noise, verify_norms_step
+from pipelines.rerun.import_steps import StageCall, budget_step, history_of, no_noise, plane_step, verify_norms_step
 from pipelines.stages.figures import UNITS
 from pipelines.stages.fit import fit
 from pipelines.stages.grade import Evidence, grade, refuse_limits_without_figures
@@ -28,7 +29,7 @@ from schemas.errors import DataRejected, WrongUse
 from schemas.limits import Limits, limits_of
 from schemas.recipe import FormulaSpec, Lot, Recipe, explain
 from schemas.station import StationConfig
-from schemas.units import STANDARD_GRAVITY_M_S2
+from schemas.units import AXES, STANDARD_GRAVITY_M_S2
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -144,6 +145,9 @@ def _imported(run: Run, wanted: ModelChange, left_out: Dwells) -> Plan:
     about = run.about
     dwells = leave_out(_fit_for_a_fit(run), left_out)
     known = has_poses(dwells)
+    across = None if wanted.effects or about.get("recipe", {}).get("effects") else axis_of_plane(dwells)
+    if across is not None:
+        return _in_a_plane(run, wanted, left_out, across)
     model = _model_of(run, dwells, wanted)
     use_formulas([FormulaSpec.model_validate(f) for f in model["formulas"]], f"run {run.id}")
     refuse_unknown_effects(model["effects"], f"run {run.id}")
@@ -167,6 +171,26 @@ def _imported(run: Run, wanted: ModelChange, left_out: Dwells) -> Plan:
         named = [f"{unit}:{dwell}" for unit, dwell in left_out]
         decisive["left_out"] = new["left_out"] = [*about.get("left_out", []), *named]
     return Plan("import", tuple(steps), new, decisive)
+
+
+def _in_a_plane(run: Run, wanted: ModelChange, left_out: Dwells, across: int) -> Plan:
+    """The fit of a unit that was turned about one of its axes: its default model is of the two axes in the plane."""
+    about, axis = run.about, AXES[across]
+    if wanted.limits is not None:
+        raise WrongUse(
+            f"run {run.id}: turned about {axis} alone, limits need the scale of {axis} too; measure other orientations, or fit without "
+            "limits"
+        )
+    history = "history" in run.tables()
+    gravity = gravity_of_import(about)
+    steps = (_import_step(history, left_out, run), plane_step(across, gravity))
+    kept = {key: value for key, value in about.items() if key not in PROVENANCE}
+    new: dict[str, Any] = {**kept, "recipe": {**about.get("recipe", {}), "name": "import"}, "plane_across": axis}
+    decisive: dict[str, Any] = {"data": {"dwells": run.manifest("dwells")["sha256"]}, "plane": axis, "code": steps[1].code}
+    if left_out:
+        named = [f"{unit}:{dwell}" for unit, dwell in left_out]
+        decisive["left_out"] = new["left_out"] = [*about.get("left_out", []), *named]
+    return Plan("import", steps, new, decisive)
 
 
 def has_poses(dwells: pd.DataFrame) -> bool:
