@@ -29,8 +29,9 @@ TEMPLATE = """\
 {% for reason in reasons %}<p>{{ reason }}</p>{% endfor %}
 {{ figures | safe }}
 {% endfor %}
-{% if held_out %}<p class="note">{{ held_out }} dwells were held out of the fit; errors "on poses not used" are theirs. Without known poses only the component along the force shows in | |a| − g |: the error
-of an axis is that of the magnitude, weighted by how far the force points along the axis.</p>{% endif %}
+{% if held_out %}<p class="note">{{ held_out }} dwells were held out of the fit; errors "on poses not used" are theirs.
+{% if norm %}Without known poses only the component along the force shows in | |a| − g |: the error of an axis is that of the
+magnitude, weighted by how far the force points along the axis.{% endif %}</p>{% endif %}
 <h2>{{ budget_title }}</h2>
 {{ budget | safe }}
 """
@@ -69,6 +70,7 @@ def decisions(run: Run) -> str:
         certificates_title=certificates.TITLE,
         certificates=certificates.render(report),
         units=[(u.unit, u.outcome, u.grade, u.reasons, figures.render(u)) for u in report.units],
+        norm=report.not_needed == OF_POSES,
         held_out=len(run.table("verification")) if "verification" in run.tables() else 0,
         budget_title=budget.TITLE,
         budget=budget.render(report),

@@ -178,8 +178,8 @@ def _in_a_plane(run: Run, wanted: ModelChange, left_out: Dwells, across: int) ->
     about, axis = run.about, AXES[across]
     if wanted.limits is not None:
         raise WrongUse(
-            f"run {run.id}: turned about {axis} alone, limits need the scale of {axis} too; measure other orientations, or fit without "
-            "limits"
+            f"run {run.id}: turned about {axis} alone, limits need the scale of {axis} too; measure other orientations, or fit "
+            "without limits"
         )
     history = "history" in run.tables()
     gravity = gravity_of_import(about)

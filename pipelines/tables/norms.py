@@ -110,9 +110,9 @@ def _refuse_quiet(output: Array) -> None:
     if quiet is not None:
         name = "xyz"[quiet]
         raise NotIdentified(
-            f"fit: output {name} stays the same while the others turn through gravity: {name} is dead, or the sensor was turned about "
-            f"{name} alone, and the norm of gravity does not show its scale; turn all axes, or fit the two others with 'tumbleline "
-            "import FILE --fit plane'"
+            f"fit: output {name} stays the same while the others turn through gravity: {name} is dead, or the sensor was turned "
+            f"about {name} alone, and the norm of gravity does not show its scale; turn all axes, or fit the two others with "
+            "'tumbleline import FILE --fit plane'"
         )
 
 
