@@ -24,6 +24,9 @@ _LONG = 400
 _HANGING = 1e-3
 """Part of a column that the others leave below which one factorisation is not trusted."""
 
+VANISHING = 3e-5
+"""Singular value of columns of unit length, over the largest, below which a combination of them vanishes."""
+
 _OWN = 20
 """Degrees of freedom of a block from which on its own variance tells of the shares; fewer are taken to be alike."""
 
@@ -150,7 +153,7 @@ class Model:
             information, squares, dof = space.information, space.squares, space.by_block
         else:
             information, squares = quick
-            dof = self.problem.covariance.count - float(self.local.shape[-1])
+            dof = self.problem.covariance.count - float(self._determined.shape[-1])
         logdet = float(np.sum(self.problem.covariance.logdet(shares)))
         if float(np.median(dof)) < _OWN:
             return logdet + information + variance.deviance(squares, dof)
@@ -159,9 +162,29 @@ class Model:
         return logdet + information + float(np.sum(own))
 
     @cached_property
+    def _determined(self) -> Array:
+        """Columns (blocks, n, r) that span those with coefficients by block, without combinations that vanish.
+
+        Of misalignment only three of six columns show in a norm, and a turn about one axis shows two of three forces. Counted among
+        the information, a combination that vanishes takes off ln F per share F of wander, and the largest share is always best.
+        """
+        unit = self.local * self.problem.covariance.there[..., None]
+        size = np.linalg.norm(unit, axis=1)
+        unit = unit / np.where(size > 0.0, size, 1.0)[:, None, :]
+        _, values, turn = np.linalg.svd(unit, full_matrices=False)
+        if not values.size:
+            return self.local
+        ranks = np.sum(values > VANISHING * values[:, :1], axis=1)
+        rank = int(ranks.max())
+        if rank == self.local.shape[-1] or int(ranks.min()) != rank:
+            return self.local
+        scaled = self.local / np.where(size > 0.0, size, 1.0)[:, None, :]
+        return scaled @ np.swapaxes(turn[:, :rank], -1, -2)
+
+    @cached_property
     def _stacked(self) -> Array:
-        """Columns with coefficients by block, of unit size, and the measurements behind them, (blocks, n, p + 1)."""
-        unit = self.local / self._sizes[:, None, :]
+        """Determined columns, of unit size, and the measurements behind them, (blocks, n, r + 1)."""
+        unit = self._determined / self._sizes[:, None, :]
         return np.concatenate([unit, self.problem.y[..., None]], axis=-1)
 
     def _quick(self, shares: Shares) -> tuple[float, Array] | None:
@@ -184,9 +207,9 @@ class Model:
 
     @cached_property
     def _sizes(self) -> Array:
-        """Sizes of the columns with coefficients by block, (blocks, p)."""
-        there = self.problem.covariance.there[..., None]
-        size = np.sqrt(np.einsum("bnp,bnp->bp", self.local * there, self.local * there))
+        """Sizes of the determined columns, (blocks, r)."""
+        own = self._determined * self.problem.covariance.there[..., None]
+        size = np.sqrt(np.einsum("bnp,bnp->bp", own, own))
         return np.where(size > 0.0, size, 1.0)
 
     @cached_property
