@@ -25,7 +25,7 @@ FEWEST_DOF = 8
 MOST = 0.1
 """Share of a unit's dwells that is taken out at the most, and never fewer than two may be."""
 
-BAD_NORM = 0.01
+BAD_NORM = 0.005
 """Probability over all dwells of a recording below which a dwell is called bad."""
 
 RECORDED_DOF = 30
