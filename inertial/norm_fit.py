@@ -262,7 +262,7 @@ class _Work:
         direction = force / np.linalg.norm(force, axis=-1, keepdims=True)
         response = response_matrix(theta, self.names)
         for unit in range(len(theta)):
-            noises = [_Solved(every[unit], left[unit], one.weight, one.whiten[unit]) for one in plausible]
+            noises = [_Solved(every[unit], left[unit], one.weight, one.whiten[unit], 1.0) for one in plausible]
             noises = noises or [_Solved(every[unit], left[unit], 1.0, self.whiten[unit])]
             whole = np.sum([one.weight * one.covariance(int(dof[unit])) for one in noises], axis=0)
             together[unit] = whole[:free, :free]
@@ -311,11 +311,11 @@ class _Solved:
     Parameters
     ----------
     rows : (n, k), derivatives of the residuals; left : (n,), residuals
-    whiten : (n, n) or (n,), of the noise
+    whiten : (n, n) or (n,), of the noise; least : variance that what is left whitened has at the least
     """
 
-    def __init__(self, rows: Array, left: Array, weight: float, whiten: Array) -> None:
-        self.weight = weight
+    def __init__(self, rows: Array, left: Array, weight: float, whiten: Array, least: float = 0.0) -> None:
+        self.weight, self.least = weight, least
         white = whiten[:, None] * rows if whiten.ndim == 1 else whiten @ rows
         rest = whiten * left if whiten.ndim == 1 else whiten @ left
         size = np.linalg.norm(white, axis=0)
@@ -328,8 +328,12 @@ class _Solved:
 
     def covariance(self, dof: int) -> Array:
         """Second moment (k, k) about the solution: of the noise, with Student's factor for k = 2, and the step to the fit."""
-        found = student(dof) ** 2 * self.chi2 / dof * self.inverse + np.outer(self.step, self.step)
+        found = student(dof) ** 2 * self._level(dof) * self.inverse + np.outer(self.step, self.step)
         return found / np.outer(self.size, self.size)
+
+    def _level(self, dof: int) -> float:
+        """Variance of what is left whitened."""
+        return max(self.chi2 / dof, self.least)
 
     def of_record(
         self, places: Sequence[int], direction: Array, slow: Array, share: Array, response: Array, dof: int
@@ -341,7 +345,7 @@ class _Solved:
         places : of the bias of each axis among the coefficients; share : (n,), of each dwell in the mean
         """
         share = share / share.sum()
-        level = student(dof) ** 2 * self.chi2 / dof
+        level = student(dof) ** 2 * self._level(dof)
         common = slow @ share  # of the wander of an axis at each dwell with its mean
         mean = float(share @ common)
         found = np.zeros(3)

@@ -24,6 +24,9 @@ _LONG = 400
 _HANGING = 1e-3
 """Part of a column that the others leave below which one factorisation is not trusted."""
 
+_SHARE_OF_WHITE = 0.5
+"""Part of the recorded white variance that the noise of norms has at the least."""
+
 VANISHING = 3e-5
 """Singular value of columns of unit length, over the largest, below which a combination of them vanishes."""
 
@@ -128,7 +131,21 @@ class Model:
         """The noise at given shares: each block's variance drawn together with the others' as far as they are alike."""
         space = self._rough(shares)
         squares, prior = variance.moderated(space.squares, space.by_block)
-        return Noise(shares, np.sqrt(squares), prior)
+        return Noise(shares, np.sqrt(np.maximum(squares, self._least)), prior)
+
+    @cached_property
+    def _least(self) -> Array:
+        """Variances (blocks,) over the recorded white ones below which those of a norm cannot be; zero where nothing is known.
+
+        White noise of the samples is a lower bound. Few dwells that fit well by chance otherwise pass for strong wander with less
+        white noise than their samples have. A record that scatters less than its samples say has none: their errors are too large.
+        """
+        lot = self.problem.lot
+        if not (lot.radial and lot.recorded):
+            return np.zeros(self.problem.blocks)
+        space = self.at(self.problem.covariance.white_noise())
+        scatter = space.squares / np.maximum(space.by_block, 1.0)
+        return _SHARE_OF_WHITE * np.minimum(scatter, 1.0)
 
     def _rough(self, shares: Shares) -> Space:
         """The space at shares, the blocks weighed as they are known before."""
@@ -155,6 +172,10 @@ class Model:
             information, squares = quick
             dof = self.problem.covariance.count - float(self._determined.shape[-1])
         logdet = float(np.sum(self.problem.covariance.logdet(shares)))
+        if self._least.any():
+            known = dof > 0
+            level = np.maximum(squares[known] / dof[known], np.maximum(self._least[known], 1e-300))
+            return logdet + information + float(np.sum(dof[known] * np.log(level) + squares[known] / level))
         if float(np.median(dof)) < _OWN:
             return logdet + information + variance.deviance(squares, dof)
         known = dof > 0
