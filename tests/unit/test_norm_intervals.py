@@ -67,9 +67,11 @@ def test_intervals_hold_the_truth_for_unequal_dwells() -> None:
     assert own.std() > 0.5
 
 
-def test_the_record_is_known_better_than_the_coefficient_where_flicker_is_strong() -> None:
-    done = norms_fitted(make(Recording(40, "white 25, B 30"), 9).dwells, None, PLAIN)
+def test_the_record_has_an_error_of_its_own_and_the_axes_one_covariance() -> None:
+    done = norms_fitted(make(Recording(30, "white 280, B 30"), 9).dwells, None, PLAIN)
     record = bias_uncertainty(done)["bias_record_u_ug"][0]
     coefficient = 1e6 * done.fit.fit.standard_errors[0, :, 0] / done.scale[0]
-    assert np.all(record < 0.8 * coefficient)
+    assert np.all((record > 0.2 * coefficient) & (record < 3.0 * coefficient))
     assert done.fit.covariance.shape == (1, 9, 9)
+    variances = np.diagonal(done.fit.covariance[0])
+    np.testing.assert_allclose(np.sqrt(variances[:1]), done.fit.fit.standard_errors[0, 0, :1])
