@@ -138,7 +138,7 @@ class Model:
         """Variances (blocks,) over the recorded white ones below which those of a norm cannot be; zero where nothing is known.
 
         White noise of the samples is a lower bound. Few dwells that fit well by chance otherwise pass for strong wander with less
-        white noise than their samples have. A record that scatters less than its samples say has none: their errors are too large.
+        white noise than their samples have. A record that scatters less than its samples say has a lower bound of its own.
         """
         lot = self.problem.lot
         if not (lot.radial and lot.recorded):
@@ -186,8 +186,8 @@ class Model:
     def _determined(self) -> Array:
         """Columns (blocks, n, r) that span those with coefficients by block, without combinations that vanish.
 
-        Of misalignment only three of six columns show in a norm, and a turn about one axis shows two of three forces. Counted among
-        the information, a combination that vanishes takes off ln F per share F of wander, and the largest share is always best.
+        Of misalignment only three of six columns show in a norm, and a turn about one axis shows two of three forces. Counted
+        among the information, a combination that vanishes takes off ln F per share F of wander: the largest would always be best.
         """
         unit = self.local * self.problem.covariance.there[..., None]
         size = np.linalg.norm(unit, axis=1)

@@ -114,7 +114,9 @@ def fit_plane(output: Array, force: Array, across: int, time: Array, error: Arra
     errors = np.array([one.error for one in solved])
     p = min(1.0, 3.0 * min(_harmonics(one, angle, (2, 3)) for one in solved))
     left = np.stack([one.left for one in solved], axis=1) / scale
-    return PlaneFit(across, (i, j), found[:, 0], errors[:, 0], found[:, 1:], errors[:, 1:], seen, left, len(seen) - 3, p)
+    return PlaneFit(
+        across, (i, j), found[:, 0], errors[:, 0], found[:, 1:], errors[:, 1:], seen, left, len(seen) - 3, p
+    )
 
 
 def fit_plane_norm(output: Array, across: int, norm: float, time: Array, error: Array) -> PlaneFit:

@@ -115,7 +115,10 @@ def _errors(dwells: pd.DataFrame, output: Array) -> Array:
 def _verdict(found: PlaneFit) -> tuple[bool | None, str]:
     """Whether the model describes the dwells, by harmonics of the angle beside it; None where they cannot tell."""
     if found.rms > GROSS:
-        return False, f"the residual is {100.0 * found.rms:.3g} % of gravity: the poses lie in no plane, or an axis is dead"
+        return (
+            False,
+            f"the residual is {100.0 * found.rms:.3g} % of gravity: the poses lie in no plane, or an axis is dead",
+        )
     if found.dof < FEWEST_DOF:
         return None, (
             f"cannot be judged: {found.dof} degrees of freedom, {FEWEST_DOF} are needed; measure "
@@ -124,7 +127,10 @@ def _verdict(found: PlaneFit) -> tuple[bool | None, str]:
     passed = passes(found.p_value, UNLIKELY)
     if passed is None:
         return None, "cannot be judged: the probability of the residuals is no number; add poses"
-    return passed, "" if passed else "the residual follows harmonics of the angle, as a second- or third-order term does"
+    return (
+        passed,
+        "" if passed else "the residual follows harmonics of the angle, as a second- or third-order term does",
+    )
 
 
 def _opened(found: PlaneFit, *, known: bool) -> list[str]:

@@ -186,7 +186,11 @@ def _in_a_plane(run: Run, wanted: ModelChange, left_out: Dwells, across: int) ->
     steps = (_import_step(history, left_out, run), plane_step(across, gravity))
     kept = {key: value for key, value in about.items() if key not in PROVENANCE}
     new: dict[str, Any] = {**kept, "recipe": {**about.get("recipe", {}), "name": "import"}, "plane_across": axis}
-    decisive: dict[str, Any] = {"data": {"dwells": run.manifest("dwells")["sha256"]}, "plane": axis, "code": steps[1].code}
+    decisive: dict[str, Any] = {
+        "data": {"dwells": run.manifest("dwells")["sha256"]},
+        "plane": axis,
+        "code": steps[1].code,
+    }
     if left_out:
         named = [f"{unit}:{dwell}" for unit, dwell in left_out]
         decisive["left_out"] = new["left_out"] = [*about.get("left_out", []), *named]
