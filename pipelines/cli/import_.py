@@ -123,7 +123,9 @@ def command(
     zero_output: Annotated[
         float | None, typer.Option("--zero-output", metavar="VALUE", help="Nominal output at 0 g; 0.")
     ] = None,
-    fit: Annotated[str, typer.Option("--fit", metavar="norm|plane|faces|temperature", help="Fit and judge at once.")] = "",
+    fit: Annotated[
+        str, typer.Option("--fit", metavar="norm|plane|faces|temperature", help="Fit and judge at once.")
+    ] = "",
     procedure: Annotated[
         str,
         typer.Option("--procedure", metavar="sweep", help="A dynamic measurement: the transfer function of a sweep."),

@@ -51,8 +51,10 @@ def verify_norms_step(gravity: float, *, history: bool) -> StageCall:
     names = ("dwells", "coefficients", "covariance", "wander")
 
     def call(run: Run) -> Tables:
-        dwells, *others = (run.table(name) for name in names)
-        return verify_norms(dwells, run.table("history") if history else None, *others, gravity)
+        dwells, coefficients, covariance, wander = (run.table(name) for name in names)
+        return verify_norms(
+            dwells, run.table("history") if history else None, coefficients, covariance, wander, gravity
+        )
 
     code = code_hash(("pipelines.stages.norm_verify", "schemas.tables"))
     inputs = (*names, "history") if history else names
@@ -82,8 +84,8 @@ def budget_step(terms: BudgetTerms, *, history: bool, known: bool) -> StageCall:
     names = ("coefficients", "covariance", "wander", "verification", "verification_poses")
 
     def call(run: Run) -> Tables:
-        tables = [run.table(name) for name in names]
-        whole = BudgetTables(run.table("dwells"), history_of(run), *tables, no_noise())
+        tables = {name: run.table(name) for name in names}
+        whole = BudgetTables(dwells=run.table("dwells"), history=history_of(run), noise=no_noise(), **tables)
         return budget(whole, terms) if known else norm_budget(whole, terms)
 
     module = "pipelines.stages.budget" if known else "pipelines.stages.norm_budget"
