@@ -11,10 +11,10 @@ from typing import TYPE_CHECKING, Annotated, Any
 from pydantic import Field, ValidationError, model_validator
 
 from schemas.bounds import Celsius, Text
-from schemas.recipe import explain, parse_toml, read_text
 from schemas.reference import Reference
 from schemas.station import refuse_untraced
 from schemas.strict import Strict
+from schemas.toml_files import explain, parse_toml, read_text
 from schemas.uncertainty import Uncertainty
 from schemas.validity import CertificateTerms, Stability
 

@@ -254,7 +254,7 @@ def refuse_unstated(run: Run) -> None:
     needed, again = _needed(run)
     missing = {name: rules for name, rules in terms.stated.not_stated.items() if name in needed}
     if missing:
-        listed = ", ".join(f"{name} (rules {rules})" for name, rules in missing.items())
+        listed = ", ".join(f"{name} (dominates {rules})" for name, rules in missing.items())
         raise WrongUse(f"certify: run {run.id}: not stated: {listed}; add it to [uncertainty] and {again}")
     if not run.table("uncertainties")["quantity"].eq("bias_error_period").any():
         kept = "verification poses" if run.about.get("capture") else "dwells held out by --verify N"

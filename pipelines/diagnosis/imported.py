@@ -1,4 +1,4 @@
-"""The fits that an import may ask for, by name: labelled faces, a plane, a temperature ramp, or gravity's norm."""
+"""The fits of an import, by name: labelled faces, a plane, a temperature ramp, or gravity's norm."""
 
 from __future__ import annotations
 
@@ -32,9 +32,9 @@ def judge(method: str, data: Imported, mapping: Mapping) -> FitAnswer:
     silent = silent_axis(data.dwells) if method == "norm" and data.dwells is not None else ""
     if silent and (turned := _in_a_plane(data, mapping)) is not None:
         return turned
-    if silent:  # more poses, which the fit would ask for, would not help
+    if silent:  # more poses, which the fit requests, do not help
         raise DataRejected(
-            f"import: axis {silent}; three axes that answer to gravity are needed for --fit norm; correct --map {silent[0]}=…"
+            f"import: axis {silent}; three axes that respond to gravity are needed for --fit norm; correct --map {silent[0]}=…"
         )
     return METHODS[method](data, mapping)
 
