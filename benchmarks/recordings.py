@@ -10,6 +10,7 @@ spoilt dwells were named. `--seeds development` are for setting constants, `judg
 from __future__ import annotations
 
 import argparse
+import copy
 import os
 import sys
 import time
@@ -70,12 +71,16 @@ class Recording:
 
 @dataclass(frozen=True)
 class Made:
-    """The dwells in the exchange format, and the truth behind them."""
+    """The dwells in the exchange format, and the truth behind them.
+
+    wander : (3,), mean of the slow noise over the dwells, each by its length, g
+    """
 
     dwells: pd.DataFrame
     spoilt: tuple[int, ...]
     bias: Floats
     response: Floats
+    wander: Floats
 
 
 def make(what: Recording, seed: int) -> Made:
@@ -90,7 +95,9 @@ def make(what: Recording, seed: int) -> Made:
     own = rng if what.sensor is None else np.random.default_rng(what.sensor)
     bias = 32768.0 + own.uniform(-300.0, 300.0, 3)
     response = 4080.0 * (np.diag(1.0 + own.uniform(-0.01, 0.01, 3)) + 0.004 * own.standard_normal((3, 3)))
+    again = copy.deepcopy(rng)
     error = dwell_noise(NOISES[what.noise], start, length, 1, rng)[0]
+    slow = dwell_noise(replace(NOISES[what.noise], white=0.0), start, length, 1, again)[0]
     middle = start + 0.5 * length
     error[:, 2] += what.cubic * force[:, 2] ** 3
     error[:, 0] += what.warm_up * np.exp(-middle / what.warm_up_s)
@@ -107,7 +114,7 @@ def make(what: Recording, seed: int) -> Made:
     )
     for k, axis in enumerate("xyz"):
         frame[f"out_{axis}"], frame[f"sd_{axis}"] = output[:, k], sd[:, k]
-    return Made(frame.assign(out_unit="LSB"), spoilt, bias, response)
+    return Made(frame.assign(out_unit="LSB"), spoilt, bias, response, 1e-6 * np.average(slow, axis=0, weights=length))
 
 
 def _placed(n: int, rng: np.random.Generator) -> Floats:

@@ -13,6 +13,10 @@ UP: tuple[float, float, float] = (0.0, 0.0, 1.0)
 _ROUNDING = 1e-14  # g; smaller components are rounding of sines and cosines
 
 
+_UPRIGHT = 0.9
+"""Cosine of the angle of x to the vertical above which the heading is that of y."""
+
+
 def rotation_x(angle: ArrayLike) -> Array:
     """Rotation matrices about x, shape (..., 3, 3), for ``angle`` (...) in rad."""
     a = np.asarray(angle, dtype=float)
@@ -65,3 +69,23 @@ def angles_from_force(force: ArrayLike) -> tuple[Array, Array]:
     across = np.hypot(f[..., 0], f[..., 1])
     inner = np.where(across > 1e-12, np.arctan2(f[..., 0], f[..., 1]), 0.0)
     return np.arctan2(across, f[..., 2]), inner
+
+
+def horizontal(force: ArrayLike, heading: ArrayLike) -> tuple[Array, Array]:
+    """The laboratory's x and y seen in the frame of a unit put down by hand, each (..., 3).
+
+    The heading is the direction, counter-clockwise from the laboratory's x as seen from above, in which the unit's x axis
+    points; that of its y axis where x is up or down.
+
+    Parameters
+    ----------
+    force : (..., 3), g, specific force of the placement; heading : (...), rad
+    """
+    f = np.asarray(force, dtype=float)
+    up = f / np.linalg.norm(f, axis=-1, keepdims=True)
+    pointer = np.where(np.abs(up[..., :1]) > _UPRIGHT, (0.0, 1.0, 0.0), (1.0, 0.0, 0.0))
+    ahead = pointer - np.sum(pointer * up, axis=-1, keepdims=True) * up
+    ahead = ahead / np.linalg.norm(ahead, axis=-1, keepdims=True)
+    left = np.cross(up, ahead)
+    c, s = (part[..., None] for part in (np.cos(heading), np.sin(heading)))
+    return c * ahead - s * left, s * ahead + c * left

@@ -5,7 +5,7 @@ changes no norm, so x stays along the sensor's own x axis: the matrix K is upper
 dρ/dc = −(uᵀK⁻¹)ᵢ·column for a coefficient c of axis i and the direction u of the force.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -28,22 +28,42 @@ _STEP = 1e-3  # relative, for the derivative by a nonlinear parameter
 
 
 @dataclass(frozen=True)
+class PlausibleNoise:
+    """A noise that the residuals of a norm fit do not rule out.
+
+    weight : of all of them, which add up to one
+    whiten : as in :func:`fit_norms`; slow : (units, n, n), covariance of the wander of one axis between the dwells, g²
+    """
+
+    weight: float
+    whiten: Array
+    slow: Array
+
+
+@dataclass(frozen=True)
 class NormFit:
     """A fit under the norm condition.
 
     fit : coefficients (units, 3, p), output unit; its ``residuals`` (units, n, 3) lie along the force
     force : (units, n, 3), g, with the axes of the sensor; left : (units, n), |f| − g
+    rows : (units, n, k), derivatives of ``left`` by the free coefficients; free : (3, p), which of the coefficients are
+    covariance : (units, k, k), of the free coefficients of all axes together
+    record : (units, 3), standard error of the bias as the mean of its record, wander included, output unit; None without noises
     nonlinear_error : standard errors of nonlinear parameters, the largest over the units
     """
 
     fit: LotFit
     force: Array
     left: Array
+    rows: Array
+    free: NDArray[np.bool_]
+    covariance: Array
+    record: Array | None
     dof: NDArray[np.int64]
     nonlinear_error: dict[str, dict[str, float]]
 
 
-def fit_norms(
+def fit_norms(  # noqa: PLR0913 - what a fit needs, and what its errors are averaged over
     effects: Sequence[str],
     state: State,
     output: Array,
@@ -52,6 +72,8 @@ def fit_norms(
     *,
     norm: float = 1.0,
     nonlinear: Values | None = None,
+    plausible: Iterable[PlausibleNoise] = (),
+    weights: Array | None = None,
 ) -> NormFit:
     """Coefficients of a model from dwells of unknown orientation.
 
@@ -64,6 +86,8 @@ def fit_norms(
     start : bias (units, 3) and response (units, 3, 3) to begin with
     norm : gravity in g
     nonlinear : values of nonlinear parameters and constants by effect id
+    plausible : noises that the residuals do not rule out: standard errors are averaged over them
+    weights : (units, n), of the dwells in the mean of the record, such as their durations; alike where None
 
     Raises
     ------
@@ -84,7 +108,7 @@ def fit_norms(
         cost = lower
         if settled:
             break
-    return work.finished(theta)
+    return work.finished(theta, list(plausible), weights)
 
 
 def _refuse(effects: Sequence[str], station: Sequence[str]) -> None:
@@ -107,7 +131,7 @@ class _Work:
         self.values = values
         self.sensor = design.split(effects)[0]
         self.names = tuple(design.local_names(self.sensor, axis, values) for axis in range(3))
-        self.free = np.array([[_is_free(axis, pair) for pair in self.names[axis]] for axis in range(3)])
+        self.free = np.array([[is_free(axis, pair) for pair in self.names[axis]] for axis in range(3)])
 
     def begun(self, bias: Array, response: Array) -> Array:
         """Coefficients (units, 3, p) of the start: everything but bias and response is zero."""
@@ -215,7 +239,7 @@ class _Work:
             )
         return np.linalg.lstsq(unit, target, rcond=None)[0] / size
 
-    def finished(self, theta: Array) -> NormFit:
+    def finished(self, theta: Array, plausible: Sequence[PlausibleNoise], weights: Array | None) -> NormFit:
         """The fit with covariances, residuals and degrees of freedom."""
         rows, more = self.rows(theta)
         used = self.whiten != 0.0 if self.whiten.ndim == 2 else np.any(self.whiten != 0.0, axis=-1)
@@ -228,17 +252,30 @@ class _Work:
             )
         left, force = self.left(theta), self.force(theta)
         white_left = self.white(left[..., None])[..., 0]
-        whole_rows = self.white(np.concatenate([rows, more], axis=-1))
+        every = np.concatenate([rows, more], axis=-1)
         chi2 = np.sum(white_left**2, axis=-1)
         covariance = np.zeros((*theta.shape, theta.shape[-1]))
         nonlinear = np.zeros((len(theta), more.shape[-1]))
         place = np.argwhere(self.free)
+        together = np.zeros((len(theta), free, free))
+        record = np.zeros((len(theta), 3)) if plausible else None
+        direction = force / np.linalg.norm(force, axis=-1, keepdims=True)
+        response = response_matrix(theta, self.names)
         for unit in range(len(theta)):
-            own = whole_rows[unit]
-            size = np.linalg.norm(own, axis=0)
-            size = np.where(size > 0.0, size, 1.0)
-            inverse = np.linalg.pinv((own / size).T @ (own / size), rcond=1e-13) / np.outer(size, size)
-            whole = student(int(dof[unit])) ** 2 * chi2[unit] / dof[unit] * inverse
+            noises = [_Solved(every[unit], left[unit], one.weight, one.whiten[unit], 1.0) for one in plausible]
+            noises = noises or [_Solved(every[unit], left[unit], 1.0, self.whiten[unit])]
+            whole = np.sum([one.weight * one.covariance(int(dof[unit])) for one in noises], axis=0)
+            together[unit] = whole[:free, :free]
+            if record is not None:
+                share = used[unit] * (1.0 if weights is None else np.nan_to_num(weights[unit]))
+                share = share if share.sum() > 0.0 else used[unit].astype(np.float64)
+                own = [self._bias_place(axis) for axis in range(3)]
+                square = [
+                    one.weight
+                    * one.of_record(own, direction[unit], other.slow[unit], share, response[unit], int(dof[unit]))
+                    for one, other in zip(noises, plausible, strict=True)
+                ]
+                record[unit] = np.sqrt(np.sum(square, axis=0))
             for axis in range(3):
                 mine = np.flatnonzero(place[:, 0] == axis)
                 covariance[unit, axis][np.ix_(place[mine, 1], place[mine, 1])] = whole[np.ix_(mine, mine)]
@@ -247,7 +284,6 @@ class _Work:
         for k, (effect, name) in enumerate(self.parameters()):
             errors.setdefault(effect, {})[name] = float(nonlinear[:, k].max())
         scale = np.abs(np.diagonal(response_matrix(theta, self.names), axis1=-2, axis2=-1))
-        direction = force / np.linalg.norm(force, axis=-1, keepdims=True)
         fit = LotFit(
             effects=self.effects,
             coefficients=theta,
@@ -261,10 +297,72 @@ class _Work:
             chi2=np.repeat(chi2[:, None] / 3.0, 3, axis=1),
             dof=np.repeat(dof[:, None], 3, axis=1),
         )
-        return NormFit(fit, force, left, dof.astype(np.int64), errors)
+        return NormFit(fit, force, left, rows, self.free, together, record, dof.astype(np.int64), errors)
+
+    def _bias_place(self, axis: int) -> int:
+        """Place of the bias of an axis among the free coefficients."""
+        column = [effect for effect, _ in self.names[axis]].index("bias")
+        return int(np.flatnonzero((np.argwhere(self.free) == (axis, column)).all(axis=1))[0])
 
 
-def _is_free(axis: int, pair: tuple[str, str]) -> bool:
+class _Solved:
+    """The linear fit of one unit about its solution, under one noise.
+
+    Parameters
+    ----------
+    rows : (n, k), derivatives of the residuals; left : (n,), residuals
+    whiten : (n, n) or (n,), of the noise; least : variance that what is left whitened has at the least
+    """
+
+    def __init__(self, rows: Array, left: Array, weight: float, whiten: Array, least: float = 0.0) -> None:
+        self.weight, self.least = weight, least
+        white = whiten[:, None] * rows if whiten.ndim == 1 else whiten @ rows
+        rest = whiten * left if whiten.ndim == 1 else whiten @ left
+        size = np.linalg.norm(white, axis=0)
+        self.size = np.where(size > 0.0, size, 1.0)
+        unit = white / self.size
+        self.inverse = np.linalg.pinv(unit.T @ unit, rcond=1e-13)
+        self.step = self.inverse @ (unit.T @ rest)
+        self.chi2 = max(float(rest @ rest - self.step @ (unit.T @ rest)), 0.0)
+        self.gain = self.inverse @ (unit.T * whiten if whiten.ndim == 1 else unit.T @ whiten) / self.size[:, None]
+
+    def covariance(self, dof: int) -> Array:
+        """Second moment (k, k) about the solution: of the noise, with Student's factor for k = 2, and the step to the fit."""
+        found = student(dof) ** 2 * self._level(dof) * self.inverse + np.outer(self.step, self.step)
+        return found / np.outer(self.size, self.size)
+
+    def _level(self, dof: int) -> float:
+        """Variance of what is left whitened."""
+        return max(self.chi2 / dof, self.least)
+
+    def of_record(
+        self, places: Sequence[int], direction: Array, slow: Array, share: Array, response: Array, dof: int
+    ) -> Array:
+        """The same of the bias (3,) less the mean of the wander over the record.
+
+        Parameters
+        ----------
+        places : of the bias of each axis among the coefficients; share : (n,), of each dwell in the mean
+        """
+        share = share / share.sum()
+        level = student(dof) ** 2 * self._level(dof)
+        common = slow @ share  # of the wander of an axis at each dwell with its mean
+        mean = float(share @ common)
+        found = np.zeros(3)
+        for axis, place in enumerate(places):
+            # the norm of a dwell shows the wander of an axis as far as the force points along it
+            shown = -self.gain[place] @ (direction * common[:, None])
+            own = self.inverse[place, place] + self.step[place] ** 2 / max(level, 1e-300)
+            square = (
+                own / self.size[place] ** 2
+                - 2.0 * float(response[axis] @ shown)
+                + mean * float(response[axis] @ response[axis])
+            )
+            found[axis] = level * max(square, 0.0)
+        return found
+
+
+def is_free(axis: int, pair: tuple[str, str]) -> bool:
     """Whether a coefficient is fitted: those of K below the diagonal are a rotation, and zero."""
     effect, name = pair
     return effect not in {"misalignment", "misalignment_temperature"} or "xyz".index(name[2]) > axis

@@ -132,6 +132,11 @@ RECORDED: tuple[Quantity, ...] = (
         "inner_deg", "inner", "°", "inner angle", factor=math.pi / 180.0, driver=False, mapped="inner",
         lowest=-_MANY_TURNS_DEG, highest=_MANY_TURNS_DEG,
     ),
+    # of units that are put down by hand: where the table is not level, the error turns with the heading
+    Quantity(
+        "heading_deg", "heading", "°", "heading of the placement", factor=math.pi / 180.0, driver=False, mapped="heading",
+        lowest=-_MANY_TURNS_DEG, highest=_MANY_TURNS_DEG,
+    ),
     Quantity("slot", "slot", "", "slot", once=True, driver=False, lowest=0.0, highest=2.0**53),
     Quantity("humidity_pct", "", "% RH", "relative humidity", usual=45.0, spread=3.0),
     Quantity("pressure_hPa", "", "hPa", "air pressure", usual=1013.0, spread=3.0),

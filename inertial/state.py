@@ -41,6 +41,7 @@ class State:
     supply : (..., n), V
     vibration : (..., n), g rms
     outer, inner : (..., n), rad, table angles
+    heading : (..., n), rad, direction about the vertical of units put down by hand (:func:`inertial.frames.horizontal`)
     slot : (...,), number of the fixture's slot
     felt : (..., n, 3), g, force along the sensor's own axes where its misalignment is known: what a sharp nonlinearity answers to
     covariates : further recorded quantities by name, (..., n)
@@ -57,6 +58,7 @@ class State:
     vibration: Array | None = None
     outer: Array | None = None
     inner: Array | None = None
+    heading: Array | None = None
     slot: Array | None = None
     felt: Array | None = None
     covariates: Mapping[str, Array] = field(default_factory=dict[str, Array])

@@ -14,7 +14,6 @@ from scipy import stats
 from scipy.special import gammaln
 
 from inertial.criticism.covariance import Noise
-from inertial.criticism.decisions import BAD_DWELL
 from inertial.criticism.model import Model
 from inertial.criticism.problem import Lot, Problem
 
@@ -25,6 +24,15 @@ FEWEST_DOF = 8
 
 MOST = 0.1
 """Largest share of a unit's dwells that is left out; two are always allowed."""
+
+BAD_NORM = 0.005
+"""Probability over all dwells of a recording below which a dwell is called bad."""
+
+RECORDED_DOF = 30
+"""Degrees of freedom that the noise of the samples counts for, where what the dwells leave agrees with it."""
+
+AGREES = 0.05
+"""Probability of the residuals' variance beyond which it does not."""
 
 _TRIED = 3  # suspicions of each size and noise for which the noise is estimated again
 _LONG = 220  # largest number of dwells for the test of pairs: they hide each other in short records only
@@ -47,7 +55,7 @@ def bad_norms(model: Model) -> list[Suspicion]:
     found: list[Suspicion] = []
     while True:
         tried = [_judged(model, unit, dwells) for unit, dwells in _suspicions(model)]
-        known = [one for one in tried if one is not None and one.log_p < np.log(BAD_DWELL)]
+        known = [one for one in tried if one is not None and one.log_p < np.log(BAD_NORM)]
         count = sum(len(one.dwells) for one in found)
         known = [one for one in known if count + len(one.dwells) <= max(2, int(MOST * model.problem.n))]
         if not known:
@@ -117,6 +125,22 @@ def _drops(p: Array, py: Array) -> list[tuple[int, Array, list[tuple[int, ...]]]
     return [*found, (2, pairs[best], [(int(i[k]), int(j[k])) for k in best])]
 
 
+def _variance(rest: Model, unit: int) -> tuple[float, int]:
+    """Variance of the whitened residuals of the other dwells, and its degrees of freedom.
+
+    Fifteen degrees of freedom know a variance to a third. Where the white noise is recorded in the samples of each dwell, and
+    what the others leave agrees with it, the record counts as further degrees of freedom.
+    """
+    own, dof = max(rest.space.variance, 1e-300), rest.space.dof
+    if not rest.problem.lot.recorded:
+        return own, dof
+    scale = float(rest.noise.scale[unit]) ** 2
+    low, high = stats.chi2.ppf([0.5 * AGREES, 1.0 - 0.5 * AGREES], dof) / dof
+    if not low < own * scale < high:
+        return own, dof
+    return (dof * own + RECORDED_DOF / scale) / (dof + RECORDED_DOF), dof + RECORDED_DOF
+
+
 def _judged(model: Model, unit: int, dwells: tuple[int, ...]) -> Suspicion | None:
     """A suspicion at the noise of the other dwells; None if these do not determine the model."""
     rest = _without(model, unit, dwells)
@@ -127,12 +151,13 @@ def _judged(model: Model, unit: int, dwells: tuple[int, ...]) -> Suspicion | Non
     own = p[np.ix_(dwells, dwells)]
     off = np.linalg.solve(own, py[list(dwells)])
     size = len(dwells)
-    statistic = float(py[list(dwells)] @ off) / max(rest.space.variance, 1e-300)
-    log_p = float(stats.f.logsf(statistic / size, size, rest.space.dof)) + _looks(model, size)
-    error = np.sqrt(np.diagonal(np.linalg.inv(own)) * max(rest.space.variance, 1e-300))
+    variance, dof = _variance(rest, unit)
+    statistic = float(py[list(dwells)] @ off) / variance
+    log_p = float(stats.f.logsf(statistic / size, size, dof)) + _looks(model, size)
+    error = np.sqrt(np.diagonal(np.linalg.inv(own)) * variance)
     if size > 1:
         # each must be bad by itself beside the other
-        each = stats.f.logsf((off / error) ** 2, 1, rest.space.dof) + _looks(model, 1)
+        each = stats.f.logsf((off / error) ** 2, 1, dof) + _looks(model, 1)
         if not bool(np.all(each < np.log(0.5))):
             return None
     return Suspicion(unit, dwells, tuple(off.tolist()), tuple(np.abs(off / error).tolist()), log_p)

@@ -11,7 +11,7 @@ from inertial.criticism import variance
 from inertial.criticism.covariance import Noise, Shares
 from inertial.criticism.handling.base import Handling
 from inertial.criticism.problem import SHARED, Problem
-from inertial.criticism.shares import best_shares
+from inertial.criticism.shares import best_shares, plausible_shares
 from inertial.criticism.space import Candidate, Space
 from inertial.effects.base import AnyEffect
 from inertial.errors import NotIdentified
@@ -23,6 +23,12 @@ _LONG = 400
 
 _HANGING = 1e-3
 """Independent part of a column below which a single factorisation is inaccurate."""
+
+_SHARE_OF_WHITE = 0.5
+"""Part of the recorded white variance that the noise of norms has at the least."""
+
+VANISHING = 3e-5
+"""Singular value of columns of unit length, over the largest, below which a combination of them vanishes."""
 
 _OWN = 20
 """Degrees of freedom of a block from which on its own variance is used for the shares; blocks with fewer have a common one."""
@@ -117,11 +123,29 @@ class Model:
         near = None if self._near is None else self._near.shares
         return self.noise_at(best_shares(self._restricted, near, finest=4 if self.problem.n > _LONG else 2))
 
+    def plausible_shares(self) -> list[tuple[Shares, float]]:
+        """Shares that the residuals do not rule out, with weights that add up to one."""
+        return plausible_shares(self._restricted, self.noise.shares)
+
     def noise_at(self, shares: Shares) -> Noise:
         """The noise at given shares: each block's variance shrunk towards the others as far as they are similar."""
         space = self._rough(shares)
         squares, prior = variance.moderated(space.squares, space.by_block)
-        return Noise(shares, np.sqrt(squares), prior)
+        return Noise(shares, np.sqrt(np.maximum(squares, self._least)), prior)
+
+    @cached_property
+    def _least(self) -> Array:
+        """Variances (blocks,) over the recorded white ones below which those of a norm cannot be; zero where nothing is known.
+
+        White noise of the samples is a lower bound. Few dwells that fit well by chance otherwise pass for strong wander with less
+        white noise than their samples have. A record that scatters less than its samples say has a lower bound of its own.
+        """
+        lot = self.problem.lot
+        if not (lot.radial and lot.recorded):
+            return np.zeros(self.problem.blocks)
+        space = self.at(self.problem.covariance.white_noise())
+        scatter = space.squares / np.maximum(space.by_block, 1.0)
+        return _SHARE_OF_WHITE * np.minimum(scatter, 1.0)
 
     def _rough(self, shares: Shares) -> Space:
         """The space at shares, with the blocks weighted by their known variances."""
@@ -146,8 +170,12 @@ class Model:
             information, squares, dof = space.information, space.squares, space.by_block
         else:
             information, squares = quick
-            dof = self.problem.covariance.count - float(self.local.shape[-1])
+            dof = self.problem.covariance.count - float(self._determined.shape[-1])
         logdet = float(np.sum(self.problem.covariance.logdet(shares)))
+        if self._least.any():
+            known = dof > 0
+            level = np.maximum(squares[known] / dof[known], np.maximum(self._least[known], 1e-300))
+            return logdet + information + float(np.sum(dof[known] * np.log(level) + squares[known] / level))
         if float(np.median(dof)) < _OWN:
             return logdet + information + variance.deviance(squares, dof)
         known = dof > 0
@@ -155,9 +183,29 @@ class Model:
         return logdet + information + float(np.sum(own))
 
     @cached_property
+    def _determined(self) -> Array:
+        """Columns (blocks, n, r) that span those with coefficients by block, without combinations that vanish.
+
+        Of misalignment only three of six columns show in a norm, and a turn about one axis shows two of three forces. Counted
+        among the information, a combination that vanishes takes off ln F per share F of wander: the largest would always be best.
+        """
+        unit = self.local * self.problem.covariance.there[..., None]
+        size = np.linalg.norm(unit, axis=1)
+        unit = unit / np.where(size > 0.0, size, 1.0)[:, None, :]
+        _, values, turn = np.linalg.svd(unit, full_matrices=False)
+        if not values.size:
+            return self.local
+        ranks = np.sum(values > VANISHING * values[:, :1], axis=1)
+        rank = int(ranks.max())
+        if rank == self.local.shape[-1] or int(ranks.min()) != rank:
+            return self.local
+        scaled = self.local / np.where(size > 0.0, size, 1.0)[:, None, :]
+        return scaled @ np.swapaxes(turn[:, :rank], -1, -2)
+
+    @cached_property
     def _stacked(self) -> Array:
-        """Columns with coefficients by block, of unit size, and the measurements behind them, (blocks, n, p + 1)."""
-        unit = self.local / self._sizes[:, None, :]
+        """Determined columns, of unit size, and the measurements behind them, (blocks, n, r + 1)."""
+        unit = self._determined / self._sizes[:, None, :]
         return np.concatenate([unit, self.problem.y[..., None]], axis=-1)
 
     def _quick(self, shares: Shares) -> tuple[float, Array] | None:
@@ -180,9 +228,9 @@ class Model:
 
     @cached_property
     def _sizes(self) -> Array:
-        """Sizes of the columns with coefficients by block, (blocks, p)."""
-        there = self.problem.covariance.there[..., None]
-        size = np.sqrt(np.einsum("bnp,bnp->bp", self.local * there, self.local * there))
+        """Sizes of the determined columns, (blocks, r)."""
+        own = self._determined * self.problem.covariance.there[..., None]
+        size = np.sqrt(np.einsum("bnp,bnp->bp", own, own))
         return np.where(size > 0.0, size, 1.0)
 
     @cached_property

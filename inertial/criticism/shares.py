@@ -15,6 +15,11 @@ _STRIDES = (4, 2, 1)
 _LEAST = 1e-3
 """Smallest reduction of the deviance by a step."""
 
+_RULED_OUT = 12.0
+"""Deviance above the least from which shares are ruled out: a weight of 0.25 %."""
+
+_MOST_PLACES = 240
+
 
 def best_shares(deviance: Callable[[Shares], float], near: Shares | None = None, *, finest: int = 1) -> Shares:
     """The shares of the smallest deviance, by descent from a start.
@@ -41,6 +46,39 @@ def best_shares(deviance: Callable[[Shares], float], near: Shares | None = None,
                 break
             here = best
     return shares_at(here)
+
+
+def plausible_shares(deviance: Callable[[Shares], float], best: Shares) -> list[tuple[Shares, float]]:
+    """Shares by half decades about the best that a record does not rule out, with their weights, which add up to one.
+
+    The weights are the restricted likelihood: a flat density over the logarithms of the shares, where shares of zero count as one
+    half decade. Few dwells leave decades of shares open, and errors that are stated at the best alone are too small.
+    """
+    stride = _STRIDES[0]
+    middle = place_of(best)
+    known = {middle: deviance(shares_at(middle))}
+    open_, least = [middle], known[middle]
+    while open_:
+        first, second = open_.pop()
+        near = [(k, second) for k in _beside(first, stride, middle[0])]
+        near += [(first, k) for k in _beside(second, stride, middle[1])]
+        for place in near:
+            if place not in known and len(known) < _MOST_PLACES:
+                known[place] = deviance(shares_at(place))
+                if known[place] < least + _RULED_OUT:
+                    least = min(least, known[place])
+                    open_.append(place)
+    kept = {place: np.exp(-0.5 * (value - least)) for place, value in known.items() if value < least + _RULED_OUT}
+    total = sum(kept.values())
+    return [(shares_at(place), float(weight / total)) for place, weight in kept.items()]
+
+
+def _beside(k: int | None, stride: int, middle: int | None) -> list[int | None]:
+    """Half decades up and down on the lattice through the best; below the least share there is none."""
+    least = LEAST_SHARE if middle is None else middle - stride * ((middle - LEAST_SHARE) // stride)
+    if k is None:
+        return [least]
+    return [k - stride if k - stride >= LEAST_SHARE else None, *([k + stride] if k + stride <= LARGEST_SHARE else [])]
 
 
 def place_of(shares: Shares) -> Place:

@@ -15,16 +15,19 @@ class LevelError(StationEffect):
     id: ClassVar[str] = "level_error"
     symbol: ClassVar[str] = "δ1, δ2"
     equation: ClassVar[str] = "f = R(α, β)ᵀ·(δ1, δ2, 1)"
-    source: ClassVar[str] = "geometry of a two-axis table"
+    source: ClassVar[str] = "geometry of a two-axis table, or of a plate and the heading of each placement"
     typical_ug: ClassVar[tuple[float, float]] = (5.0, 5000.0)
     hides_behind: ClassVar[tuple[str, ...]] = ("outer_encoder_offset", "magnetic")
     breaker: ClassVar[str] = (
-        "a level on the table; the tilt along the outer axis is identical with the offset of its encoder"
+        "a level on the table; the tilt along the outer axis is identical with the offset of its encoder; of units put down by "
+        "hand the same face at several headings"
     )
     simplicity: ClassVar[int] = 40
 
     def force_change(self, state: State, **nonlinear: float) -> Array:
         del nonlinear
+        if state.outer is None and state.heading is not None:
+            return np.stack(frames.horizontal(state.force, state.heading), axis=-1)
         outer, inner = state.need("outer", self.id), state.need("inner", self.id)
         return np.stack([frames.to_fixture(v, outer, inner) for v in ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0))], axis=-1)
 

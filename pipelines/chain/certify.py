@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
+from inertial.quantities import ANGLE_COLUMNS, FORCE_COLUMNS
 from pipelines.archive import Archive, Run, files
 from pipelines.archive.locks import alone
 from pipelines.archive.signatures import public_keys
@@ -28,6 +29,10 @@ if TYPE_CHECKING:
 
 NEVER_LEFT_OUT = ("gravity", "level", "orthogonality", "outer_offset", "harmonics", "pose", "thermometer")
 """Entries of [uncertainty] without which nothing is certified; without the seat the misalignment to the case is not."""
+NEEDED_OF_FACES = ("gravity", "level", "pose", "thermometer")
+"""The same for an import whose units were put down on known faces: there are no encoders."""
+NEEDED_OF_NORMS = ("gravity", "thermometer")
+"""The same for an import of unknown orientations: the norm of gravity does not depend on the poses."""
 EVIDENCE = ("dwells", "coefficients", "covariance", "grades")
 
 
@@ -155,6 +160,8 @@ def _grades(run: Run) -> Any:
 def _how_to_grade(run: Run) -> str:
     if run.about.get("capture"):
         return "it is not finished: give its 'tumbleline run' again and it goes on"
+    if axis := run.about.get("plane_across"):
+        return f"it was turned about {axis} alone, the scale of {axis} is not known: measure other orientations"
     again = f"'tumbleline fit {run.id} --limits FILE'"
     return f"it was imported: fit it against limits with {again} and certify the run that this makes"
 
@@ -238,9 +245,8 @@ def refuse_unstated(run: Run) -> None:
     terms, grades = archived_terms(run.about), run.table("grades")
     if terms is None and not run.about.get("capture"):
         raise WrongUse(
-            f"certify: run {run.id} was imported: no station states the uncertainty of its references (noise only), a "
-            "certificate needs the whole budget; measure the units on a station whose file "
-            "has [uncertainty]"
+            f"certify: run {run.id} was imported without a statement of its references (noise only), a certificate needs the "
+            "whole budget; import the recording again with --references FILE, a TOML with [uncertainty] as in a station's file"
         )
     if terms is None or terms.stated is None or "basis" not in grades or set(grades["basis"]) != {BUDGET}:
         raise WrongUse(
@@ -252,15 +258,28 @@ def refuse_unstated(run: Run) -> None:
             f'certify: run {run.id} rests on assumed uncertainties (grade_source = "assumed"), certificates or data sheets are '
             "needed; state where the figures of [uncertainty] come from and measure again"
         )
-    missing = {name: rules for name, rules in terms.stated.not_stated.items() if name in NEVER_LEFT_OUT}
+    needed, again = _needed(run)
+    missing = {name: rules for name, rules in terms.stated.not_stated.items() if name in needed}
     if missing:
         listed = ", ".join(f"{name} (dominates {rules})" for name, rules in missing.items())
-        raise WrongUse(f"certify: run {run.id}: not stated: {listed}; add it to [uncertainty] and measure again")
+        raise WrongUse(f"certify: run {run.id}: not stated: {listed}; add it to [uncertainty] and {again}")
     if not run.table("uncertainties")["quantity"].eq("bias_error_period").any():
+        kept = "verification poses" if run.about.get("capture") else "dwells held out by --verify N"
         raise WrongUse(
             f"certify: run {run.id} has no error over the period of validity ({terms.certificate.validity_months} months): state "
-            "[stability] of the device with a horizon_days that reaches so far, and verification poses, and measure again"
+            f"[stability] of the device with a horizon_days that reaches so far, and {kept}, and {again}"
         )
+
+
+def _needed(run: Run) -> tuple[tuple[str, ...], str]:
+    """Entries of [uncertainty] without which a run is not certified, and what is to be done where one is missing."""
+    if run.about.get("capture"):
+        return NEVER_LEFT_OUT, "measure again"
+    columns = set(run.table("dwells").columns)
+    again = "import the recording again"
+    if set(ANGLE_COLUMNS) <= columns:
+        return NEVER_LEFT_OUT, again
+    return NEEDED_OF_FACES if set(FORCE_COLUMNS) <= columns else NEEDED_OF_NORMS, again
 
 
 def refuse_two_at_once(ledger: Ledger, run: Run, serial: str) -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
@@ -67,6 +66,7 @@ def command(
     """
     from pipelines.archive import Archive
     from pipelines.cli.series_options import even_series
+    from pipelines.cli.series_pictures import write_pictures
 
     if spacing not in SPACINGS:
         raise WrongUse(f"--spacing: found '{spacing[:40]}', octave or decade is needed; correct it")
@@ -194,21 +194,6 @@ def allan_of_run(run: Run) -> dict[str, Any]:
         "terms": rows,
         "notes": notes,
     }
-
-
-def write_pictures(document: dict[str, Any], plot: Path | None, page: Path | None) -> None:
-    """Draw a document of ``allan`` or ``psd`` as a picture, and as a page with its tables."""
-    if plot is None and page is None:
-        return
-    from pipelines.archive import files
-    from pipelines.report.noise_page import draw, noise_page
-
-    if plot is not None:
-        files.publish(plot, draw(document, plot.suffix), "plot", files.ELSEWHERE)
-        error_console().print(f"plot: {plot}", markup=False, soft_wrap=True)
-    if page is not None:
-        files.publish(page, noise_page(document).encode(), "page", files.ELSEWHERE)
-        error_console().print(f"page: {page}", markup=False, soft_wrap=True)
 
 
 def _print(document: dict[str, Any]) -> None:

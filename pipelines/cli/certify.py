@@ -82,7 +82,12 @@ def command(
         keys=public_keys() | (public_keys(key) if key else {}),
     )  # fmt: skip
     try:
-        renew_report(source)
+        if source.about.get("capture"):
+            renew_report(source)
+        elif source.report.is_file():
+            from pipelines.cli.imported_report import make_imported_report
+
+            make_imported_report(source)
     except ArchiveUnusable as problem:  # the certificates are written; the old report may show other coefficients
         error_console().print(f"certify: the report was not made again: {problem}", markup=False, soft_wrap=True)
     if as_json:

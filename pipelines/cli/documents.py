@@ -189,6 +189,7 @@ class ImportedFitDocument(TypedDict):
     leave_out: LeaveOut | None
     missing: Annotated[list[list[str]], "classes of effects that are missing"]
     lines: Annotated[list[str], "the same in words"]
+    open: NotRequired[Annotated[list[str], "of a unit that was turned about one axis: what that does not show"]]
 
 
 class AllanChannel(TypedDict):

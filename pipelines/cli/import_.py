@@ -23,6 +23,7 @@ from schemas.foreign import shown
 if TYPE_CHECKING:
     from pipelines.importers.content import Content
     from pipelines.importers.mapping import Mapping
+    from schemas.import_references import ImportReferences
 
 PART = "Measure"
 ORDER = 160
@@ -32,7 +33,7 @@ EXAMPLES = (
     "tumbleline import acc.csv --mapping columns.toml --fit norm",
 )
 
-METHODS = ("norm", "faces", "temperature")
+METHODS = ("norm", "plane", "faces", "temperature")
 VERDICTS = {
     True: ("adequate", "bold green"),
     False: ("NOT ADEQUATE: this fit does not describe these data", "bold red"),
@@ -70,6 +71,12 @@ def command(
     signs: Annotated[str, typer.Option("--signs", metavar="+,+,+", help="Signs of the axes in that order.")] = "",
     poses: Annotated[
         str, typer.Option("--poses", metavar="LABEL=+x,…", help="Dwells to keep by label, with the face that is up.")
+    ] = "",
+    headings: Annotated[
+        str,
+        typer.Option(
+            "--headings", metavar="LABEL=deg,…", help="Direction of x in each pose, degrees (of y where x is vertical)."
+        ),
     ] = "",
     face: Annotated[str, typer.Option("--face", metavar="+x|…|-z", help="The face that is up all the time.")] = "",
     blocks: Annotated[
@@ -117,7 +124,20 @@ def command(
         float | None,
         typer.Option("--local-g", metavar="M/S2", help="Local gravity at the place of the measurement, m/s²."),
     ] = None,
-    fit: Annotated[str, typer.Option("--fit", metavar="norm|faces|temperature", help="Fit, and judge the fit.")] = "",
+    verify: Annotated[
+        str, typer.Option("--verify", metavar="N|N%", help="Dwells that the fit does not use; they verify it.")
+    ] = "",
+    references: Annotated[
+        Path | None,
+        typer.Option("--references", metavar="TOML", help="Uncertainty of the references; a certificate needs it."),
+    ] = None,
+    measured: Annotated[str, typer.Option("--measured", metavar="DATE", help="Day of the measurement.")] = "",
+    zero_output: Annotated[
+        float | None, typer.Option("--zero-output", metavar="VALUE", help="Nominal output at 0 g; 0.")
+    ] = None,
+    fit: Annotated[
+        str, typer.Option("--fit", metavar="norm|plane|faces|temperature", help="Fit, and judge the fit.")
+    ] = "",
     procedure: Annotated[
         str,
         typer.Option("--procedure", metavar="sweep", help="Dynamic measurement: the transfer function of a sweep."),
@@ -146,6 +166,7 @@ def command(
         "columns": mapped.pairs(columns, "--map"),
         "units": mapped.pairs(units, "--units"),
         "poses": mapped.pairs(poses, "--poses"),
+        "headings": mapped.pairs(headings, "--headings"),
         "unit": unit,
         "face": face,
         "block_s": blocks,
@@ -162,11 +183,19 @@ def command(
         "axes": [part.strip() for part in axes.split(",")] if axes else None,
         "signs": [part.strip() for part in signs.split(",")] if signs else None,
         "local_gravity_m_s2": local_g,
+        "verify": verify,
+        "measured": measured,
+        "zero_output": zero_output,
     }
     keys = given | {key: value for key, value in options.items() if value not in ("", None, {}, [])}  # 0 is a value
     _refuse_unknown_fit(fit)
+    stated = None
+    if references is not None:
+        from pipelines.importers.stated_references import stated_references
+
+        stated = stated_references(references, keys)
     sets = [files] if keys.get("join") else [[path] for path in files]
-    imports = [_import_one(paths, keys, str(mapping or "import"), fit, archive) for paths in sets]
+    imports = [_import_one(paths, keys, str(mapping or "import"), fit, archive, stated) for paths in sets]
     verdicts = [one["adequate"] for one in imports if one["fit"]]
     adequate = False if False in verdicts else None if None in verdicts else True
     if as_json:
@@ -231,7 +260,14 @@ def _refuse_unknown_fit(fit: str) -> None:
         )
 
 
-def _import_one(paths: list[Path], keys: dict[str, Any], where: str, fit: str, archive: str | None) -> dict[str, Any]:
+def _import_one(
+    paths: list[Path],
+    keys: dict[str, Any],
+    where: str,
+    fit: str,
+    archive: str | None,
+    stated: ImportReferences | None,
+) -> dict[str, Any]:
     """Read, judge and store one recording; the document for JSON."""
     from pipelines.importers import keep, record, sources
     from pipelines.importers import mapping as mapped
@@ -254,7 +290,7 @@ def _import_one(paths: list[Path], keys: dict[str, Any], where: str, fit: str, a
 
         with error_console().status("fitting and judging"):
             judged = judge(fit, data, how)
-    run = keep.keep(data, source, how, judged, archive)
+    run = keep.keep(data, source, how, judged, archive, stated)
     return {
         "run": run.id,
         "source": source.as_dict(),

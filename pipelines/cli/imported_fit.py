@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 from pipelines.cli.options import console, error_console, print_json
 from schemas.errors import DONE, PART_FAILED
+from schemas.units import AXES
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -57,6 +58,8 @@ def fit_document(done: Run, source: str) -> dict[str, Any]:
     from pipelines.tables.frames import rows_of
 
     dwells = done.table("dwells")
+    if done.about.get("plane_across"):
+        return _of_a_plane(done, source)
     past = done.table("history") if "history" in done.tables() else None
     effects = list(done.about["recipe"]["effects"])
     if has_poses(dwells):
@@ -76,6 +79,28 @@ def fit_document(done: Run, source: str) -> dict[str, Any]:
     }
 
 
+def _of_a_plane(done: Run, source: str) -> dict[str, Any]:
+    """The document of a fit of the two axes in a plane."""
+    from pipelines.importers.plane import plane_answer
+    from pipelines.rerun.steps import gravity_of_import
+
+    dwells = done.table("dwells")
+    across = AXES.index(done.about["plane_across"])
+    answer = plane_answer(dwells, across, gravity_of_import(done.about), str(dwells["out_unit"].iloc[0]))
+    return {
+        "run": done.id,
+        "fit_of": source,
+        "effects": [],
+        "left_out": list(done.about.get("left_out", [])),
+        "units": [],
+        **{key: answer.document[key] for key in ("adequate", "reason", "error", "open")},
+        "evidence": None,
+        "leave_out": None,
+        "missing": [],
+        "lines": list(answer.lines),
+    }
+
+
 def _known_poses(dwells: Any, past: Any, effects: list[str]) -> dict[str, Any]:
     """The verdict on a fit with commanded poses, and its basis as lines."""
     from pipelines.cli.diagnosis_text import verdict
@@ -91,7 +116,8 @@ def _known_poses(dwells: Any, past: Any, effects: list[str]) -> dict[str, Any]:
 def _print(document: dict[str, Any]) -> None:
     out = console()
     left = f", without {', '.join(document['left_out'])}" if document["left_out"] else ""
-    out.print(f"{', '.join(document['effects'])}{left}: kept as run {document['run']}", markup=False, soft_wrap=True)
+    model = ", ".join(document["effects"]) or "axes in the plane"
+    out.print(f"{model}{left}: kept as run {document['run']}", markup=False, soft_wrap=True)
     for line in document["lines"]:
         out.print(f"  {line}", markup=False, soft_wrap=True)
     for unit in document["units"]:

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from schemas.errors import WrongUse
 
 if TYPE_CHECKING:
     from pipelines.archive import Run
 
-MODULES = ("pipelines.report.diagnosis", "pipelines.diagnosis.diagnose", "schemas.tables")
+MODULES = ("pipelines.report.diagnosis", "pipelines.report.imported", "pipelines.diagnosis.diagnose", "schemas.tables")
+GRADED = ("grades", "figures", "budget", "uncertainties", "verification", "lot_risks")
 
 
 def make_imported_report(run: Run) -> bool:
@@ -23,10 +24,17 @@ def make_imported_report(run: Run) -> bool:
     from pipelines.archive import code_hash, stage_key
     from pipelines.cli.diagnose import diagnosed
     from pipelines.jobs.model_files import use_formulas_of
+    from pipelines.report.imported import certificates_of, decisions
+    from pipelines.stages.norm_fit import fitted_dwells
     from pipelines.tables.frames import rows_of
 
     effects = list((run.about.get("recipe") or {}).get("effects", ()))
     names = ("dwells", "coefficients")
+    if axis := run.about.get("plane_across"):
+        raise WrongUse(
+            f"report: run {run.id} was turned about {axis} alone and has coefficients of the axes in the plane only; "
+            f"'tumbleline fit {run.id}' prints them"
+        )
     if not effects or not set(names) <= set(run.tables()):
         raise WrongUse(
             f"report: run {run.id} was imported and not fitted, coefficients are needed; fit it with 'tumbleline fit {run.id} "
@@ -34,13 +42,19 @@ def make_imported_report(run: Run) -> bool:
         )
     use_formulas_of(run)
     past = run.table("history") if "history" in run.tables() else None
-    inputs, code = {name: run.manifest(name)["sha256"] for name in names}, code_hash(MODULES)
-    parameters = {"effects": effects}
+    judged = [name for name in GRADED if name in run.tables()]
+    inputs, code = {name: run.manifest(name)["sha256"] for name in (*names, *judged)}, code_hash(MODULES)
+    parameters: dict[str, Any] = {"effects": effects}
+    if given := certificates_of(run):
+        parameters["certificates"] = {unit: list(one) for unit, one in sorted(given.items())}
     key = stage_key("report", inputs, parameters, code)
     if run.has_report(key):
         run.seal()
         return True
     rows = rows_of(run.table("coefficients"))
-    _, page = diagnosed(run.table("dwells"), past, effects, f"run {run.id}", with_report=True, coefficients=rows)
+    _, page = diagnosed(
+        fitted_dwells(run.table("dwells")), past, effects, f"run {run.id}", with_report=True, coefficients=rows
+    )
+    page = page.replace("</body>", f"{decisions(run)}</body>")
     run.save_report(key, page, {"inputs": inputs, "parameters": parameters, "code": code})
     return False

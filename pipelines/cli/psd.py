@@ -6,7 +6,6 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from pipelines.cli.allan import write_pictures
 from pipelines.cli.options import (
     ArchiveOption,
     JsonOption,
@@ -69,6 +68,7 @@ def command(
     σ²(τ) = 2·∫ S(f)·sin⁴(πfτ)/(πfτ)² df (IEEE Std 952). Where the two differ, the record holds lines, jumps or a drift.
     """
     from pipelines.cli.series_options import even_series
+    from pipelines.cli.series_pictures import write_pictures
 
     found = even_series(source, columns, (time, time_unit, rate), unit, archive, stretch)
     if found is None:

@@ -12,7 +12,7 @@ from inertial.state import T_REFERENCE
 from pipelines.diagnosis.condense import MOST
 from pipelines.diagnosis.diagnose import default_model, diagnose
 from pipelines.importers.judged import FitAnswer, dwells_of, gravity_of
-from pipelines.stages.norm_fit import FittedNorms, bias_uncertainty, norm_tables, norms_fitted
+from pipelines.stages.norm_fit import FittedNorms, bias_uncertainty, fitted_dwells, norm_tables, norms_fitted
 from schemas.errors import DataRejected
 from schemas.units import AXES, MICRO, STANDARD_GRAVITY_M_S2
 
@@ -69,7 +69,7 @@ def fitted(
     with threadpool_limits(1):
         done = norms_fitted(dwells, history, effects, gravity)
         smaller = _smaller(dwells, history, effects, gravity)
-    verdict = diagnose(dwells, history, list(effects))
+    verdict = diagnose(fitted_dwells(dwells), history, list(effects))
     document = _document(done, smaller, verdict)
     return NormAnswer(done, verdict["adequate"], document, tuple(_lines(done, smaller, verdict, out_unit)))
 

@@ -116,6 +116,11 @@ def _ungraded(run: Run, serials: tuple[str, ...]) -> list[UnitCalibration]:
         raise WrongUse(
             f"export: run {run.id} has no grades, they are needed; it is not finished: give its 'tumbleline run' again"
         )
+    if axis := run.about.get("plane_across"):
+        raise WrongUse(
+            f"export: run {run.id} was turned about {axis} alone: the scale of {axis} is not known, and a correction needs three "
+            f"axes; measure other orientations ('tumbleline fit {run.id}' prints what is known of the others)"
+        )
     missing = [name for name in ("dwells", "coefficients", "covariance") if name not in run.tables()]
     if missing:
         raise WrongUse(

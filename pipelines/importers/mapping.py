@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+from datetime import date
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator, model_validator
 
 from inertial.quantities import FORCE_COLUMNS, LARGEST, OUTPUT_COLUMNS, RECORDED, SPREAD_COLUMNS
 from schemas.bounds import FASTEST_HZ, LONGEST_WAIT_S
@@ -93,6 +94,14 @@ class Mapping(BaseModel):
     local_gravity_m_s2: Annotated[float, Field(gt=9.7, lt=9.9)] | None = None
     poses: dict[str, str] = Field(default_factory=dict)
     """Label of a dwell → face up, as +x … -z; with any given, dwells with other labels are left out."""
+    headings: dict[str, Annotated[float, Field(ge=-360.0, le=360.0)]] = Field(default_factory=dict)
+    """Label of a dwell → heading of its placement, degrees: direction of x about the vertical, of y where x is up or down."""
+    verify: str = ""
+    """Dwells of a unit that are held out to verify the fit: a number, or a share such as 20%."""
+    measured: date | None = None
+    """Day of the measurement."""
+    zero_output: Annotated[float, Field(ge=-LARGEST, le=LARGEST)] = 0.0
+    """Nominal output at 0 g, in the output's unit."""
     face: Literal["", "+x", "+y", "+z", "-x", "-y", "-z"] = ""
     """The face that is up all the time, for a record in one pose."""
     block_s: Annotated[float, Field(ge=SHORTEST_BLOCK_S, le=LONGEST_WAIT_S)] | None = None
@@ -145,6 +154,21 @@ class Mapping(BaseModel):
             if face not in FACES:
                 raise ValueError(f"'{label}': found '{shown(face)}', one of {', '.join(FACES)} is needed")
         return value
+
+    @model_validator(mode="after")
+    def _headings_of_poses(self) -> Mapping:
+        if not self.headings:
+            return self
+        if "heading" in self.columns:
+            raise ValueError("headings: there is a column of headings as well, one of the two is needed; remove one")
+        missing = [label for label in self.poses if label not in self.headings]
+        more = [label for label in self.headings if label not in self.poses]
+        if missing or more:
+            words = f"'{shown(missing[0])}' has none" if missing else f"'{shown(more[0])}' is no pose"
+            raise ValueError(
+                f"headings: {words}, a heading for every pose is needed; give --headings for the labels of --poses"
+            )
+        return self
 
     @property
     def likely_slips(self) -> dict[str, tuple[str, ...]]:

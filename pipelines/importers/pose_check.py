@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.optimize import linear_sum_assignment
 
+from inertial.fits.plane import quiet_axis
 from schemas.errors import DataRejected
 from schemas.units import AXES
 
@@ -16,9 +17,6 @@ if TYPE_CHECKING:
     from pipelines.importers.mapping import Mapping
 
 _DEAD = 0.2
-_LEAST = 4
-_SILENT = 0.05
-_TURNED = 0.8
 _CLEAR = 0.6
 _MISFIT = 0.1
 """Largest unexplained part of gravity for a response of exchanged axes."""
@@ -29,17 +27,14 @@ FORCE = ["force_x", "force_y", "force_z"]
 def silent_axis(dwells: pd.DataFrame) -> str:
     """A sentence on an axis, with its letter first, that stays constant while another turns through gravity; else empty."""
     means = dwells[OUT].to_numpy(dtype=np.float64)
-    if len(means) < _LEAST:
+    weak = quiet_axis(means)
+    if weak is None:
         return ""
     spans = np.ptp(means, axis=0)
-    weak, strong = int(np.argmin(spans)), int(np.argmax(spans))
-    if not spans[strong] > 0.0 or spans[weak] > _SILENT * spans[strong]:
-        return ""
-    if spans[strong] < _TURNED * float(np.median(np.linalg.norm(means - means.mean(axis=0), axis=1))):
-        return ""
+    strong = int(np.argmax(spans))
     return (
         f"{AXES[weak]} changes by {spans[weak]:.3g} over {len(means)} dwells, {AXES[strong]} by {spans[strong]:.3g}; "
-        f"a dead axis, another quantity mapped as {AXES[weak]}, or a sensor turned about {AXES[weak]} alone"
+        f"a dead axis, another quantity mapped as {AXES[weak]}, or a sensor turned about {AXES[weak]} alone (then --fit plane)"
     )
 
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pandas as pd
 
-from pipelines.importers import exchange, pose_check, sample_faults, unit_check, values
+from pipelines.importers import exchange, held_out, pose_check, sample_faults, unit_check, values
 from pipelines.importers.mapping import FACES, MEANINGS, OUTPUT_UNITS, Mapping
 from pipelines.importers.record_time import backwards, gaps_of, seconds, time_doubts
 from pipelines.importers.stated_units import column_name
@@ -100,6 +100,8 @@ def imported(
     dwells = _means(samples, found, tuple(extras), mapping) if len(found) else None
     if dwells is not None:
         remarks = (*remarks, *pose_check.refuse_or_remark(dwells, mapping, where))
+        dwells, held = _held_out(dwells, mapping, where)
+        remarks = (*remarks, *held)
     remarks = (
         *remarks,
         *found.remarks,
@@ -261,7 +263,17 @@ def _as_dwells(
     frame = _finished(frame.assign(record=count, pose=labels, **extras), mapping)
     dwells = exchange.checked(frame[sound].reset_index(drop=True), where=where, foreign=True)
     remarks = (*remarks, *pose_check.refuse_or_remark(dwells, mapping, where))
+    dwells, held = _held_out(dwells, mapping, where)
+    remarks = (*remarks, *held)
     return Imported(None, dwells, OUTPUT_UNITS[mapping.units.output][0], remarks)
+
+
+def _held_out(dwells: pd.DataFrame, mapping: Mapping, where: str) -> tuple[pd.DataFrame, tuple[str, ...]]:
+    """The dwells with those for verification marked, and a remark that names these."""
+    if not mapping.verify:
+        return dwells, ()
+    marked, remark = held_out.with_held_out(dwells, mapping.verify, where)
+    return marked, (remark,)
 
 
 def _finished(frame: pd.DataFrame, mapping: Mapping) -> pd.DataFrame:
@@ -273,4 +285,6 @@ def _finished(frame: pd.DataFrame, mapping: Mapping) -> pd.DataFrame:
         raise WrongUse("import: poses are stated, local gravity is needed with them; give --local-g M/S2")
     up = [mapping.poses.get(label, mapping.face) for label in frame["pose"]]
     frame[["force_x", "force_y", "force_z"]] = np.array([FACES[face] for face in up]) * mapping.norm_g
+    if mapping.headings:
+        frame["heading_deg"] = [mapping.headings[label] for label in frame["pose"]]
     return frame

@@ -7,6 +7,7 @@ down, which are uniform, and the table begins with the first line of the same fo
 
 from __future__ import annotations
 
+import contextlib
 import csv
 import re
 from collections import Counter
@@ -69,7 +70,10 @@ def fields_of(line: str, divider: str) -> list[str]:
     if divider == BLANKS:
         return [word.strip('"') for word in line.split()]
     if '"' in line and line.count('"') % 2 == 0 and len(line) < 100_000:
-        return [word.strip() for word in next(csv.reader([line], delimiter=divider, skipinitialspace=True))]
+        with contextlib.suppress(
+            csv.Error
+        ):  # a quote in the middle of a field opens none, and a line break ends the field
+            return [word.strip() for word in next(csv.reader([line], delimiter=divider, skipinitialspace=True))]
     return [word.strip().strip('"') for word in line.split(divider)]
 
 

@@ -35,6 +35,9 @@ class ReportContext:
     certificates : of the run's units, in their present state in the ledger.
     """
 
+    not_needed: tuple[str, ...] = ()
+    """Entries of [uncertainty] that nothing of the run depends on."""
+
     def __init__(self, run: Run, certificates: Mapping[str, Stated]) -> None:
         self.run = run
         self.certificates = certificates

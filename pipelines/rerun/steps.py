@@ -14,21 +14,23 @@ from pipelines.archive.signatures import ENTRY
 from pipelines.chain.chain import BY_NAME, RECORDS, STAGES, Tables
 from pipelines.chain.runner import captured_tables
 from pipelines.diagnosis.diagnose import default_model
+from pipelines.importers.plane import axis_of_plane
 from pipelines.jobs.job import Job
 from pipelines.jobs.model_files import refuse_unknown_effects, use_formulas
+from pipelines.jobs.terms import archived_terms
+from pipelines.rerun.import_steps import StageCall, budget_step, history_of, no_noise, plane_step, verify_norms_step
 from pipelines.stages.figures import UNITS
 from pipelines.stages.fit import fit
 from pipelines.stages.grade import Evidence, grade, refuse_limits_without_figures
 from pipelines.stages.norm_fit import fit_of_norms
-from pipelines.stages.verify import nothing_verified, verify
-from pipelines.tables.frames import empty_table
+from pipelines.stages.verify import verify
 from pipelines.tables.leave_out import Dwells, leave_out
 from schemas.errors import DataRejected, WrongUse
 from schemas.limits import Limits, limits_of
 from schemas.recipe import FormulaSpec, Lot, Recipe
 from schemas.station import StationConfig
 from schemas.toml_files import explain
-from schemas.units import STANDARD_GRAVITY_M_S2
+from schemas.units import AXES, STANDARD_GRAVITY_M_S2
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -40,18 +42,6 @@ CAPTURED = ("readings", "history")
 RAW = ("validate", "reduce", "noise")
 """Stages that read the raw samples."""
 PROVENANCE = ("who", "where", "when", "software", "libraries", ENTRY, "rerun_of", "because", "measured")
-
-
-@dataclass(frozen=True)
-class StageCall:
-    """One stage for one run: as :class:`pipelines.chain.chain.Stage`, with everything that the job decides filled in."""
-
-    name: str
-    inputs: tuple[str, ...]
-    outputs: tuple[str, ...]
-    parameters: dict[str, Any]
-    code: str
-    call: Callable[[Run], Tables]
 
 
 @dataclass(frozen=True)
@@ -158,6 +148,9 @@ def _imported(run: Run, change: ModelChange, left_out: Dwells) -> Plan:
     about = run.about
     dwells = leave_out(_fit_for_a_fit(run), left_out)
     known = has_poses(dwells)
+    across = None if change.effects or about.get("recipe", {}).get("effects") else axis_of_plane(dwells)
+    if across is not None:
+        return _in_a_plane(run, change, left_out, across)
     model = _model_of(run, dwells, change)
     use_formulas([FormulaSpec.model_validate(f) for f in model["formulas"]], f"run {run.id}")
     refuse_unknown_effects(model["effects"], f"run {run.id}")
@@ -165,8 +158,11 @@ def _imported(run: Run, change: ModelChange, left_out: Dwells) -> Plan:
     history = "history" in run.tables()
     gravity = gravity_of_import(about)
     steps = [_import_step(history, left_out, run), _fit_step(model, history, None if known else gravity)]
-    steps += [_verify_step(history)] if known else [_no_verification()]
-    steps += [_grade_step(limits)] if limits else []
+    steps += [_verify_step(history)] if known else [verify_norms_step(gravity, history=history)]
+    terms = archived_terms({**about, "limits": limits.model_dump(mode="json") if limits else about.get("limits")})
+    steps += [budget_step(terms, history=history, known=known)] if terms else []
+    zero = float((about.get("mapping") or {}).get("zero_output", 0.0))
+    steps += [_grade_step(limits, zero, budgeted=terms is not None)] if limits else []
     recipe = {**about.get("recipe", {}), "name": "import", **model}
     recipe |= {"limits": change.limits_name} if change.limits else {}
     kept = {key: value for key, value in about.items() if key not in PROVENANCE}
@@ -178,6 +174,30 @@ def _imported(run: Run, change: ModelChange, left_out: Dwells) -> Plan:
         named = [f"{unit}:{dwell}" for unit, dwell in left_out]
         decisive["left_out"] = new["left_out"] = [*about.get("left_out", []), *named]
     return Plan("import", tuple(steps), new, decisive)
+
+
+def _in_a_plane(run: Run, wanted: ModelChange, left_out: Dwells, across: int) -> Plan:
+    """The fit of a unit that was turned about one of its axes: its default model is of the two axes in the plane."""
+    about, axis = run.about, AXES[across]
+    if wanted.limits is not None:
+        raise WrongUse(
+            f"run {run.id}: turned about {axis} alone, limits need the scale of {axis} too; measure other orientations, or fit "
+            "without limits"
+        )
+    history = "history" in run.tables()
+    gravity = gravity_of_import(about)
+    steps = (_import_step(history, left_out, run), plane_step(across, gravity))
+    kept = {key: value for key, value in about.items() if key not in PROVENANCE}
+    new: dict[str, Any] = {**kept, "recipe": {**about.get("recipe", {}), "name": "import"}, "plane_across": axis}
+    decisive: dict[str, Any] = {
+        "data": {"dwells": run.manifest("dwells")["sha256"]},
+        "plane": axis,
+        "code": steps[1].code,
+    }
+    if left_out:
+        named = [f"{unit}:{dwell}" for unit, dwell in left_out]
+        decisive["left_out"] = new["left_out"] = [*about.get("left_out", []), *named]
+    return Plan("import", steps, new, decisive)
 
 
 def has_poses(dwells: pd.DataFrame) -> bool:
@@ -238,10 +258,6 @@ def _import_step(history: bool, left_out: Dwells, old: Run) -> StageCall:  # noq
     return StageCall("import", (), names, {}, "", lambda run: {name: run.table(name) for name in names})
 
 
-def _history(run: Run) -> pd.DataFrame:
-    return run.table("history") if "history" in run.tables() else empty_table(texts="unit", numbers="time_s unit_C")
-
-
 def _fit_step(model: dict[str, Any], history: bool, gravity: float | None) -> StageCall:  # noqa: FBT001
     """The fit of the chain; by the norm of gravity alone where its size is given."""
     stage = BY_NAME["fit"]
@@ -258,15 +274,9 @@ def _fit_step(model: dict[str, Any], history: bool, gravity: float | None) -> St
         return StageCall("fit", inputs, stage.outputs, {**parameters, "gravity_g": gravity}, code, of_norms)
 
     def call(run: Run) -> Tables:
-        return fit(run.table("dwells"), _history(run), model["effects"])
+        return fit(run.table("dwells"), history_of(run), model["effects"])
 
     return StageCall("fit", inputs, stage.outputs, parameters, code_hash(stage.modules), call)
-
-
-def _no_verification() -> StageCall:
-    """The tables of a verification without a row: dwells of unknown orientation have no pose that was kept for it."""
-    stage = BY_NAME["verify"]
-    return StageCall("verify", (), stage.outputs, {}, code_hash(stage.modules), lambda _: nothing_verified())
 
 
 def _verify_step(history: bool) -> StageCall:  # noqa: FBT001
@@ -275,22 +285,21 @@ def _verify_step(history: bool) -> StageCall:  # noqa: FBT001
 
     def call(run: Run) -> Tables:
         names = ("coefficients", "covariance", "predictions")
-        return verify(run.table("dwells"), _history(run), *(run.table(name) for name in names))
+        return verify(run.table("dwells"), history_of(run), *(run.table(name) for name in names))
 
     return StageCall("verify", inputs, stage.outputs, {}, code_hash(stage.modules), call)
 
 
-def _grade_step(limits: Limits) -> StageCall:
+def _grade_step(limits: Limits, zero: float, *, budgeted: bool) -> StageCall:
     stage = BY_NAME["grade"]
     names = ("coefficients", "covariance", "residuals", "verification", "verification_poses")
+    names = (*names, "uncertainties", "budget_covariance") if budgeted else names
 
     def call(run: Run) -> Tables:
         tables: dict[str, Any] = {name: run.table(name) for name in names}
         units = list(dict.fromkeys(tables["coefficients"]["unit"].astype(str)))
         sound = {"unit": units, "slot": range(len(units)), "refused": False, "fault": "", "reason": ""}
-        noise = empty_table(texts="unit axis term unit_text", numbers="value low high", flags="identified")
-        return grade(Evidence(verdicts=pd.DataFrame(sound), **tables, noise=noise), limits)
+        return grade(Evidence(verdicts=pd.DataFrame(sound), **tables, noise=no_noise()), limits, zero)
 
-    return StageCall(
-        "grade", names, stage.outputs, {"limits": limits.model_dump(mode="json")}, code_hash(stage.modules), call
-    )
+    parameters = {"limits": limits.model_dump(mode="json"), **({"zero_output": zero} if zero else {})}
+    return StageCall("grade", names, stage.outputs, parameters, code_hash(stage.modules), call)

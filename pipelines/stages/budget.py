@@ -9,6 +9,7 @@ import numpy as np
 import pandas as pd
 
 from inertial.fits.wander import wander_kernels
+from inertial.frames import angles_from_force
 from inertial.uncertainty.influences import Model, sensitivity
 from inertial.uncertainty.propagation import fit_design, propagated
 from pipelines.stages.budget_rows import covariance_rows, empty, rows_of_quantities
@@ -32,10 +33,12 @@ def budget(tables: BudgetTables, terms: BudgetTerms) -> dict[str, pd.DataFrame]:
     ``budget`` has one row per unit, quantity and contribution, ``uncertainties`` one per unit and quantity: value, u of type A
     and B, effective degrees of freedom, k and U, and for verification the part that the station's own verification shows.
     """
-    angles = {"outer_deg", "inner_deg"} <= set(tables.dwells.columns)
-    if terms.stated is None or tables.coefficients.empty or not angles:
+    if terms.stated is None or tables.coefficients.empty:
         return empty()
     lot = lot_arrays(tables.dwells, tables.history, KINDS)
+    if lot.state.outer is None:  # faces or forces that are known otherwise: as a table would have turned to them
+        outer, inner = angles_from_force(lot.state.force)
+        lot = replace(lot, state=replace(lot.state, outer=outer, inner=inner, memory={}))
     calibration = read_calibration(tables.coefficients, tables.covariance)
     at = conditions(lot, tables.dwells, calibration.response, terms)
     found = propagate(lot, calibration, tables.wander, terms, at)

@@ -10,14 +10,14 @@ import pandas as pd
 
 from inertial import effects as catalogue
 from inertial.criticism.model import Model
-from inertial.criticism.noise import LONGEST
+from inertial.criticism.noise import LONGEST, walk_kernel
 from inertial.criticism.problem import Problem
 from inertial.criticism.refinement import terms_of
 from inertial.errors import InertialError
 from inertial.fits.wander import student
-from inertial.noise.flicker import SLOWEST_DIAGNOSED
+from inertial.noise.flicker import SLOWEST_DIAGNOSED, flicker_kernel
 from inertial.noise.measurands import DAY_S, instability, of_a_day
-from inertial.norm_fit import NormFit, fit_norms
+from inertial.norm_fit import NormFit, PlausibleNoise, fit_norms
 from pipelines.stages.bias_measurands import COLUMNS
 from pipelines.tables.calibration import coefficient_rows, covariance_rows
 from pipelines.tables.dwells import Measured, lot_of, measured
@@ -27,11 +27,14 @@ from schemas.errors import DataRejected
 from schemas.units import AXES, MICRO
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Iterator, Sequence
 
     from numpy.typing import NDArray
 
     Array = NDArray[np.float64]
+
+FEW_DWELLS = 300
+"""Dwells up to which standard errors are averaged over the plausible shares of wander."""
 
 NORM = "norm"
 """The axis of a residual of the norm."""
@@ -76,7 +79,7 @@ def norms_fitted(
         The dwells do not determine the model, or lack a quantity that it needs.
     """
     try:
-        found = measured(dwells, history)
+        found = measured(fitted_dwells(dwells), history)
         lot = lot_of(found, square="misalignment" not in effects)
         problem = Problem(lot)
         model = Model(problem, terms_of(catalogue.get_all(effects), problem))
@@ -85,7 +88,17 @@ def norms_fitted(
         shape = "six" if "misalignment" not in effects else "nine"
         origin = [expansion(found.readings, unit, shape=shape) for unit in range(len(found.units))]
         start = np.stack([o.bias for o in origin]), np.stack([o.response for o in origin]) / gravity
-        fit = fit_norms(effects, lot.state, filled, whitener(model), start, norm=gravity, nonlinear=values)
+        fit = fit_norms(
+            effects,
+            lot.state,
+            filled,
+            whitener(model),
+            start,
+            norm=gravity,
+            nonlinear=values,
+            plausible=plausible_noises(model),
+            weights=found.readings.duration,
+        )
     except InertialError as problem_found:
         raise DataRejected(str(problem_found)) from None
     noise, covariance = model.noise, problem.covariance
@@ -109,6 +122,28 @@ def whitener(model: Model) -> Array:
         return np.where(np.isfinite(error), 1.0 / np.where(np.isfinite(error), error, 1.0), 0.0)
     eye = np.broadcast_to(np.eye(n), (model.problem.blocks, n, n))
     return covariance.whiten(eye, noise.shares) / noise.scale[:, None, None]
+
+
+def fitted_dwells(dwells: pd.DataFrame) -> pd.DataFrame:
+    """The dwells without those that are held out for verification."""
+    return dwells[dwells["kind"] == "dwell"] if "kind" in dwells.columns else dwells
+
+
+def plausible_noises(model: Model) -> Iterator[PlausibleNoise]:
+    """The noises that the residuals do not rule out.
+
+    None for long records: their shares of wander are known well.
+    """
+    problem = model.problem
+    if problem.n > FEW_DWELLS:
+        return
+    eye = np.broadcast_to(np.eye(problem.n), (problem.blocks, problem.n, problem.n))
+    time, white = problem.lot.state.time, problem.covariance.white
+    kernels = np.stack([flicker_kernel(own) for own in time]), np.stack([walk_kernel(own) for own in time])
+    for shares, weight in model.plausible_shares():
+        square = model.noise_at(shares).scale[:, None, None] ** 2
+        slow = white * (shares.flicker * kernels[0] + shares.walk * kernels[1])
+        yield PlausibleNoise(weight, problem.covariance.whiten(eye, shares) / np.sqrt(square), square * slow)
 
 
 def fit_of_norms(
@@ -181,7 +216,8 @@ def bias_uncertainty(done: FittedNorms) -> dict[str, Array]:
     """
     place = [[name for name, _ in names].index("bias") for names in done.fit.fit.names]
     errors = np.sqrt(np.diagonal(done.fit.fit.covariance, axis1=-2, axis2=-1))
-    record = MICRO * np.stack([errors[:, axis, k] for axis, k in enumerate(place)], axis=1) / done.scale
+    record = np.stack([errors[:, axis, k] for axis, k in enumerate(place)], axis=1)
+    record = MICRO * (record if done.fit.record is None else done.fit.record) / done.scale
     lot = done.model.problem.lot
     known = done.model.problem.covariance.level if lot.recorded else done.white
     wander = MICRO * np.sqrt(done.flicker**2 + np.maximum(done.white**2 - known**2, 0.0))

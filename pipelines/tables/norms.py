@@ -14,6 +14,7 @@ import numpy as np
 from inertial.criticism.problem import Lot
 from inertial.errors import NotIdentified
 from inertial.fits.ellipsoid import EllipsoidFit, fit_ellipsoid
+from inertial.fits.plane import quiet_axis
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -82,6 +83,7 @@ def expansion(readings: Readings, unit: int, *, shape: Shape = "nine") -> Ellips
         As :func:`inertial.fits.ellipsoid.fit_ellipsoid`.
     """
     kept = readings.there[unit].copy()
+    _refuse_quiet(readings.output[unit, kept])
     heat = _heat(readings, unit, kept)
     warm = heat is not None and float(np.ptp(heat)) > WARM and shape == "nine"
     unknowns = {"six": 6, "nine": 9}[shape] + (3 if warm else 0)
@@ -100,6 +102,18 @@ def expansion(readings: Readings, unit: int, *, shape: Shape = "nine") -> Ellips
             break
         kept &= ~far
     return fit
+
+
+def _refuse_quiet(output: Array) -> None:
+    """Refuse dwells in which an axis does not answer to gravity: a fit of the norm would still give it a scale."""
+    quiet = quiet_axis(output)
+    if quiet is not None:
+        name = "xyz"[quiet]
+        raise NotIdentified(
+            f"fit: output {name} stays the same while the others turn through gravity: {name} is dead, or the sensor was turned "
+            f"about {name} alone, and the norm of gravity does not show its scale; turn all axes, or fit the two others with "
+            "'tumbleline import FILE --fit plane'"
+        )
 
 
 def _far(readings: Readings, unit: int, fit: EllipsoidFit, kept: NDArray[np.bool_], *, warm: bool) -> NDArray[np.bool_]:

@@ -69,7 +69,10 @@ def test_a_plan_has_every_quantity_and_every_driver(tmp_path):
     columns = [row.column for row in RECORDED if not row.attribute]
     state = planned_state(recipe, recorded=columns)
     for row in RECORDED:
-        if row.attribute and row.column != "power_off_s":
+        if row.attribute and row.column not in {
+            "power_off_s",
+            "heading_deg",
+        }:  # no table has a heading: units put by hand do
             assert getattr(state, row.attribute) is not None
     assert list(state.covariates) == columns
     drivers = {row.column for row in RECORDED if row.driver} | {row.name for row in DERIVED if row.driver}

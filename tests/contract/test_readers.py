@@ -179,3 +179,43 @@ def test_several_groups_of_channels_are_asked_about(tmp_path: Path) -> None:
     with pytest.raises(WrongUse, match=r"no group is called 'fas'.*fast"):
         files.read_content(tmp_path / "a.tdms", "fas")
     assert len(files.read_content(tmp_path / "a.tdms", "slow")[0].table) == 4
+
+
+def test_a_matlab_file_with_a_bad_checksum_is_refused_with_a_remedy(tmp_path: Path) -> None:
+    path = tmp_path / "torn.mat"
+    savemat(path, {name: frame()[name].to_numpy() for name in frame()}, do_compression=True)
+    data = bytearray(path.read_bytes())
+    count = int.from_bytes(data[132:136], "little")
+    data[136 + count - 4 : 136 + count] = bytes(4)  # the Adler-32 sum behind the first variable
+    path.write_bytes(data)
+    with pytest.raises(DataRejected) as caught:
+        files.read(path)
+    assert "torn.mat" in str(caught.value)
+    assert "incorrect data check" in str(caught.value)
+    assert "copy it again" in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize("name", [*SAMPLES, *FROM_ELSEWHERE])
+def test_a_file_that_ends_too_early_is_refused_in_one_line_or_read_as_far_as_it_goes(
+    name: str, tmp_path: Path, request
+) -> None:
+    path = tmp_path / "short"
+    group = ""
+    if name in FROM_ELSEWHERE:
+        pytest.importorskip("idelib")
+        file, group = FROM_ELSEWHERE[name]
+        path.write_bytes((request.getfixturevalue("shared_data") / file).read_bytes())
+    else:
+        SAMPLES[name](path)
+    data = path.read_bytes()
+    for share in (0.3, 0.6, 0.97):
+        path.write_bytes(data[: int(share * len(data))])
+        message, rows = "short", 1
+        try:
+            rows = len(files.read_content(path, group)[0].table)
+        except (DataRejected, WrongUse) as problem:
+            message = str(problem)
+        assert message.startswith("short")
+        assert "\n" not in message
+        assert 0 < rows <= 60_000

@@ -85,7 +85,7 @@ def test_from_a_recording_of_unknown_poses_to_a_report_and_no_certificate(
     assert "degrees of freedom" in text
     problem = run("certify", fitted["run"], archive=archive).exception
     assert isinstance(problem, WrongUse)
-    assert "was imported: no station states the uncertainty of its references (noise only)" in str(problem)
+    assert "was imported without a statement of its references (noise only)" in str(problem)
     problem = run("certificate", "H1", "--laboratory", laboratory(tmp_path), archive=archive).exception
     assert isinstance(problem, WrongUse)
     assert "unit H1 has no certificate, one is needed" in str(problem)

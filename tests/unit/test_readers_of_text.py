@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from pipelines.importers import files
+from pipelines.importers.text_table import content
 from schemas.errors import DataRejected
 
 SPLIT = "t;ax;ay;az\n0,01;0,1;0,2;9,8\n0,02;0,1;0,2;9,7\n0,03;0,1;0,2;9,8\n"
@@ -65,3 +66,13 @@ def test_rows_of_another_width_are_refused_below_a_preamble_too(tmp_path) -> Non
     (tmp_path / "a.csv").write_text("logger\nt,x,y\n1,2,3\n2,3,4\n3,4,5,6\n4,5,6\n", encoding="utf-8")
     with pytest.raises(DataRejected, match="rows from line 3 on do not have the 3 columns"):
         files.read(tmp_path / "a.csv")
+
+
+
+def test_a_line_break_in_a_quoted_field_of_every_row_is_part_of_the_field() -> None:
+    """It ended in a traceback of the csv library while the other dividers were tried."""
+    rows = "".join(f'0.{k},1.{k},"moved\nagain"\n' for k in range(1, 7))
+    table = content(f"t,x,note\n{rows}", "x.csv").table
+    assert list(table.columns) == ["t", "x", "note"]
+    assert table["x"].tolist() == [1.1, 1.2, 1.3, 1.4, 1.5, 1.6]
+    assert set(table["note"]) == {"moved\nagain"}

@@ -27,26 +27,22 @@ def read(name: str, data: bytes, group: str) -> Content:
     """The subchannels of one channel beside `time` in s, calibrated by the file's own coefficients."""
     idelib = library("idelib", EXTRA, f"{name}: an IDE recording")
     broken = f"{name}: an IDE recording that cannot be read"
-    with as_file(data, ".ide") as path:
+    # the library's importFile opens the file itself, and leaves it open where the file is broken
+    with as_file(data, ".ide") as path, path.open("rb") as stream:
         with foreign(broken, REMEDY):
-            dataset = idelib.importFile(str(path), quiet=True)
-        try:
-            with foreign(broken, REMEDY):
-                channels = {f"{key}": channel for key, channel in dataset.channels.items()}
-                lengths = {key: len(channel.getSession()) for key, channel in channels.items()}
-            filled = {key: n for key, n in lengths.items() if n > 0}
-            if not filled:
-                raise DataRejected(
-                    f"{name}: no channel with samples in this IDE recording, one is needed; check the file"
-                )
-            with foreign(broken, REMEDY):
-                titles = {f"{key} {channels[key].name}".strip(): key for key in filled}
-            titles = {**titles, **({group: group} if group in filled else {})}
-            title = chosen([(t, filled[k]) for t, k in titles.items()], group, name)
-            with foreign(broken, REMEDY):
-                return _content(channels[titles[title]])
-        finally:
-            dataset.close()
+            dataset = idelib.importer.openFile(stream, quiet=True)
+            idelib.importer.readData(dataset)
+            channels = {f"{key}": channel for key, channel in dataset.channels.items()}
+            lengths = {key: len(channel.getSession()) for key, channel in channels.items()}
+        filled = {key: n for key, n in lengths.items() if n > 0}
+        if not filled:
+            raise DataRejected(f"{name}: no channel with samples in this IDE recording, one is needed; check the file")
+        with foreign(broken, REMEDY):
+            titles = {f"{key} {channels[key].name}".strip(): key for key in filled}
+        titles = {**titles, **({group: group} if group in filled else {})}
+        title = chosen([(t, filled[k]) for t, k in titles.items()], group, name)
+        with foreign(broken, REMEDY):
+            return _content(channels[titles[title]])
 
 
 def _content(channel: Any) -> Content:

@@ -15,6 +15,8 @@ from pipelines.stages.figures import FIGURES
 from pipelines.tables.frames import rows_of
 
 if TYPE_CHECKING:
+    from collections.abc import Collection
+
     from pipelines.report.context import ReportContext
 
 ORDER = 45
@@ -64,17 +66,17 @@ def render(report: ReportContext) -> str:
         frame=str(sums["frame"].iloc[0]) if len(sums) else "",
         source=str(entries.get("grade_source", "assumed")).replace("_", " "),
         plot=shares_plot(_shares(report.tables["budget"], first)) if len(sums) else "",
-        missing=_missing(entries) if len(sums) else {},
+        missing=_missing(entries, report.not_needed) if len(sums) else {},
         references=[{**NO_REFERENCE, **one} for one in station.get("reference", [])],
         seen=_seen(sums),
         risks=_risks(report.tables.get("lot_risks")),
     )
 
 
-def _missing(entries: dict[str, Any]) -> dict[str, str]:
+def _missing(entries: dict[str, Any], not_needed: Collection[str]) -> dict[str, str]:
     from schemas.uncertainty import NEEDED
 
-    return {name: rules for name, rules in NEEDED.items() if name not in entries}
+    return {name: rules for name, rules in NEEDED.items() if name not in {*entries, *not_needed}}
 
 
 def _shares(budget: pd.DataFrame, unit: str) -> dict[str, dict[str, float]]:

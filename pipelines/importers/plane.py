@@ -1,0 +1,188 @@
+"""A recording turned about one axis of the sensor: bias, scale and misalignment of the axes in the plane, and what stays open."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from inertial.errors import NotIdentified
+from inertial.fits.plane import FEWEST_DOF, PlaneFit, fit_plane, fit_plane_norm, inside_of, plane_across, quiet_axis
+from inertial.probability import passes
+from pipelines.importers.judged import FitAnswer, coefficient, dwells_of, gravity_of
+from pipelines.tables.dwells import measured
+from schemas.errors import DataRejected
+from schemas.units import AXES, MICRO, STANDARD_GRAVITY_M_S2
+
+if TYPE_CHECKING:
+    import pandas as pd
+    from numpy.typing import NDArray
+
+    from pipelines.importers.mapping import Mapping
+    from pipelines.importers.record import Imported
+
+    Array = NDArray[np.float64]
+
+OUT, SPREAD = ([f"{kind}_{axis}" for axis in AXES] for kind in ("out", "sd"))
+FEWEST = 4
+UNLIKELY = 0.05
+GROSS = 0.02
+"""Residual, g rms, above which the dwells lie in no plane, or the model is wrong however few they are."""
+
+
+def known_force(dwells: pd.DataFrame) -> Array | None:
+    """The force (n, 3), g, of the first unit's dwells with known poses; None where they are not known."""
+    found = measured(dwells)
+    return None if found.reference == "norm" else found.state.force[0]
+
+
+def axis_of_plane(dwells: pd.DataFrame) -> int | None:
+    """The axis that a sensor was turned about alone, by its poses or, where these are not known, its outputs; else None."""
+    if len(dwells) < FEWEST or len(set(dwells["unit"])) != 1:
+        return None
+    force = known_force(dwells)
+    return quiet_axis(dwells[OUT].to_numpy(dtype=np.float64)) if force is None else plane_across(force)
+
+
+def plane(data: Imported, mapping: Mapping) -> FitAnswer:
+    """The answer of ``import --fit plane``, with known poses or by the norm of gravity."""
+    dwells = dwells_of(data)
+    across = axis_of_plane(dwells)
+    if across is None:
+        raise DataRejected(
+            "import: the poses lie in no plane across an axis of the sensor, one axis of rotation along x, y or z is needed for "
+            "--fit plane; use --fit norm, or mount the sensor with an axis along that of the table"
+        )
+    gravity = gravity_of(mapping) if known_force(dwells) is None else 1.0
+    return plane_answer(dwells, across, gravity, data.out_unit)
+
+
+def plane_answer(dwells: pd.DataFrame, across: int, gravity: float, out_unit: str) -> FitAnswer:
+    """The fit with its verdict.
+
+    Parameters
+    ----------
+    across : axis of the sensor across the plane; gravity : g, read where the poses are not known
+
+    Raises
+    ------
+    DataRejected
+        Too few dwells, or outputs that lie on no ellipse.
+    """
+    output = dwells[OUT].to_numpy(dtype=np.float64)
+    time = dwells["time_s"].to_numpy(dtype=np.float64)
+    error = _errors(dwells, output)
+    force = known_force(dwells)
+    try:
+        if force is None:
+            found = fit_plane_norm(output, across, gravity, time, error)
+        else:
+            found = fit_plane(output, force, across, time, error)
+    except NotIdentified as problem:
+        raise DataRejected(f"import: {problem}") from None
+    adequate, reason = _verdict(found)
+    opened = _opened(found, known=force is not None)
+    document = {
+        "adequate": adequate,
+        "reason": reason or None,
+        "across": AXES[across],
+        "open": opened,
+        "error": {"rms_ug": MICRO * found.rms, "p_value": found.p_value, "dof": found.dof, "coverage_factor": 2.0},
+        "bias": found.bias.tolist(),
+        "bias_u": found.bias_error.tolist(),
+        "response_per_g": found.response.tolist(),
+        "response_u": found.response_error.tolist(),
+    }
+    unit = str(dwells["unit"].iloc[0])
+    lines = [_head(found), *(_line(found, k, out_unit) for k in (*found.inside, across)), f"open: {'; '.join(opened)}"]
+    if reason:
+        lines.append(reason)
+    return FitAnswer("plane", adequate, document, tuple(lines), _rows(found, unit, out_unit, known=force is not None))
+
+
+def _errors(dwells: pd.DataFrame, output: Array) -> Array:
+    """White standard errors (n, 3), output unit: sd/√n where recorded, else alike."""
+    alike = np.full(output.shape, 1e-6 * float(np.ptp(output)))
+    if not {*SPREAD, "n"} <= set(dwells.columns):
+        return alike
+    own = dwells[SPREAD].to_numpy(dtype=np.float64) / np.sqrt(dwells["n"].to_numpy(dtype=np.float64))[:, None]
+    typical = np.median(own, axis=0)
+    if not np.all(typical > 0.0):
+        return alike
+    return np.clip(np.where(np.isfinite(own), own, typical), typical / 20.0, typical * 20.0)
+
+
+def _verdict(found: PlaneFit) -> tuple[bool | None, str]:
+    """Whether the model describes the dwells, by harmonics of the angle beside it; None where they cannot tell."""
+    if found.rms > GROSS:
+        return (
+            False,
+            f"the residual is {100.0 * found.rms:.3g} % of gravity: the poses lie in no plane, or an axis is dead",
+        )
+    if found.dof < FEWEST_DOF:
+        return None, (
+            f"cannot be judged: {found.dof} degrees of freedom, {FEWEST_DOF} are needed; measure "
+            f"{FEWEST_DOF - found.dof} more poses"
+        )
+    passed = passes(found.p_value, UNLIKELY)
+    if passed is None:
+        return None, "cannot be judged: the probability of the residuals is no number; add poses"
+    return (
+        passed,
+        "" if passed else "the residual follows harmonics of the angle, as a second- or third-order term does",
+    )
+
+
+def _opened(found: PlaneFit, *, known: bool) -> list[str]:
+    """What a turn about one axis does not show."""
+    y = AXES[found.across]
+    i, j = (AXES[k] for k in found.inside)
+    parts = [
+        f"scale of {y}",
+        f"response of {i} and {j} to {y}",
+        f"bias of {y} apart from the tilt of the axis of rotation (1 mrad is 1 mg)",
+        "third-order terms apart from the scale, beyond 1 g",
+    ]
+    if not known:
+        parts.append(f"rotation of {i} and {j} together about {y}")
+    return parts
+
+
+def _head(found: PlaneFit) -> str:
+    i, j = (AXES[k] for k in found.inside)
+    p = f"harmonics of the angle: p = {found.p_value:.2g}"
+    axes = f"turned about {AXES[found.across]}: {i} and {j} are calibrated in their plane"
+    return f"{axes}; residual {MICRO * found.rms:.1f} µg rms, {p}"
+
+
+def _line(found: PlaneFit, axis: int, unit: str) -> str:
+    i, j = found.inside
+    bias = f"{AXES[axis]}: bias {found.bias[axis]:.7g} ± {2.0 * found.bias_error[axis]:.2g} {unit} (k = 2)"
+    if axis == found.across:
+        parts = [
+            f"K{AXES[axis]}{AXES[k]} {found.response[axis, c]:.4g} ± {2.0 * found.response_error[axis, c]:.2g} {unit}/g"
+            for c, k in enumerate((i, j))
+        ]
+        return f"{bias}, with the tilt of the axis of rotation; couplings {', '.join(parts)}"
+    own, other = (0, 1) if axis == i else (1, 0)
+    scale = f"scale {found.response[axis, own] / STANDARD_GRAVITY_M_S2:.6g} {unit} per m/s²"
+    if found.response_error[axis, other] == 0.0:
+        return f"{bias}, {scale}"
+    cross = f"K{AXES[axis]}{AXES[j if axis == i else i]} {found.response[axis, other]:.4g}"
+    return f"{bias}, {scale}, {cross} ± {2.0 * found.response_error[axis, other]:.2g} {unit}/g"
+
+
+def _rows(found: PlaneFit, unit: str, out_unit: str, *, known: bool) -> list[dict[str, Any]]:
+    """Rows of coefficients: only those that the plane determines."""
+    per_g = f"{out_unit}/g"
+    rows: list[dict[str, Any]] = []
+    for axis in range(3):
+        rows.append(coefficient(unit, axis, "bias", "K0", found.bias[axis], found.bias_error[axis], out_unit))
+        for column, other in enumerate(inside_of(found.across)):
+            value, error = found.response[axis, column], found.response_error[axis, column]
+            if other == axis:
+                rows.append(coefficient(unit, axis, "scale", "K1", value, error, per_g))
+            elif known or error > 0.0:
+                name = f"K{AXES[axis]}{AXES[other]}"
+                rows.append(coefficient(unit, axis, "misalignment", name, value, error, per_g))
+    return rows

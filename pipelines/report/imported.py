@@ -1,0 +1,77 @@
+"""What the report of an import has beside its diagnosis: figures against their limits, certificates, and the budget."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from inertial.quantities import ANGLE_COLUMNS, FORCE_COLUMNS
+from pipelines.certificates.statement import stated
+from pipelines.report.context import OPTIONAL, TABLES, ReportContext
+from pipelines.report.panels import budget, certificates
+from pipelines.report.templates import fill
+from pipelines.report.unit_panels import figures
+from pipelines.stages.norm_budget import OF_POSES
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from pipelines.archive import Run
+    from pipelines.certificates.statement import Stated
+
+FEWEST_OF_A_LOT = 3
+"""Units from which on the risk of a lot is known."""
+OF_ENCODERS = ("orthogonality", "outer_offset", "inner_offset", "harmonics")
+TEMPLATE = """\
+<h2>{{ certificates_title }}</h2>
+{{ certificates | safe }}
+{% for unit, outcome, grade, reasons, figures in units %}
+<h2>{{ unit }}: {{ outcome }}, grade {{ grade }}</h2>
+{% for reason in reasons %}<p>{{ reason }}</p>{% endfor %}
+{{ figures | safe }}
+{% endfor %}
+{% if held_out %}<p class="note">{{ held_out }} dwells were held out of the fit; errors "on poses not used" are theirs.
+{% if norm %}Without known poses only the component along the force shows in | |a| − g |: the error of an axis is that of the
+magnitude, weighted by how far the force points along the axis.{% endif %}</p>{% endif %}
+<h2>{{ budget_title }}</h2>
+{{ budget | safe }}
+"""
+
+
+class ImportContext(ReportContext):
+    """An import that was graded, as the panels of a report read it."""
+
+    def __init__(self, run: Run, given: Mapping[str, Stated]) -> None:
+        self.run, self.certificates = run, given
+        self.about = run.about
+        self.recipe = run.about["recipe"]
+        there = set(run.tables())
+        self.tables = {name: run.table(name) for name in (*TABLES, *OPTIONAL) if name in there}
+        if self.tables["grades"]["unit"].nunique() < FEWEST_OF_A_LOT:
+            self.tables.pop("lot_risks", None)
+        columns = set(run.table("dwells").columns)
+        if not columns & {ANGLE_COLUMNS[0], FORCE_COLUMNS[0]}:
+            self.not_needed = OF_POSES
+        elif ANGLE_COLUMNS[0] not in columns:
+            self.not_needed = OF_ENCODERS
+
+
+def certificates_of(run: Run) -> dict[str, Stated]:
+    """The certificates of the units of an import; none where it has no grades."""
+    return stated(run, run.table("grades")["unit"]) if "grades" in run.tables() else {}
+
+
+def decisions(run: Run) -> str:
+    """The part of the page as HTML; empty where the import was not graded."""
+    if not {"grades", "figures"} <= set(run.tables()):
+        return ""
+    report = ImportContext(run, certificates_of(run))
+    return fill(
+        TEMPLATE,
+        certificates_title=certificates.TITLE,
+        certificates=certificates.render(report),
+        units=[(u.unit, u.outcome, u.grade, u.reasons, figures.render(u)) for u in report.units],
+        norm=report.not_needed == OF_POSES,
+        held_out=len(run.table("verification")) if "verification" in run.tables() else 0,
+        budget_title=budget.TITLE,
+        budget=budget.render(report),
+    )

@@ -1,0 +1,93 @@
+"""The stages of an import that its references and held-out dwells allow: verification by the norm, and the budget."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import pandas as pd
+
+from pipelines.archive import code_hash
+from pipelines.chain.chain import BY_NAME, Tables
+from pipelines.importers.plane import plane_answer
+from pipelines.stages.budget import budget
+from pipelines.stages.budget_terms import BudgetTables
+from pipelines.stages.norm_budget import norm_budget
+from pipelines.stages.norm_verify import verify_norms
+from pipelines.tables.frames import empty_table
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from pipelines.archive import Run
+    from pipelines.stages.budget_terms import BudgetTerms
+
+
+@dataclass(frozen=True)
+class StageCall:
+    """One stage for one run: as :class:`pipelines.chain.chain.Stage`, with everything that the job decides filled in."""
+
+    name: str
+    inputs: tuple[str, ...]
+    outputs: tuple[str, ...]
+    parameters: dict[str, Any]
+    code: str
+    call: Callable[[Run], Tables]
+
+
+def history_of(run: Run) -> pd.DataFrame:
+    """The temperatures between the dwells of a run; without rows where it has none."""
+    return run.table("history") if "history" in run.tables() else empty_table(texts="unit", numbers="time_s unit_C")
+
+
+def no_noise() -> pd.DataFrame:
+    """The table of noise terms of an import, which has no static record."""
+    return empty_table(texts="unit axis term unit_text", numbers="value low high", flags="identified")
+
+
+def verify_norms_step(gravity: float, *, history: bool) -> StageCall:
+    """Verification of a fit by the norm of gravity, g, on the dwells that were held out; no row where none was."""
+    stage = BY_NAME["verify"]
+    names = ("dwells", "coefficients", "covariance", "wander")
+
+    def call(run: Run) -> Tables:
+        dwells, coefficients, covariance, wander = (run.table(name) for name in names)
+        return verify_norms(
+            dwells, run.table("history") if history else None, coefficients, covariance, wander, gravity
+        )
+
+    code = code_hash(("pipelines.stages.norm_verify", "schemas.tables"))
+    inputs = (*names, "history") if history else names
+    return StageCall("verify", inputs, stage.outputs, {"gravity_g": gravity}, code, call)
+
+
+def plane_step(across: int, gravity: float) -> StageCall:
+    """The fit of the two axes in the plane across an axis; gravity, g, is read where the poses are not known."""
+
+    def call(run: Run) -> Tables:
+        dwells = run.table("dwells")
+        answer = plane_answer(dwells, across, gravity, str(dwells["out_unit"].iloc[0]))
+        return {"coefficients": pd.DataFrame(answer.coefficients)}
+
+    code = code_hash(("pipelines.importers.plane", "schemas.tables"))
+    return StageCall("fit", ("dwells",), ("coefficients",), {"plane_across": across, "gravity_g": gravity}, code, call)
+
+
+def budget_step(terms: BudgetTerms, *, history: bool, known: bool) -> StageCall:
+    """The uncertainty budget of an import whose references are stated.
+
+    Parameters
+    ----------
+    known : whether its poses are known; otherwise only the norm of gravity is
+    """
+    stage = BY_NAME["budget"]
+    names = ("coefficients", "covariance", "wander", "verification", "verification_poses")
+
+    def call(run: Run) -> Tables:
+        tables = {name: run.table(name) for name in names}
+        whole = BudgetTables(dwells=run.table("dwells"), history=history_of(run), noise=no_noise(), **tables)
+        return budget(whole, terms) if known else norm_budget(whole, terms)
+
+    module = "pipelines.stages.budget" if known else "pipelines.stages.norm_budget"
+    inputs = ("dwells", *(("history",) if history else ()), *names)
+    return StageCall("budget", inputs, stage.outputs, terms.document(), code_hash((module, "schemas.tables")), call)
