@@ -64,6 +64,7 @@ class ProcedureStep:
     off_s : without power before the move, s
     soak : number of the soak within the procedure, from 0
     role : equipment of the station that performs it; empty for a record on the tilt table
+    on_table : the equipment of the role is set first, then the record is taken on the tilt table
     setting : what the equipment is set to, by name with unit
     """
 
@@ -78,6 +79,7 @@ class ProcedureStep:
     soak: int = 0
     settled: bool = True
     role: str = ""
+    on_table: bool = False
     setting: Mapping[str, float] = field(default_factory=dict[str, float])
 
 
@@ -192,6 +194,10 @@ class Procedure(ABC):
 
     def measure(self, equipment: Any, step: ProcedureStep, slots: Sequence[int]) -> Any:
         """The recording of a step on the equipment of its role; steps without a role are recorded on the tilt table."""
+        raise NotImplementedError
+
+    def prepare(self, equipment: Any, step: ProcedureStep) -> Mapping[str, float]:
+        """Sets the equipment of a step with ``on_table``; ``supply_ratio`` in the result is the supply over its nominal voltage."""
         raise NotImplementedError
 
     @abstractmethod
