@@ -62,7 +62,9 @@ def step_figures(time: Array, response: Array, error: Array, *, band: float, edg
     """
     noise = float(np.sqrt(np.mean(error**2)))
     if 3.0 * noise > band:
-        msg = f"step: noise {100.0 * noise:.3g} % of the step, a third of the band at most is needed; average more steps"
+        msg = (
+            f"step: noise {100.0 * noise:.3g} % of the step, a third of the band at most is needed; average more steps"
+        )
         raise NotIdentified(msg)
     ten, ninety = (_first_above(time, response, level) for level in (0.1, 0.9))
     rise = ninety - ten
@@ -137,7 +139,9 @@ def _smoothed(time: Array, response: Array, error: Array, width: float) -> tuple
 def _first_above(time: Array, response: Array, level: float) -> float:
     above = np.flatnonzero(response >= level)
     if above.size == 0 or above[0] == 0:
-        msg = f"step: the response does not rise through {100.0 * level:g} % of the step; check drive, cable and trigger"
+        msg = (
+            f"step: the response does not rise through {100.0 * level:g} % of the step; check drive, cable and trigger"
+        )
         raise NotIdentified(msg)
     return float(time[above[0]])
 
@@ -163,13 +167,17 @@ def _local(time: Array, response: Array, error: Array, near: float, width: float
     return covariance @ (design.T @ (response[rows] / error[rows])), covariance, width
 
 
-def _crossing(time: Array, response: Array, error: Array, level: float, near: float, width: float) -> tuple[float, float]:
+def _crossing(
+    time: Array, response: Array, error: Array, level: float, near: float, width: float
+) -> tuple[float, float]:
     """Time at which the response crosses a level near a time, and its standard uncertainty."""
     c, covariance, width = _local(time, response, error, near, width)
     x = 0.0
     for _ in range(20):  # Newton on the parabola; the slope at a crossing is not zero
         slope = c[1] + 2.0 * c[2] * x
-        x = float(np.clip(x - (c[0] + c[1] * x + c[2] * x**2 - level) / (slope if abs(slope) > 1e-12 else 1e-12), -1.0, 1.0))
+        x = float(
+            np.clip(x - (c[0] + c[1] * x + c[2] * x**2 - level) / (slope if abs(slope) > 1e-12 else 1e-12), -1.0, 1.0)
+        )
     row = np.array([1.0, x, x**2])
     slope = max(abs(c[1] + 2.0 * c[2] * x), 1e-12)
     return near + width * x, float(width * np.sqrt(row @ covariance @ row) / slope)

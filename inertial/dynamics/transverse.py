@@ -75,11 +75,11 @@ def fit_transverse(first: Array, second: Array, output: Array, error: Array) -> 
     across = np.array([-along[1], along[0]])
     spread = float(np.sqrt(along @ covariance[:2, :2] @ along))
     turned = float(np.sqrt(across @ covariance[:2, :2] @ across))
-    seen = size > 3.0 * turned
+    seen = size > 3.0 * max(turned, spread)  # without any, 1.1 % of units exceed this (Rayleigh)
     return Transverse(
         size,
         spread,
-        max(0.0, size - Z95 * spread) if size > 2.0 * spread else 0.0,
+        max(0.0, size - Z95 * spread) if seen else 0.0,
         size + Z95 * spread,
         float(np.degrees(np.arctan2(c[1], c[0]))),
         float(np.degrees(turned / size)) if seen else 180.0,

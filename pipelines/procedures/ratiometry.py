@@ -82,8 +82,12 @@ class Ratiometry(Procedure):
     name: ClassVar[str] = "ratiometry"
     title: ClassVar[str] = "Supply voltage"
     order: ClassVar[int] = 70
-    states: ClassVar[str] = "zero and sensitivity over the supply voltage: ratiometric error, or rejection of the supply"
-    source: ClassVar[str] = "IEEE Std 1293, input-voltage sensitivity; IEEE Std 2700, ratiometricity and power-supply rejection"
+    states: ClassVar[str] = (
+        "zero and sensitivity over the supply voltage: ratiometric error, or rejection of the supply"
+    )
+    source: ClassVar[str] = (
+        "IEEE Std 1293, input-voltage sensitivity; IEEE Std 2700, ratiometricity and power-supply rejection"
+    )
     roles: ClassVar[tuple[str, ...]] = ("power_supply",)
     part: ClassVar[type[Part]] = RatiometryPart
     figures: ClassVar[tuple[FigureSpec, ...]] = (
@@ -93,7 +97,9 @@ class Ratiometry(Procedure):
             "largest departure of the sensitivity from that at the nominal supply, times the voltage ratio where the output follows it",
         ),
         FigureSpec(ZERO, "%", "the same departure of the zero, of the full scale of the output"),
-        FigureSpec(SLOPE, "µg/V", "slope of the zero over the supply, after the ratio where the output follows it; worst axis"),
+        FigureSpec(
+            SLOPE, "µg/V", "slope of the zero over the supply, after the ratio where the output follows it; worst axis"
+        ),
     )
 
     def steps(self, part: RatiometryPart, recipe: Recipe) -> list[ProcedureStep]:
@@ -163,10 +169,14 @@ class Ratiometry(Procedure):
             name = str(unit)
             if bool((rows["constant"] > 0.0).any()):
                 note = "the output is constant; check cable and supply"
-                figures[name] = [FigureValue(f.name, "*", np.nan, np.nan, identified=False, note=note) for f in self.figures]
+                figures[name] = [
+                    FigureValue(f.name, "*", np.nan, np.nan, identified=False, note=note) for f in self.figures
+                ]
                 continue
             found = {axis: over_supply(part, rows[rows["axis"] == axis]) for axis in part.axes}
-            figures[name] = [worst([_figure(spec.name, axis, one, device) for axis, one in found.items()]) for spec in self.figures]
+            figures[name] = [
+                worst([_figure(spec.name, axis, one, device) for axis, one in found.items()]) for spec in self.figures
+            ]
             findings += [Finding(name, f"axis {axis}", _text(part, one)) for axis, one in found.items()]
         return Outcome(figures, findings)
 
@@ -175,15 +185,25 @@ class Ratiometry(Procedure):
         left, right = drawing.subplots(1, 2)
         for k, axis in enumerate(part.axes):
             one = over_supply(part, points[points["axis"] == axis])
-            style: dict[str, Any] = {"fmt": "o-", "ms": 3.5, "lw": 0.9, "c": COLOURS[AXES.index(axis)], "label": f"axis {axis}"}
-            shift = 0.002 * (k - 1) * float(np.ptp(one.supply))
-            left.errorbar(one.supply + shift, 100.0 * one.sensitivity, 200.0 * one.sensitivity_error, **style)
-            right.errorbar(one.supply + shift, 1e3 * one.zero_g, 2e3 * one.zero_error_g, **style)
+            style: dict[str, Any] = {
+                "fmt": "o-",
+                "ms": 3.5,
+                "lw": 0.9,
+                "c": COLOURS[AXES.index(axis)],
+                "label": f"axis {axis}",
+            }
+            order = np.argsort(one.supply)
+            at = one.supply[order] + 0.015 * (k - 1) * float(
+                np.ptp(one.supply)
+            )  # side by side, so that no bar hides another
+            left.errorbar(at, 100.0 * one.sensitivity[order], 200.0 * one.sensitivity_error[order], **style)
+            right.errorbar(at, 1e3 * one.zero_g[order], 2e3 * one.zero_error_g[order], **style)
         left.set(xlabel="supply / V", ylabel="departure of the sensitivity / %")
         right.set(xlabel="supply / V", ylabel="departure of the zero / mg")
         for place in (left, right):
             place.axhline(0.0, lw=0.7, c="#888888", ls="--")
-        left.legend(frameon=False, title="bars: U (k = 2)")
+        right.legend(frameon=False, title="bars: U (k = 2)", loc="upper left")
+        right.margins(y=0.15)
 
 
 def over_supply(part: RatiometryPart, rows: pd.DataFrame) -> Follows:

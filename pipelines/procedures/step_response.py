@@ -35,7 +35,6 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure as Drawing
 
     from schemas.recipe import Recipe
-    from schemas.station import StationConfig
 
 SETTLING, OVERSHOOT, RISE = "step_settling_ms", "step_overshoot_percent", "step_rise_ms"
 BEFORE_SHARE = 0.25  # of the step's duration, recorded before the edge
@@ -65,11 +64,15 @@ class StepResponse(Procedure):
     title: ClassVar[str] = "Step response"
     order: ClassVar[int] = 116
     states: ClassVar[str] = "settling time into a band, overshoot, rise time, of the worst axis"
-    source: ClassVar[str] = "IEEE Std 1293, response to a step; electrostatic or magnetic self-test as the source of the step"
+    source: ClassVar[str] = (
+        "IEEE Std 1293, response to a step; electrostatic or magnetic self-test as the source of the step"
+    )
     roles: ClassVar[tuple[str, ...]] = ("step_generator",)
     part: ClassVar[type[Part]] = StepPart
     figures: ClassVar[tuple[FigureSpec, ...]] = (
-        FigureSpec(SETTLING, "ms", "time from the edge of the drive until the response stays within band_percent of the step"),
+        FigureSpec(
+            SETTLING, "ms", "time from the edge of the drive until the response stays within band_percent of the step"
+        ),
         FigureSpec(OVERSHOOT, "%", "largest value of the response above the final value, of the step"),
         FigureSpec(RISE, "ms", "time from 10 % to 90 % of the step"),
     )
@@ -101,7 +104,11 @@ class StepResponse(Procedure):
         rows: list[dict[str, Any]] = []
         edges = [_edge(record.samples[REFERENCE]) for record in records]
         for unit in dict.fromkeys(str(name) for record in records for name in record.readings["unit"]):
-            own = [(record.samples[unit], edge) for record, edge in zip(records, edges, strict=True) if unit in record.samples]
+            own = [
+                (record.samples[unit], edge)
+                for record, edge in zip(records, edges, strict=True)
+                if unit in record.samples
+            ]
             for i, axis in enumerate(AXES):
                 rows += [one | {"unit": unit, "axis": axis} for one in _averaged(part, own, i, device)]
         return point_table(rows)
@@ -196,7 +203,10 @@ def _averaged(
     times = [np.arange(len(one.output)) / rate - edge for one, edge in own]
     outputs = [one.output[:, axis] for one, _ in own]
     before = [output[time < -2.0 / rate] for time, output in zip(times, outputs, strict=True)]
-    final = [output[(time > (1.0 - FINAL_SHARE) * hold) & (time < hold - 2.0 / rate)] for time, output in zip(times, outputs, strict=True)]
+    final = [
+        output[(time > (1.0 - FINAL_SHARE) * hold) & (time < hold - 2.0 / rate)]
+        for time, output in zip(times, outputs, strict=True)
+    ]
     base, size = np.array([one.mean() for one in before]), np.array([one.mean() for one in final])
     step = float(np.mean(size - base))
     noise = float(np.sqrt(np.mean([one.var(ddof=1) for one in before])))
@@ -228,13 +238,21 @@ def _averaged(
 
 def _values(part: StepPart, axis: str, one: StepFigures) -> list[FigureValue]:
     known = one.settling_identified
-    note = "" if known else (
-        f"an extremum of the response lies at the edge of the band of ± {part.band_percent:g} %: the settling time is "
-        f"{1e3 * one.settling_low_s:.3g} or {1e3 * one.settling_high_s:.3g} ms; average more steps, or choose another band_percent"
+    note = (
+        ""
+        if known
+        else (
+            f"an extremum of the response lies at the edge of the band of ± {part.band_percent:g} %: the settling time is "
+            f"{1e3 * one.settling_low_s:.3g} or {1e3 * one.settling_high_s:.3g} ms; average more steps, or choose another band_percent"
+        )
     )
     spread = 1e3 * one.settling_error_s
     value = 1e3 * one.settling_s
-    low, high = (value - 1.96 * spread, value + 1.96 * spread) if known else (1e3 * one.settling_low_s, 1e3 * one.settling_high_s)
+    low, high = (
+        (value - 1.96 * spread, value + 1.96 * spread)
+        if known
+        else (1e3 * one.settling_low_s, 1e3 * one.settling_high_s)
+    )
     return [
         FigureValue(SETTLING, axis, value, spread, low, high, identified=known, note=note),
         FigureValue(OVERSHOOT, axis, 100.0 * one.overshoot, 100.0 * one.overshoot_error),

@@ -140,15 +140,11 @@ class TransverseTest(Procedure):
             try:
                 found = fitted(rows)
             except NotIdentified as problem:
-                figures[name] = [
-                    FigureValue(FIGURE, part.axis, np.nan, np.nan, identified=False, note=str(problem))
-                ]
+                figures[name] = [FigureValue(FIGURE, part.axis, np.nan, np.nan, identified=False, note=str(problem))]
                 continue
             value = 100.0 * found.value
             error = float(np.hypot(100.0 * found.error, 1e-2 * part.reference_percent * value))
-            figures[name] = [
-                FigureValue(FIGURE, part.axis, value, error, 100.0 * found.low, 100.0 * found.high)
-            ]
+            figures[name] = [FigureValue(FIGURE, part.axis, value, error, 100.0 * found.low, 100.0 * found.high)]
             findings += [Finding(name, subject, text) for subject, text in _texts(part, found)]
         return Outcome(figures, findings)
 
@@ -166,7 +162,7 @@ class TransverseTest(Procedure):
             place.plot(angle, wave, lw=1.1, c="#d55e00", label="fitted sine")
             place.axhline(100.0 * found.offset, lw=0.7, ls="--", c="#888888", label="motion along the axis")
         first = AXES[(AXES.index(part.axis) + 1) % 3]
-        place.set(xlabel=f"direction of motion from {first} / °", ylabel=f"output of {part.axis} / % of the driven acceleration")
+        place.set(xlabel=f"direction of motion from {first} / °", ylabel=f"output of {part.axis} / % of the motion")
         place.set_xticks(range(0, 361, 45))
         place.margins(y=0.25)
         place.legend(frameon=False, ncols=3, loc="upper center")
@@ -253,7 +249,9 @@ def _texts(part: TransversePart, found: Transverse) -> list[tuple[str, str]]:
         text = "the transverse sensitivity does not stand out of its uncertainty; raise level_g, or record longer"
         out = [("direction not determined", text)]
     else:
-        text = f"{found.direction_deg:.1f}° ± {2.0 * found.direction_error_deg:.1g}° (k = 2) from {first} towards {second}"
+        text = (
+            f"{found.direction_deg:.1f}° ± {2.0 * found.direction_error_deg:.1g}° (k = 2) from {first} towards {second}"
+        )
         out = [("direction of the largest transverse sensitivity", text)]
     verdict = "adequate" if found.p_value >= 0.005 else "not adequate"
     text = f"a sine over the angle is {verdict}: χ² {found.chi_square:.1f} for {found.dof} degrees of freedom, p = {found.p_value:.2g}"

@@ -16,9 +16,7 @@ NEEDED = ("rate_hz", "reference", "reference_rate_hz", "reference_unit")
 STANDARD_GRAVITY = {"g": 1.0, "m/s^2": 9.80665}
 
 
-def read_recording(
-    path: Path, slots: list[int], name: str, units: Mapping[str, float] = STANDARD_GRAVITY
-) -> Recording:
+def read_recording(path: Path, slots: list[int], name: str, units: Mapping[str, float] = STANDARD_GRAVITY) -> Recording:
     """The recording in a result file; a file without rate or unit is refused.
 
     Parameters
@@ -38,9 +36,7 @@ def read_recording(
         )
     unit = str(content["reference_unit"])
     if unit not in units:
-        raise StationRefused(
-            f"{name}: reference in '{unit}', {' or '.join(units)} is needed; correct the set-up"
-        )
+        raise StationRefused(f"{name}: reference in '{unit}', {' or '.join(units)} is needed; correct the set-up")
     outputs = {
         slot: np.atleast_2d(np.asarray(content[f"slot_{slot}"], dtype=np.float64))
         for slot in slots

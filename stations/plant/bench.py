@@ -244,7 +244,7 @@ class Bench:
         return Waveforms(self._converted(outputs, rng, rate), rate, reference, recorder)
 
     def _answers(self, force: Array, share: Array, rest: Array, fine_hz: float, rate_hz: float) -> Array:
-        """Outputs (n, units, 3) in g of forces (m, 3) in g at a fine rate, of which a unit feels ``share`` (units, 3), beside ``rest``."""
+        """Outputs (n, units, 3) in g of forces (m, 3) in g at a fine rate, times ``share`` (units, 3), beside ``rest``."""
         n = len(force)
         whole: int = cast("Any", next_fast_len)(n + round(0.05 * fine_hz), real=True)
         f = np.asarray(np.fft.rfftfreq(whole, 1.0 / fine_hz), dtype=np.float64)
@@ -273,7 +273,7 @@ class Bench:
         tick: int,
         troubles: frozenset[str] = frozenset(),
     ) -> Waveforms:
-        """Response to a step of voltage at the self-test inputs, which push the masses of all axes; the reference is the drive in V."""
+        """Response to a step of voltage at the self-test inputs, which push all masses; the reference is the drive in V."""
         rng, fine_hz = self._rng(tick, 4), STEP_FINE_HZ
         volts *= 0.3 if "level_not_reached" in troubles else 1.0
         n = round(seconds * fine_hz)

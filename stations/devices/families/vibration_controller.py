@@ -70,7 +70,9 @@ class VibrationController(Equipment):
         self.values.write("turn", angle_deg)
         recording = self._run("ACROSS", seconds, slots)
         turn = np.radians(angle_deg)
-        moved = recording.reference[:, (axis + 1) % 3] * np.cos(turn) + recording.reference[:, (axis + 2) % 3] * np.sin(turn)
+        moved = recording.reference[:, (axis + 1) % 3] * np.cos(turn) + recording.reference[:, (axis + 2) % 3] * np.sin(
+            turn
+        )
         refuse_wrong_sine(moved, frequency, level, self.name)
         return recording
 

@@ -95,7 +95,11 @@ class Generator:
         if head == "ACQ:FILE":
             done = self._there and world.now_us >= self._until_us
             return (self._files.write(self._number, self._recorded, world.slots, self._unit) if done else "NONE"), False
-        texts = {"SOUR1:FUNC": self._function, "OUTP1": str(int(self._on)), **{k: f"{v:.7g}" for k, v in self._set.items()}}
+        texts = {
+            "SOUR1:FUNC": self._function,
+            "OUTP1": str(int(self._on)),
+            **{k: f"{v:.7g}" for k, v in self._set.items()},
+        }
         return texts.get(head, ""), False
 
     @property
@@ -123,6 +127,8 @@ class Generator:
         bench, seconds = self._world.bench, self._set["ACQ:LENG"]
         if self._steps:
             hold = 0.5 / self._set["SOUR1:FREQ"]
-            return bench.self_test(self._set["SOUR1:VOLT"], hold, self._set["ACQ:BEF"], seconds, self._start_us, self._troubles)
+            return bench.self_test(
+                self._set["SOUR1:VOLT"], hold, self._set["ACQ:BEF"], seconds, self._start_us, self._troubles
+            )
         axis = int(self._set["ROUT:AXIS"])
         return bench.sine(self._set["SOUR1:FREQ"], self._level(), axis, seconds, self._start_us, self._troubles)
