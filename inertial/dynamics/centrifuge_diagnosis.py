@@ -147,7 +147,7 @@ def _verdict(
 
 
 def _left_out(points: Spins, output: Array, error: Array, effects: Sequence[str]) -> float:
-    """Rms residual of points that a fit has not seen over its uncertainty, that of the fit included; every fifth left out in turn."""
+    """Rms residual of left-out points (every fifth in turn) over its uncertainty, that of the fit included."""
     n = len(output)
     if n * (FOLDS - 1) // FOLDS < 4 + len(effects):
         return float("nan")

@@ -71,8 +71,8 @@ def missing_classes(
 ) -> tuple[tuple[EffectClass, ...], AnyFit]:
     """Classes of effects that mend an inadequate model, one after the other, and the fit with the best of each.
 
-    An effect is named only where the model is inadequate and the effect improves it with a p-value below 10⁻³, times the number of
-    candidates.
+    An effect is named only where the model is inadequate and the effect improves it with a p-value below 10⁻³, times the
+    number of candidates.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Whether the comparison of a shock is good enough: the waveform of the unit against that of the reference, and what is missing."""
+"""Whether the comparison of a shock is good enough: waveform of the unit against the reference's, and what is missing."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ class Waves:
 
 @dataclass(frozen=True)
 class ShockRecord:
-    """Shocks of one unit: the rate of the waveforms, Hz, the duration of the pulse, s, and the time from the first sample to it, s."""
+    """Shocks of one unit: rate of the waveforms, Hz, duration of the pulse, s, and time from the first sample to it, s."""
 
     rate_hz: float
     duration_s: float
@@ -152,7 +152,7 @@ def diagnose_shock(record: ShockRecord, effects: Sequence[str] = DEFAULT) -> Sho
 
 
 def predicted(record: ShockRecord, fit: ShockFit) -> float:
-    """Rms residual of shocks that the fit has not seen, in % of the peak: its sensitivity and effects applied to the reference."""
+    """Rms residual of shocks that the fit has not seen, in % of the peak: sensitivity and effects applied to the reference."""
     parameters = [(name, p) for name in fit.effects for p in EFFECTS[name].parameters(record.duration_s)]
     x = np.array([np.log(fit.parameters[p.name][0]) if p.log else fit.parameters[p.name][0] for _, p in parameters])
     c = np.array([fit.sensitivity, *(value for value, _ in fit.coefficients.values())])

@@ -68,8 +68,9 @@ def step_figures(time: Array, response: Array, error: Array, *, band: float, edg
         raise NotIdentified(msg)
     ten, ninety = (_first_above(time, response, level) for level in (0.1, 0.9))
     rise = ninety - ten
-    if np.count_nonzero((time >= ten) & (time <= ninety)) < FEWEST:
-        msg = f"step: {np.count_nonzero((time >= ten) & (time <= ninety))} points in the rise time, {FEWEST} are needed; sample faster"
+    within = int(np.count_nonzero((time >= ten) & (time <= ninety)))
+    if within < FEWEST:
+        msg = f"step: {within} points in the rise time, {FEWEST} are needed; sample faster"
         raise NotIdentified(msg)
     width = 0.12 * rise
     first, half, last = (
@@ -97,8 +98,8 @@ def step_figures(time: Array, response: Array, error: Array, *, band: float, edg
 def aligned(times: Sequence[Array], responses: Sequence[Array]) -> list[Array]:
     """Times of several records of one step, shifted so that the responses agree; the mean of the shifts is zero.
 
-    The edge of a sampled drive is known to a sample interval only, which would blur the mean of the records. The shift of a record
-    is that of least squares on the slope of the mean of all.
+    The edge of a sampled drive is known to a sample interval only, which would blur the mean of the records. The shift of
+    a record is that of least squares on the slope of the mean of all.
 
     Parameters
     ----------

@@ -108,8 +108,13 @@ def command(
     fit: Annotated[str, typer.Option("--fit", metavar="norm|faces|temperature", help="Fit and judge at once.")] = "",
     procedure: Annotated[
         str,
-        typer.Option("--procedure", metavar="sweep", help="A dynamic measurement: the transfer function of a sweep."),
+        typer.Option(
+            "--procedure", metavar="NAME", help="A dynamic test: points of a sweep, or with --map reference=… waveforms."
+        ),
     ] = "",
+    part: Annotated[
+        Path | None, typer.Option("--part", metavar="TOML", help="Keys of the procedure, and full_scale of the output.")
+    ] = None,
     effects: Annotated[
         str, typer.Option("--effects", metavar="a,b,…", help="Model of the transfer function; second_order,delay.")
     ] = "",
@@ -122,6 +127,11 @@ def command(
     Columns are named, or numbered from 1. What a file does not state and its numbers do not show is not guessed but asked for.
     Exit status 1: the fit asked for is not adequate for these data, or they cannot tell.
     """
+    if procedure and (columns or procedure != "sweep"):
+        from pipelines.cli.waveform_import import import_and_print
+
+        stated = (columns, units, rate, group)
+        raise typer.Exit(import_and_print(files, procedure, part, unit, stated, archive, as_json=as_json))
     if procedure:
         raise typer.Exit(_transfer(files, procedure, unit, effects, archive, as_json=as_json))
     from pipelines.importers import mapping as mapped

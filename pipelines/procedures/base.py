@@ -172,7 +172,8 @@ class Procedure(ABC):
 
     name : of the module, and ``kind`` in recipes · title : heading in the report · order : place in the reference
     roles : equipment that a station must have · source : standard, edition and part · states : one line on what it determines
-    rows : of plots in its picture
+    rows : of plots in its picture · from_waveforms : recordings made elsewhere can be imported, one file a record
+    reference_unit : of the reference channel of such a recording, g or V
     """
 
     name: ClassVar[str]
@@ -184,6 +185,8 @@ class Procedure(ABC):
     part: ClassVar[type[Part]]
     figures: ClassVar[tuple[FigureSpec, ...]] = ()
     rows: ClassVar[int] = 1
+    from_waveforms: ClassVar[bool] = False
+    reference_unit: ClassVar[str] = "g"
 
     @abstractmethod
     def steps(self, part: Any, recipe: Recipe) -> list[ProcedureStep]:
@@ -197,7 +200,11 @@ class Procedure(ABC):
         raise NotImplementedError
 
     def prepare(self, equipment: Any, step: ProcedureStep) -> Mapping[str, float]:
-        """Sets the equipment of a step with ``on_table``; ``supply_ratio`` in the result is the supply over its nominal voltage."""
+        """Sets the equipment of a step with ``on_table``; ``supply_ratio`` of the result is over the nominal supply."""
+        raise NotImplementedError
+
+    def setting_of(self, part: Any, reference: UnitRecord) -> dict[str, float]:
+        """The setting of a step that was recorded elsewhere, from its reference channel."""
         raise NotImplementedError
 
     @abstractmethod

@@ -49,8 +49,9 @@ NAMED_P = 1e-3
 class CentrifugePart(NominalScale):
     """Speeds up and down again, with the units mounted one way and reversed.
 
-    ``effects`` is the model to be judged; the diagnosis names what is missing. ``radius_m`` is the nominal radius to the proof mass and ``radius_um`` its standard uncertainty: with one radius it is the
-    sensitivity's, in full. ``point_ppm`` is the standard uncertainty of a point's acceleration besides (rate, trend), of itself.
+    ``effects`` is the model to be judged; the diagnosis names what is missing. ``radius_m`` is the nominal radius to the proof
+    mass and ``radius_um`` its standard uncertainty: with one radius it is the sensitivity's, in full. ``point_ppm`` is the
+    standard uncertainty of a point's acceleration besides (rate, trend), of itself.
     """
 
     kind: Literal["centrifuge"]
@@ -232,7 +233,8 @@ def diagnosis_text(part: CentrifugePart, found: SpinDiagnosis) -> list[tuple[str
     if found.adequate is None:
         return [("diagnosis", f"{model} cannot be judged: {found.reason}")]
     p = chi2.sf(found.fit.chi_square, found.fit.dof)
-    text = f"{model} is {'adequate' if found.adequate else 'not adequate'} (p = {p:.2g}), rms residual {MICRO * found.error_g:.3g} µg"
+    verdict = "adequate" if found.adequate else "not adequate"
+    text = f"{model} is {verdict} (p = {p:.2g}), rms residual {MICRO * found.error_g:.3g} µg"
     out = [("diagnosis", text)]
     for one in found.classes:
         name = one.effects[0]

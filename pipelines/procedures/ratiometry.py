@@ -70,8 +70,8 @@ class RatiometryPart(Part):
         for volt in self.supplies_V:
             if not abs(volt / self.supplies_V[0] - 1.0) <= FARTHEST:
                 raise ValueError(
-                    f"supplies_V: {volt:g} V, at most {100.0 * FARTHEST:g} % from the nominal {self.supplies_V[0]:g} V (the first) is "
-                    "allowed; correct it"
+                    f"supplies_V: {volt:g} V, at most {100.0 * FARTHEST:g} % from the nominal {self.supplies_V[0]:g} V "
+                    "(the first) is allowed; correct it"
                 )
         return self
 
@@ -94,7 +94,8 @@ class Ratiometry(Procedure):
         FigureSpec(
             SENSITIVITY,
             "%",
-            "largest departure of the sensitivity from that at the nominal supply, times the voltage ratio where the output follows it",
+            "largest departure of the sensitivity from that at the nominal supply (times the voltage ratio where the output "
+            "follows it)",
         ),
         FigureSpec(ZERO, "%", "the same departure of the zero, of the full scale of the output"),
         FigureSpec(
@@ -129,8 +130,8 @@ class Ratiometry(Procedure):
         for volt in part.supplies_V:
             if not low <= volt <= high:
                 raise RecipeInvalid(
-                    f"recipe: procedure ratiometry: supplies_V has {volt:g} V, the supply of station {station.name} has {low:g} to "
-                    f"{high:g} V; give voltages inside",
+                    f"recipe: procedure ratiometry: supplies_V has {volt:g} V, the supply of station {station.name} has "
+                    f"{low:g} to {high:g} V; give voltages inside",
                     key="supplies_V",
                 )
 

@@ -89,6 +89,7 @@ class ShockTest(Procedure):
     source: ClassVar[str] = "ISO 16063-22 (comparison), IEC 60068-2-27 (pulse), ISO 18431-4 (shock response spectrum)"
     roles: ClassVar[tuple[str, ...]] = ("shock_machine",)
     part: ClassVar[type[Part]] = ShockPart
+    from_waveforms: ClassVar[bool] = True
     figures: ClassVar[tuple[FigureSpec, ...]] = (
         FigureSpec(
             "shock_sensitivity_percent",
@@ -144,9 +145,19 @@ class ShockTest(Procedure):
         one = step.setting
         return equipment.shock(one["peak_g"], one["duration_s"], int(one["axis"]), int(one["direction"]), slots)
 
+    def setting_of(self, part: ShockPart, reference: UnitRecord) -> dict[str, float]:
+        """Peak and direction of a shock, from the reference."""
+        axis = AXES.index(part.axis)
+        wave = reference.output[:, axis]
+        wave = wave - wave[: max(8, int(BEFORE_S * reference.rate_hz))].mean()
+        peak = float(wave[int(np.argmax(np.abs(wave)))])
+        duration = 1e-3 * part.duration_ms
+        return {"peak_g": abs(peak), "duration_s": duration, "direction": float(np.sign(peak)), "axis": float(axis)}
+
     def reduce(self, part: ShockPart, records: Sequence[ProcedureRecord], device: Device) -> pd.DataFrame:
         """Peaks of reference and unit, waveforms and spectra of the first shock, and the bias before and after."""
         rows: list[dict[str, Any]] = []
+        first = next((k for k, record in enumerate(records) if record.step.role), -1)
         for k, record in enumerate(records):
             for unit in record.readings["unit"]:
                 own = record.samples.get(str(unit))
@@ -162,7 +173,7 @@ class ShockTest(Procedure):
                     noise = _noise(part, record, own, scale)
                     found = shock_waves.waves(k, pair, record.step.setting["direction"], settings_of(part), noise)
                     rows += [one | {"unit": unit, "axis": part.axis} for one in found]
-                    if k == 1:
+                    if k == first:
                         found = shock_waves.curves(pair, 1e-3 * part.duration_ms, BEFORE_S)
                         rows += [one | {"unit": unit, "axis": part.axis} for one in found]
         return point_table(rows)

@@ -54,7 +54,8 @@ def waves(number: int, pair: Pair, direction: float, settings: WaveSettings, noi
     error = float(np.hypot(noise_g, 1e-2 * settings.floor_percent * top))
     return [
         {
-            "series": "compared", "point": MOST_SAMPLES * number + k, "setting": float(t - peak + 0.5 * duration), "value": float(b), "uncertainty": error,
+            "series": "compared", "point": MOST_SAMPLES * number + k,
+            "setting": float(t - peak + 0.5 * duration), "value": float(b), "uncertainty": error,
             "reference_g": float(a), "direction": direction, "shock": float(number),
         }
         for k, (t, a, b) in enumerate(zip(at, reference(at), unit(at), strict=True))
@@ -86,10 +87,8 @@ def diagnosis_text(rows: pd.DataFrame, settings: WaveSettings, effects: Sequence
     if found.adequate is None:
         return [("comparison of the waveforms", f"{model} cannot be judged: {found.reason}")]
     p = chi2.sf(found.fit.chi_square, found.fit.dof)
-    text = (
-        f"{model} is {'adequate' if found.adequate else 'not adequate'} (p = {p:.2g}), rms residual {found.error_percent:.2g} % of "
-        "the peak"
-    )
+    verdict = "adequate" if found.adequate else "not adequate"
+    text = f"{model} is {verdict} (p = {p:.2g}), rms residual {found.error_percent:.2g} % of the peak"
     if not found.adequate:
         text += f"; {100.0 * found.where[1]:.0f} % of χ² is in the samples of {found.where[0]}"
     out = [("comparison of the waveforms", text)]

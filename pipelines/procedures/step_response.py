@@ -69,6 +69,8 @@ class StepResponse(Procedure):
     )
     roles: ClassVar[tuple[str, ...]] = ("step_generator",)
     part: ClassVar[type[Part]] = StepPart
+    from_waveforms: ClassVar[bool] = True
+    reference_unit: ClassVar[str] = "V"
     figures: ClassVar[tuple[FigureSpec, ...]] = (
         FigureSpec(
             SETTLING, "ms", "time from the edge of the drive until the response stays within band_percent of the step"
@@ -99,6 +101,11 @@ class StepResponse(Procedure):
         one = step.setting
         return equipment.step(one["volts"], one["hold_s"], one["before_s"], slots)
 
+    def setting_of(self, part: StepPart, reference: UnitRecord) -> dict[str, float]:
+        """Voltage of the step, from the recorded drive."""
+        hold = 1e-3 * part.hold_ms
+        return {"volts": float(np.ptp(reference.output[:, 0])), "hold_s": hold, "before_s": BEFORE_SHARE * hold}
+
     def reduce(self, part: StepPart, records: Sequence[ProcedureRecord], device: Device) -> pd.DataFrame:
         """The averaged response of every axis as a share of the step, over the time from the edge of the drive."""
         rows: list[dict[str, Any]] = []
@@ -125,8 +132,8 @@ class StepResponse(Procedure):
                     one = axis_figures(part, own)
                 except NotIdentified as problem:
                     note = f"axis {axis}: {problem}"
-                    for name in found:
-                        found[name].append(FigureValue(name, str(axis), np.nan, np.nan, identified=False, note=note))
+                    for name, values in found.items():
+                        values.append(FigureValue(name, str(axis), np.nan, np.nan, identified=False, note=note))
                     continue
                 for value in _values(part, str(axis), one):
                     found[value.figure].append(value)
@@ -170,8 +177,8 @@ def axis_figures(part: StepPart, rows: pd.DataFrame) -> StepFigures:
     samples = found.rise_s * float(kept["rate_hz"].iloc[0])
     if samples < RISE_POINTS:
         msg = (
-            f"{samples:.1f} samples in the rise time, {RISE_POINTS:g} are needed to resolve a tenth of 1/f_n; record the analogue "
-            "output, or use a sweep"
+            f"{samples:.1f} samples in the rise time, {RISE_POINTS:g} are needed to resolve a tenth of 1/f_n; record the "
+            "analogue output, or use a sweep"
         )
         raise NotIdentified(msg)
     return found
@@ -243,7 +250,8 @@ def _values(part: StepPart, axis: str, one: StepFigures) -> list[FigureValue]:
         if known
         else (
             f"an extremum of the response lies at the edge of the band of ± {part.band_percent:g} %: the settling time is "
-            f"{1e3 * one.settling_low_s:.3g} or {1e3 * one.settling_high_s:.3g} ms; average more steps, or choose another band_percent"
+            f"{1e3 * one.settling_low_s:.3g} or {1e3 * one.settling_high_s:.3g} ms; average more steps, or choose "
+            "another band_percent"
         )
     )
     spread = 1e3 * one.settling_error_s

@@ -153,7 +153,8 @@ class TransverseTest(Procedure):
         place = drawing.subplots()
         kept = points[np.isfinite(points["value"])]
         place.errorbar(
-            kept["setting"], kept["value"], 2.0 * kept["uncertainty"], fmt="o", ms=3.5, lw=0.9, c="#0072b2", label="measured, U (k = 2)"
+            kept["setting"], kept["value"], 2.0 * kept["uncertainty"], fmt="o", ms=3.5, lw=0.9, c="#0072b2",
+            label="measured, U (k = 2)"
         )  # fmt: skip
         if len(kept) >= FEWEST_ANGLES:
             found = fitted(points)
@@ -254,7 +255,8 @@ def _texts(part: TransversePart, found: Transverse) -> list[tuple[str, str]]:
         )
         out = [("direction of the largest transverse sensitivity", text)]
     verdict = "adequate" if found.p_value >= 0.005 else "not adequate"
-    text = f"a sine over the angle is {verdict}: χ² {found.chi_square:.1f} for {found.dof} degrees of freedom, p = {found.p_value:.2g}"
+    text = f"a sine over the angle is {verdict}: χ² {found.chi_square:.1f} for {found.dof} degrees of freedom"
+    text += f", p = {found.p_value:.2g}"
     if verdict == "not adequate":
         text += "; check the angles of the fixture and its resonance, repeat at another frequency"
     return [*out, ("model", text)]

@@ -35,7 +35,8 @@ class Spins:
 class CentrifugeEffect(ABC):
     """A term of the output. Every module of this package defines one class.
 
-    id : of the module · equation, source : for people · unit : of the coefficient · breaker : measurement that tells it from others
+    id : of the module · equation, source : for people · unit : of the coefficient
+    breaker : measurement that tells it from others
     """
 
     id: ClassVar[str]

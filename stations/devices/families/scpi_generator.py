@@ -1,4 +1,4 @@
-"""Function generator with a multichannel recorder, by SCPI: it drives an exciter's amplifier, or the devices' self-test inputs."""
+"""Function generator with a multichannel recorder, by SCPI: before an exciter's amplifier, or at the self-test inputs."""
 
 from __future__ import annotations
 
@@ -74,8 +74,8 @@ class ScpiGenerator(Equipment):
         reached = self._level(recording, axis)
         if not abs(reached / level - 1.0) <= 2.0 * LEVEL_SHARE:
             raise RecordingSpoilt(
-                f"{self.name}: {reached:.4g} g at {frequency:g} Hz with {volts:.3g} V, {level:g} g was ordered; check amplifier and "
-                "fixture"
+                f"{self.name}: {reached:.4g} g at {frequency:g} Hz with {volts:.3g} V, {level:g} g was ordered; check amplifier "
+                "and fixture"
             )
         return recording
 
