@@ -198,7 +198,7 @@ def step_truth(unit: DynamicTruth) -> dict[str, float]:
     outside = np.flatnonzero(np.abs(out - 1.0) > 0.02)[-1]
     ten, ninety = (time[np.flatnonzero(out > level)[0]] for level in (0.1, 0.9))
     return {
-        "step_settling_ms": 1e3 * float(time[outside] + unit.delay_s),
+        "step_settling_ms": 1e3 * float(time[outside] + unit.delay_s - 2e-6 * np.log(2.0)),
         "step_overshoot_percent": 100.0 * float(out.max() - 1.0),
         "step_rise_ms": 1e3 * float(ninety - ten),
     }
