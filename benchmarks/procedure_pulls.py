@@ -76,12 +76,14 @@ def outcome(name: str, count: int, seed: int) -> tuple[pd.DataFrame, Plant]:
         points = points[points["axis"] == "z"]
     import pandas as pd
 
+    found = procedure.evaluate(part, points, device).figures
     rows = [
-        {"unit": unit, "figure": one.figure, "axis": one.axis, "value": one.value, "uncertainty": one.uncertainty, "known": one.identified}
-        for unit, values in procedure.evaluate(part, points, device).figures.items()
+        (unit, one.figure, one.axis, one.value, one.uncertainty, one.identified)
+        for unit, values in found.items()
         for one in values
-    ]  # fmt: skip
-    return pd.DataFrame(rows), Plant(station, lot)
+    ]
+    heads = ["unit", "figure", "axis", "value", "uncertainty", "known"]
+    return pd.DataFrame(rows, columns=heads), Plant(station, lot)
 
 
 def truth(plant: Plant, k: int) -> dict[str, float]:
