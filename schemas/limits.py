@@ -51,7 +51,7 @@ PERIOD_FIGURE = "bias_error_period_ug"
 
 
 class Limit(Strict):
-    """The largest magnitude of a figure that a unit may have, or its least value, in the figure's unit, which is stated again."""
+    """The largest magnitude of a figure that a unit may have, or its least value; the file states the unit again."""
 
     max: Positive | None = None
     min: Positive | None = None

@@ -248,6 +248,17 @@ def test_the_parts_are_checked_with_the_key_that_is_wrong(tmp_path: Path) -> Non
             parts_of(load_recipe(str(path)))
 
 
+def test_a_list_without_the_multi_position_test_becomes_a_job_with_a_least_value(tmp_path: Path) -> None:
+    from pipelines.jobs.job import Request
+
+    recipe_of(tmp_path, ["sweep"])
+    (tmp_path / "limits.toml").write_text('name = "l"\n[figures]\nsweep_bandwidth_hz = { min = 800.0, unit = "Hz" }\n')
+    path = tmp_path / "recipe.toml"
+    path.write_text('limits = "limits.toml"\nunits = ["A1"]\n' + path.read_text())
+    job = Request(str(path)).job(Archive(tmp_path / "archive"))
+    assert job.limits.figures["sweep_bandwidth_hz"].min == 800.0
+
+
 def test_the_band_edge_of_a_plain_second_order_model_is_the_closed_form() -> None:
     from inertial.dynamics.transfer_effects import Conditions
     from inertial.dynamics.transfer_model import Points, fit_transfer
