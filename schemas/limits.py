@@ -66,7 +66,7 @@ class Limit(Strict):
 
     @model_serializer(mode="wrap")
     def _as_before(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
-        """Without the side that is not stated: runs are named for their limits, and those of earlier versions keep their names."""
+        """Without the side that is not stated, so that runs of earlier versions keep their names."""
         return {name: value for name, value in handler(self).items() if value is not None}
 
     @property

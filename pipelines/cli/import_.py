@@ -109,7 +109,9 @@ def command(
     procedure: Annotated[
         str,
         typer.Option(
-            "--procedure", metavar="NAME", help="A dynamic test: points of a sweep, or with --map reference=… waveforms."
+            "--procedure",
+            metavar="NAME",
+            help="A dynamic test: points of a sweep, or with --map reference=… waveforms.",
         ),
     ] = "",
     part: Annotated[
