@@ -91,6 +91,34 @@ def test_a_sweep_runs_on_the_generator(tmp_path: Path) -> None:
     assert points["value"].iloc[3] == pytest.approx(0.007, rel=0.02)
 
 
+def shock_station(faults: list[FaultOrder] | None = None):
+    """The built-in station with a shock machine that holds registers."""
+    own = Equipment(shock_machine=Device(profile="modbus_shock", device_id=60, link="tcp"))
+    return with_faults(load_station().model_copy(update={"equipment": own}), faults or [])
+
+
+def test_a_shock_machine_by_modbus_is_armed_released_and_read() -> None:
+    with open_station(shock_station(), lot_of(2), roles=["shock_machine"]) as station:
+        found = station.equipment["shock_machine"].shock(30.0, 0.011, 2, -1, [0, 1])
+        assert float(found.reference[:, 2].min()) == pytest.approx(-30.0, rel=0.15)
+        assert set(found.outputs) == {0, 1}
+        assert "shock machine stopped" in station.make_safe().done
+
+
+@pytest.mark.parametrize(
+    ("kind", "error", "text"),
+    [
+        ("guard_door", OperatorNeeded, "guard door is open"),
+        ("missed_trigger", RecordingSpoilt, "trigger was missed"),
+        ("level_not_reached", RecordingSpoilt, "was ordered"),
+    ],
+)
+def test_trouble_at_a_shock_machine_by_modbus_gives_no_recording(kind: str, error: type, text: str) -> None:
+    station = shock_station([FaultOrder(kind=kind)])
+    with open_station(station, lot_of(1), roles=["shock_machine"]) as opened, pytest.raises(error, match=text):
+        opened.equipment["shock_machine"].shock(30.0, 0.011, 2, 1, [0])
+
+
 def test_production_adapters_of_equipment_know_no_plant() -> None:
     for path in FAMILIES.glob("*.py"):
         assert "plant" not in path.read_text(encoding="utf-8"), path.name
