@@ -164,7 +164,7 @@ def _local(time: Array, response: Array, error: Array, near: float, width: float
         width *= 1.3
     x = (time[rows] - near) / width
     design = np.column_stack([np.ones_like(x), x, x**2]) / error[rows, None]
-    covariance = np.linalg.inv(design.T @ design)
+    covariance: Array = np.asarray(np.linalg.inv(design.T @ design), dtype=np.float64)
     return covariance @ (design.T @ (response[rows] / error[rows])), covariance, width
 
 

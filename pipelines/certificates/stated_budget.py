@@ -189,7 +189,7 @@ def _contribution(row: dict[str, Any]) -> Contribution:
 
 
 def _decision(row: dict[str, Any]) -> StatedDecision:
-    return {
+    stated: StatedDecision = {
         "figure": row["figure"],
         "unit": row["unit_text"],
         "value": float(row["value"]),
@@ -200,8 +200,10 @@ def _decision(row: dict[str, Any]) -> StatedDecision:
         "rule": row["rule"],
         "pfa": float(row["pfa"]),
         "pfr": float(row["pfr"]),
-        **({"least": True} if np.isfinite(row.get("least", np.nan)) else {}),
     }
+    if np.isfinite(row.get("least", np.nan)):
+        stated["least"] = True
+    return stated
 
 
 def _edge(row: dict[str, Any]) -> float:

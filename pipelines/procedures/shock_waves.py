@@ -93,13 +93,9 @@ def diagnosis_text(rows: pd.DataFrame, settings: WaveSettings, effects: Sequence
         text += f"; {100.0 * found.where[1]:.0f} % of χ² is in the samples of {found.where[0]}"
     out = [("comparison of the waveforms", text)]
     for one in found.classes:
-        rivals = f"; the shocks do not tell it from {', '.join(one.effects[1:])}" if len(one.effects) > 1 else ""
-        out.append(
-            (
-                "missing effect",
-                f"{one.effects[0]}: {_size(found, one.effects[0], settings)}, p = {one.p_value:.2g}{rivals}",
-            )
-        )
+        best, *others = one.effects
+        rivals = f"; the shocks do not tell it from {', '.join(others)}" if others else ""
+        out.append(("missing effect", f"{best}: {_size(found, best, settings)}, p = {one.p_value:.2g}{rivals}"))
     if found.classes:
         text = (
             f"rms residual {found.error_percent:.2g} → {found.extended_percent:.2g} % of the peak; samples left out, in standard "

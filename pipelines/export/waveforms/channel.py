@@ -32,4 +32,4 @@ class Channel:
     @property
     def time(self) -> NDArray[np.float64]:
         """(n,), s."""
-        return self.start_s + self.interval_s * np.arange(len(self.values))
+        return np.asarray(self.start_s + self.interval_s * np.arange(len(self.values)), dtype=np.float64)
