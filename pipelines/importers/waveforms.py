@@ -20,8 +20,8 @@ from pipelines.procedures.base import REFERENCE, Device, ProcedureRecord, Proced
 from pipelines.procedures.columns import figure_table, finding_table, gathered_points
 from schemas.errors import DataRejected, WrongUse, did_you_mean
 from schemas.foreign import shown
-from schemas.recipe import Pose, explain, parse_toml
-from schemas.toml_files import read_text
+from schemas.recipe import Pose
+from schemas.toml_files import explain, parse_toml, read_text
 from schemas.units import AXES
 
 if TYPE_CHECKING:
