@@ -27,6 +27,7 @@ KINDS = {
     "shock_machine": "Shock machines",
     "centrifuge": "Centrifuges",
     "power_supply": "Power supplies",
+    "step_generator": "Generators of steps",
 }
 MOST_NAMES = 16
 SPACES = {"holding": "", "input": "input register", "coil": "coil", "discrete": "discrete input"}

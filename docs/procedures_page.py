@@ -7,6 +7,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from docs.generated_page import write_or_check
+from inertial.dynamics.centrifuge_effects import EFFECTS as CENTRIFUGE_EFFECTS
+from inertial.dynamics.shock_effects import EFFECTS as SHOCK_EFFECTS
 from inertial.dynamics.transfer_effects import EFFECTS
 from pipelines.procedures import PROCEDURES
 
@@ -63,7 +65,20 @@ def _effects() -> str:
         f"| `{one.id}` | {one.equation} | {(type(one).__doc__ or '').strip()} | {one.breaker} |"
         for one in EFFECTS.values()
     ]
+    lines += ["", "## Effects on a shock comparison", ""]
+    lines += [_row_head(), *(_effect_row(name, one) for name, one in SHOCK_EFFECTS.items())]
+    lines += ["", "## Effects on a centrifuge test", ""]
+    lines += [_row_head(), *(_effect_row(name, one) for name, one in CENTRIFUGE_EFFECTS.items())]
     return "\n".join([*lines, ""])
+
+
+def _row_head() -> str:
+    return "| effect | term | meaning | measurement that tells it from others |\n|---|---|---|---|"
+
+
+def _effect_row(name: str, one: Any) -> str:
+    term, meaning = one.equation.replace("|", "\\|"), (type(one).__doc__ or "").strip()
+    return f"| `{name}` | {term} | {meaning} | {one.breaker} |"
 
 
 if __name__ == "__main__":

@@ -51,10 +51,28 @@ PERIOD_FIGURE = "bias_error_period_ug"
 
 
 class Limit(Strict):
-    """The largest magnitude of a figure that a unit may have, in the figure's unit, which the file states again."""
+    """The largest magnitude of a figure that a unit may have, or its least value; the file states the unit again."""
 
-    max: Positive
+    max: Positive | None = None
+    min: Positive | None = None
     unit: str
+
+    @model_validator(mode="after")
+    def _one_side(self) -> Limit:
+        if (self.max is None) == (self.min is None):
+            found = "neither" if self.max is None else "both"
+            raise ValueError(f"max, min: {found} given, one of them is needed; state max, or min for a least value")
+        return self
+
+    @model_serializer(mode="wrap")
+    def _as_before(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
+        """Without the side that is not stated, so that runs of earlier versions keep their names."""
+        return {name: value for name, value in handler(self).items() if value is not None}
+
+    @property
+    def text(self) -> str:
+        """The limit for people, without its unit."""
+        return f"at least {self.min:.4g}" if self.min is not None else f"{self.max:.4g}"
 
 
 class Limits(Strict):
@@ -134,6 +152,8 @@ class Decision:
     outcome: Outcome
     risk: float = 0.0
     accept: float = float("nan")
+    least: bool = False
+    """Whether ``limit`` is the least value that the figure may have."""
 
     @property
     def pfa(self) -> float:
@@ -152,17 +172,18 @@ class Decision:
 
     @property
     def margin(self) -> float:
-        """Limit minus magnitude, in the figure's unit: negative where the limit is broken."""
-        return self.limit - abs(self.value)
+        """Distance of the figure from the limit, in the figure's unit: negative where the limit is broken."""
+        return self.value - self.limit if self.least else self.limit - abs(self.value)
 
     @property
     def sentence(self) -> str:
         """The decision for people: figure, value, uncertainty, limit and margin."""
         unit = "" if self.unit == "1" else f" {self.unit}"
         spread = f" ± {float(f'{self.uncertainty:.2g}'):g}" if self.uncertainty > 0.0 else ""
-        what = f"{self.value:.4g}{spread}{unit}, limit {self.limit:.4g}{unit}"
+        side = "at least " if self.least else ""
+        what = f"{self.value:.4g}{spread}{unit}, limit {side}{self.limit:.4g}{unit}"
         if self.outcome.startswith("conditional"):
-            risk = f"probability of exceeding it {100.0 * self.risk:.2g} %"
+            risk = f"probability of {'falling below' if self.least else 'exceeding'} it {100.0 * self.risk:.2g} %"
             return f"{self.figure} not accepted: inside the guard band, {what}, {risk}: measure longer, or again"
         return f"{self.figure} {self.outcome}: {what}, margin {self.margin:.3g}{unit}"
 
@@ -177,7 +198,21 @@ def decide(limits: Limits, figure: str, value: float, standard_uncertainty: floa
     """
     guard = limits.guard_factor * standard_uncertainty
     expanded = limits.coverage_factor * standard_uncertainty
-    limit = limits.figures[figure].max
+    own = limits.figures[figure]
+    if own.min is not None:
+        return Decision(
+            figure=figure,
+            value=value,
+            uncertainty=expanded,
+            limit=own.min,
+            unit=own.unit,
+            rule=describe_rule(limits),
+            outcome=_outcome(-value, -own.min, guard),
+            risk=below(value, standard_uncertainty, own.min),
+            accept=own.min + guard,
+            least=True,
+        )
+    limit = own.max or 0.0  # a limit has one of both
     return Decision(
         figure=figure,
         value=value,
@@ -197,6 +232,11 @@ def outside(value: float, u: float, limit: float) -> float:
         return float(not abs(value) <= limit)
     normal = NormalDist()
     return normal.cdf((-limit - value) / u) + normal.cdf((value - limit) / u)
+
+
+def below(value: float, u: float, least: float) -> float:
+    """Probability that a figure measured as ``value`` with standard uncertainty ``u`` lies below its least value."""
+    return NormalDist().cdf((least - value) / u) if u > 0.0 else float(not value >= least)
 
 
 def _outcome(magnitude: float, limit: float, guard: float) -> Outcome:

@@ -19,7 +19,9 @@ from schemas.toml_files import explain, parse_toml
 WordOrder = Literal["high_first", "low_first", "high_first_swapped", "low_first_swapped"]
 RegisterType = Literal["uint16", "int16", "uint32", "int32", "float32", "string", "bit"]
 Space = Literal["holding", "input", "coil", "discrete"]
-Kind = Literal["axis", "chamber", "reader", "slot", "exciter", "shock_machine", "centrifuge", "power_supply"]
+Kind = Literal[
+    "axis", "chamber", "reader", "slot", "exciter", "shock_machine", "centrifuge", "power_supply", "step_generator"
+]
 Carrier = Literal["tcp", "rtu", "tls", "ascii"]
 Adapter = Annotated[str, Field(pattern=r"^[a-z][a-z0-9_]*$")]  # the family, a module in stations/devices/families
 

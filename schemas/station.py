@@ -80,6 +80,7 @@ class Equipment(Strict):
     shock_machine: Device | None = None
     centrifuge: Device | None = None
     power_supply: Device | None = None
+    step_generator: Device | None = None
 
     def there(self) -> dict[str, Device]:
         """The equipment that the station has, by role."""

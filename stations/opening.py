@@ -30,6 +30,7 @@ if TYPE_CHECKING:
     from schemas.station import Device, Limits, StationConfig
     from stations.devices.axis import TableAxis
     from stations.devices.chamber import ThermalChamber
+    from stations.devices.values import Values
     from stations.plant.hidden import HiddenEffect
     from stations.plant.plant import Plant
 
@@ -153,14 +154,20 @@ def _assemble(
         Reader(reader, {slot: Slot(_slot_registers(config, links, slot)) for slot in slots}, fastest),
     )
     equipment = {
-        role: equipment_adapter(role, profile_of(device))(
-            Commands(role.replace("_", " "), links.lines(role), profile_of(device)), clock
-        )
+        role: equipment_adapter(role, profile_of(device))(_values(role, device, links), clock)
         for role, device in config.fitted().items()
         if role in roles
     }
     steps = [*equipment_steps(equipment), *safe_steps(config.safety, axes, *parts[1:])]
     return Station(config, clock, *parts, safe_steps=steps, equipment=equipment)
+
+
+def _values(role: str, device: Device, links: Links) -> Values:
+    """Values of test equipment: text commands on an ascii link, registers on any other."""
+    name = role.replace("_", " ")
+    if device.link == "ascii":
+        return Commands(name, links.lines(role), profile_of(device))
+    return _registers(name, role, device, links)
 
 
 def _registers(name: str, place: str, device: Device, links: Links) -> Registers:

@@ -140,8 +140,10 @@ class Acquisition:
         Suspended : a condition failed before, during or after the record
         """
         station, recipe = self.station, self.recipe
-        if step.order is not None and step.order.role:
+        if step.order is not None and step.order.role and not step.order.on_table:
+            self.prepare(None)
             return self.measure_on_equipment(step)
+        self.prepare(step if step.order is not None and step.order.on_table else None)
         station.table.move(step.pose.outer_deg, step.pose.inner_deg)
         self.rest(recipe.settle_s if step.wait_s is None else step.wait_s)
         self.supervisor.check_before(self.slots)
@@ -178,6 +180,18 @@ class Acquisition:
         if step.kind in TUMBLED and step.settled:
             self.plausibility.refuse_contradiction(record.soak, samples, readings)
         return record, samples, readings
+
+    def prepare(self, step: Step | None) -> None:
+        """Sets the equipment of a step on the table, and brings all other equipment to the state of records without it."""
+        own = step.order if step is not None else None
+        for role, equipment in self.station.equipment.items():
+            if own is None or role != own.role:
+                equipment.stand_by()
+        ratio = 1.0
+        if step is not None and own is not None:
+            procedure = PROCEDURES[self.recipe.procedures[step.procedure or 0]["kind"]]
+            ratio = procedure.prepare(self.station.equipment[own.role], own).get("supply_ratio", 1.0)
+        self.supervisor.expect_supply(ratio)
 
     def measure_on_equipment(self, step: Step) -> tuple[Record, pd.DataFrame, pd.DataFrame]:
         """One record that other equipment of the station performs, with its samples, those of the reference, and readings.

@@ -59,7 +59,7 @@ def check(station: Station, recipe: Recipe, plan: list[Step]) -> None:
             station.reader.require_switch()
         station.chamber.check(step.temperature)
         station.table.check(step.pose.outer_deg, step.pose.inner_deg)
-        if step.rate_hz is not None and (step.order is None or not step.order.role):
+        if step.rate_hz is not None and (step.order is None or not step.order.role or step.order.on_table):
             station.reader.check(step.rate_hz)
     station.reader.check(recipe.rate_hz)
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 from schemas.errors import LeaseLost, OperatorNeeded, StationError
@@ -57,6 +57,10 @@ class Supervisor:
             self.note("reference", NO_RECORD, "supplies at the start", "reference of later supplies", figures)
         reference = {int(name.removeprefix("slot_").removesuffix(VOLT)): volt for name, volt in figures.items()}
         self.watched = Watched(config.suspenders, config.soak, reference)
+
+    def expect_supply(self, ratio: float) -> None:
+        """The devices' supply that later checks expect, over that at the start: a procedure may set it."""
+        self.watched = replace(self.watched, supply_ratio=ratio)
 
     def past(self) -> list[Event]:
         """Events up to the present time: a simulated run that was killed resumes at an earlier time than its last events."""

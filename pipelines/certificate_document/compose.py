@@ -183,8 +183,9 @@ def _budget(one: StatedQuantity) -> BudgetTable:
 
 
 def _conformity(one: Any) -> Conformity:
+    label = FIGURES[one["figure"]].label if one["figure"] in FIGURES else one["figure"]
     return Conformity(
-        figure=FIGURES[one["figure"]].label if one["figure"] in FIGURES else one["figure"],
+        figure=f"{label} (least value, accepted from)" if one.get("least") else label,
         **{name: one[name] for name in ("value", "expanded", "limit", "accept", "unit", "outcome", "pfa")},
     )
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NotRequired
 
 import numpy as np
 from typing_extensions import TypedDict
@@ -66,7 +66,7 @@ class StatedQuantity(TypedDict):
 class StatedDecision(TypedDict):
     """A decision with its rule and its risk.
 
-    expanded : U with the coverage factor of the limits; accept : largest value that is accepted
+    expanded : U with the coverage factor of the limits; accept : largest value that is accepted, smallest where ``least`` is true
     pfa, pfr : specific probability of false acceptance and false rejection (JCGM 106, 7.4)
     """
 
@@ -77,6 +77,7 @@ class StatedDecision(TypedDict):
     limit: float
     accept: float
     outcome: str
+    least: NotRequired[bool]
     rule: str
     pfa: float
     pfr: float
@@ -145,7 +146,7 @@ def stated_budget(run: Run, unit: str) -> StatedBudget:
         "validity_months": int(terms.get("validity_months", 12)),
         "customer_agreed": bool(terms.get("customer_agreed", False)),
         "quantities": [_quantity(row, parts) for row in rows_of(sums)],
-        "decisions": [_decision(row) for row in rows_of(figures) if np.isfinite(row["limit"])],
+        "decisions": [_decision(row) for row in rows_of(figures) if np.isfinite(_edge(row))],
         "references": [_reference(one) for one in station.get("reference", [])],
     }
 
@@ -188,18 +189,26 @@ def _contribution(row: dict[str, Any]) -> Contribution:
 
 
 def _decision(row: dict[str, Any]) -> StatedDecision:
-    return {
+    stated: StatedDecision = {
         "figure": row["figure"],
         "unit": row["unit_text"],
         "value": float(row["value"]),
         "expanded": float(row["uncertainty"]),
-        "limit": float(row["limit"]),
+        "limit": _edge(row),
         "accept": float(row["accept"]),
         "outcome": row["outcome"],
         "rule": row["rule"],
         "pfa": float(row["pfa"]),
         "pfr": float(row["pfr"]),
     }
+    if np.isfinite(row.get("least", np.nan)):
+        stated["least"] = True
+    return stated
+
+
+def _edge(row: dict[str, Any]) -> float:
+    """The limit of a figure: of its magnitude, or its least value; nan where it has none."""
+    return float(row["limit"] if np.isfinite(row["limit"]) else row.get("least", np.nan))
 
 
 def _reference(document: dict[str, Any]) -> StatedReference:

@@ -140,8 +140,15 @@ def command(
     ] = "",
     procedure: Annotated[
         str,
-        typer.Option("--procedure", metavar="sweep", help="Dynamic measurement: the transfer function of a sweep."),
+        typer.Option(
+            "--procedure",
+            metavar="NAME",
+            help="Dynamic test: the transfer function of a sweep, or with --map reference=… the waveforms of a procedure.",
+        ),
     ] = "",
+    part: Annotated[
+        Path | None, typer.Option("--part", metavar="TOML", help="Keys of the procedure, and full_scale of the output.")
+    ] = None,
     effects: Annotated[
         str,
         typer.Option(
@@ -157,6 +164,11 @@ def command(
     Columns are named, or numbered from 1. Nothing is guessed: what neither the file nor its numbers show must be given. Exit
     status 1: the requested fit is not adequate, or cannot be judged.
     """
+    if procedure and (columns or procedure != "sweep"):
+        from pipelines.cli.waveform_import import import_and_print
+
+        stated = (columns, units, rate, group)
+        raise typer.Exit(import_and_print(files, procedure, part, unit, stated, archive, as_json=as_json))
     if procedure:
         raise typer.Exit(_transfer(files, procedure, unit, effects, archive, as_json=as_json))
     from pipelines.importers import mapping as mapped

@@ -27,7 +27,7 @@ SHOWN = (
 )
 
 FIXED = ("value", "uncertainty", "limit", "unit_text", "outcome", "rule")
-RISKS = ("accept", "pfa", "pfr")  # runs of earlier versions have none
+RISKS = ("accept", "pfa", "pfr", "least")  # runs of earlier versions have none
 NOISE_ONLY = (
     "uncertainty: noise only, the station states no [uncertainty]: no grade above consumer, no certificate "
     "(docs/how-to/state-the-uncertainty.md)"

@@ -114,3 +114,26 @@ class TransferImport(TypedDict):
     parameters: dict[str, TransferParameter]
     next_hz: list[float]
     text: list[str]
+
+
+class WaveformFigure(TypedDict):
+    """A figure of a procedure from waveforms that were recorded elsewhere."""
+
+    figure: str
+    axis: str
+    value: Annotated[float | None, "null: not determined, with `note`"]
+    uncertainty: Annotated[float | None, "standard uncertainty, in `unit`"]
+    unit: str
+    identified: bool
+    note: str
+
+
+class WaveformImport(TypedDict):
+    """``import FILE… --procedure NAME --map reference=…``: figures and findings of a procedure."""
+
+    run: str
+    unit: str
+    procedure: str
+    records: int
+    figures: list[WaveformFigure]
+    text: list[str]

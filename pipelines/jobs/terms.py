@@ -74,8 +74,8 @@ def refuse_unreachable(job: Measuring) -> None:
     The noise of the device is left out: what is refused here would fail with a device of no noise.
     """
     terms = planned_terms(job.recipe, job.station, job.limits)
-    if terms.stated is None:
-        return
+    if terms.stated is None or not job.recipe.tumbles:
+        return  # without the multi-position test no figure rests on the budget
     dwells = planned_dwells(job.recipe, job.station)
     quiet = PlannedDwells(*dwells, covariance=np.eye(dwells.fit.time.size), run_ug=0.0, instability_ug=0.0)
     wrong = unreachable(reachable(quiet, terms, job.recipe.effects), job.limits, terms.certificate.validity_months)

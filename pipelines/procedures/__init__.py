@@ -38,7 +38,7 @@ __all__ = [
 ]
 
 MULTI_POSITION = "multi_position"
-SHARED = ("base", "columns", "recorded", "transfer_figures", "transfer_plots")
+SHARED = ("base", "columns", "recorded", "shock_waves", "transfer_figures", "transfer_plots")
 
 
 class IncompleteProcedure(Exception):

@@ -64,6 +64,7 @@ class ProcedureStep:
     off_s : without power before the move, s
     soak : number of the soak within the procedure, from 0
     role : equipment of the station that performs it; empty for a record on the tilt table
+    on_table : the equipment of the role is set first, then the record is taken on the tilt table
     setting : what the equipment is set to, by name with unit
     """
 
@@ -78,6 +79,7 @@ class ProcedureStep:
     soak: int = 0
     settled: bool = True
     role: str = ""
+    on_table: bool = False
     setting: Mapping[str, float] = field(default_factory=dict[str, float])
 
 
@@ -170,7 +172,8 @@ class Procedure(ABC):
 
     name : of the module, and ``kind`` in recipes · title : heading in the report · order : place in the reference
     roles : equipment that a station must have · source : standard, edition and part · states : its results in one line
-    rows : of plots in its picture
+    rows : of plots in its picture · from_waveforms : recordings made elsewhere can be imported, one file a record
+    reference_unit : of the reference channel of such a recording, g or V
     """
 
     name: ClassVar[str]
@@ -182,6 +185,8 @@ class Procedure(ABC):
     part: ClassVar[type[Part]]
     figures: ClassVar[tuple[FigureSpec, ...]] = ()
     rows: ClassVar[int] = 1
+    from_waveforms: ClassVar[bool] = False
+    reference_unit: ClassVar[str] = "g"
 
     @abstractmethod
     def steps(self, part: Any, recipe: Recipe) -> list[ProcedureStep]:
@@ -192,6 +197,14 @@ class Procedure(ABC):
 
     def measure(self, equipment: Any, step: ProcedureStep, slots: Sequence[int]) -> Any:
         """The recording of a step on the equipment of its role; steps without a role are recorded on the tilt table."""
+        raise NotImplementedError
+
+    def prepare(self, equipment: Any, step: ProcedureStep) -> Mapping[str, float]:
+        """Sets the equipment of a step with ``on_table``; ``supply_ratio`` of the result is over the nominal supply."""
+        raise NotImplementedError
+
+    def setting_of(self, part: Any, reference: UnitRecord) -> dict[str, float]:
+        """The setting of a step that was recorded elsewhere, from its reference channel."""
         raise NotImplementedError
 
     @abstractmethod

@@ -6,10 +6,12 @@ import math
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 
 import numpy as np
-from pydantic import Field
+from pydantic import Field, model_validator
 from scipy.stats import chi2
 
 from inertial.dynamics.centrifuge import TERMS, Polynomial, columns, fit_polynomial, linearity_percent
+from inertial.dynamics.centrifuge_diagnosis import DEFAULT, SpinDiagnosis, diagnose_spins
+from inertial.dynamics.centrifuge_effects import EFFECTS, Spins
 from inertial.errors import NotIdentified
 from pipelines.procedures.base import (
     REFERENCE,
@@ -27,6 +29,7 @@ from pipelines.procedures.base import (
 )
 from pipelines.procedures.columns import points as point_table
 from schemas.bounds import NotNegative, Positive
+from schemas.errors import did_you_mean
 from schemas.recipe import Pose
 from schemas.units import MICRO
 
@@ -46,8 +49,9 @@ NAMED_P = 1e-3
 class CentrifugePart(NominalScale):
     """Speeds up and down again, with the units mounted one way and reversed.
 
-    ``radius_m`` is the nominal radius to the proof mass and ``radius_um`` its standard uncertainty: with one radius it is the
-    sensitivity's, in full. ``point_ppm`` is the standard uncertainty of a point's acceleration besides (rate, trend), of itself.
+    ``effects`` is the model to be judged; the diagnosis names what is missing. ``radius_m`` is the nominal radius to the proof
+    mass and ``radius_um`` its standard uncertainty: with one radius it is the sensitivity's, in full. ``point_ppm`` is the
+    standard uncertainty of a point's acceleration besides (rate, trend), of itself.
     """
 
     kind: Literal["centrifuge"]
@@ -62,6 +66,14 @@ class CentrifugePart(NominalScale):
     record_s: Annotated[Positive, Field(le=600.0)] = 5.0
     full_scale_g: Positive = 30.0
     temperature_C: Annotated[float, Field(ge=-100.0, le=200.0)] = 25.0
+    effects: Annotated[list[str], Field(max_length=6)] = Field(default_factory=lambda: list(DEFAULT))
+
+    @model_validator(mode="after")
+    def _known(self) -> CentrifugePart:
+        for name in self.effects:
+            if name not in EFFECTS:
+                raise ValueError(f"effects: no effect '{name}' of centrifuges; {did_you_mean(name, EFFECTS)}")
+        return self
 
 
 class CentrifugeTest(Procedure):
@@ -173,7 +185,8 @@ class CentrifugeTest(Procedure):
                 ]
                 continue
             figures[name] = _figures(part, fit)
-            findings += [Finding(name, subject, text) for subject, text in _texts(part, fit)]
+            texts = [*_texts(part, fit), *diagnosis_text(part, judged(part, rows))]
+            findings += [Finding(name, subject, text) for subject, text in texts]
         return Outcome(figures, findings)
 
     def draw(self, drawing: Drawing, part: CentrifugePart, points: pd.DataFrame) -> None:
@@ -204,6 +217,41 @@ def fitted(part: CentrifugePart, rows: pd.DataFrame) -> Polynomial:
     """All terms with the input reversed; without it the four that one direction separates."""
     force, value, error = (rows[name].to_numpy(dtype=float) for name in ("setting", "value", "uncertainty"))
     return fit_polynomial(force, value, error, TERMS if part.reversed else TERMS[:4])
+
+
+def judged(part: CentrifugePart, rows: pd.DataFrame) -> SpinDiagnosis:
+    """The diagnosis of the part's model on the points of one unit."""
+    force, value, error = (rows[name].to_numpy(dtype=float) for name in ("setting", "value", "uncertainty"))
+    slowing = np.r_[0.0, (np.diff(np.abs(force)) < 0.0) & (force[1:] * force[:-1] > 0.0)].astype(float)
+    spins = Spins(force, np.full(force.size, part.radius_m), np.linspace(0.0, 1.0, force.size), slowing)
+    return diagnose_spins(spins, value, error, part.effects)
+
+
+def diagnosis_text(part: CentrifugePart, found: SpinDiagnosis) -> list[tuple[str, str]]:
+    """The diagnosis in sentences: subject and text."""
+    model = " + ".join(("bias", "scale", *found.fit.effects))
+    if found.adequate is None:
+        return [("diagnosis", f"{model} cannot be judged: {found.reason}")]
+    p = chi2.sf(found.fit.chi_square, found.fit.dof)
+    verdict = "adequate" if found.adequate else "not adequate"
+    text = f"{model} is {verdict} (p = {p:.2g}), rms residual {MICRO * found.error_g:.3g} µg"
+    out = [("diagnosis", text)]
+    for one in found.classes:
+        name = one.effects[0]
+        value, error = found.extended.of(name)
+        rivals = f"; the points do not tell it from {', '.join(one.effects[1:])}" if len(one.effects) > 1 else ""
+        size = f"{value:.4g} ± {2.0 * error:.2g} {EFFECTS[name].unit} (k = 2)"
+        out.append(("missing effect", f"{name}: {size}, p = {one.p_value:.2g}{rivals}"))
+    if found.classes:
+        text = (
+            f"rms residual {MICRO * found.error_g:.3g} → {MICRO * found.extended_g:.3g} µg; points left out, in standard "
+            f"uncertainties: {found.left_out[0]:.2f} → {found.left_out[1]:.2f}"
+        )
+        out.append(("with the missing effects", text))
+    if found.unexplained:
+        out.append(("unexplained", "no known effect explains the residual; look at it over the acceleration"))
+    del part
+    return [*out, *(("next measurement", step) for step in found.next_steps)]
 
 
 def _responds(rows: pd.DataFrame) -> float:

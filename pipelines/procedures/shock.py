@@ -5,13 +5,15 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 
 import numpy as np
-from pydantic import Field
+from pydantic import Field, model_validator
 from scipy.signal import butter, sosfiltfilt
 
 from inertial.dynamics.pulses import Pulse, measured_pulse, velocity_change
-from inertial.dynamics.shock_spectrum import octave_frequencies, shock_spectrum
+from inertial.dynamics.shock_diagnosis import DEFAULT
+from inertial.dynamics.shock_effects import EFFECTS
 from inertial.dynamics.stability import difference_error, white_and_flicker
 from inertial.errors import NotIdentified
+from pipelines.procedures import shock_waves
 from pipelines.procedures.base import (
     REFERENCE,
     Device,
@@ -29,6 +31,7 @@ from pipelines.procedures.base import (
 )
 from pipelines.procedures.columns import points as point_table
 from schemas.bounds import NotNegative, Positive, Wait
+from schemas.errors import did_you_mean
 from schemas.recipe import Pose
 from schemas.units import AXES, MICRO
 
@@ -42,13 +45,16 @@ if TYPE_CHECKING:
     from schemas.station import StationConfig
 
 BEFORE_S = 0.04
-DRAWN = 400  # points of a waveform that are kept for the picture
 CUT = 6.0  # corner of the equal low-pass of both channels, over 1/D
 STUCK = 1e-9
 
 
 class ShockPart(NominalScale):
-    """Shocks up and against the axis; the bias is measured on the table before and after, in one pose, over equal windows."""
+    """Shocks up and against the axis; the bias is measured on the table before and after, in one pose, over equal windows.
+
+    ``effects`` is the model by which the waveforms of unit and reference are compared; the diagnosis names what is missing.
+    ``waveform_percent`` is the standard uncertainty of a sample of that comparison, of the peak.
+    """
 
     kind: Literal["shock"]
     peak_g: Annotated[Positive, Field(le=50000.0)] = 30.0
@@ -60,6 +66,15 @@ class ShockPart(NominalScale):
     settle_s: Wait = 30.0
     temperature_C: Annotated[float, Field(ge=-100.0, le=200.0)] = 25.0
     reference_percent: NotNegative = 0.5
+    waveform_percent: Annotated[Positive, Field(le=20.0)] = 0.1
+    effects: Annotated[list[str], Field(max_length=6)] = Field(default_factory=lambda: list(DEFAULT))
+
+    @model_validator(mode="after")
+    def _known(self) -> ShockPart:
+        for name in self.effects:
+            if name not in EFFECTS:
+                raise ValueError(f"effects: no effect '{name}' of shocks; {did_you_mean(name, EFFECTS)}")
+        return self
 
 
 class ShockTest(Procedure):
@@ -74,6 +89,7 @@ class ShockTest(Procedure):
     source: ClassVar[str] = "ISO 16063-22 (comparison), IEC 60068-2-27 (pulse), ISO 18431-4 (shock response spectrum)"
     roles: ClassVar[tuple[str, ...]] = ("shock_machine",)
     part: ClassVar[type[Part]] = ShockPart
+    from_waveforms: ClassVar[bool] = True
     figures: ClassVar[tuple[FigureSpec, ...]] = (
         FigureSpec(
             "shock_sensitivity_percent",
@@ -129,9 +145,19 @@ class ShockTest(Procedure):
         one = step.setting
         return equipment.shock(one["peak_g"], one["duration_s"], int(one["axis"]), int(one["direction"]), slots)
 
+    def setting_of(self, part: ShockPart, reference: UnitRecord) -> dict[str, float]:
+        """Peak and direction of a shock, from the reference."""
+        axis = AXES.index(part.axis)
+        wave = reference.output[:, axis]
+        wave = wave - wave[: max(8, int(BEFORE_S * reference.rate_hz))].mean()
+        peak = float(wave[int(np.argmax(np.abs(wave)))])
+        duration = 1e-3 * part.duration_ms
+        return {"peak_g": abs(peak), "duration_s": duration, "direction": float(np.sign(peak)), "axis": float(axis)}
+
     def reduce(self, part: ShockPart, records: Sequence[ProcedureRecord], device: Device) -> pd.DataFrame:
         """Peaks of reference and unit, waveforms and spectra of the first shock, and the bias before and after."""
         rows: list[dict[str, Any]] = []
+        first = next((k for k, record in enumerate(records) if record.step.role), -1)
         for k, record in enumerate(records):
             for unit in record.readings["unit"]:
                 own = record.samples.get(str(unit))
@@ -143,8 +169,13 @@ class ShockTest(Procedure):
                 else:
                     found = _pulse(part, k, record, own, scale, device)
                     rows += [one | {"unit": unit, "axis": part.axis} for one in found]
-                    if k == 1:
-                        rows += [one | {"unit": unit, "axis": part.axis} for one in _curves(part, record, own, scale)]
+                    pair = _both(part, record, own, scale)
+                    noise = _noise(part, record, own, scale)
+                    found = shock_waves.waves(k, pair, record.step.setting["direction"], settings_of(part), noise)
+                    rows += [one | {"unit": unit, "axis": part.axis} for one in found]
+                    if k == first:
+                        found = shock_waves.curves(pair, 1e-3 * part.duration_ms, BEFORE_S)
+                        rows += [one | {"unit": unit, "axis": part.axis} for one in found]
         return point_table(rows)
 
     def evaluate(self, part: ShockPart, points: pd.DataFrame, device: Device) -> Outcome:
@@ -172,6 +203,11 @@ class ShockTest(Procedure):
                     f"(half sine: {ideal:.3g} m/s; IEC 60068-2-27 allows ± 15 %)"
                 )
                 findings.append(Finding(name, "pulse", text))
+            if len(good):
+                findings += [
+                    Finding(name, subject, text)
+                    for subject, text in shock_waves.diagnosis_text(rows, settings_of(part), part.effects)
+                ]
         return Outcome(figures, findings)
 
     def draw(self, drawing: Drawing, part: ShockPart, points: pd.DataFrame) -> None:
@@ -188,6 +224,18 @@ class ShockTest(Procedure):
         right.minorticks_off()
         left.legend(frameon=False)
         right.legend(frameon=False)
+
+
+def settings_of(part: ShockPart) -> shock_waves.WaveSettings:
+    """What the comparison of the waveforms needs of a part."""
+    return shock_waves.WaveSettings(1e-3 * part.duration_ms, BEFORE_S, part.waveform_percent)
+
+
+def _noise(part: ShockPart, record: ProcedureRecord, own: UnitRecord, scale: np.ndarray) -> float:
+    """Standard deviation of the difference of both channels before the pulse, behind their low-pass, g."""
+    (first, rate), (second, unit_rate) = _both(part, record, own, scale)
+    quiet = first[: int(BEFORE_S * rate)], second[: int(BEFORE_S * unit_rate)]
+    return float(np.hypot(quiet[0].std(ddof=1), quiet[1].std(ddof=1)))
 
 
 def _filtered(record: np.ndarray, rate_hz: float, duration_s: float) -> np.ndarray:
@@ -243,28 +291,6 @@ def _pulse(
         "undershoot_percent": under, "clipped": float(clipped), "noise_g": np.nan if answer is None else answer.noise,
     }  # fmt: skip
     return [*rows, row]
-
-
-def _curves(part: ShockPart, record: ProcedureRecord, own: UnitRecord, scale: np.ndarray) -> list[dict[str, Any]]:
-    """Waveforms and shock response spectra of one shock, thinned for the picture."""
-    rows: list[dict[str, Any]] = []
-    for name, (wave, rate) in zip(("reference", "unit"), _both(part, record, own, scale), strict=True):
-        y = wave - wave[: int(BEFORE_S * rate)].mean()
-        duration = 1e-3 * part.duration_ms
-        middle = int(np.argmax(np.abs(y)))
-        inside = slice(max(0, middle - int(2.0 * duration * rate)), middle + int(3.0 * duration * rate))
-        t = (np.arange(y.size) / rate)[inside]
-        step = max(1, t.size // DRAWN)
-        rows += [
-            {"series": f"wave_{name}", "point": k, "setting": float(a - t[0]), "value": float(b), "uncertainty": np.nan}
-            for k, (a, b) in enumerate(zip(t[::step], y[inside][::step], strict=True))
-        ]
-        f = octave_frequencies(0.1 / duration, min(10.0 / duration, 0.08 * rate))
-        rows += [
-            {"series": f"spectrum_{name}", "point": k, "setting": float(a), "value": float(b), "uncertainty": np.nan}
-            for k, (a, b) in enumerate(zip(f, shock_spectrum(y, rate, f), strict=True))
-        ]
-    return rows
 
 
 def _bias(unit: str, number: int, record: ProcedureRecord, own: UnitRecord, scale: np.ndarray) -> list[dict[str, Any]]:

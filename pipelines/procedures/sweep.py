@@ -124,6 +124,7 @@ class Sweep(Procedure):
     roles: ClassVar[tuple[str, ...]] = ("exciter",)
     part: ClassVar[type[Part]] = SweepPart
     rows: ClassVar[int] = 2
+    from_waveforms: ClassVar[bool] = True
     figures: ClassVar[tuple[FigureSpec, ...]] = (
         FigureSpec("sweep_bandwidth_hz", "Hz", "frequency at which the magnitude is 3 dB below that at low frequency"),
         FigureSpec("sweep_natural_hz", "Hz", "undamped natural frequency of the adequate model"),
@@ -171,6 +172,15 @@ class Sweep(Procedure):
         one = step.setting
         seconds = step.lasting_s or 0.0
         return equipment.sine(one["frequency_hz"], one["level_g"], int(one["axis"]), seconds, slots)
+
+    def setting_of(self, part: SweepPart, reference: UnitRecord) -> dict[str, float]:
+        """Frequency and level of a dwell, from the largest tone of the reference."""
+        axis = AXES.index(part.axis)
+        wave = reference.output[:, [axis]] - reference.output[:, axis].mean()
+        spectrum = np.abs(np.fft.rfft(wave[:, 0] * np.hanning(len(wave))))
+        coarse = float(np.argmax(spectrum[1:]) + 1) * reference.rate_hz / len(wave)
+        tone = fit_tone_and_frequency(wave, reference.rate_hz, coarse)
+        return {"frequency_hz": tone.frequency, "level_g": float(abs(tone.value[0])), "axis": float(axis)}
 
     def reduce(self, part: SweepPart, records: Sequence[ProcedureRecord], device: Device) -> pd.DataFrame:
         """Magnitude, phase, and their uncertainty at every point; the device's clock is estimated from all points first."""

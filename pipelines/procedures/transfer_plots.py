@@ -98,6 +98,7 @@ def _plain(value: float, _: int) -> str:
 
 def _text(found: Diagnosis, name: str, unit: str) -> str:
     value, error, low, high = found.extended.of(name)
+    unit = "" if unit == "1" else f" {unit}"
     if not found.extended.identified(name):
-        return f"not identified, {low:.3g} … {high:.3g} {unit}"
-    return f"{value:.4g} ± {2.0 * error:.2g} {unit}"
+        return f"not identified, {low:.3g} … {high:.3g}{unit}"
+    return f"{value:.4g} ± {2.0 * error:.2g}{unit}"

@@ -141,6 +141,7 @@ class TurnOn(Procedure):
             for sign in (-1.0, 1.0):
                 place.axhline(sign * spread, c=colour, lw=0.7, ls="--")
         place.set(xlabel="power cycle", ylabel="bias about its mean / µg")
+        place.margins(y=0.3)  # room for the legend above the points
         place.legend(frameon=False, loc="upper right", ncols=3, title="dashed: standard deviation")
 
 

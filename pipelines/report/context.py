@@ -70,6 +70,10 @@ class ReportContext:
         """The limit of a figure, in the figure's unit; nan where it has none."""
         return float(self.about["limits"]["figures"].get(figure, {}).get("max", np.nan))
 
+    def least(self, figure: str) -> float:
+        """The least value of a figure, in the figure's unit; nan where it has none."""
+        return float(self.about["limits"]["figures"].get(figure, {}).get("min", np.nan))
+
 
 class UnitContext:
     """A unit of a run as its panels read it."""

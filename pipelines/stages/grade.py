@@ -166,12 +166,17 @@ def _of_procedures(table: pd.DataFrame | None, unit: str, limits: Limits) -> lis
         name = str(row["figure"])
         one = Figure(name, str(row["unit_text"]), value, float(row["uncertainty"]) if not why else 0.0, why)
         before = found.get(name)
-        nearer = (
-            before is None or abs(one.value) + guard * one.uncertainty > abs(before.value) + guard * before.uncertainty
-        )
-        if nearer:
+        least = name in limits.figures and limits.figures[name].min is not None
+        if before is None or _badness(one, guard, least=least) > _badness(before, guard, least=least):
             found[name] = one
     return list(found.values())
+
+
+def _badness(figure: Figure, guard: float, *, least: bool) -> float:
+    """How far a figure lies towards its limit, with its guard band; infinite where it is not determined."""
+    if figure.why_not:
+        return float("inf")
+    return (-figure.value if least else abs(figure.value)) + guard * figure.uncertainty
 
 
 def _coefficients(evidence: Evidence, zero_g: float) -> tuple[LotCoefficients | None, dict[str, int]]:
@@ -194,7 +199,7 @@ def _decided(
     best = NO_GRADE
     reasons = [decision.sentence for decision in decisions if not decision.passed]
     reasons += [
-        f"{figure.name}: not determined ({figure.why_not}), limit {limits.figures[figure.name].max:.4g}"
+        f"{figure.name}: not determined ({figure.why_not}), limit {limits.figures[figure.name].text}"
         for figure in figures
         if figure.why_not and figure.name in limits.figures
     ]
@@ -244,11 +249,17 @@ def _figure_row(unit: str, figure: Figure, decisions: list[Decision], limits: Li
         "figure": figure.name,
         "value": figure.value,
         "uncertainty": limits.coverage_factor * figure.uncertainty,
-        "limit": decision.limit if decision else np.nan,
+        "limit": decision.limit if decision and not decision.least else np.nan,
         "unit_text": figure.unit,
         "outcome": decision.outcome if decision else "no limit",
         "rule": decision.rule if decision else "",
         "accept": decision.accept if decision else np.nan,
         "pfa": decision.pfa if decision else np.nan,
         "pfr": decision.pfr if decision else np.nan,
+        **({"least": decision.limit if decision and decision.least else np.nan} if has_least(limits) else {}),
     }
+
+
+def has_least(limits: Limits) -> bool:
+    """Whether a limit is a least value: such figures stand in a column of their own, since ``limit`` is of a magnitude."""
+    return any(one.min is not None for one in limits.figures.values())

@@ -1,4 +1,4 @@
-"""Test equipment that speaks in lines of text: exciter, shock machine, centrifuge, power supply."""
+"""Test equipment in a role of a station: exciter, shock machine, centrifuge, power supply, generator of steps."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, ClassVar
 
 if TYPE_CHECKING:
     from stations.clock import Clock
-    from stations.devices.commands import Commands
+    from stations.devices.values import Values
 
 
 class Equipment(ABC):
@@ -15,10 +15,13 @@ class Equipment(ABC):
 
     needs: ClassVar[tuple[str, ...]] = ()
 
-    def __init__(self, values: Commands, clock: Clock) -> None:
+    def __init__(self, values: Values, clock: Clock) -> None:
         self.values, self.clock = values, clock
         self.name = values.name
 
     @abstractmethod
     def make_safe(self) -> None:
         """Leaves it at rest, disarmed: an absolute state, which may be ordered twice."""
+
+    def stand_by(self) -> None:  # noqa: B027 - most equipment is at rest between its own records
+        """Brings it to the state in which records without it are taken; nothing is sent where it is there already."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -15,13 +16,14 @@ NEEDED = ("rate_hz", "reference", "reference_rate_hz", "reference_unit")
 STANDARD_GRAVITY = {"g": 1.0, "m/s^2": 9.80665}
 
 
-def read_recording(path: Path, slots: list[int], name: str) -> Recording:
+def read_recording(path: Path, slots: list[int], name: str, units: Mapping[str, float] = STANDARD_GRAVITY) -> Recording:
     """The recording in a result file; a file without rate or unit is refused.
 
     Parameters
     ----------
     slots : whose channels are wanted; one that is not there is left out
     name : of the equipment, for messages
+    units : allowed units of the reference, with their number in the one that is returned
     """
     try:
         content: dict[str, Any] = loadmat(path, simplify_cells=True)
@@ -33,14 +35,12 @@ def read_recording(path: Path, slots: list[int], name: str) -> Recording:
             f"{name}: result file {path.name} lacks {', '.join(missing)}; set up the export of the recorder"
         )
     unit = str(content["reference_unit"])
-    if unit not in STANDARD_GRAVITY:
-        raise StationRefused(
-            f"{name}: reference in '{unit}', {' or '.join(STANDARD_GRAVITY)} is needed; correct the set-up"
-        )
+    if unit not in units:
+        raise StationRefused(f"{name}: reference in '{unit}', {' or '.join(units)} is needed; correct the set-up")
     outputs = {
         slot: np.atleast_2d(np.asarray(content[f"slot_{slot}"], dtype=np.float64))
         for slot in slots
         if f"slot_{slot}" in content
     }
-    reference = np.asarray(content["reference"], dtype=np.float64) / STANDARD_GRAVITY[unit]
+    reference = np.asarray(content["reference"], dtype=np.float64) / units[unit]
     return Recording(outputs, float(content["rate_hz"]), reference, float(content["reference_rate_hz"]))

@@ -147,10 +147,10 @@ class GatedLines:
 
 def _fits(command: Command, order: str) -> bool:
     """Whether a line is this command with an allowed value."""
-    head = command.tell.split("{", 1)[0]
-    value = order.removeprefix(head)
-    if value == order:
+    head, tail = command.tell.split("{", 1)[0], command.tell.rpartition("}")[2]
+    if not (order.startswith(head) and order.endswith(tail) and len(order) > len(head) + len(tail)):
         return False
+    value = order[len(head) : len(order) - len(tail)]
     if command.type == "text":
         return value in command.values
     try:

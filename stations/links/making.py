@@ -116,6 +116,9 @@ class Links:
             if self._key(device) == key:
                 ids = range(device.device_id, device.device_id + getattr(device, "count", 1))
                 found.update(dict.fromkeys(ids, load_profile(device.profile)))
+        for equipment in self.config.fitted().values():
+            if equipment.link != "ascii" and self._key(equipment) == key:
+                found[equipment.device_id] = load_profile(equipment.profile)
         return found
 
     def _wire(self, device: Carried, key: Key) -> Wire:

@@ -21,8 +21,8 @@ if TYPE_CHECKING:
 UNITS = {"V": "volt", "LSB": "lsb"}
 
 
-def build_banks(world: World, devices: Devices) -> dict[int, Bank]:
-    """A bank for every device id of the station."""
+def build_banks(world: World, devices: Devices, equipment: Mapping[str, Device] | None = None) -> dict[int, Bank]:
+    """A bank for every device id of the station that holds registers."""
     banks = {
         devices.outer.device_id: axis_bank(world, world.outer, profile_of(devices.outer)),
         devices.inner.device_id: axis_bank(world, world.inner, profile_of(devices.inner)),
@@ -32,6 +32,9 @@ def build_banks(world: World, devices: Devices) -> dict[int, Bank]:
         banks[devices.chamber.device_id] = chamber_bank(world, chamber)
     for unit, slot in enumerate(world.slots):
         banks[devices.slots.device_id + slot] = _slot(world, unit, profile_of(devices.slots))
+    for device in (equipment or {}).values():
+        if (own := profile_of(device)).registers:
+            banks[device.device_id] = chamber_bank(world, own)
     return banks
 
 
@@ -42,7 +45,8 @@ def build_line_devices(
     profile = profile_of(devices.chamber)
     found = {devices.chamber.device_id: chamber_line_device(world, profile)} if profile.commands else {}
     for device in (equipment or {}).values():
-        found[device.device_id] = chamber_line_device(world, profile_of(device))
+        if (own := profile_of(device)).commands:
+            found[device.device_id] = chamber_line_device(world, own)
     return found
 
 

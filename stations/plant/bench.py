@@ -31,6 +31,9 @@ FINE_HZ = 102400.0
 PERIOD_POINTS = 64
 PER_CYCLE, SLOWEST_HZ = 40.0, 1600.0  # samples of a cycle, and the slowest rate, of the recorder in a sine test
 STANDARD_G = 9.80665
+STEP_FINE_HZ = 409600.0
+DRIVE_RISE_S = 2e-6  # time constant of the generator at the self-test inputs
+SELF_TEST_G_V, SELF_TEST_SPREAD = 0.5, 0.1  # force of the self-test, and its standard deviation over units and axes
 
 
 @dataclass(frozen=True)
@@ -83,6 +86,15 @@ class Waveforms:
     reference_rate_hz: float
 
 
+def _directions(axis: int, across_deg: float | None) -> tuple[Array, Array, Array]:
+    """Unit vectors (3,) of the driven direction and of the two across it, in the axes of the units."""
+    own, one, two = np.eye(3)[axis], np.eye(3)[(axis + 1) % 3], np.eye(3)[(axis + 2) % 3]
+    if across_deg is None:
+        return own, one, two
+    c, s = math.cos(math.radians(across_deg)), math.sin(math.radians(across_deg))
+    return c * one + s * two, own, c * two - s * one
+
+
 def two_pole_behind(preset: Preset) -> float:
     """Corner of the two-pole low-pass, Hz, that puts the −3 dB point of the chain at the sheet's bandwidth."""
     u = preset.bandwidth_hz / preset.natural_frequency_hz
@@ -109,6 +121,8 @@ class Bench:
     def __post_init__(self) -> None:
         """Draws what the units and the equipment are."""
         self.units = [self._unit(truth.serial) for truth in self.truths]
+        forces = [stream(self.lot_seed, truth.serial, "self-test").standard_normal(3) for truth in self.truths]
+        self.self_test_g_V = SELF_TEST_G_V * (1.0 + SELF_TEST_SPREAD * np.stack(forces))
         z = stream(self.station_seed, "bench").standard_normal(8)
         u = stream(self.station_seed, "bench", "uniform").uniform(size=8)
         self.rig = Rig(
@@ -151,8 +165,12 @@ class Bench:
         seconds: float,
         tick: int,
         troubles: frozenset[str] = frozenset(),
+        across_deg: float | None = None,
     ) -> Waveforms:
-        """Steady vibration along an axis, which points up: the record of ``seconds`` from a common trigger."""
+        """Steady vibration along an axis, which points up: the record of ``seconds`` from a common trigger.
+
+        With ``across_deg`` the axis still points up and the exciter moves across it, at this angle from the next axis.
+        """
         rng, rig = self._rng(tick, 1), self.rig
         a = level * (1.0 + 0.02 * rng.standard_normal())
         if "level_not_reached" in troubles:
@@ -168,10 +186,10 @@ class Bench:
         r = frequency / rig.fixture_hz
         fixture = abs(1.0 + r**2 / (1.0 - r**2 + 2j * rig.fixture_damping * r))
         cross = a * rig.transverse * min(fixture, 1.0 / rig.transverse) * np.cos(turn + 1.0)
-        base = np.zeros((PERIOD_POINTS, 3))
-        base[:, axis] = along
-        base[:, (axis + 1) % 3] = cross * math.cos(rig.transverse_angle)
-        base[:, (axis + 2) % 3] = cross * math.sin(rig.transverse_angle)
+        driven, beside, third = _directions(axis, across_deg)
+        base = np.outer(along, driven)
+        base += np.outer(cross * math.cos(rig.transverse_angle), beside)
+        base += np.outer(cross * math.sin(rig.transverse_angle), third)
         recorder = ANALOGUE_HZ
         while recorder / 2.0 >= max(PER_CYCLE * frequency, SLOWEST_HZ):
             recorder /= 2.0
@@ -179,8 +197,8 @@ class Bench:
         n_ref = round(seconds * recorder)
         reference = self._harmonics(np.fft.rfft(base, axis=0), frequency, np.arange(n_ref) / recorder)
         reference = self._as_reference(reference, rng, troubles)
-        felt = base.copy()
-        felt[:, axis] = along * (1.0 + share) + self.gravity
+        felt = base + np.outer(share * along, driven)
+        felt[:, axis] += self.gravity
         spectrum = np.fft.rfft(felt, axis=0)
         orders = frequency * np.arange(len(spectrum), dtype=np.float64)
         outputs = np.zeros((round(seconds * rate), len(self.units), 3))
@@ -213,31 +231,63 @@ class Bench:
         """
         rng = self._rng(tick, 2)
         n = len(force)
-        whole: int = cast("Any", next_fast_len)(n + round(0.05 * fine_hz), real=True)
-        f = np.asarray(np.fft.rfftfreq(whole, 1.0 / fine_hz), dtype=np.float64)
-        padded = np.zeros((whole, 3))
-        padded[:n, axis] = force
+        along = np.zeros((n, 3))
+        along[:, axis] = force
         rest = np.zeros(3)
         rest[axis] = self.gravity
-        seconds = n / fine_hz
         rate = min(self.rate_hz, slow_hz or self.rate_hz)
-        count = int(seconds * rate * 0.985)
-        outputs = np.zeros((count, len(self.units), 3))
-        spectrum = np.fft.rfft(padded, axis=0)
-        fine = np.arange(n) / fine_hz
-        for k, (unit, truth) in enumerate(zip(self.units, self.truths, strict=True)):
-            moved = np.fft.irfft(spectrum * unit.mass(f)[:, None], whole, axis=0) + rest
-            bent = self._bent(truth, unit, moved)
-            floor = bent[-1]
-            late = unit.behind(f) * np.exp(-2j * np.pi * f * unit.delay_s)
-            after = np.fft.irfft(np.fft.rfft(bent - floor, axis=0) * late[:, None], whole, axis=0)[:n] + floor
-            time = np.arange(count) / (rate * (1.0 + unit.clock))
-            outputs[:, k] = np.stack([np.interp(time, fine, after[:, i]) for i in range(3)], axis=1)
+        outputs = self._answers(along, np.ones((len(self.units), 3)), rest, fine_hz, rate)
         reference = np.zeros((n, 3))
         reference[:, axis] = force
         recorder = slow_hz or ANALOGUE_HZ
         reference = self._as_reference(reference[:: round(fine_hz / recorder)], rng, troubles)
         return Waveforms(self._converted(outputs, rng, rate), rate, reference, recorder)
+
+    def _answers(self, force: Array, share: Array, rest: Array, fine_hz: float, rate_hz: float) -> Array:
+        """Outputs (n, units, 3) in g of forces (m, 3) in g at a fine rate, times ``share`` (units, 3), beside ``rest``."""
+        n = len(force)
+        whole: int = cast("Any", next_fast_len)(n + round(0.05 * fine_hz), real=True)
+        f = np.asarray(np.fft.rfftfreq(whole, 1.0 / fine_hz), dtype=np.float64)
+        padded = np.zeros((whole, 3))
+        padded[:n] = force
+        count = int(n / fine_hz * rate_hz * 0.985)
+        outputs = np.zeros((count, len(self.units), 3))
+        spectrum = np.fft.rfft(padded, axis=0)
+        fine = np.arange(n) / fine_hz
+        for k, (unit, truth) in enumerate(zip(self.units, self.truths, strict=True)):
+            moved = np.fft.irfft(spectrum * unit.mass(f)[:, None] * share[k], whole, axis=0) + rest
+            bent = self._bent(truth, unit, moved)
+            floor = bent[-1]
+            late = unit.behind(f) * np.exp(-2j * np.pi * f * unit.delay_s)
+            after = np.fft.irfft(np.fft.rfft(bent - floor, axis=0) * late[:, None], whole, axis=0)[:n] + floor
+            time = np.arange(count) / (rate_hz * (1.0 + unit.clock))
+            outputs[:, k] = np.stack([np.interp(time, fine, after[:, i]) for i in range(3)], axis=1)
+        return outputs
+
+    def self_test(
+        self,
+        volts: float,
+        hold_s: float,
+        before_s: float,
+        seconds: float,
+        tick: int,
+        troubles: frozenset[str] = frozenset(),
+    ) -> Waveforms:
+        """Response to a step of voltage at the self-test inputs, which push all masses; the reference is the drive in V."""
+        rng, fine_hz = self._rng(tick, 4), STEP_FINE_HZ
+        volts *= 0.3 if "level_not_reached" in troubles else 1.0
+        n = round(seconds * fine_hz)
+        time = np.arange(n) / fine_hz - before_s - rng.uniform(0.0, 1.0) / ANALOGUE_HZ
+        drive = np.where(time >= 0.0, -np.expm1(-np.maximum(time, 0.0) / DRIVE_RISE_S), 0.0)
+        drive = volts * np.where(time >= hold_s, np.exp(-np.maximum(time - hold_s, 0.0) / DRIVE_RISE_S), drive)
+        rest = np.zeros(3)
+        rest[2] = self.gravity
+        force = drive[:, None] * np.ones(3)
+        rate = self.rate_hz
+        outputs = self._answers(force, self.self_test_g_V, rest, fine_hz, rate)
+        recorded = drive[:: round(fine_hz / ANALOGUE_HZ), None] * np.array([1.0, 0.0, 0.0])
+        recorded = recorded + 2e-4 * rng.standard_normal(recorded.shape)
+        return Waveforms(self._converted(outputs, rng, rate), rate, recorded, ANALOGUE_HZ)
 
     def steady(self, force: Array, axis: int, seconds: float, rate_hz: float, tick: int) -> Array:
         """Outputs (n, units, 3) under steady forces (units,) in g along an axis."""

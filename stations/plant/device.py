@@ -19,6 +19,8 @@ Counts = NDArray[np.int64]
 
 REFERENCE_C = 25.0
 SUPPLY_SHIFT_G = 0.05  # bias of a device that is not ratiometric, for a supply that is gone
+RATIOMETRIC_ERROR = 3e-3  # one sigma: departure of a ratiometric gain, per relative change of the supply
+REJECTION = 1e-3  # one sigma: relative change of the gain of other outputs, per relative change of the supply
 QUADRATIC_PER_K = 0.003  # quadratic over linear temperature coefficient, one sigma
 
 
@@ -43,6 +45,7 @@ class Truth:
     output_scale: float  # output units per g
     zero_level: float  # output units
     supply_ratio: float  # true supply over nominal where the output follows it, else 1
+    supply_gain: float = 0.0  # relative change of the gain besides, per relative change of the supply
 
     @property
     def matrix(self) -> Array:
@@ -80,6 +83,8 @@ def draw_truth(
         output_scale=output_scale,
         zero_level=preset.zero_level,
         supply_ratio=supply_ratio if preset.ratiometric else 1.0,
+        supply_gain=(RATIOMETRIC_ERROR if preset.ratiometric else REJECTION)
+        * float(stream(seed, serial, "supply").standard_normal()),
     )
 
 
@@ -100,6 +105,7 @@ class Devices:
         self._cubic = np.stack([t.cubic for t in truths])
         self._ratio = np.array([t.supply_ratio for t in truths])[:, None]
         self._gain = self._ratio
+        self._supply_gain = np.array([t.supply_gain for t in truths])[:, None]
         self._shift = np.zeros((len(truths), 1))
         self._offset_counts = np.zeros((len(truths), 3))
 
@@ -135,10 +141,13 @@ class Devices:
 
     def supply(self, part: Array) -> None:
         """Supplies at ``part`` (s,) of what they were: ratiometric outputs follow, the bias of others moves."""
+        change = part[:, None] - 1.0
+        besides = 1.0 + self._supply_gain * change
         if self._preset.ratiometric:
-            self._gain = self._ratio * part[:, None]
+            self._gain = self._ratio * part[:, None] * besides
         else:
-            self._shift = SUPPLY_SHIFT_G * (part[:, None] - 1.0)
+            self._gain = self._ratio * besides
+            self._shift = SUPPLY_SHIFT_G * change
 
     def counts(self, output: Array) -> Counts:
         """What the converter says of outputs (n, s, 3) in g: supply, clipping at range and codes, rounding."""

@@ -32,7 +32,7 @@ class Plant(World):
         self._devices = config.devices
         self.requested: set[int] = set()  # ids of devices that had a request since IdleStop last cleared this
         self.faults: list[Fault] = []
-        self.banks = build_banks(self, config.devices)
+        self.banks = build_banks(self, config.devices, config.fitted())
         self.line_devices = build_line_devices(self, config.devices, config.fitted())
         self.journal = Journal(fingerprint(config, lot))
         for order in (config.simulation or Simulation()).faults:

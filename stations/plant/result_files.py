@@ -23,7 +23,9 @@ class ResultFiles:
         self._folder: Path | None = None
         self._last: Path | None = None
 
-    def write(self, number: int, recorded: Callable[[], Waveforms], slots: Sequence[int]) -> str:
+    def write(
+        self, number: int, recorded: Callable[[], Waveforms], slots: Sequence[int], reference_unit: str = "g"
+    ) -> str:
         """The path of the file of a recording, which is computed once."""
         if self._folder is None:
             self._folder = Path(tempfile.mkdtemp(prefix="tumbleline-results-"))
@@ -36,7 +38,7 @@ class ResultFiles:
             "rate_hz": made.rate_hz,
             "reference": made.reference,
             "reference_rate_hz": made.reference_rate_hz,
-            "reference_unit": "g",
+            "reference_unit": reference_unit,
             **{f"slot_{slot}": made.outputs[:, k] for k, slot in enumerate(slots)},
         }
         savemat(path, content)

@@ -35,8 +35,10 @@ if TYPE_CHECKING:
 
 __all__ = ["PARTS", "Holder", "Leases", "Part", "addresses", "holders", "new_holder"]
 
-Part = Literal["outer", "inner", "chamber", "reader", "exciter", "shock_machine", "centrifuge", "power_supply"]
-ROLES: tuple[Part, ...] = ("exciter", "shock_machine", "centrifuge", "power_supply")
+Part = Literal[
+    "outer", "inner", "chamber", "reader", "exciter", "shock_machine", "centrifuge", "power_supply", "step_generator"
+]
+ROLES: tuple[Part, ...] = ("exciter", "shock_machine", "centrifuge", "power_supply", "step_generator")
 PARTS: tuple[Part, ...] = ("outer", "inner", "chamber", "reader")
 POLL_S = 0.2
 PASSING_S = 5.0  # a lock whose note names no live holder is being taken, released or tested

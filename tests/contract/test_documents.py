@@ -12,6 +12,7 @@ from typer.testing import CliRunner
 
 from docs.documents_page import PAGE, documents, head_of, page
 from inertial.dynamics.second_order import transfer
+from inertial.dynamics.settling import step_response
 from pipelines.chain import certify as certifying
 from pipelines.cli import COMMANDS, app
 
@@ -42,6 +43,10 @@ CASES = {
     "station check --json": ["station", "check", "--registers"],
     "station log --json": ["station", "log"],
     "import FILE --procedure sweep": ["import", "{folder}/sweep.csv", "--procedure", "sweep", "--unit", "S1"],
+    "import FILE… --procedure NAME --map reference=…": [
+        *("import", "{folder}/step.csv", "{folder}/step.csv", "{folder}/step.csv", "{folder}/step.csv", "--unit", "S1"),
+        *("--procedure", "step_response", "--map", "z=out [V],reference=drive [V]", "--rate", "50000"),
+    ],
     "run --json": ["fit", "latest", "--limits", "consumer"],
     "allan --json": ["allan", "{folder}/rest.csv", "--rate", "100"],
     "psd --json": ["psd", "{folder}/rest.csv", "--rate", "100"],
@@ -67,6 +72,9 @@ def kept(tmp_path_factory: pytest.TempPathFactory) -> Path:
     (folder / "record.csv").write_text("\n".join(["t,ax,ay,az", *rows, ""]), encoding="utf-8")
     rng = np.random.default_rng(1)
     np.savetxt(folder / "rest.csv", rng.normal(size=(2000, 3)), delimiter=",", header="x,y,z", comments="")
+    time = np.arange(1000) / 50e3 - 0.003
+    step = np.column_stack([0.3 * step_response(time, 900.0, 0.6) + 1e-4 * rng.normal(size=1000), 2.0 * (time > 0.0)])
+    np.savetxt(folder / "step.csv", step, delimiter=",", header="out [V],drive [V]", comments="")
     f = np.geomspace(5.0, 4000.0, 30)
     h = -transfer(f, 2500.0, 0.7)
     rows = [f"{a:.6g},{abs(b):.6g},{np.degrees(np.angle(b)):.6g},0.2,0.2" for a, b in zip(f, h, strict=True)]

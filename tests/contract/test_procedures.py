@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy import signal
 
 from docs.procedures_page import PAGE, page
 from inertial.dynamics import second_order
@@ -24,7 +25,7 @@ from schemas.progress import silent
 from schemas.recipe import Lot, Unit
 from schemas.station import Equipment, load_station
 from stations import open_station
-from stations.plant.bench import Bench
+from stations.plant.bench import Bench, DynamicTruth
 from stations.plant.plant import Plant
 
 HOW_TO = Path(__file__).resolve().parents[2] / "docs" / "how-to" / "list-procedures.md"
@@ -35,6 +36,9 @@ PARTS = {
     "warm_up": f"band_ug = 3000.0\noff_s = 60.0\nlasting_s = 120.0\nscale = {SF1500}",
     "turn_on": f"cycles = 3\noff_s = 10.0\nwarm_up_s = 1.0\nwindow_s = 5.0\nscale = {SF1500}",
     "sweep": f"low_hz = 20.0\nhigh_hz = 6000.0\nper_octave = 2\nnominal_scale = {SF1500}\nlevel_g = 2.0\nrecord_s = 0.1",
+    "transverse": f"step_deg = 45.0\nrecord_s = 0.1\nscale = {SF1500}",
+    "ratiometry": "supplies_V = [12.0, 11.0, 13.0]\ndwell_s = 5.0\nsettle_s = 1.0",
+    "step_response": "steps = 8",
     "shock": f"shocks = 1\nwindow_s = 10.0\nsettle_s = 1.0\nscale = {SF1500}",
     "centrifuge": f"record_s = 1.0\nscale = {SF1500}\ndown_again = false",
     "random_vibration": f"seconds = 4.0\nlevels_g = [1.0, 2.0, 3.0]\nwindow_s = 10.0\nscale = {SF1500}",
@@ -169,7 +173,12 @@ def truth_of(plant: Plant, k: int) -> dict[str, float]:
     g = plant.bench.gravity
     bend = 2.0 * dynamic.quadratic[2] * g + 3.0 * static.cubic[2] * g**2
     gain_all = 1.0 + 1e-6 * static.scale_ppm[2]
+    shifts = [(volt / 12.0 - 1.0) for volt in (11.0, 13.0)]
     return {
+        "transverse_sensitivity_percent": 100.0 * float(np.hypot(*static.misalignment[2, :2])),
+        "supply_sensitivity_percent": 100.0 * max((static.supply_gain * one for one in shifts), key=abs),
+        "supply_zero_ug_V": 1e6 * 0.05 / 12.0,
+        **step_truth(dynamic),
         "sweep_bandwidth_hz": float(grid[np.flatnonzero(gain < np.sqrt(0.5))[0]]),
         "sweep_natural_hz": dynamic.natural_hz,
         "sweep_damping": dynamic.damping,
@@ -177,6 +186,21 @@ def truth_of(plant: Plant, k: int) -> dict[str, float]:
         "shock_sensitivity_percent": scale,
         "centrifuge_second_order_ug_g2": 1e6 * dynamic.quadratic[2] * gain_all,
         "centrifuge_third_order_ug_g3": 1e6 * static.cubic[2] * gain_all,
+    }
+
+
+def step_truth(unit: DynamicTruth) -> dict[str, float]:
+    """Settling to ± 2 % and rise of the chain by scipy: sprung mass, two-pole low-pass, delay, drive of 2 µs."""
+    mass, pole = 2.0 * np.pi * unit.natural_hz, 2.0 * np.pi * unit.low_pass_hz
+    chain = np.polymul([1.0 / mass**2, 2.0 * unit.damping / mass, 1.0], [1.0 / pole**2, np.sqrt(2.0) / pole, 1.0])
+    time = np.linspace(0.0, 0.01, 100_001)
+    out = signal.step(([1.0], np.polymul(chain, [2e-6, 1.0])), T=time)[1]
+    outside = np.flatnonzero(np.abs(out - 1.0) > 0.02)[-1]
+    ten, ninety = (time[np.flatnonzero(out > level)[0]] for level in (0.1, 0.9))
+    return {
+        "step_settling_ms": 1e3 * float(time[outside] + unit.delay_s - 2e-6 * np.log(2.0)),
+        "step_overshoot_percent": 100.0 * float(out.max() - 1.0),
+        "step_rise_ms": 1e3 * float(ninety - ten),
     }
 
 
@@ -222,6 +246,17 @@ def test_the_parts_are_checked_with_the_key_that_is_wrong(tmp_path: Path) -> Non
         path.write_text(HEAD + f"\n[[procedures]]\n{text}\n")
         with pytest.raises(RecipeInvalid, match=found):
             parts_of(load_recipe(str(path)))
+
+
+def test_a_list_without_the_multi_position_test_becomes_a_job_with_a_least_value(tmp_path: Path) -> None:
+    from pipelines.jobs.job import Request
+
+    recipe_of(tmp_path, ["sweep"])
+    (tmp_path / "limits.toml").write_text('name = "l"\n[figures]\nsweep_bandwidth_hz = { min = 800.0, unit = "Hz" }\n')
+    path = tmp_path / "recipe.toml"
+    path.write_text('limits = "limits.toml"\nunits = ["A1"]\n' + path.read_text())
+    job = Request(str(path)).job(Archive(tmp_path / "archive"))
+    assert job.limits.figures["sweep_bandwidth_hz"].min == 800.0
 
 
 def test_the_band_edge_of_a_plain_second_order_model_is_the_closed_form() -> None:

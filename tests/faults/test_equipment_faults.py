@@ -25,6 +25,9 @@ PARTS = {
     "1300.0]\nnominal_scale = 0.007\nlevel_g = 2.0\nrecord_s = 0.05\ncycles = 4",
     "shock": "shocks = 1\nboth_directions = false\nwindow_s = 10.0\nsettle_s = 0.0\nscale = 0.007",
     "centrifuge": "forces_g = [1.0, 5.0, 10.0, 20.0]\nrecord_s = 0.5\nreversed = false\ndown_again = false\nscale = 0.007",
+    "step_response": "steps = 4",
+    "ratiometry": 'supplies_V = [12.0, 11.0, 13.0]\naxes = ["z"]\ndwell_s = 2.0\nsettle_s = 0.0',
+    "transverse": "step_deg = 45.0\nrecord_s = 0.05\nscale = 0.007",
 }  # fmt: skip
 
 
@@ -58,6 +61,7 @@ def take(folder: Path, name: str, faults: list[FaultOrder], archive: str):
         ("sweep", "clipped_reference"),
         ("sweep", "level_not_reached"),
         ("shock", "missed_trigger"),
+        ("step_response", "missed_trigger"),
     ],
 )
 def test_a_spoilt_recording_is_discarded_and_repeated(name: str, kind: str, tmp_path: Path) -> None:
@@ -69,7 +73,7 @@ def test_a_spoilt_recording_is_discarded_and_repeated(name: str, kind: str, tmp_
     events = [event for event in again.events.recorded() if event.kind == "spoilt"]
     assert events
     assert again.finished() == good.finished()
-    assert ("exciter" if name == "sweep" else "shock") in events[0].reason
+    assert {"sweep": "exciter", "shock": "shock", "step_response": "step generator"}[name] in events[0].reason
 
 
 @pytest.mark.parametrize(
@@ -82,6 +86,11 @@ def test_a_spoilt_recording_is_discarded_and_repeated(name: str, kind: str, tmp_
         ("centrifuge", "guard_door", "guard door"),
         ("centrifuge", "overspeed", "overspeed"),
         ("centrifuge", "missed_trigger", "trigger was missed"),
+        ("step_response", "missed_trigger", "trigger was missed"),
+        ("step_response", "level_not_reached", "was ordered"),
+        ("step_response", "controller_abort", "amplifier reports a fault"),
+        ("ratiometry", "current_limit", "V measured, 13 V was set"),
+        ("transverse", "controller_abort", "interlock open"),
     ],
 )
 def test_trouble_that_stays_ends_the_run_for_a_person(name: str, kind: str, text: str, tmp_path: Path) -> None:
@@ -89,13 +98,15 @@ def test_trouble_that_stays_ends_the_run_for_a_person(name: str, kind: str, text
         take(tmp_path, name, [FaultOrder(kind=kind)], "bad")
 
 
-@pytest.mark.parametrize("name", ["sweep", "shock", "centrifuge"])
+@pytest.mark.parametrize("name", ["sweep", "shock", "centrifuge", "step_response", "transverse"])
 def test_a_unit_whose_cable_is_off_has_no_figure(name: str, tmp_path: Path) -> None:
     recipe = recipe_of(tmp_path, name)
     figure = {
         "sweep": "sweep_bandwidth_hz",
         "shock": "shock_sensitivity_percent",
         "centrifuge": "centrifuge_linearity_percent",
+        "step_response": "step_settling_ms",
+        "transverse": "transverse_sensitivity_percent",
     }
     limits = limits_of({"name": "one", "figures": {figure[name]: {"max": 1e9, "unit": UNITS[figure[name]]}}}, UNITS)
     station = with_faults(load_station(), [FaultOrder(kind="cable_off", serial="F2")])

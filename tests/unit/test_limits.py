@@ -80,3 +80,64 @@ def test_uncertainty_never_raises_a_grade(value: float, expanded: float) -> None
 
 def test_there_are_limits_for_every_grade() -> None:
     assert set(sample_names("limits-")) == set(GRADES)
+
+
+LEAST = """
+name = "bandwidth"
+rule = "{rule}"
+[figures]
+sweep_bandwidth_hz = {{ min = 800.0, unit = "Hz" }}
+"""
+
+
+@pytest.mark.parametrize(
+    ("value", "guarded", "simple"),
+    [
+        (820.0, "pass", "pass"),
+        (805.0, "conditional pass", "pass"),
+        (795.0, "conditional fail", "fail"),
+        (700.0, "fail", "fail"),
+        (-900.0, "fail", "fail"),
+        (float("nan"), "conditional fail", "conditional fail"),  # passes nothing
+    ],
+)
+def test_a_least_value_is_decided_by_the_same_rules(value: float, guarded: str, simple: str) -> None:
+    decision = decide(
+        parse_limits(LEAST.format(rule="guarded_acceptance"), "test", UNITS), "sweep_bandwidth_hz", value, 5.0
+    )
+    assert decision.outcome == guarded
+    assert decision.accept == 810.0
+    other = decide(
+        parse_limits(LEAST.format(rule="simple_acceptance"), "test", UNITS), "sweep_bandwidth_hz", value, 5.0
+    )
+    assert other.outcome == simple
+
+
+def test_a_least_value_says_its_side_its_margin_and_its_risk() -> None:
+    own = parse_limits(LEAST.format(rule="guarded_acceptance"), "test", UNITS)
+    decision = decide(own, "sweep_bandwidth_hz", 780.0, 5.0)
+    assert "limit at least 800 Hz, margin -20 Hz" in decision.sentence
+    near = decide(own, "sweep_bandwidth_hz", 800.0, 5.0)
+    assert near.risk == pytest.approx(0.5)
+    assert own.model_dump()["figures"] == {"sweep_bandwidth_hz": {"min": 800.0, "unit": "Hz"}}
+    assert limits().model_dump()["figures"] == {"bias_error_ug": {"max": 100.0, "unit": "µg"}}
+
+
+def test_a_limit_has_one_side() -> None:
+    for text, found in (("max = 1.0, min = 2.0, ", "both given"), ("", "neither given")):
+        with pytest.raises(RecipeInvalid, match=found):
+            parse_limits(f'name = "x"\n[figures]\nsweep_bandwidth_hz = {{ {text}unit = "Hz" }}\n', "test", UNITS)
+
+
+def test_of_several_axes_the_smallest_is_decided_for_a_least_value() -> None:
+    import pandas as pd
+
+    from pipelines.stages.grade import _of_procedures
+
+    own = parse_limits(LEAST.format(rule="guarded_acceptance"), "test", UNITS)
+    rows = [
+        {"unit": "A", "figure": "sweep_bandwidth_hz", "axis": axis, "value": value, "uncertainty": 5.0, "identified": True,
+         "unit_text": "Hz", "note": ""}
+        for axis, value in (("x", 950.0), ("y", 805.0), ("z", 990.0))
+    ]  # fmt: skip
+    assert [one.value for one in _of_procedures(pd.DataFrame(rows), "A", own)] == [805.0]

@@ -37,6 +37,9 @@ def render(unit: UnitContext) -> str:
 def _line(row: dict[str, Any]) -> dict[str, Any]:
     value, expanded = with_uncertainty(row["value"], row["uncertainty"])
     limited = bool(np.isfinite(row["limit"]))
+    least = float(row.get("least", np.nan))
+    if np.isfinite(least):
+        return _at_least(row, value, expanded, least)
     return {
         "title": FIGURES[row["figure"]].label if row["figure"] in FIGURES else row["figure"],
         "value": value,
@@ -46,6 +49,20 @@ def _line(row: dict[str, Any]) -> dict[str, Any]:
         "unit": "" if row["unit_text"] == "1" else row["unit_text"],
         "outcome": row["outcome"] if limited else "",
         "risk": _risk(row) if limited else "",
+    }
+
+
+def _at_least(row: dict[str, Any], value: str, expanded: str, least: float) -> dict[str, Any]:
+    """The line of a figure with a least value."""
+    return {
+        "title": FIGURES[row["figure"]].label if row["figure"] in FIGURES else row["figure"],
+        "value": value,
+        "uncertainty": expanded,
+        "limit": f"≥ {plain(least)}",
+        "margin": plain(row["value"] - least),
+        "unit": "" if row["unit_text"] == "1" else row["unit_text"],
+        "outcome": row["outcome"],
+        "risk": _risk(row),
     }
 
 

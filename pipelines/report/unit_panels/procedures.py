@@ -76,7 +76,8 @@ def picture(name: str, content: dict[str, Any], points: pd.DataFrame) -> str:
 
 def _line(unit: UnitContext, row: dict[str, Any], meanings: dict[str, str]) -> dict[str, Any]:
     known = bool(row["identified"])
-    limit = unit.report.limit(row["figure"])
+    limit, least = unit.report.limit(row["figure"]), unit.report.least(row["figure"])
+    limited = bool(np.isfinite(limit) or np.isfinite(least))
     decided = unit.tables["figures"]
     outcome = decided.loc[decided["figure"] == row["figure"], "outcome"].tolist()
     interval = f"{row['low']:.5g} … {row['high']:.5g}" if np.isfinite([row["low"], row["high"]]).all() else ""
@@ -87,7 +88,7 @@ def _line(unit: UnitContext, row: dict[str, Any], meanings: dict[str, str]) -> d
         "spread": plain(unit.report.coverage * row["uncertainty"]) if known else "",
         "interval": interval,
         "unit": row["unit_text"],
-        "limit": plain(limit) if np.isfinite(limit) else "",
-        "outcome": "" if not np.isfinite(limit) else (outcome[0] if outcome else "fail"),
+        "limit": plain(limit) if np.isfinite(limit) else f"≥ {plain(least)}" if limited else "",
+        "outcome": (outcome[0] if outcome else "fail") if limited else "",
         "note": row["note"],
     }

@@ -33,6 +33,10 @@ class ShockMachine(Equipment):
         "file",
     )
 
+    on: ClassVar[str | int] = "ON"  # what is written, in the form of the controller
+    off: ClassVar[str | int] = "OFF"
+    now: ClassVar[str | int] = "NOW"
+
     def shock(self, peak: float, seconds: float, axis: int, direction: int, slots: Sequence[int]) -> Recording:
         """A half sine with a peak in g along an axis (0 to 2), up or against it (direction 1 or −1).
 
@@ -55,8 +59,8 @@ class ShockMachine(Equipment):
         ):
             self.values.write(name, value)
         before = self.values.text("file")
-        self.values.write("arm", "ON")
-        self.values.write("release", "NOW")
+        self.values.write("arm", self.on)
+        self.values.write("release", self.now)
         end = self.clock.now() + PATIENCE_S
         while (state := self.values.text("state")) == "RUN":
             if self.clock.now() > end:
@@ -76,7 +80,7 @@ class ShockMachine(Equipment):
 
     def make_safe(self) -> None:
         """Disarms the machine."""
-        self.values.write("arm", "OFF")
+        self.values.write("arm", self.off)
 
 
 def _refuse_wrong_pulse(driven: np.ndarray, peak: float, name: str) -> None:

@@ -29,6 +29,7 @@ class VibrationController(Equipment):
         "level",
         "duration",
         "axis",
+        "turn",
         "start",
         "stop",
         "state",
@@ -49,13 +50,30 @@ class VibrationController(Equipment):
         for name, value in (("frequency", frequency), ("level", level), ("duration", seconds), ("axis", float(axis))):
             self.values.write(name, value)
         recording = self._run("SINE", seconds, slots)
-        driven = recording.reference[:, axis] - recording.reference[:, axis].mean()
-        _refuse_clipped(driven, self.name)
-        reached = float(np.sqrt(2.0 * np.mean(driven**2)))
-        if not abs(reached / level - 1.0) <= LEVEL_SHARE:
-            raise RecordingSpoilt(
-                f"{self.name}: {reached:.4g} g at {frequency:g} Hz, {level:g} g was ordered; check amplifier and fixture"
-            )
+        refuse_wrong_sine(recording.reference[:, axis], frequency, level, self.name)
+        return recording
+
+    def sine_across(
+        self, frequency: float, level: float, axis: int, angle_deg: float, seconds: float, slots: Sequence[int]
+    ) -> Recording:
+        """A dwell with the motion across an axis (0 to 2), about which the fixture has turned the units by an angle in degrees.
+
+        At 0° the motion is along the next axis (x after z), at 90° along the one after it.
+
+        Raises
+        ------
+        RecordingSpoilt, OperatorNeeded
+            As for :meth:`sine`.
+        """
+        for name, value in (("frequency", frequency), ("level", level), ("duration", seconds), ("axis", float(axis))):
+            self.values.write(name, value)
+        self.values.write("turn", angle_deg)
+        recording = self._run("ACROSS", seconds, slots)
+        turn = np.radians(angle_deg)
+        moved = recording.reference[:, (axis + 1) % 3] * np.cos(turn) + recording.reference[:, (axis + 2) % 3] * np.sin(
+            turn
+        )
+        refuse_wrong_sine(moved, frequency, level, self.name)
         return recording
 
     def random(self, profile: str, level: float, axis: int, seconds: float, slots: Sequence[int]) -> Recording:
@@ -99,11 +117,17 @@ class VibrationController(Equipment):
         return read_recording(Path(path), list(slots), self.name)
 
 
-def _refuse_clipped(driven: np.ndarray, name: str) -> None:
-    """Refuse a reference whose extremes are flat."""
+def refuse_wrong_sine(reference: np.ndarray, frequency: float, level: float, name: str) -> None:
+    """Refuse a reference (n,) in g whose extremes are flat, or whose level is not the one that was ordered."""
+    driven = reference - reference.mean()
     top = float(np.max(np.abs(driven)))
     share = float(np.mean(np.abs(driven) > 0.999 * top))
     if share > 0.1:
         raise RecordingSpoilt(
             f"{name}: the reference is clipped at {top:.4g} g; choose a larger range of its conditioner"
+        )
+    reached = float(np.sqrt(2.0 * np.mean(driven**2)))
+    if not abs(reached / level - 1.0) <= LEVEL_SHARE:
+        raise RecordingSpoilt(
+            f"{name}: {reached:.4g} g at {frequency:g} Hz, {level:g} g was ordered; check amplifier and fixture"
         )

@@ -30,7 +30,7 @@ class Controller:
 
     def __init__(self, world: World, profile: Profile) -> None:
         self._world, self._profile = world, profile
-        self._set = {"FREQ": 160.0, "LEVEL": 1.0, "DUR": 1.0, "AXIS": 2.0}
+        self._set = {"FREQ": 160.0, "LEVEL": 1.0, "DUR": 1.0, "AXIS": 2.0, "TURN": 0.0}
         self._density = "flat_20_2000"
         self._kind, self._start_us, self._until_us, self._number = "", 0, 0, 0
         self._aborted, self._troubles = "", frozenset[str]()
@@ -76,7 +76,7 @@ class Controller:
         self._aborted = ""
         if "controller_abort" in troubles:
             self._aborted = "interlock open"
-        elif "amplifier_overload" in troubles or (kind == "SINE" and self._set["LEVEL"] > 1.001 * reach):
+        elif "amplifier_overload" in troubles or (kind in {"SINE", "ACROSS"} and self._set["LEVEL"] > 1.001 * reach):
             self._aborted = "limit of stroke velocity or acceleration"
         if self._aborted:
             return "OK", True
@@ -101,8 +101,9 @@ class Controller:
     def _recorded(self) -> Waveforms:
         bench, axis, seconds = self._world.bench, int(self._set["AXIS"]), self._set["DUR"]
         tick = self._start_us
-        if self._kind == "SINE":
-            return bench.sine(self._set["FREQ"], self._set["LEVEL"], axis, seconds, tick, self._troubles)
+        if self._kind in {"SINE", "ACROSS"}:
+            angle = self._set["TURN"] if self._kind == "ACROSS" else None
+            return bench.sine(self._set["FREQ"], self._set["LEVEL"], axis, seconds, tick, self._troubles, angle)
         return bench.transient(self._random(seconds, tick), axis, tick, RANDOM_FINE_HZ, RANDOM_HZ, self._troubles)
 
     def _random(self, seconds: float, tick: int) -> np.ndarray:

@@ -80,3 +80,10 @@ class CableOff(Fault):
     def ends(self, world: World) -> None:
         """Puts the cable back."""
         world.bench.cable_off.discard(self.unit)
+
+
+@dataclass
+class CurrentLimit(_Trouble):
+    """The current limit of the power supply holds a raised voltage a tenth too low."""
+
+    kind: ClassVar[str] = "current_limit"

@@ -1,0 +1,15 @@
+"""Effects on the output over the acceleration of a centrifuge: each module of this package is one and is found here."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from inertial.dynamics.centrifuge_effects.base import CentrifugeEffect, Spins
+from inertial.dynamics.missing_effects import effects_of
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+__all__ = ["EFFECTS", "CentrifugeEffect", "Spins"]
+
+EFFECTS: Mapping[str, CentrifugeEffect] = effects_of(__name__, __path__, CentrifugeEffect)

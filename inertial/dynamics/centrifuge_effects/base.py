@@ -1,0 +1,58 @@
+"""What an effect on a centrifuge test is, and the conditions of its points."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Spins:
+    """The points of a test in the order of time, all (n,).
+
+    acceleration : rω²/g of the nominal radius, g; negative where the unit is mounted the other way round
+    radius_m : nominal radius, m
+    order : time from the first to the last point, 0 to 1
+    slowing : 1 where the point follows a faster one, else 0
+    """
+
+    acceleration: Array
+    radius_m: Array
+    order: Array
+    slowing: Array
+
+    def picked(self, rows: NDArray[np.bool_]) -> Spins:
+        """Some of the points."""
+        return Spins(self.acceleration[rows], self.radius_m[rows], self.order[rows], self.slowing[rows])
+
+
+class CentrifugeEffect(ABC):
+    """A term of the output. Every module of this package defines one class.
+
+    id : of the module · equation, source : for people · unit : of the coefficient
+    breaker : measurement that tells it from others
+    """
+
+    id: ClassVar[str]
+    equation: ClassVar[str]
+    source: ClassVar[str]
+    unit: ClassVar[str]
+    breaker: ClassVar[str]
+
+    @abstractmethod
+    def column(self, points: Spins) -> Array:
+        """The term (n,) in g for a coefficient of 1."""
+
+    def seen(self, points: Spins) -> bool:
+        """Whether the points can show the effect besides bias and scale."""
+        own = self.column(points)
+        rest = np.column_stack([np.ones_like(own), points.acceleration])
+        size = float(np.linalg.norm(own))
+        left = own - rest @ np.linalg.lstsq(rest, own, rcond=None)[0]
+        return size > 0.0 and float(np.linalg.norm(left)) > 1e-6 * size

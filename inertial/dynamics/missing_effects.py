@@ -1,0 +1,115 @@
+"""Which effects a model lacks: forward selection in classes of effects that the data do not tell apart."""
+
+from __future__ import annotations
+
+from importlib import import_module
+from inspect import isabstract
+from pkgutil import iter_modules
+from typing import TYPE_CHECKING, Any, Protocol, TypeVar
+
+import numpy as np
+from scipy.stats import chi2
+
+from inertial.dynamics.transfer_diagnosis import ADDED_P, ADEQUATE_P, CLASS_WIDTH, MOST_ADDED, EffectClass
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterable, Sequence
+
+Found = TypeVar("Found")
+
+
+class Fitted(Protocol):
+    """A fit of a model with some effects."""
+
+    @property
+    def chi_square(self) -> float:
+        """Sum of the squared weighted residuals."""
+        ...
+
+    @property
+    def dof(self) -> int:
+        """Degrees of freedom."""
+        ...
+
+
+AnyFit = TypeVar("AnyFit", bound=Fitted)
+
+
+class IncompleteEffect(Exception):
+    """A module without exactly one effect of its own name: its author repairs the module."""
+
+
+def effects_of(package: str, path: Iterable[str], base: type[Found]) -> dict[str, Found]:
+    """One effect of each module of a package, by name.
+
+    Raises
+    ------
+    IncompleteEffect
+        A module does not define exactly one effect with its own name.
+    """
+    found: dict[str, Found] = {}
+    for info in iter_modules(list(path)):
+        if info.name == "base":
+            continue
+        content = vars(import_module(f"{package}.{info.name}")).values()
+        own: list[Any] = [
+            one for one in content if isinstance(one, type) and issubclass(one, base) and not isabstract(one)
+        ]
+        if len(own) != 1 or own[0].id != info.name:
+            raise IncompleteEffect(f"{package}.{info.name}: one effect with id '{info.name}' is needed; define it")
+        found[info.name] = own[0]()
+    return found
+
+
+def p_value(fit: Fitted) -> float:
+    """Probability of a larger χ² where the model is right; nan without degrees of freedom."""
+    return float(chi2.sf(fit.chi_square, fit.dof)) if fit.dof > 0 else float("nan")
+
+
+def missing_classes(
+    base: AnyFit, effects: Sequence[str], candidates: Sequence[str], fit_of: Callable[[list[str]], AnyFit]
+) -> tuple[tuple[EffectClass, ...], AnyFit]:
+    """Classes of effects that mend an inadequate model, one after the other, and the fit with the best of each.
+
+    An effect is named only where the model is inadequate and the effect improves it with a p-value below 10⁻³, times the
+    number of candidates.
+
+    Parameters
+    ----------
+    base : fit of the judged model with ``effects``
+    candidates : ids of all effects that the data can show
+    fit_of : the fit of a model with some effects
+    """
+    classes: list[EffectClass] = []
+    best, current = base, list(effects)
+    while len(classes) < MOST_ADDED and not p_value(best) >= ADEQUATE_P:
+        left = [name for name in candidates if name not in current]
+        found = _next_class(best, current, left, fit_of)
+        if found is None:
+            break
+        one, best = found
+        classes.append(one)
+        current.append(one.effects[0])
+    return tuple(classes), best
+
+
+def _next_class(
+    best: AnyFit, current: list[str], candidates: list[str], fit_of: Callable[[list[str]], AnyFit]
+) -> tuple[EffectClass, AnyFit] | None:
+    fits = {name: fit_of([*current, name]) for name in candidates}
+    price = float(np.log(max(best.dof, 2)))
+
+    def score(fit: Fitted) -> float:
+        return fit.chi_square - price * fit.dof
+
+    def added_p(fit: Fitted) -> float:
+        gain, parameters = max(0.0, best.chi_square - fit.chi_square), max(1, best.dof - fit.dof)
+        return float(min(1.0, len(candidates) * chi2.sf(gain, parameters)))
+
+    real = sorted((name for name in fits if added_p(fits[name]) < ADDED_P), key=lambda name: score(fits[name]))
+    if not real:
+        return None
+    top = fits[real[0]]
+    width = CLASS_WIDTH * max(1.0, top.chi_square / max(top.dof, 1))  # what another effect leaves blurs the comparison
+    same = tuple(name for name in real if score(fits[name]) - score(top) < width)
+    return EffectClass(same, added_p(top), top.chi_square, top.dof), top

@@ -1,0 +1,71 @@
+"""Zero and sensitivity over the supply voltage: departures from a ratiometric output, or from one that is independent of it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Follows:
+    """Departures at n supply voltages, those at the first one being zero.
+
+    Attributes
+    ----------
+    supply : (n,), V
+    sensitivity, sensitivity_error : (n,), share of the sensitivity at the first supply, and its standard uncertainty
+    zero_g, zero_error_g : (n,), g
+    slope_g_V, slope_error_g_V : of the zero over the supply, by weighted least squares through the first point
+    scale : sensitivity at the first supply, output per g, positive
+    """
+
+    supply: Array
+    sensitivity: Array
+    sensitivity_error: Array
+    zero_g: Array
+    zero_error_g: Array
+    slope_g_V: float
+    slope_error_g_V: float
+    scale: float
+
+
+def zero_and_sensitivity(means: Array, errors: Array) -> tuple[Array, Array, Array]:
+    """Zero and sensitivity per g from the two faces, and the standard uncertainty of both; each (n,), unit of the output.
+
+    zero = (o₊ + o₋)/2, sensitivity = (o₊ − o₋)/2: independent for equal uncertainties of the faces.
+
+    Parameters
+    ----------
+    means, errors : (n, 2), output on the two faces
+    """
+    both = 0.5 * np.hypot(errors[:, 0], errors[:, 1])
+    return 0.5 * (means[:, 0] + means[:, 1]), 0.5 * (means[:, 0] - means[:, 1]), both
+
+
+def departures(supply: Array, zero: Array, sensitivity: Array, error: Array, *, follows: bool) -> Follows:
+    """Departures from the values at the first supply; for an output that follows the supply after division by the voltage ratio.
+
+    Ratiometric error of the sensitivity: S(V)/S(V₀)·V₀/V − 1. The point at V₀ is common, so departures share its uncertainty.
+
+    Parameters
+    ----------
+    supply, zero, sensitivity, error : (n,)
+    follows : whether the output is to be proportional to the supply
+    """
+    ratio = supply / supply[0] if follows else np.ones_like(supply)
+    scale = float(abs(sensitivity[0]))
+    own = error / ratio / scale
+    gain = sensitivity / ratio / sensitivity[0] - 1.0
+    level = (zero / ratio - zero[0]) / scale
+    spread = np.where(np.arange(len(supply)) == 0, 0.0, np.hypot(own, own[0]))
+    step = supply - supply[0]
+    covariance = np.diag(own**2) + own[0] ** 2
+    used = slice(1, None)
+    weight = np.linalg.solve(covariance[used, used], step[used])
+    norm = float(step[used] @ weight)
+    slope = float(weight @ level[used]) / norm
+    return Follows(supply, gain, spread, level, spread, slope, float(norm**-0.5), scale)

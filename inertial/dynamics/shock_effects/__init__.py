@@ -1,0 +1,15 @@
+"""Effects on a shock comparison: each module of this package is one and is found here."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from inertial.dynamics.missing_effects import effects_of
+from inertial.dynamics.shock_effects.base import ShockEffect
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+__all__ = ["EFFECTS", "ShockEffect"]
+
+EFFECTS: Mapping[str, ShockEffect] = effects_of(__name__, __path__, ShockEffect)

@@ -1,0 +1,53 @@
+"""What an effect on a shock comparison is."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from typing import Any, ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.signal import cont2discrete, lfilter
+
+from inertial.dynamics.transfer_effects.base import Parameter
+
+Array = NDArray[np.float64]
+
+
+class ShockEffect(ABC):
+    """How the unit's waveform departs from that of the reference. Every module of this package defines one class.
+
+    A waveform effect changes the reference's waveform; an added effect adds a waveform with a linear coefficient.
+
+    id : of the module · equation, source : for people · breaker : the measurement that tells it from others
+    """
+
+    id: ClassVar[str]
+    equation: ClassVar[str]
+    source: ClassVar[str]
+    breaker: ClassVar[str]
+
+    def parameters(self, duration_s: float) -> tuple[Parameter, ...]:
+        """The nonlinear parameters, with bounds and starts that suit a pulse; none for an added effect."""
+        del duration_s
+        return ()
+
+    def changed(self, wave: Array, rate_hz: float, values: Array) -> Array:
+        """The waveform (n,) with the effect."""
+        del rate_hz, values
+        return wave
+
+    def added(self, wave: Array, rate_hz: float) -> Array | None:
+        """The waveform (n,) that is added with a coefficient of its own; None for an effect on the waveform."""
+        del wave, rate_hz
+        return None
+
+    @abstractmethod
+    def unit(self) -> str:
+        """Unit of the coefficient or of the first parameter."""
+
+
+def through(wave: Array, rate_hz: float, numerator: list[float], denominator: list[float]) -> Array:
+    """A waveform (n,) that begins at zero, through a filter in s; exact for straight lines between the samples."""
+    system: Any = cont2discrete((numerator, denominator), 1.0 / rate_hz, method="foh")
+    return np.asarray(lfilter(np.atleast_1d(np.squeeze(system[0])), system[1], wave), dtype=np.float64)

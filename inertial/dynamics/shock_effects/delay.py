@@ -1,0 +1,33 @@
+"""A delay between the channels: converter, linear-phase filter, time base."""
+
+from __future__ import annotations
+
+from typing import ClassVar
+
+import numpy as np
+from scipy.interpolate import CubicSpline
+
+from inertial.dynamics.shock_effects.base import Array, ShockEffect
+from inertial.dynamics.transfer_effects.base import Parameter
+
+
+class Delay(ShockEffect):
+    """A delay between the channels: converter, linear-phase filter, time base."""
+
+    id: ClassVar[str] = "delay"
+    equation: ClassVar[str] = "u(t) = r(t − τ)"
+    source: ClassVar[str] = "time base"
+    breaker: ClassVar[str] = "a shared trigger edge on both channels"
+
+    def unit(self) -> str:
+        """Unit of the coefficient or of the first parameter."""
+        return "s"
+
+    def parameters(self, duration_s: float) -> tuple[Parameter, ...]:
+        """The parameters."""
+        return (Parameter("delay_s", "s", -0.3 * duration_s, 0.3 * duration_s, (0.0,)),)
+
+    def changed(self, wave: Array, rate_hz: float, values: Array) -> Array:
+        """The waveform (n,)."""
+        time = np.arange(len(wave)) / rate_hz
+        return np.asarray(CubicSpline(time, wave, bc_type="natural")(np.clip(time - values[0], time[0], time[-1])))

@@ -1,0 +1,42 @@
+"""A resonance of the mounting between the reference and the unit."""
+
+from __future__ import annotations
+
+from typing import ClassVar
+
+import numpy as np
+
+from inertial.dynamics.shock_effects.base import Array, ShockEffect, through
+from inertial.dynamics.transfer_effects.base import Parameter
+
+
+class MountingResonance(ShockEffect):
+    """A resonance of the mounting between the reference and the unit."""
+
+    id: ClassVar[str] = "mounting_resonance"
+    equation: ClassVar[str] = "(1 + 2jζr)/(1 − r² + 2jζr), r = f/f_m"
+    source: ClassVar[str] = "sprung mass on its mounting"
+    breaker: ClassVar[str] = "another torque, adhesive or fixture"
+
+    def unit(self) -> str:
+        """Unit of the coefficient or of the first parameter."""
+        return "Hz"
+
+    def parameters(self, duration_s: float) -> tuple[Parameter, ...]:
+        """The parameters."""
+        return (
+            Parameter(
+                "mounting_hz",
+                "Hz",
+                1.0 / duration_s,
+                12.0 / duration_s,
+                (2.0 / duration_s, 4.0 / duration_s, 7.0 / duration_s),
+                log=True,
+            ),
+            Parameter("mounting_damping", "1", 0.002, 0.5, (0.03,), log=True),
+        )
+
+    def changed(self, wave: Array, rate_hz: float, values: Array) -> Array:
+        """The waveform (n,)."""
+        w, z = 2.0 * np.pi * float(values[0]), float(values[1])
+        return through(wave, rate_hz, [2.0 * z / w, 1.0], [1.0 / w**2, 2.0 * z / w, 1.0])

@@ -1,0 +1,36 @@
+"""A clock of the device that departs from that of the reference: the pulse is stretched."""
+
+from __future__ import annotations
+
+from typing import ClassVar
+
+import numpy as np
+from scipy.interpolate import CubicSpline
+
+from inertial.dynamics.shock_effects.base import Array, ShockEffect
+from inertial.dynamics.transfer_effects.base import Parameter
+
+
+class OwnClock(ShockEffect):
+    """A clock of the device that departs from that of the reference: the pulse is stretched."""
+
+    id: ClassVar[str] = "own_clock"
+    equation: ClassVar[str] = "u(t) = r(t·(1 + ε))"
+    source: ClassVar[str] = "time base"
+    breaker: ClassVar[str] = "a sweep, or a shared sample clock"
+
+    def unit(self) -> str:
+        """Unit of the coefficient or of the first parameter."""
+        return "share"
+
+    def parameters(self, duration_s: float) -> tuple[Parameter, ...]:
+        """The parameters."""
+        del duration_s
+        return (Parameter("clock_share", "1", -0.05, 0.05, (0.0,)),)
+
+    def changed(self, wave: Array, rate_hz: float, values: Array) -> Array:
+        """The waveform (n,)."""
+        time = np.arange(len(wave)) / rate_hz
+        middle = time[int(np.argmax(np.abs(wave)))]
+        at = np.clip(middle + (time - middle) * (1.0 + values[0]), time[0], time[-1])
+        return np.asarray(CubicSpline(time, wave, bc_type="natural")(at))

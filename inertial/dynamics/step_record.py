@@ -1,0 +1,204 @@
+"""Figures of a recorded step response: overshoot, settling time into a band, rise time and delay, with uncertainties."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from inertial.errors import NotIdentified
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+Array = NDArray[np.float64]
+ALIGNMENTS = 3
+FEWEST = 7  # points of a local fit
+RISE_POINTS = 6.0  # samples within the rise time that a time base needs: it then resolves a tenth of 1/f_n
+
+
+@dataclass(frozen=True)
+class StepFigures:
+    """Overshoot as a share of the step; times in s from the edge of the drive. ``…_error`` are standard uncertainties.
+
+    settling_low_s, settling_high_s : settling times for a band that is wider and narrower by three standard uncertainties; they
+    lie far apart where an extremum of the response is near the edge of the band
+    """
+
+    overshoot: float
+    overshoot_error: float
+    settling_s: float
+    settling_error_s: float
+    settling_low_s: float
+    settling_high_s: float
+    rise_s: float
+    rise_error_s: float
+    delay_s: float
+
+    @property
+    def settling_identified(self) -> bool:
+        """Whether the settling time does not depend on which side of the band's edge an extremum is."""
+        return self.settling_high_s - self.settling_low_s <= 12.0 * self.settling_error_s
+
+
+def step_figures(time: Array, response: Array, error: Array, *, band: float, edge_error_s: float = 0.0) -> StepFigures:
+    """Figures of a response that is normalised: 0 before the edge of the drive at time 0, 1 at the end.
+
+    Crossings and the maximum are those of parabolas through the points near them, which noise does not bias.
+
+    Parameters
+    ----------
+    time : (n,), s, increasing
+    response, error : (n,), share of the step, and its standard uncertainty
+    band : share of the step
+    edge_error_s : standard uncertainty of the edge's time
+
+    Raises
+    ------
+    NotIdentified
+        The response does not rise, does not settle within the record, or the time base is too coarse.
+    """
+    noise = float(np.sqrt(np.mean(error**2)))
+    if 3.0 * noise > band:
+        msg = (
+            f"step: noise {100.0 * noise:.3g} % of the step, a third of the band at most is needed; average more steps"
+        )
+        raise NotIdentified(msg)
+    ten, ninety = (_first_above(time, response, level) for level in (0.1, 0.9))
+    rise = ninety - ten
+    within = int(np.count_nonzero((time >= ten) & (time <= ninety)))
+    if within < FEWEST:
+        msg = f"step: {within} points in the rise time, {FEWEST} are needed; sample faster"
+        raise NotIdentified(msg)
+    width = 0.12 * rise
+    first, half, last = (
+        _crossing(time, response, error, level, near, width)
+        for level, near in ((0.1, ten), (0.5, _first_above(time, response, 0.5)), (0.9, ninety))
+    )
+    top, top_error = _maximum(time, response, error, last[0], rise)
+    smooth, left = _smoothed(time, response, error, width)
+    margin = 3.0 * left
+    settled = [_last_outside(time, smooth, size) for size in (band, band + margin, max(band - margin, 0.1 * band))]
+    at, spread = _settling(time, response, error, band, settled[0], width)
+    return StepFigures(
+        max(0.0, top - 1.0),
+        top_error,
+        at,
+        float(np.hypot(spread, edge_error_s)),
+        settled[1],
+        settled[2],
+        last[0] - first[0],
+        float(np.hypot(last[1], first[1])),
+        half[0],
+    )
+
+
+def aligned(times: Sequence[Array], responses: Sequence[Array]) -> list[Array]:
+    """Times of several records of one step, shifted so that the responses agree; the mean of the shifts is zero.
+
+    The edge of a sampled drive is known to a sample interval only, which would blur the mean of the records. The shift of
+    a record is that of least squares on the slope of the mean of all.
+
+    Parameters
+    ----------
+    times : s, of each record, from the edge of its drive; evenly spaced
+    responses : share of the step
+    """
+    step = float(np.median(np.diff(times[0])))
+    own = [time.copy() for time in times]
+    for _ in range(ALIGNMENTS):
+        place = [np.round(time / step).astype(int) for time in own]
+        first = min(int(one.min()) for one in place)
+        joined = np.concatenate(place) - first
+        count = np.maximum(np.bincount(joined), 1)
+        mean = np.bincount(joined, weights=np.concatenate(responses)) / count
+        grid = np.bincount(joined, weights=np.concatenate(own)) / count
+        there = np.bincount(joined) > 0
+        grid, mean = grid[there], mean[there]
+        slope = np.gradient(mean, grid)
+        shift: list[float] = []
+        for time, response in zip(own, responses, strict=True):
+            at = np.interp(time, grid, slope)
+            off = response - np.interp(time, grid, mean)
+            shift.append(float(np.sum(at * off) / np.sum(at**2)))
+        middle = float(np.mean(shift))
+        own = [time + one - middle for time, one in zip(own, shift, strict=True)]
+    return own
+
+
+def _smoothed(time: Array, response: Array, error: Array, width: float) -> tuple[Array, float]:
+    """Means over a moving window of a width in s, and the standard uncertainty of one."""
+    step = float(np.median(np.diff(time)))
+    size = max(1, 2 * int(0.5 * width / step) + 1)
+    padded = np.pad(response, size // 2, mode="edge")
+    mean = np.convolve(padded, np.full(size, 1.0 / size), mode="valid")
+    return mean, float(np.sqrt(np.mean(error**2) / size))
+
+
+def _first_above(time: Array, response: Array, level: float) -> float:
+    above = np.flatnonzero(response >= level)
+    if above.size == 0 or above[0] == 0:
+        msg = (
+            f"step: the response does not rise through {100.0 * level:g} % of the step; check drive, cable and trigger"
+        )
+        raise NotIdentified(msg)
+    return float(time[above[0]])
+
+
+def _last_outside(time: Array, response: Array, band: float) -> float:
+    outside = np.flatnonzero(np.abs(response - 1.0) > band)
+    if outside.size == 0 or outside[-1] > len(time) - 2 - FEWEST:
+        msg = f"step: the response does not settle within ± {100.0 * band:.3g} % of the step; record longer"
+        raise NotIdentified(msg)
+    return float(0.5 * (time[outside[-1]] + time[outside[-1] + 1]))
+
+
+def _local(time: Array, response: Array, error: Array, near: float, width: float) -> tuple[Array, Array, float]:
+    """Parabola in (t − near)/width through the points near a time: coefficients, covariance, and the half width used."""
+    while True:
+        rows = np.abs(time - near) <= width
+        if np.count_nonzero(rows) >= FEWEST:
+            break
+        width *= 1.3
+    x = (time[rows] - near) / width
+    design = np.column_stack([np.ones_like(x), x, x**2]) / error[rows, None]
+    covariance: Array = np.asarray(np.linalg.inv(design.T @ design), dtype=np.float64)
+    return covariance @ (design.T @ (response[rows] / error[rows])), covariance, width
+
+
+def _crossing(
+    time: Array, response: Array, error: Array, level: float, near: float, width: float
+) -> tuple[float, float]:
+    """Time at which the response crosses a level near a time, and its standard uncertainty."""
+    c, covariance, width = _local(time, response, error, near, width)
+    x = 0.0
+    for _ in range(20):  # Newton on the parabola; the slope at a crossing is not zero
+        slope = c[1] + 2.0 * c[2] * x
+        x = float(
+            np.clip(x - (c[0] + c[1] * x + c[2] * x**2 - level) / (slope if abs(slope) > 1e-12 else 1e-12), -1.0, 1.0)
+        )
+    row = np.array([1.0, x, x**2])
+    slope = max(abs(c[1] + 2.0 * c[2] * x), 1e-12)
+    return near + width * x, float(width * np.sqrt(row @ covariance @ row) / slope)
+
+
+def _settling(
+    time: Array, response: Array, error: Array, band: float, near: float, width: float
+) -> tuple[float, float]:
+    """Time of the last crossing into the band, and its standard uncertainty."""
+    side = float(np.sign(np.interp(near - width, time, response) - 1.0)) or 1.0
+    return _crossing(time, response, error, 1.0 + side * band, near, width)
+
+
+def _maximum(time: Array, response: Array, error: Array, after: float, rise: float) -> tuple[float, float]:
+    """Largest value of the response after a time, and its standard uncertainty."""
+    inside = time >= after
+    if not inside.any():
+        return 1.0, float(error.mean())
+    near = float(time[inside][int(np.argmax(response[inside]))])
+    c, covariance, _ = _local(time, response, error, near, 0.25 * rise)
+    at = float(np.clip(-0.5 * c[1] / c[2], -1.0, 1.0)) if c[2] < 0.0 else 0.0
+    row = np.array([1.0, at, at**2])
+    return float(row @ c), float(np.sqrt(row @ covariance @ row))

@@ -1,0 +1,280 @@
+"""Dynamic tests that were recorded elsewhere: waveforms of unit and reference, reduced and judged as those of a station are."""
+
+from __future__ import annotations
+
+import hashlib
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pandas as pd
+from pydantic import ValidationError
+
+from inertial.errors import InertialError
+from pipelines.archive import Archive, code_hash, stage_key
+from pipelines.importers import files
+from pipelines.importers.content import unit_in
+from pipelines.importers.documents import WaveformFigure, WaveformImport
+from pipelines.procedures import PROCEDURES
+from pipelines.procedures.base import REFERENCE, Device, ProcedureRecord, ProcedureStep, UnitRecord
+from pipelines.procedures.columns import figure_table, finding_table, gathered_points
+from schemas.errors import DataRejected, WrongUse, did_you_mean
+from schemas.foreign import shown
+from schemas.recipe import Pose
+from schemas.toml_files import explain, parse_toml, read_text
+from schemas.units import AXES
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+    from pathlib import Path
+
+    from pipelines.archive import Run
+    from pipelines.importers.content import Content
+    from pipelines.procedures import Part, Procedure
+
+ACCELERATION = {"g": 1.0, "m/s^2": 1.0 / 9.80665, "m/s²": 1.0 / 9.80665, "m/s2": 1.0 / 9.80665, "mg": 1e-3}
+VOLT = {"V": 1.0, "mV": 1e-3}
+TIMES = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "µs": 1e-6}
+UNEVEN = 0.01
+"""Part of a sample interval by which a time may depart from an even grid."""
+
+
+@dataclass(frozen=True)
+class Asked:
+    """What the command states: columns by meaning, units by meaning, rate in Hz, group of channels (or two: units, reference)."""
+
+    columns: Mapping[str, str]
+    units: Mapping[str, str]
+    rate_hz: float | None = None
+    group: str = ""
+
+
+def import_waveforms(
+    paths: Sequence[Path], procedure: str, part: Path | None, unit: str, asked: Asked, archive: str | None = None
+) -> WaveformImport:
+    """Figures and findings of a procedure from the recordings of one unit, one file a record; kept as a run of the archive.
+
+    Parameters
+    ----------
+    part : TOML file with the keys of the procedure, and ``full_scale`` of the output where clipping is to be judged
+
+    Raises
+    ------
+    WrongUse
+        The procedure has no import, or a channel is not named.
+    DataRejected
+        A file has no sample interval, no unit, or samples that cannot be used.
+    """
+    own, content, full_scale = _part(procedure, part)
+    one = PROCEDURES[procedure]
+    out_unit = ""
+    records: list[ProcedureRecord] = []
+    sources: list[files.SourceFile] = []
+    for number, path in enumerate(paths):
+        unit_record, reference, text, source = _recording(path, asked, own, one)
+        out_unit = out_unit or text
+        if text != out_unit:
+            raise DataRejected(f"{path.name}: output in {text}, {out_unit} in the files before; import them apart")
+        setting = one.setting_of(own, reference)
+        pose = Pose(name="imported", outer_deg=0.0, inner_deg=0.0)
+        step = ProcedureStep(path.name, pose, own.temperature_C, role="imported", setting=setting)
+        reading = {
+            "unit": unit,
+            "unit_C": own.temperature_C,
+            "supply_V": np.nan,
+            "full_scale": full_scale,
+            "out_unit": text,
+        }
+        records.append(
+            ProcedureRecord(number, step, pd.DataFrame([reading]), {unit: unit_record, REFERENCE: reference})
+        )
+        sources.append(source)
+    device = Device({}, {}, full_scale, out_unit)
+    try:
+        points = one.reduce(own, records, device)
+        mapped = [axis for axis in AXES if axis in asked.columns]
+        points = points[points["axis"].isin(mapped)].reset_index(drop=True)
+        outcome = one.evaluate(own, points, device)
+    except InertialError as problem:
+        raise DataRejected(f"{paths[0].name}: {problem}") from None
+    found = outcome.figures.get(unit, [])
+    texts = [(f.subject, f.text) for f in outcome.findings]
+    if not np.isfinite(full_scale):
+        texts.append(("not judged", "clipping: full_scale is not given; add it to the file of --part"))
+    run = _keep(procedure, content, points, found, texts, sources, unit, archive)
+    units = {spec.name: spec.unit for spec in one.figures}
+    figures: list[WaveformFigure] = [
+        {
+            "figure": f.figure, "axis": f.axis, "value": f.value if f.identified and np.isfinite(f.value) else None,
+            "uncertainty": f.uncertainty if f.identified and np.isfinite(f.uncertainty) else None, "unit": units[f.figure],
+            "identified": bool(f.identified and np.isfinite(f.value)), "note": f.note,
+        }
+        for f in found
+    ]  # fmt: skip
+    return {
+        "run": run.id,
+        "unit": unit,
+        "procedure": procedure,
+        "records": len(records),
+        "figures": figures,
+        "text": [f"{subject}: {text}" for subject, text in texts],
+    }
+
+
+def _part(procedure: str, path: Path | None) -> tuple[Any, dict[str, Any], float]:
+    """The part of the procedure, the content of its file, and the full scale of the output (infinite where it is not given)."""
+    can = [name for name, one in PROCEDURES.items() if one.from_waveforms]
+    if procedure not in can:
+        what = f"--procedure: found '{shown(procedure)}', {', '.join(can)} can be imported"
+        raise WrongUse(f"{what}; {did_you_mean(procedure, can)}")
+    content: dict[str, Any] = parse_toml(read_text(path, "part"), str(path)) if path else {}
+    content = {"kind": procedure} | content
+    full_scale = content.pop("full_scale", np.inf)
+    if not (isinstance(full_scale, int | float) and full_scale > 0.0):
+        raise WrongUse(
+            f"{path}: full_scale is {full_scale!r}, a number above 0 in the unit of the output is needed; correct it"
+        )
+    part: type[Part] = PROCEDURES[procedure].part
+    try:
+        return part.model_validate(content), content, float(full_scale)
+    except ValidationError as problem:
+        raise explain(problem, str(path or "--part"), part) from None
+
+
+def _recording(
+    path: Path, asked: Asked, part: Any, procedure: Procedure
+) -> tuple[UnitRecord, UnitRecord, str, files.SourceFile]:
+    """The unit and the reference of one file, the unit of the output, and the source."""
+    first, _, second = (piece.strip() for piece in asked.group.partition(","))
+    content, source = files.read_content(path, first)
+    other = files.read_content(path, second)[0] if second else content
+    outputs = {axis: asked.columns[axis] for axis in AXES if axis in asked.columns}
+    if not outputs or "reference" not in asked.columns:
+        there = ", ".join(shown(str(name)) for name in content.table.columns)
+        raise WrongUse(
+            f"import: reference and at least one of x, y, z are needed for {path.name} (its columns: {there}); add --map "
+            "reference=…,z=…"
+        )
+    text = _unit(content, asked, "output", next(iter(outputs.values())), path.name)
+    known = VOLT if procedure.reference_unit == "V" else ACCELERATION
+    reference_unit = _unit(other, asked, "reference", asked.columns["reference"], path.name)
+    if reference_unit not in known:
+        raise DataRejected(
+            f"{path.name}: reference in '{shown(reference_unit)}', one of {', '.join(known)} is needed; state it with "
+            "--units reference=…"
+        )
+    time = _clock(content, asked, path.name)
+    wide = np.zeros((len(time), 3))
+    for axis, column in outputs.items():
+        wide[:, AXES.index(axis)] = _values(content, column, path.name)
+    drive_time = _clock(other, asked, path.name)
+    drive = np.zeros((len(drive_time), 3))
+    place = AXES.index(part.axis) if hasattr(part, "axis") else 0
+    drive[:, place] = known[reference_unit] * _values(other, asked.columns["reference"], path.name)
+    for k, axis in enumerate(AXES):
+        if f"reference_{axis}" in asked.columns:
+            drive[:, k] = known[reference_unit] * _values(other, asked.columns[f"reference_{axis}"], path.name)
+    return UnitRecord(time, wide), UnitRecord(drive_time, drive), text, source
+
+
+def _unit(content: Content, asked: Asked, meaning: str, column: str, where: str) -> str:
+    """Unit of a channel: as stated by the command, else by the file; one that neither states is refused."""
+    stated = content.units.get(column, "") or unit_in(column)
+    given = asked.units.get(meaning, "")
+    if not (given or stated):
+        raise DataRejected(
+            f"{where}: column '{shown(column)}' has no unit, one is needed; add --units {meaning}=… as the sensor's sheet says"
+        )
+    if given and stated and given != stated:
+        raise WrongUse(
+            f"{where}: column '{shown(column)}' states {shown(stated)}, --units has {shown(given)}; correct one"
+        )
+    return given or stated
+
+
+def _clock(content: Content, asked: Asked, where: str) -> np.ndarray:
+    """Times in s from 0: by a time column, the file's interval, or --rate; a file without any is refused."""
+    n = len(content.table)
+    column = asked.columns.get("time") or next(
+        (name for name in content.table.columns if name.partition("[")[0].strip().lower() in {"time", "x_value"}), ""
+    )
+    interval = content.interval_s
+    if asked.rate_hz:
+        interval = 1.0 / asked.rate_hz
+    elif interval is None and column:
+        unit = asked.units.get("time") or content.units.get(column, "") or unit_in(column)
+        if unit not in TIMES:
+            raise DataRejected(
+                f"{where}: column '{shown(column)}' has no unit of time, one of {', '.join(TIMES)} is needed; add --units time=…"
+            )
+        time = TIMES[unit] * _values(content, column, where)
+        steps = np.diff(time)
+        interval = float((time[-1] - time[0]) / max(n - 1, 1))
+        if interval <= 0.0 or np.max(np.abs(steps - interval)) > max(UNEVEN, 2e-16 * n) * interval:
+            raise DataRejected(
+                f"{where}: the times are not evenly spaced, a constant sample interval is needed; export without gaps"
+            )
+    if interval is None or not interval > 0.0:
+        raise DataRejected(
+            f"{where}: no sample interval is stated, one is needed; map the time with --map time=…, or add --rate HZ"
+        )
+    if n < 16:
+        raise DataRejected(f"{where}: {n} samples, 16 or more are needed; record longer")
+    return np.arange(n) * interval
+
+
+def _values(content: Content, column: str, where: str) -> np.ndarray:
+    """The numbers of a column."""
+    if column not in content.table.columns:
+        names = [str(name) for name in content.table.columns]
+        raise DataRejected(f"{where}: column '{shown(column)}' is not there; {did_you_mean(column, names)}")
+    values = pd.to_numeric(content.table[column], errors="coerce").to_numpy(dtype=float)
+    bad = np.flatnonzero(~np.isfinite(values))
+    if bad.size:
+        raise DataRejected(
+            f"{where}: column '{shown(column)}', row {int(bad[0]) + 1}: a finite number is needed; repair or cut the recording"
+        )
+    return values
+
+
+def _keep(
+    procedure: str,
+    content: Mapping[str, Any],
+    points: pd.DataFrame,
+    found: Sequence[Any],
+    texts: Sequence[tuple[str, str]],
+    sources: Sequence[files.SourceFile],
+    unit: str,
+    archive: str | None,
+) -> Run:
+    """The run that holds the import, with a manifest that names the sources."""
+    whole = hashlib.sha256("".join(one.sha256 for one in sources).encode()).hexdigest()
+    inputs, parameters = {"source": whole}, {"procedure": procedure, "part": dict(content), "unit": unit}
+    code = code_hash(("pipelines.importers.waveforms", f"pipelines.procedures.{procedure}"))
+    key = stage_key("import", inputs, parameters, code)
+    about = {
+        "name": f"{PROCEDURES[procedure].title} of {unit}, recorded elsewhere",
+        "source": sources[0].as_dict(),
+        "sources": [one.as_dict() for one in sources],
+        "lot": {"device": "imported", "units": [{"serial": unit, "slot": 0}]},
+    }
+    run = Archive(archive).open_run("import", about, {"key": key})
+    units = {spec.name: spec.unit for spec in PROCEDURES[procedure].figures}
+    rows = [
+        {
+            "unit": unit, "procedure": procedure, "number": 0, "figure": f.figure, "axis": f.axis, "value": f.value,
+            "uncertainty": f.uncertainty, "low": f.low, "high": f.high, "identified": bool(f.identified and np.isfinite(f.value)),
+            "unit_text": units[f.figure], "note": f.note,
+        }
+        for f in found
+    ]  # fmt: skip
+    findings = [{"unit": unit, "procedure": procedure, "number": 0, "subject": a, "text": b} for a, b in texts]
+    tables = {
+        "procedure_points": gathered_points([(0, procedure, points)]),
+        "procedure_figures": figure_table(rows),
+        "procedure_findings": finding_table(findings),
+    }
+    if not run.has(tuple(tables), key):
+        run.save("import", key, tables, {"inputs": inputs, "parameters": parameters, "code": code})
+    run.seal()
+    return run

@@ -1,0 +1,254 @@
+"""Zero and sensitivity over the supply voltage: ratiometry of outputs that follow it, rejection of those that do not."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
+
+import numpy as np
+from pydantic import Field, model_validator
+
+from inertial.dynamics.ratiometry import Follows, departures, zero_and_sensitivity
+from inertial.dynamics.stability import difference_error, white_and_flicker
+from pipelines.procedures.base import (
+    Device,
+    FigureSpec,
+    FigureValue,
+    Finding,
+    Outcome,
+    Part,
+    Procedure,
+    ProcedureRecord,
+    ProcedureStep,
+    worst,
+)
+from pipelines.procedures.columns import points as point_table
+from schemas.bounds import NotNegative, Positive, Wait
+from schemas.errors import RecipeInvalid
+from schemas.recipe import Pose
+from schemas.units import AXES, MICRO
+from stations.profile_files import profile_of
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    import pandas as pd
+    from matplotlib.figure import Figure as Drawing
+
+    from schemas.recipe import Recipe
+    from schemas.station import StationConfig
+
+FACES = {"z": ((0.0, 0.0), (180.0, 0.0)), "y": ((90.0, 0.0), (-90.0, 0.0)), "x": ((90.0, 90.0), (-90.0, 90.0))}
+"""Angles (outer, inner) of the table with each axis along and against gravity; the order is found from the outputs."""
+FARTHEST = 0.5  # of the nominal supply
+SENSITIVITY, ZERO, SLOPE = "supply_sensitivity_percent", "supply_zero_percent_fs", "supply_zero_ug_V"
+COLOURS = ("#0072b2", "#d55e00", "#009e73")
+
+
+class RatiometryPart(Part):
+    """Both faces of every axis at each supply voltage; the first of ``supplies_V`` is the nominal voltage.
+
+    ``follows`` states whether the output is to follow the supply (ratiometric) or to be independent of it.
+    White noise and flicker between the records are estimated from the records; ``repeatability_ug`` is the standard uncertainty
+    of a face's mean besides.
+    """
+
+    kind: Literal["ratiometry"]
+    supplies_V: Annotated[list[Positive], Field(min_length=3, max_length=20)]
+    follows: bool = False
+    axes: Annotated[list[Literal["x", "y", "z"]], Field(min_length=1, max_length=3)] = Field(
+        default_factory=lambda: list(AXES)
+    )
+    dwell_s: Annotated[Positive, Field(ge=1.0, le=3600.0)] = 10.0
+    settle_s: Wait = 10.0
+    temperature_C: Annotated[float, Field(ge=-100.0, le=200.0)] = 25.0
+    repeatability_ug: NotNegative = 0.0
+
+    @model_validator(mode="after")
+    def _different(self) -> RatiometryPart:
+        if len(set(self.supplies_V)) < len(self.supplies_V):
+            raise ValueError("supplies_V: a voltage occurs twice, different ones are needed; remove one")
+        for volt in self.supplies_V:
+            if not abs(volt / self.supplies_V[0] - 1.0) <= FARTHEST:
+                raise ValueError(
+                    f"supplies_V: {volt:g} V, at most {100.0 * FARTHEST:g} % from the nominal {self.supplies_V[0]:g} V "
+                    "(the first) is allowed; correct it"
+                )
+        return self
+
+
+class Ratiometry(Procedure):
+    """Zero and sensitivity at several supply voltages."""
+
+    name: ClassVar[str] = "ratiometry"
+    title: ClassVar[str] = "Supply voltage"
+    order: ClassVar[int] = 70
+    states: ClassVar[str] = (
+        "zero and sensitivity over the supply voltage: ratiometric error, or rejection of the supply"
+    )
+    source: ClassVar[str] = (
+        "IEEE Std 1293, input-voltage sensitivity; IEEE Std 2700, ratiometricity and power-supply rejection"
+    )
+    roles: ClassVar[tuple[str, ...]] = ("power_supply",)
+    part: ClassVar[type[Part]] = RatiometryPart
+    figures: ClassVar[tuple[FigureSpec, ...]] = (
+        FigureSpec(
+            SENSITIVITY,
+            "%",
+            "largest departure of the sensitivity from that at the nominal supply (times the voltage ratio where the output "
+            "follows it)",
+        ),
+        FigureSpec(ZERO, "%", "the same departure of the zero, of the full scale of the output"),
+        FigureSpec(
+            SLOPE, "µg/V", "slope of the zero over the supply, after the ratio where the output follows it; worst axis"
+        ),
+    )
+
+    def steps(self, part: RatiometryPart, recipe: Recipe) -> list[ProcedureStep]:
+        """Both faces of every axis, at each voltage."""
+        del recipe
+        return [
+            ProcedureStep(
+                f"{volt:g} V, {axis} {side}",
+                Pose(name=f"{axis}{side}", outer_deg=outer, inner_deg=inner),
+                part.temperature_C,
+                lasting_s=part.dwell_s,
+                wait_s=part.settle_s,
+                role="power_supply",
+                on_table=True,
+                setting={"supply_V": volt, "axis": float(AXES.index(axis)), "side": float(side)},
+            )
+            for volt in part.supplies_V
+            for axis in part.axes
+            for side, (outer, inner) in enumerate(FACES[axis])
+        ]
+
+    def check(self, part: RatiometryPart, recipe: Recipe, station: StationConfig) -> None:
+        """Refuse a voltage that the supply does not have."""
+        del recipe
+        command = profile_of(station.fitted()["power_supply"]).command("voltage")
+        low, high = command.minimum or 0.0, command.maximum or np.inf
+        for volt in part.supplies_V:
+            if not low <= volt <= high:
+                raise RecipeInvalid(
+                    f"recipe: procedure ratiometry: supplies_V has {volt:g} V, the supply of station {station.name} has "
+                    f"{low:g} to {high:g} V; give voltages inside",
+                    key="supplies_V",
+                )
+
+    def prepare(self, equipment: Any, step: ProcedureStep) -> dict[str, float]:
+        """Sets the supply; returns the ratio to its nominal voltage, which the monitor of the slots expects then."""
+        return {"supply_ratio": equipment.set_voltage(step.setting["supply_V"])}
+
+    def reduce(self, part: RatiometryPart, records: Sequence[ProcedureRecord], device: Device) -> pd.DataFrame:
+        """Mean of the axis on each face at each voltage, in the unit of the output, with the measured supply."""
+        rows: list[dict[str, Any]] = []
+        for k, record in enumerate(records):
+            axis = int(record.step.setting["axis"])
+            for reading in record.readings.to_dict("records"):
+                own = record.samples.get(str(reading["unit"]))
+                if own is None:
+                    continue
+                output = own.output[:, axis]
+                white, flicker = white_and_flicker(output, own.rate_hz)
+                rows.append(
+                    {
+                        "unit": reading["unit"], "axis": AXES[axis], "series": "face", "point": k,
+                        "setting": record.step.setting["supply_V"], "value": float(output.mean()),
+                        "uncertainty": float(output.std(ddof=1) / np.sqrt(output.size)), "side": record.step.setting["side"],
+                        "white": white, "flicker": flicker, "window_s": output.size / own.rate_hz,
+                        "measured_V": float(reading["supply_V"]), "constant": float(np.ptp(output) == 0.0),
+                    }
+                )  # fmt: skip
+        del part, device
+        return point_table(rows)
+
+    def evaluate(self, part: RatiometryPart, points: pd.DataFrame, device: Device) -> Outcome:
+        """The figures of every unit: the worst axis."""
+        figures: dict[str, list[FigureValue]] = {}
+        findings: list[Finding] = []
+        for unit, rows in points.groupby("unit", sort=False):
+            name = str(unit)
+            if bool((rows["constant"] > 0.0).any()):
+                note = "the output is constant; check cable and supply"
+                figures[name] = [
+                    FigureValue(f.name, "*", np.nan, np.nan, identified=False, note=note) for f in self.figures
+                ]
+                continue
+            found = {axis: over_supply(part, rows[rows["axis"] == axis]) for axis in part.axes}
+            figures[name] = [
+                worst([_figure(spec.name, axis, one, device) for axis, one in found.items()]) for spec in self.figures
+            ]
+            findings += [Finding(name, f"axis {axis}", _text(part, one)) for axis, one in found.items()]
+        return Outcome(figures, findings)
+
+    def draw(self, drawing: Drawing, part: RatiometryPart, points: pd.DataFrame) -> None:
+        """Departures of sensitivity and zero over the supply voltage."""
+        left, right = drawing.subplots(1, 2)
+        for k, axis in enumerate(part.axes):
+            one = over_supply(part, points[points["axis"] == axis])
+            style: dict[str, Any] = {
+                "fmt": "o-",
+                "ms": 3.5,
+                "lw": 0.9,
+                "c": COLOURS[AXES.index(axis)],
+                "label": f"axis {axis}",
+            }
+            order = np.argsort(one.supply)
+            at = one.supply[order] + 0.015 * (k - 1) * float(
+                np.ptp(one.supply)
+            )  # side by side, so that no bar hides another
+            left.errorbar(at, 100.0 * one.sensitivity[order], 200.0 * one.sensitivity_error[order], **style)
+            right.errorbar(at, 1e3 * one.zero_g[order], 2e3 * one.zero_error_g[order], **style)
+        left.set(xlabel="supply / V", ylabel="departure of the sensitivity / %")
+        right.set(xlabel="supply / V", ylabel="departure of the zero / mg")
+        for place in (left, right):
+            place.axhline(0.0, lw=0.7, c="#888888", ls="--")
+        right.legend(frameon=False, title="bars: U (k = 2)", loc="upper left")
+        right.margins(y=0.15)
+
+
+def over_supply(part: RatiometryPart, rows: pd.DataFrame) -> Follows:
+    """Departures of one axis of one unit from the nominal supply's zero and sensitivity."""
+    supplies = np.array(part.supplies_V)
+    means = np.full((len(supplies), 2), np.nan)
+    errors, measured = means.copy(), np.full(len(supplies), np.nan)
+    for k, volt in enumerate(supplies):
+        own = rows[rows["setting"] == volt]
+        measured[k] = float(own["measured_V"].mean()) if len(own) else np.nan
+        for side in (0, 1):
+            one = own[own["side"] == side]
+            if len(one):
+                means[k, side], errors[k, side] = float(one["value"].iloc[0]), float(one["uncertainty"].iloc[0])
+    zero, sensitivity, error = zero_and_sensitivity(means, errors)
+    pooled = difference_error(
+        float(rows["white"].mean()), float(rows["flicker"].mean()), float(rows["window_s"].mean())
+    )
+    error = np.maximum(error, 0.5 * pooled)  # of a mean of two faces: a face has 1/√2 of a difference
+    error = np.hypot(error, 1e-6 * part.repeatability_ug * abs(sensitivity[0]) / np.sqrt(2.0))
+    return departures(measured, zero, sensitivity, error, follows=part.follows)
+
+
+def _figure(name: str, axis: str, one: Follows, device: Device) -> FigureValue:
+    if not np.all(np.isfinite(one.sensitivity)):
+        note = "a face was not recorded at a voltage; measure again"
+        return FigureValue(name, axis, np.nan, np.nan, identified=False, note=note)
+    if name == SENSITIVITY:
+        k = int(np.argmax(np.abs(one.sensitivity)))
+        return FigureValue(name, axis, 100.0 * float(one.sensitivity[k]), 100.0 * float(one.sensitivity_error[k]))
+    if name == SLOPE:
+        return FigureValue(name, axis, MICRO * one.slope_g_V, MICRO * one.slope_error_g_V)
+    k = int(np.argmax(np.abs(one.zero_g)))
+    share = 100.0 * one.scale / device.full_scale
+    return FigureValue(name, axis, share * float(one.zero_g[k]), share * float(one.zero_error_g[k]))
+
+
+def _text(part: RatiometryPart, one: Follows) -> str:
+    what = "ratiometric output" if part.follows else "output independent of the supply"
+    return (
+        f"{what}: sensitivity {100.0 * one.sensitivity[int(np.argmax(np.abs(one.sensitivity)))]:+.3g} %, zero "
+        f"{MICRO * one.slope_g_V:+.3g} ± {2.0 * MICRO * one.slope_error_g_V:.2g} µg/V (k = 2), from "
+        f"{one.supply.min():.4g} to {one.supply.max():.4g} V as the reader measures them"
+    )
+
+
+PROCEDURE = Ratiometry()

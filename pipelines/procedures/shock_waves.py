@@ -1,0 +1,138 @@
+"""Waveforms of a shock: for the picture, the shock response spectrum, and the diagnosis of their comparison."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+from scipy.interpolate import CubicSpline
+from scipy.stats import chi2
+
+from inertial.dynamics.shock_diagnosis import ShockDiagnosis, ShockRecord, Waves, diagnose_shock
+from inertial.dynamics.shock_effects import EFFECTS
+from inertial.dynamics.shock_spectrum import octave_frequencies, shock_spectrum
+from inertial.errors import NotIdentified
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    import pandas as pd
+
+DRAWN = 400  # points of a waveform that are kept for the picture
+PER_PULSE = 40  # samples of the compared waveforms in a duration of the pulse
+MOST_SAMPLES = 10_000  # of a compared waveform: they number its points
+LEAD, TAIL = 1.5, 6.0  # durations before and after the pulse that are compared
+Pair = tuple[tuple[np.ndarray, float], tuple[np.ndarray, float]]
+
+
+class WaveSettings(NamedTuple):
+    """Nominal duration of the pulse, s; time that is free of it, s; standard uncertainty of a sample, % of the peak."""
+
+    duration_s: float
+    before_s: float
+    floor_percent: float
+
+
+def waves(number: int, pair: Pair, direction: float, settings: WaveSettings, noise_g: float) -> list[dict[str, Any]]:
+    """Both waveforms of a shock on one time base, without the baseline, for the diagnosis.
+
+    Parameters
+    ----------
+    pair : waveform (n,) in g and rate in Hz of reference and unit, both from the trigger
+    """
+    duration = settings.duration_s
+    both: list[tuple[np.ndarray, CubicSpline]] = []
+    for wave, rate in pair:
+        time = np.arange(wave.size) / rate
+        both.append((time, CubicSpline(time, wave - wave[: int(settings.before_s * rate)].mean())))
+    (time, reference), (own, unit) = both
+    peak = float(time[int(np.argmax(np.abs(reference(time))))])
+    first = max(peak - (0.5 + LEAD) * duration, 0.0)
+    last = min(peak + (0.5 + TAIL) * duration, time[-1], own[-1])
+    at = np.arange(first, last, duration / PER_PULSE)
+    top = float(np.max(np.abs(reference(at))))
+    error = float(np.hypot(noise_g, 1e-2 * settings.floor_percent * top))
+    return [
+        {
+            "series": "compared", "point": MOST_SAMPLES * number + k,
+            "setting": float(t - peak + 0.5 * duration), "value": float(b), "uncertainty": error,
+            "reference_g": float(a), "direction": direction, "shock": float(number),
+        }
+        for k, (t, a, b) in enumerate(zip(at, reference(at), unit(at), strict=True))
+    ]  # fmt: skip
+
+
+def judged(rows: pd.DataFrame, settings: WaveSettings, effects: Sequence[str]) -> ShockDiagnosis | None:
+    """The diagnosis of the first shock in each direction; None where no waveforms are kept."""
+    kept = rows[rows["series"] == "compared"]
+    shocks: list[Waves] = []
+    before, rate = 0.0, PER_PULSE / settings.duration_s
+    for _, one in kept.groupby("direction", sort=False):
+        own = one[one["shock"] == one["shock"].iloc[0]]
+        reference, unit, error = (own[name].to_numpy(dtype=float) for name in ("reference_g", "value", "uncertainty"))
+        shocks.append(Waves(reference, unit, error))
+        before = -float(own["setting"].iloc[0])
+    return diagnose_shock(ShockRecord(rate, settings.duration_s, before, tuple(shocks)), effects) if shocks else None
+
+
+def diagnosis_text(rows: pd.DataFrame, settings: WaveSettings, effects: Sequence[str]) -> list[tuple[str, str]]:
+    """The diagnosis in sentences: subject and text."""
+    try:
+        found = judged(rows, settings, effects)
+    except NotIdentified as problem:
+        return [("comparison of the waveforms", f"cannot be judged: {problem}")]
+    if found is None:
+        return []
+    model = " + ".join(("sensitivity", *found.fit.effects))
+    if found.adequate is None:
+        return [("comparison of the waveforms", f"{model} cannot be judged: {found.reason}")]
+    p = chi2.sf(found.fit.chi_square, found.fit.dof)
+    verdict = "adequate" if found.adequate else "not adequate"
+    text = f"{model} is {verdict} (p = {p:.2g}), rms residual {found.error_percent:.2g} % of the peak"
+    if not found.adequate:
+        text += f"; {100.0 * found.where[1]:.0f} % of χ² is in the samples of {found.where[0]}"
+    out = [("comparison of the waveforms", text)]
+    for one in found.classes:
+        best, *others = one.effects
+        rivals = f"; the shocks do not tell it from {', '.join(others)}" if others else ""
+        out.append(("missing effect", f"{best}: {_size(found, best, settings)}, p = {one.p_value:.2g}{rivals}"))
+    if found.classes:
+        text = (
+            f"rms residual {found.error_percent:.2g} → {found.extended_percent:.2g} % of the peak; samples left out, in standard "
+            f"uncertainties: {found.left_out[0]:.2f} → {found.left_out[1]:.2f}"
+        )
+        out.append(("with the missing effects", text))
+    if found.unexplained:
+        out.append(
+            ("unexplained", "no known effect explains the difference of the waveforms; look at mounting and cable")
+        )
+    return [*out, *(("next measurement", step) for step in found.next_steps)]
+
+
+def _size(found: ShockDiagnosis, name: str, settings: WaveSettings) -> str:
+    one = EFFECTS[name]
+    parameters = one.parameters(settings.duration_s)
+    fit = found.extended
+    value, error = fit.coefficients[name] if name in fit.coefficients else fit.parameters[parameters[0].name]
+    return f"{value:.4g} ± {2.0 * error:.2g} {one.unit()} (k = 2)"
+
+
+def curves(pair: Pair, duration: float, before_s: float) -> list[dict[str, Any]]:
+    """Waveforms and shock response spectra of one shock, thinned for the picture."""
+    rows: list[dict[str, Any]] = []
+    for name, (wave, rate) in zip(("reference", "unit"), pair, strict=True):
+        y = wave - wave[: int(before_s * rate)].mean()
+        middle = int(np.argmax(np.abs(y)))
+        inside = slice(max(0, middle - int(2.0 * duration * rate)), middle + int(3.0 * duration * rate))
+        t = (np.arange(y.size) / rate)[inside]
+        step = max(1, t.size // DRAWN)
+        rows += [
+            {"series": f"wave_{name}", "point": k, "setting": float(a - t[0]), "value": float(b), "uncertainty": np.nan}
+            for k, (a, b) in enumerate(zip(t[::step], y[inside][::step], strict=True))
+        ]
+        f = octave_frequencies(0.1 / duration, min(10.0 / duration, 0.08 * rate))
+        rows += [
+            {"series": f"spectrum_{name}", "point": k, "setting": float(a), "value": float(b), "uncertainty": np.nan}
+            for k, (a, b) in enumerate(zip(f, shock_spectrum(y, rate, f), strict=True))
+        ]
+    return rows

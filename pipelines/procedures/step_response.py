@@ -1,0 +1,271 @@
+"""Step response by the self-test inputs: settling time into a band, overshoot, rise time."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
+
+import numpy as np
+from pydantic import Field
+
+from inertial.dynamics.step_record import RISE_POINTS, StepFigures, aligned, step_figures
+from inertial.errors import NotIdentified
+from pipelines.procedures.base import (
+    REFERENCE,
+    Device,
+    FigureSpec,
+    FigureValue,
+    Finding,
+    Outcome,
+    Part,
+    Procedure,
+    ProcedureRecord,
+    ProcedureStep,
+    UnitRecord,
+    worst,
+)
+from pipelines.procedures.columns import points as point_table
+from schemas.bounds import Positive
+from schemas.recipe import Pose
+from schemas.units import AXES
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+    import pandas as pd
+    from matplotlib.figure import Figure as Drawing
+
+    from schemas.recipe import Recipe
+
+SETTLING, OVERSHOOT, RISE = "step_settling_ms", "step_overshoot_percent", "step_rise_ms"
+BEFORE_SHARE = 0.25  # of the step's duration, recorded before the edge
+FINAL_SHARE = 0.3  # of the step's duration, at its end: the final value
+BINS = 2  # points of the averaged response for each sample interval
+COLOURS = ("#0072b2", "#d55e00", "#009e73")
+
+
+class StepPart(Part):
+    """Steps of voltage on the self-test inputs of the devices, averaged about the edge of the drive.
+
+    ``band_percent`` is the band of the settling time, of the step; ``hold_ms`` is the duration of a step.
+    """
+
+    kind: Literal["step_response"]
+    volts: Annotated[Positive, Field(le=20.0)] = 2.0
+    steps: Annotated[int, Field(ge=4, le=1000)] = 16
+    hold_ms: Annotated[Positive, Field(ge=1.0, le=1000.0)] = 12.0
+    band_percent: Annotated[Positive, Field(ge=0.05, le=20.0)] = 2.0
+    temperature_C: Annotated[float, Field(ge=-100.0, le=200.0)] = 25.0
+
+
+class StepResponse(Procedure):
+    """Steps of force by the self-test of the devices."""
+
+    name: ClassVar[str] = "step_response"
+    title: ClassVar[str] = "Step response"
+    order: ClassVar[int] = 116
+    states: ClassVar[str] = "settling time into a band, overshoot, rise time, of the worst axis"
+    source: ClassVar[str] = (
+        "IEEE Std 1293, response to a step; electrostatic or magnetic self-test as the source of the step"
+    )
+    roles: ClassVar[tuple[str, ...]] = ("step_generator",)
+    part: ClassVar[type[Part]] = StepPart
+    from_waveforms: ClassVar[bool] = True
+    reference_unit: ClassVar[str] = "V"
+    figures: ClassVar[tuple[FigureSpec, ...]] = (
+        FigureSpec(
+            SETTLING, "ms", "time from the edge of the drive until the response stays within band_percent of the step"
+        ),
+        FigureSpec(OVERSHOOT, "%", "largest value of the response above the final value, of the step"),
+        FigureSpec(RISE, "ms", "time from 10 % to 90 % of the step"),
+    )
+
+    def steps(self, part: StepPart, recipe: Recipe) -> list[ProcedureStep]:
+        """One record for each step."""
+        del recipe
+        pose = Pose(name="step", outer_deg=0.0, inner_deg=0.0)
+        hold = 1e-3 * part.hold_ms
+        return [
+            ProcedureStep(
+                f"step {k + 1}",
+                pose,
+                part.temperature_C,
+                lasting_s=2.0 * hold,
+                role="step_generator",
+                setting={"volts": part.volts, "hold_s": hold, "before_s": BEFORE_SHARE * hold},
+            )
+            for k in range(part.steps)
+        ]
+
+    def measure(self, equipment: Any, step: ProcedureStep, slots: Sequence[int]) -> Any:
+        """One step."""
+        one = step.setting
+        return equipment.step(one["volts"], one["hold_s"], one["before_s"], slots)
+
+    def setting_of(self, part: StepPart, reference: UnitRecord) -> dict[str, float]:
+        """Voltage of the step, from the recorded drive."""
+        hold = 1e-3 * part.hold_ms
+        return {"volts": float(np.ptp(reference.output[:, 0])), "hold_s": hold, "before_s": BEFORE_SHARE * hold}
+
+    def reduce(self, part: StepPart, records: Sequence[ProcedureRecord], device: Device) -> pd.DataFrame:
+        """The averaged response of every axis as a share of the step, over the time from the edge of the drive."""
+        rows: list[dict[str, Any]] = []
+        edges = [_edge(record.samples[REFERENCE]) for record in records]
+        for unit in dict.fromkeys(str(name) for record in records for name in record.readings["unit"]):
+            own = [
+                (record.samples[unit], edge)
+                for record, edge in zip(records, edges, strict=True)
+                if unit in record.samples
+            ]
+            for i, axis in enumerate(AXES):
+                rows += [one | {"unit": unit, "axis": axis} for one in _averaged(part, own, i, device)]
+        return point_table(rows)
+
+    def evaluate(self, part: StepPart, points: pd.DataFrame, device: Device) -> Outcome:
+        """The figures of the worst axis of every unit."""
+        del device
+        figures: dict[str, list[FigureValue]] = {}
+        findings: list[Finding] = []
+        for unit, rows in points.groupby("unit", sort=False):
+            found: dict[str, list[FigureValue]] = {spec.name: [] for spec in self.figures}
+            for axis, own in rows.groupby("axis", sort=False):
+                try:
+                    one = axis_figures(part, own)
+                except NotIdentified as problem:
+                    note = f"axis {axis}: {problem}"
+                    for name, values in found.items():
+                        values.append(FigureValue(name, str(axis), np.nan, np.nan, identified=False, note=note))
+                    continue
+                for value in _values(part, str(axis), one):
+                    found[value.figure].append(value)
+                text = f"{1e3 * one.delay_s:.4g} ms from the edge of the drive to 50 % of the step"
+                findings.append(Finding(str(unit), f"delay of axis {axis}", text))
+            figures[str(unit)] = [worst(values) for values in found.values()]
+        return Outcome(figures, findings)
+
+    def draw(self, drawing: Drawing, part: StepPart, points: pd.DataFrame) -> None:
+        """The response of every axis, and its last part about the final value with the band and the settling times."""
+        left, right = drawing.subplots(1, 2)
+        for axis, colour in zip(AXES, COLOURS, strict=True):
+            own = points[points["axis"] == axis].sort_values("setting")
+            time, value = 1e3 * own["setting"].to_numpy(dtype=float), 100.0 * own["value"].to_numpy(dtype=float)
+            left.plot(time, value, lw=1.0, c=colour, label=f"axis {axis}")
+            right.plot(time, value - 100.0, lw=1.0, c=colour)
+            try:
+                settled = 1e3 * axis_figures(part, own).settling_s
+            except NotIdentified:
+                continue
+            right.axvline(settled, lw=0.9, ls=":", c=colour)
+            left.set_xlim(-1.0 * settled, 5.0 * settled)
+            right.set_xlim(0.0, 4.0 * settled)
+        right.axhspan(-part.band_percent, part.band_percent, color="#dddddd", zorder=0)
+        right.set_ylim(-5.0 * part.band_percent, 5.0 * part.band_percent)
+        left.set(xlabel="time from the edge of the drive / ms", ylabel="response / % of the step")
+        right.set(xlabel="time from the edge of the drive / ms", ylabel="response minus final value / %")
+        right.set_title(f"band ± {part.band_percent:g} %, dotted: settling time", fontsize=8)
+        left.legend(frameon=False, loc="lower right")
+
+
+def axis_figures(part: StepPart, rows: pd.DataFrame) -> StepFigures:
+    """Figures of one axis from its averaged response."""
+    if bool((rows["fault"] > 0.0).any()):
+        raise NotIdentified(FAULTS[int(rows["fault"].iloc[0])])
+    kept = rows.sort_values("setting")
+    time, value, error = (kept[name].to_numpy(dtype=float) for name in ("setting", "value", "uncertainty"))
+    found = step_figures(
+        time, value, error, band=1e-2 * part.band_percent, edge_error_s=float(kept["edge_error_s"].iloc[0])
+    )
+    samples = found.rise_s * float(kept["rate_hz"].iloc[0])
+    if samples < RISE_POINTS:
+        msg = (
+            f"{samples:.1f} samples in the rise time, {RISE_POINTS:g} are needed to resolve a tenth of 1/f_n; record the "
+            "analogue output, or use a sweep"
+        )
+        raise NotIdentified(msg)
+    return found
+
+
+FAULTS: Mapping[int, str] = {
+    1: "no step in the output; check the self-test input, the cable and the drive",
+    2: "the output is clipped; lower volts",
+}
+
+
+def _edge(reference: UnitRecord) -> float:
+    """Time of the rising edge of the drive, s from the beginning of the record."""
+    drive = reference.output[:, 0]
+    half = 0.5 * (drive.min() + drive.max())
+    above = int(np.argmax(drive > half))
+    if above == 0:
+        msg = "step: no rising edge in the recorded drive; check the trigger"
+        raise NotIdentified(msg)
+    share = (half - drive[above - 1]) / (drive[above] - drive[above - 1])
+    return float((above - 1 + share) / reference.rate_hz)
+
+
+def _averaged(
+    part: StepPart, own: Sequence[tuple[UnitRecord, float]], axis: int, device: Device
+) -> list[dict[str, Any]]:
+    """The response of an axis as a share of its step, averaged over the steps in bins of time."""
+    hold, rate = 1e-3 * part.hold_ms, own[0][0].rate_hz
+    times = [np.arange(len(one.output)) / rate - edge for one, edge in own]
+    outputs = [one.output[:, axis] for one, _ in own]
+    before = [output[time < -2.0 / rate] for time, output in zip(times, outputs, strict=True)]
+    final = [
+        output[(time > (1.0 - FINAL_SHARE) * hold) & (time < hold - 2.0 / rate)]
+        for time, output in zip(times, outputs, strict=True)
+    ]
+    base, size = np.array([one.mean() for one in before]), np.array([one.mean() for one in final])
+    step = float(np.mean(size - base))
+    noise = float(np.sqrt(np.mean([one.var(ddof=1) for one in before])))
+    fault = 0
+    if max(float(np.max(np.abs(one))) for one in outputs) >= device.full_scale:
+        fault = 2
+    elif not abs(step) > 10.0 * noise / np.sqrt(len(final[0])) or noise == 0.0:
+        fault, step = 1, step or 1.0
+    shares = [(output - first) / step for output, first in zip(outputs, base, strict=True)]
+    time = np.concatenate(times if fault else aligned(times, shares))
+    share = np.concatenate(shares)
+    inside = (time >= -0.5 * BEFORE_SHARE * hold) & (time < hold - 2.0 / rate)
+    time, share = time[inside], share[inside]
+    place = np.floor(time * rate * BINS).astype(int)
+    place -= place.min()
+    count = np.bincount(place)
+    there = count > 0
+    middle, value = (np.bincount(place, weights=one)[there] / count[there] for one in (time, share))
+    edge_error = 1.0 / rate / np.sqrt(12.0 * len(own))
+    return [
+        {
+            "series": "response", "point": k, "setting": float(t), "value": float(v),
+            "uncertainty": max(noise / abs(step) / float(np.sqrt(n)), 1e-12), "edge_error_s": edge_error, "rate_hz": rate,
+            "fault": float(fault), "step": step,
+        }
+        for k, (t, v, n) in enumerate(zip(middle, value, count[there], strict=True))
+    ]  # fmt: skip
+
+
+def _values(part: StepPart, axis: str, one: StepFigures) -> list[FigureValue]:
+    known = one.settling_identified
+    note = (
+        ""
+        if known
+        else (
+            f"an extremum of the response lies at the edge of the band of ± {part.band_percent:g} %: the settling time is "
+            f"{1e3 * one.settling_low_s:.3g} or {1e3 * one.settling_high_s:.3g} ms; average more steps, or choose "
+            "another band_percent"
+        )
+    )
+    spread = 1e3 * one.settling_error_s
+    value = 1e3 * one.settling_s
+    low, high = (
+        (value - 1.96 * spread, value + 1.96 * spread)
+        if known
+        else (1e3 * one.settling_low_s, 1e3 * one.settling_high_s)
+    )
+    return [
+        FigureValue(SETTLING, axis, value, spread, low, high, identified=known, note=note),
+        FigureValue(OVERSHOOT, axis, 100.0 * one.overshoot, 100.0 * one.overshoot_error),
+        FigureValue(RISE, axis, 1e3 * one.rise_s, 1e3 * one.rise_error_s),
+    ]
+
+
+PROCEDURE = StepResponse()

@@ -1,0 +1,265 @@
+"""Transverse sensitivity on an exciter: the units are turned about their sensitive axis in steps, and a sine is fitted."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
+
+import numpy as np
+from pydantic import Field, model_validator
+
+from inertial.dynamics.sine_fit import fit_tone, fit_tone_and_frequency
+from inertial.dynamics.transverse import Transverse, fit_transverse
+from inertial.errors import NotIdentified
+from pipelines.procedures.base import (
+    REFERENCE,
+    Device,
+    FigureSpec,
+    FigureValue,
+    Finding,
+    NominalScale,
+    Outcome,
+    Part,
+    Procedure,
+    ProcedureRecord,
+    ProcedureStep,
+    UnitRecord,
+    scale_of,
+)
+from pipelines.procedures.columns import points as point_table
+from schemas.bounds import NotNegative, Positive
+from schemas.recipe import Pose
+from schemas.units import AXES
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    import pandas as pd
+    from matplotlib.figure import Figure as Drawing
+
+    from schemas.recipe import Recipe
+    from schemas.station import StationConfig
+
+FEWEST_ANGLES = 8
+SILENT = 8.0  # standard uncertainties that a tone must stand out of the noise for the clock
+FIGURE = "transverse_sensitivity_percent"
+
+
+class TransversePart(NominalScale):
+    """Motion across ``axis`` while the units are turned about it through a whole circle in steps of ``step_deg``.
+
+    Uncertainties are standard ones: ``reference_percent`` is the reference's, as a share of the result; ``repeatability_ppm`` is
+    each angle's own, of the driven acceleration.
+    """
+
+    kind: Literal["transverse"]
+    axis: Literal["x", "y", "z"] = "z"
+    step_deg: Annotated[Positive, Field(le=45.0)] = 30.0
+    frequency_hz: Annotated[Positive, Field(ge=1.0, le=5000.0)] = 80.0
+    level_g: Annotated[Positive, Field(le=50.0)] = 2.0
+    record_s: Annotated[Positive, Field(ge=0.05, le=60.0)] = 0.5
+    temperature_C: Annotated[float, Field(ge=-100.0, le=200.0)] = 25.0
+    reference_percent: NotNegative = 0.25
+    repeatability_ppm: NotNegative = 5.0
+
+    @model_validator(mode="after")
+    def _whole_circle(self) -> TransversePart:
+        count = 360.0 / self.step_deg
+        if abs(count - round(count)) > 1e-9 or count < FEWEST_ANGLES:
+            raise ValueError(
+                f"step_deg: {self.step_deg:g}° gives {count:g} angles in a turn, a whole number of at least {FEWEST_ANGLES} is "
+                "needed (ISO 16063-31); use 15, 30, 36 or 45"
+            )
+        return self
+
+
+class TransverseTest(Procedure):
+    """The output of the sensitive axis under motion across it, over the angle of the unit about that axis."""
+
+    name: ClassVar[str] = "transverse"
+    title: ClassVar[str] = "Transverse sensitivity"
+    order: ClassVar[int] = 114
+    states: ClassVar[str] = "largest transverse sensitivity in % of the sensitivity, and its direction"
+    source: ClassVar[str] = "ISO 16063-31 (transverse vibration sensitivity), 8 angles or more, fit of a sine"
+    roles: ClassVar[tuple[str, ...]] = ("exciter",)
+    part: ClassVar[type[Part]] = TransversePart
+    figures: ClassVar[tuple[FigureSpec, ...]] = (
+        FigureSpec(FIGURE, "%", "largest transverse sensitivity over the angle, of the sensitivity on the axis"),
+    )
+
+    def steps(self, part: TransversePart, recipe: Recipe) -> list[ProcedureStep]:
+        """One dwell at each angle."""
+        del recipe
+        pose = Pose(name="exciter", outer_deg=0.0, inner_deg=0.0)
+        return [
+            ProcedureStep(
+                f"across {part.axis}, {k * part.step_deg:g}°",
+                pose,
+                part.temperature_C,
+                lasting_s=part.record_s,
+                role="exciter",
+                setting={
+                    "frequency_hz": part.frequency_hz,
+                    "level_g": part.level_g,
+                    "axis": float(AXES.index(part.axis)),
+                    "angle_deg": k * part.step_deg,
+                },
+            )
+            for k in range(round(360.0 / part.step_deg))
+        ]
+
+    def check(self, part: TransversePart, recipe: Recipe, station: StationConfig) -> None:
+        """Refuse a list without a scale."""
+        del station
+        part.require_scale(recipe)
+
+    def measure(self, equipment: Any, step: ProcedureStep, slots: Sequence[int]) -> Any:
+        """The dwell on the exciter."""
+        one = step.setting
+        level, angle, seconds = one["level_g"], one["angle_deg"], step.lasting_s or 0.0
+        return equipment.sine_across(one["frequency_hz"], level, int(one["axis"]), angle, seconds, slots)
+
+    def reduce(self, part: TransversePart, records: Sequence[ProcedureRecord], device: Device) -> pd.DataFrame:
+        """In-phase output of the axis over the driven acceleration, in %, at every angle."""
+        rows: list[dict[str, Any]] = []
+        units = list(dict.fromkeys(str(unit) for record in records for unit in record.readings["unit"]))
+        for unit in units:
+            own = [(k, record) for k, record in enumerate(records) if unit in record.samples]
+            tones = [_tones(part, record, record.samples[unit], scale_of(part, device, unit)) for _, record in own]
+            turn = np.exp(-1j * _phase(part, tones))
+            for (k, record), (drive, answer, noise, whole) in zip(own, tones, strict=True):
+                rows.append(_point(part, k, record, (drive, answer, noise), turn, device, whole=whole) | {"unit": unit})
+        return point_table(rows)
+
+    def evaluate(self, part: TransversePart, points: pd.DataFrame, device: Device) -> Outcome:
+        """The maximum and its direction for every unit."""
+        del device
+        figures: dict[str, list[FigureValue]] = {}
+        findings: list[Finding] = []
+        for unit, rows in points.groupby("unit", sort=False):
+            name = str(unit)
+            try:
+                found = fitted(rows)
+            except NotIdentified as problem:
+                figures[name] = [FigureValue(FIGURE, part.axis, np.nan, np.nan, identified=False, note=str(problem))]
+                continue
+            value = 100.0 * found.value
+            error = float(np.hypot(100.0 * found.error, 1e-2 * part.reference_percent * value))
+            figures[name] = [FigureValue(FIGURE, part.axis, value, error, 100.0 * found.low, 100.0 * found.high)]
+            findings += [Finding(name, subject, text) for subject, text in _texts(part, found)]
+        return Outcome(figures, findings)
+
+    def draw(self, drawing: Drawing, part: TransversePart, points: pd.DataFrame) -> None:
+        """Output over the angle with its uncertainty, the fitted sine, and the direction of the maximum."""
+        place = drawing.subplots()
+        kept = points[np.isfinite(points["value"])]
+        place.errorbar(
+            kept["setting"], kept["value"], 2.0 * kept["uncertainty"], fmt="o", ms=3.5, lw=0.9, c="#0072b2",
+            label="measured, U (k = 2)"
+        )  # fmt: skip
+        if len(kept) >= FEWEST_ANGLES:
+            found = fitted(points)
+            angle = np.linspace(0.0, 360.0, 361)
+            wave = 100.0 * (found.value * np.cos(np.radians(angle - found.direction_deg)) + found.offset)
+            place.plot(angle, wave, lw=1.1, c="#d55e00", label="fitted sine")
+            place.axhline(100.0 * found.offset, lw=0.7, ls="--", c="#888888", label="motion along the axis")
+        first = AXES[(AXES.index(part.axis) + 1) % 3]
+        place.set(xlabel=f"direction of motion from {first} / °", ylabel=f"output of {part.axis} / % of the motion")
+        place.set_xticks(range(0, 361, 45))
+        place.margins(y=0.25)
+        place.legend(frameon=False, ncols=3, loc="upper center")
+
+
+def fitted(rows: pd.DataFrame) -> Transverse:
+    """The sine through the points of one unit that have a value."""
+    kept = rows[np.isfinite(rows["value"])]
+    if len(kept) < max(FEWEST_ANGLES, 0.8 * len(rows)):
+        msg = f"{len(kept)} of {len(rows)} angles have a value, four fifths are needed; check cable and range"
+        raise NotIdentified(msg)
+    first, second, value, error = (
+        kept[name].to_numpy(dtype=float) for name in ("first", "second", "value", "uncertainty")
+    )
+    return fit_transverse(first, second, 1e-2 * value, 1e-2 * error)
+
+
+def _tones(
+    part: TransversePart, record: ProcedureRecord, own: UnitRecord, scale: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, bool]:
+    """Tones (3,) of the reference and of the unit in g, their standard uncertainties (3,), and whether the unit answers.
+
+    The frequency on the clock of the device is that of its strongest channel.
+    """
+    reference = record.samples[REFERENCE]
+    drive = fit_tone(reference.output, reference.rate_hz, part.frequency_hz)
+    output = own.output / scale
+    alive = bool(np.all(np.isfinite(output)) and np.ptp(output[:, AXES.index(part.axis)]) > 0.0)
+    frequency = part.frequency_hz
+    seen = False
+    if alive:
+        strongest = int(np.argmax(output.std(axis=0)))
+        tone = fit_tone_and_frequency(output[:, [strongest]], own.rate_hz, part.frequency_hz)
+        seen = abs(tone.value[0]) > SILENT * tone.amplitude_error[0]
+        frequency = tone.frequency if seen else frequency
+    answer = fit_tone(output if alive else np.zeros_like(output), own.rate_hz, frequency)
+    return drive.value, answer.value, answer.amplitude_error, alive and seen
+
+
+def _phase(part: TransversePart, tones: Sequence[tuple[np.ndarray, np.ndarray, np.ndarray, bool]]) -> float:
+    """Phase of the device against the reference, from its axes in the plane of motion; rad."""
+    axis = AXES.index(part.axis)
+    plane = [(axis + 1) % 3, (axis + 2) % 3]
+    total = sum((np.sum(np.conj(drive[plane]) * answer[plane]) for drive, answer, _, whole in tones if whole), 0j)
+    return float(np.angle(total))
+
+
+def _point(
+    part: TransversePart,
+    number: int,
+    record: ProcedureRecord,
+    tones: tuple[np.ndarray, np.ndarray, np.ndarray],
+    turn: complex,
+    device: Device,
+    *,
+    whole: bool,
+) -> dict[str, Any]:
+    """One angle of one unit: the part along the axis that the reference measures is subtracted."""
+    drive, answer, noise = tones
+    axis = AXES.index(part.axis)
+    first, second = (axis + 1) % 3, (axis + 2) % 3
+    angle = record.step.setting["angle_deg"]
+    driven = drive[first] * np.cos(np.radians(angle)) + drive[second] * np.sin(np.radians(angle))
+    ratio = float(np.real(answer[axis] * turn / driven) - np.real(drive[axis] / driven))
+    error = float(np.hypot(noise[axis] / abs(driven), 1e-6 * part.repeatability_ppm))
+    del device
+    return {
+        "axis": part.axis,
+        "series": "across",
+        "point": number,
+        "setting": angle,
+        "value": 100.0 * ratio if whole else np.nan,
+        "uncertainty": 100.0 * error if whole else np.nan,
+        "first": float(np.real(drive[first] / driven)),
+        "second": float(np.real(drive[second] / driven)),
+        "along_percent": 100.0 * float(abs(drive[axis] / driven)),
+    }
+
+
+def _texts(part: TransversePart, found: Transverse) -> list[tuple[str, str]]:
+    axis = AXES.index(part.axis)
+    first, second = AXES[(axis + 1) % 3], AXES[(axis + 2) % 3]
+    if found.direction_error_deg >= 180.0:
+        text = "the transverse sensitivity does not stand out of its uncertainty; raise level_g, or record longer"
+        out = [("direction not determined", text)]
+    else:
+        text = (
+            f"{found.direction_deg:.1f}° ± {2.0 * found.direction_error_deg:.1g}° (k = 2) from {first} towards {second}"
+        )
+        out = [("direction of the largest transverse sensitivity", text)]
+    verdict = "adequate" if found.p_value >= 0.005 else "not adequate"
+    text = f"a sine over the angle is {verdict}: χ² {found.chi_square:.1f} for {found.dof} degrees of freedom"
+    text += f", p = {found.p_value:.2g}"
+    if verdict == "not adequate":
+        text += "; check the angles of the fixture and its resonance, repeat at another frequency"
+    return [*out, ("model", text)]
+
+
+PROCEDURE = TransverseTest()

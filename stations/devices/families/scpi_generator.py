@@ -1,0 +1,146 @@
+"""Function generator with a multichannel recorder, by SCPI: before an exciter's amplifier, or at the self-test inputs."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import ClassVar
+
+import numpy as np
+
+from schemas.errors import OperatorNeeded, StationRefused, StationTimeout
+from stations.devices.equipment import Equipment
+from stations.devices.recording import Recording, RecordingSpoilt
+from stations.devices.result_files import STANDARD_GRAVITY, read_recording
+
+POLL_S = 0.05
+GRACE_S = 30.0
+FIRST_V = 0.02  # amplitude of the first try: the gain of amplifier and exciter is not known
+MOST_V = 10.0
+ROUNDS = 5
+LEVEL_SHARE = 0.05  # by which the level may depart from the order when the loop ends
+FLAT_SHARE = 0.1  # of the samples within a thousandth of the extremes: a sine has less
+TRY_S = 0.1
+VOLT = {"V": 1.0}
+SHARE_OF_DRIVE = 0.2
+
+
+class ScpiGenerator(Equipment):
+    """Bursts of a finite number of cycles, so that an exciter that is left alone stops; the recorder is triggered by the burst.
+
+    The generator runs open loop: the adapter finds the amplitude from the level that the reference shows.
+    """
+
+    needs: ClassVar[tuple[str, ...]] = (
+        "function",
+        "frequency",
+        "amplitude",
+        "cycles",
+        "output",
+        "length",
+        "before",
+        "axis",
+        "start",
+        "state",
+        "error",
+        "file",
+    )
+
+    def sine(self, frequency: float, level: float, axis: int, seconds: float, slots: Sequence[int]) -> Recording:
+        """A dwell at one frequency in Hz with a peak level in g, along an axis (0 to 2) of the units.
+
+        Raises
+        ------
+        RecordingSpoilt
+            Missed trigger, clipped reference, or a level that is not reached within the generator's range.
+        OperatorNeeded
+            The amplifier reports a fault.
+        """
+        self.values.write("function", "SIN")
+        self.values.write("frequency", frequency)
+        self.values.write("axis", float(axis))
+        self.values.write("before", 0.0)
+        volts, reached = FIRST_V, 0.0
+        for _ in range(ROUNDS):
+            trial = self._record(volts, frequency, max(TRY_S, 8.0 / frequency), slots)
+            reached = self._level(trial, axis)
+            if abs(reached / level - 1.0) <= LEVEL_SHARE:
+                break
+            wanted = volts * level / max(reached, 1e-3 * level)
+            if wanted > MOST_V:
+                break
+            volts = wanted
+        recording = self._record(volts, frequency, seconds, slots)
+        reached = self._level(recording, axis)
+        if not abs(reached / level - 1.0) <= 2.0 * LEVEL_SHARE:
+            raise RecordingSpoilt(
+                f"{self.name}: {reached:.4g} g at {frequency:g} Hz with {volts:.3g} V, {level:g} g was ordered; check amplifier "
+                "and fixture"
+            )
+        return recording
+
+    def step(self, volts: float, hold_s: float, before_s: float, slots: Sequence[int]) -> Recording:
+        """One step of voltage that is held, recorded from ``before_s`` before its edge; the reference is the drive in V.
+
+        Raises
+        ------
+        RecordingSpoilt
+            Missed trigger, or a drive that did not reach its voltage.
+        """
+        self.values.write("function", "SQU")
+        self.values.write("frequency", 0.5 / hold_s)
+        self.values.write("before", before_s)
+        recording = self._record(volts, 0.5 / hold_s, before_s + 1.5 * hold_s, slots, cycles=1.0)
+        driven = float(np.ptp(recording.reference[:, 0]))
+        if not abs(driven / volts - 1.0) <= SHARE_OF_DRIVE:
+            raise RecordingSpoilt(
+                f"{self.name}: a step of {driven:.4g} V in the recorded drive, {volts:g} V was ordered; check load and cable"
+            )
+        return recording
+
+    def make_safe(self) -> None:
+        """Switches the generator's output off."""
+        self.values.write("output", "OFF")
+
+    def _record(
+        self, volts: float, frequency: float, seconds: float, slots: Sequence[int], cycles: float = 0.0
+    ) -> Recording:
+        before = self.values.text("file")
+        self.values.write("amplitude", volts)
+        self.values.write("length", seconds)
+        self.values.write("cycles", cycles or float(np.ceil(frequency * (seconds + 0.5)) + 1.0))
+        self.values.write("output", "ON")
+        self.values.write("start", "NOW")
+        self._refuse_error(f"{volts:.4g} V at {frequency:.4g} Hz")
+        end = self.clock.now() + seconds + GRACE_S
+        while (state := self.values.text("state")) == "RUN":
+            if self.clock.now() > end:
+                self.make_safe()
+                raise StationTimeout(f"{self.name}: still records {GRACE_S:g} s after the end; check the recorder")
+            self.clock.sleep(POLL_S)
+        self.make_safe()
+        if state == "FAULT":
+            raise OperatorNeeded(
+                f"{self.name}: the amplifier reports a fault; remove its cause, reset it, and give the command again"
+            )
+        path = self.values.text("file")
+        if path in {before, "NONE"}:
+            raise RecordingSpoilt(f"{self.name}: no recording, the trigger was missed; check the recorder")
+        units = VOLT if self.values.profile.kind == "step_generator" else STANDARD_GRAVITY
+        return read_recording(Path(path), list(slots), self.name, units)
+
+    def _level(self, recording: Recording, axis: int) -> float:
+        """Peak level in g of the reference; a clipped reference is refused."""
+        driven = recording.reference[:, axis] - recording.reference[:, axis].mean()
+        top = float(np.max(np.abs(driven)))
+        if float(np.mean(np.abs(driven) > 0.999 * top)) > FLAT_SHARE:
+            raise RecordingSpoilt(
+                f"{self.name}: the reference is clipped at {top:.4g} g; choose a larger range of its conditioner"
+            )
+        return float(np.sqrt(2.0 * np.mean(driven**2)))
+
+    def _refuse_error(self, what: str) -> None:
+        code = self.values.number("error")
+        if code != 0.0:
+            self.make_safe()
+            raise StationRefused(f"{self.name}: error {code:.0f} at {what}, none is needed; check its ranges")

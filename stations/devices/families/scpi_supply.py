@@ -1,0 +1,75 @@
+"""Programmable power supplies that speak SCPI; the nominal setting of the devices is in the supply's memory 1."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, ClassVar
+
+from schemas.errors import OperatorNeeded, StationRefused
+from stations.devices.equipment import Equipment
+
+if TYPE_CHECKING:
+    from stations.clock import Clock
+    from stations.devices.values import Values
+
+NOMINAL = 1.0  # the memory that holds the nominal setting
+SETTLE_S = 1.0
+REACHED = 0.01  # share of the order by which the measured voltage may differ
+
+
+class ScpiSupply(Equipment):
+    """Sets the voltage of the devices and measures it; an error in the supply's queue refuses the order."""
+
+    needs: ClassVar[tuple[str, ...]] = ("voltage", "measured", "output", "recall", "error")
+
+    def __init__(self, values: Values, clock: Clock) -> None:
+        super().__init__(values, clock)
+        self._nominal_V = 0.0
+        self._changed = True  # what an earlier run has left is not known
+
+    def set_voltage(self, volt: float) -> float:
+        """Sets the voltage, V, and returns its ratio to the nominal one.
+
+        Raises
+        ------
+        StationRefused
+            The supply reports an error.
+        OperatorNeeded
+            The measured voltage is not the one that was set.
+        """
+        if self._nominal_V <= 0.0:
+            self._recall()
+            self._nominal_V = self.values.number("voltage")
+        self._changed = True
+        self.values.write("voltage", volt)
+        self._refuse_error(f"{volt:g} V")
+        self.clock.sleep(SETTLE_S)
+        measured = self.values.number("measured")
+        if not abs(measured - volt) <= REACHED * volt:
+            self._recall()
+            raise OperatorNeeded(
+                f"{self.name}: {measured:.4g} V measured, {volt:g} V was set; check current limit and wiring, then give the "
+                "command again"
+            )
+        return volt / self._nominal_V
+
+    def stand_by(self) -> None:
+        """The nominal voltage."""
+        if self._changed:
+            self._recall()
+
+    def make_safe(self) -> None:
+        """The nominal voltage, with the output on: the devices keep their supply."""
+        self._recall()
+
+    def _recall(self) -> None:
+        self.values.write("recall", NOMINAL)
+        self.values.write("output", "ON")
+        self._refuse_error("the nominal setting")
+        self._changed = False
+
+    def _refuse_error(self, what: str) -> None:
+        code = self.values.number("error")
+        if code != 0.0:
+            raise StationRefused(
+                f"{self.name}: error {code:.0f} at {what}, none is needed; check limits and memory 1 of the supply"
+            )

@@ -1,0 +1,134 @@
+"""The simulated generator with recorder, before an exciter with its amplifier, or at the self-test inputs of the devices."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+from stations.plant.result_files import ResultFiles
+
+if TYPE_CHECKING:
+    from schemas.profile import Profile
+    from stations.plant.bench import Waveforms
+    from stations.plant.world import World
+
+DONE = "1"
+OUT_OF_RANGE, UNDEFINED = -222, -113  # SCPI-99, 21.8.10 and 21.8.9
+TEXTS = {0: "No error", OUT_OF_RANGE: "Data out of range", UNDEFINED: "Undefined header"}
+SETTLE_S = 0.3
+MOST_V = 10.0
+GAIN_G_V, SUSPENSION_HZ, SUSPENSION_DAMPING = 10.0, 12.0, 0.4
+STROKE_M, VELOCITY_M_S, ACCELERATION_G = 0.0127, 1.5, 50.0
+STANDARD_G = 9.80665
+NUMBERS = {
+    "SOUR1:FREQ": (1e-3, 2e4),
+    "SOUR1:VOLT": (0.0, MOST_V),
+    "SOUR1:BURS:NCYC": (1.0, 1e7),
+    "ACQ:LENG": (1e-4, 600.0),
+    "ACQ:BEF": (0.0, 600.0),
+    "ROUT:AXIS": (0.0, 2.0),
+}
+
+
+def simulated(world: World, profile: Profile) -> Generator:
+    """A generator in front of the world's bench, in the role of its profile."""
+    return Generator(world, steps=profile.kind == "step_generator")
+
+
+def exciter_gain(frequency: float) -> float:
+    """Acceleration over the amplifier's input, g/V: a mass on its suspension above the suspension's resonance."""
+    r2 = (frequency / SUSPENSION_HZ) ** 2
+    return GAIN_G_V * r2 / math.hypot(1.0 - r2, 2.0 * SUSPENSION_DAMPING * math.sqrt(r2))
+
+
+class Generator:
+    """Finite bursts; a burst that is not ended is over after its cycles."""
+
+    def __init__(self, world: World, *, steps: bool) -> None:
+        self._world, self._steps = world, steps
+        self._set = {
+            "SOUR1:FREQ": 160.0, "SOUR1:VOLT": 0.0, "SOUR1:BURS:NCYC": 1.0, "ACQ:LENG": 0.1, "ACQ:BEF": 0.0, "ROUT:AXIS": 2.0,
+        }  # fmt: skip
+        self._function, self._on, self._error = "SIN", False, 0
+        self._number, self._start_us, self._until_us, self._fault = 0, 0, 0, False
+        self._there, self._troubles = False, frozenset[str]()
+        self._files = ResultFiles()
+
+    def answer(self, line: str) -> tuple[str, bool]:
+        """The answer to a line, and whether the line changed anything."""
+        if line.endswith("?") and not line.endswith(";*OPC?"):
+            return self._report(line[:-1])
+        head, _, value = line.removesuffix(";*OPC?").partition(" ")
+        if head in NUMBERS:
+            self._number_order(head, value)
+        elif head == "SOUR1:FUNC" and value in {"SIN", "SQU"}:
+            self._function = value
+        elif head == "OUTP1" and value in {"ON", "OFF"}:
+            self._on = value == "ON"
+            if not self._on:
+                self._until_us = min(self._until_us, self._world.now_us)
+        elif head == "INIT":
+            self._begin()
+        else:
+            self._error = UNDEFINED
+        return DONE, True
+
+    def _number_order(self, head: str, value: str) -> None:
+        low, high = NUMBERS[head]
+        try:
+            number = float(value)
+        except ValueError:
+            self._error = UNDEFINED
+            return
+        if low <= number <= high:
+            self._set[head] = number
+        else:
+            self._error = OUT_OF_RANGE
+
+    def _report(self, head: str) -> tuple[str, bool]:
+        world = self._world
+        if head == "SYST:ERR":
+            code, self._error = self._error, 0
+            return f'{code},"{TEXTS[code]}"', code != 0
+        if head == "ACQ:STAT":
+            return ("FAULT" if self._fault else "RUN" if world.now_us < self._until_us else "DONE"), False
+        if head == "ACQ:FILE":
+            done = self._there and world.now_us >= self._until_us
+            return (self._files.write(self._number, self._recorded, world.slots, self._unit) if done else "NONE"), False
+        texts = {
+            "SOUR1:FUNC": self._function,
+            "OUTP1": str(int(self._on)),
+            **{k: f"{v:.7g}" for k, v in self._set.items()},
+        }
+        return texts.get(head, ""), False
+
+    @property
+    def _unit(self) -> str:
+        return "V" if self._steps else "g"
+
+    def _level(self) -> float:
+        return exciter_gain(self._set["SOUR1:FREQ"]) * self._set["SOUR1:VOLT"]
+
+    def _begin(self) -> None:
+        world, w = self._world, 2.0 * math.pi * self._set["SOUR1:FREQ"]
+        troubles = world.bench.troubles
+        reach = min(STROKE_M * w**2 / STANDARD_G, VELOCITY_M_S * w / STANDARD_G, ACCELERATION_G)
+        self._fault = "controller_abort" in troubles or (not self._steps and self._level() > reach)
+        self._there = False
+        if self._fault:
+            return
+        self._start_us, self._troubles = world.now_us, frozenset(troubles)
+        self._until_us = world.now_us + round(1e6 * (self._set["ACQ:LENG"] + SETTLE_S))
+        if self._on and "missed_trigger" not in troubles:
+            self._number += 1
+            self._there = True
+
+    def _recorded(self) -> Waveforms:
+        bench, seconds = self._world.bench, self._set["ACQ:LENG"]
+        if self._steps:
+            hold = 0.5 / self._set["SOUR1:FREQ"]
+            return bench.self_test(
+                self._set["SOUR1:VOLT"], hold, self._set["ACQ:BEF"], seconds, self._start_us, self._troubles
+            )
+        axis = int(self._set["ROUT:AXIS"])
+        return bench.sine(self._set["SOUR1:FREQ"], self._level(), axis, seconds, self._start_us, self._troubles)

@@ -1,0 +1,74 @@
+"""The simulated programmable power supply of the devices."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from schemas.profile import Profile
+    from stations.plant.world import World
+
+DONE = "1"
+OUT_OF_RANGE, UNDEFINED = -222, -113  # SCPI-99, 21.8.10 and 21.8.9
+TEXTS = {0: "No error", OUT_OF_RANGE: "Data out of range", UNDEFINED: "Undefined header"}
+DROP = 0.9  # of the set voltage, where the current limit holds it
+
+
+def simulated(world: World, profile: Profile) -> Supply:
+    """A supply of all devices of the world."""
+    return Supply(world, profile)
+
+
+class Supply:
+    """Follows its setting at once; in its current limit the voltage is lower."""
+
+    def __init__(self, world: World, profile: Profile) -> None:
+        self._world = world
+        self._nominal = world.preset.supply_V
+        self._set = self._nominal
+        self._on = True
+        self._error = 0
+        command = profile.command("voltage")
+        self._range = (command.minimum or 0.0, command.maximum or 60.0)
+
+    def answer(self, line: str) -> tuple[str, bool]:
+        """The answer to a line, and whether the line changed anything."""
+        head, _, value = line.removesuffix(";*OPC?").partition(" ")
+        if line == "VOLT?":
+            return f"{self._set:.6f}", False
+        if line == "MEAS:VOLT?":
+            return f"{self._voltage():.6f}", False
+        if line == "OUTP?":
+            return str(int(self._on)), False
+        if line == "SYST:ERR?":
+            code, self._error = self._error, 0
+            return f'{code},"{TEXTS[code]}"', code != 0
+        if head == "VOLT":
+            self._order(value)
+        elif head == "OUTP" and value in {"ON", "OFF"}:
+            self._on = value == "ON"
+        elif head == "*RCL" and value == "1":
+            self._set = self._nominal
+        elif line != "*OPC?":
+            self._error = UNDEFINED
+        self._apply()
+        return DONE, line != "*OPC?"
+
+    def _order(self, value: str) -> None:
+        try:
+            volt = float(value)
+        except ValueError:
+            self._error = UNDEFINED
+            return
+        if not self._range[0] <= volt <= self._range[1]:
+            self._error = OUT_OF_RANGE
+            return
+        self._set = volt
+
+    def _voltage(self) -> float:
+        limited = "current_limit" in self._world.bench.troubles and self._set > self._nominal
+        return (DROP if limited else 1.0) * self._set if self._on else 0.0
+
+    def _apply(self) -> None:
+        world = self._world
+        world.scale_supply(range(len(world.slots)), self._voltage() / self._nominal)

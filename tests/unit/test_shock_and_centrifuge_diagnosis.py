@@ -1,0 +1,172 @@
+"""Shock and centrifuge: hidden effects, made by scipy and by mechanics, are named in their class; nothing is named without."""
+
+import numpy as np
+import pytest
+from scipy import signal
+
+from inertial.dynamics.centrifuge_diagnosis import diagnose_spins
+from inertial.dynamics.centrifuge_effects import EFFECTS as SPIN_EFFECTS
+from inertial.dynamics.centrifuge_effects import Spins
+from inertial.dynamics.shock_diagnosis import ShockRecord, Waves, diagnose_shock, predicted
+from inertial.dynamics.shock_effects import EFFECTS as SHOCK_EFFECTS
+
+FINE = 200e3
+DURATION, RATE, BEFORE, AFTER = 0.011, 40 / 0.011, 0.015, 0.08
+FLOOR = 0.02  # g, of a pulse of 30 g
+G = 9.80665
+
+
+def filtered(wave: np.ndarray, corner: float) -> np.ndarray:
+    b, a = signal.butter(2, corner, fs=FINE)
+    return signal.lfilter(b, a, wave)
+
+
+def shock_of(hidden: str, size: float, rng: np.random.Generator, signs=(1.0, -1.0)) -> ShockRecord:
+    """Shocks whose unit has a hidden effect that is made at 200 kHz, and noise on every sample of the comparison."""
+    shocks = []
+    time = np.arange(round((BEFORE + DURATION + AFTER) * FINE)) / FINE - BEFORE
+    for sign in signs:
+        peak, length = 30.0 * (1.0 + 0.05 * rng.normal()), DURATION * (1.0 + 0.03 * rng.normal())
+        true = np.where((time > 0) & (time < length), sign * peak * np.sin(np.pi * time / length), 0.0)
+        true = filtered(true, 6.0 / DURATION)
+        unit, reference = true.copy(), true.copy()
+        if hidden == "filter_of_unit":
+            unit = filtered(unit, size)
+        elif hidden == "filter_of_reference":
+            reference = filtered(reference, size)
+        elif hidden == "ac_coupled_reference":
+            b, a = signal.butter(1, 1.0 / (2.0 * np.pi * size), btype="high", fs=FINE)
+            reference = signal.lfilter(b, a, reference)
+        elif hidden == "zero_shift":
+            unit = unit + size * (time > 0.5 * length)
+        elif hidden == "third_order":
+            unit = unit + size * unit**3
+        elif hidden == "mounting_resonance":
+            w = 2.0 * np.pi * size
+            system = signal.cont2discrete(([0.06 / w, 1.0], [1.0 / w**2, 0.06 / w, 1.0]), 1.0 / FINE, method="foh")
+            unit = signal.lfilter(system[0].ravel(), system[1], unit)
+        at = np.arange(time[0] + 1e-3, time[-1], 1.0 / RATE)
+        unit, reference = np.interp(at - 120e-6, time, unit), np.interp(at, time, reference)
+        shocks.append(Waves(reference, unit + FLOOR * rng.normal(size=at.size), np.full(at.size, FLOOR)))
+    return ShockRecord(RATE, DURATION, BEFORE - 1e-3, tuple(shocks))
+
+
+HIDDEN = {
+    "filter_of_unit": 350.0,
+    "filter_of_reference": 350.0,
+    "ac_coupled_reference": 2.0,
+    "zero_shift": 0.05,
+    "third_order": 5e-6,
+    "mounting_resonance": 400.0,
+}
+
+
+@pytest.mark.parametrize("hidden", HIDDEN)
+def test_a_hidden_effect_of_a_shock_is_named_and_a_fresh_shock_is_predicted_better(hidden: str, rng) -> None:
+    found = diagnose_shock(shock_of(hidden, HIDDEN[hidden], rng))
+    assert found.adequate is False
+    assert hidden in found.classes[0].effects
+    assert found.left_out[1] == pytest.approx(1.0, abs=0.2)
+    assert found.left_out[0] > 1.04
+    fresh = shock_of(hidden, HIDDEN[hidden], rng)
+    assert predicted(fresh, found.extended) < predicted(fresh, found.fit)
+
+
+def test_shocks_in_one_direction_do_not_tell_an_ac_coupled_reference_from_a_zero_shift(rng) -> None:
+    one = diagnose_shock(shock_of("ac_coupled_reference", 2.0, rng, signs=(1.0,)))
+    both = diagnose_shock(shock_of("ac_coupled_reference", 2.0, rng))
+    assert {"ac_coupled_reference", "zero_shift"} <= set(one.classes[0].effects)
+    assert any("other direction" in text for text in one.next_steps)
+    assert "ac_coupled_reference" in both.classes[0].effects
+    assert "zero_shift" not in both.classes[0].effects
+    assert both.extended.parameters["coupling_s"][0] == pytest.approx(2.0, rel=0.1)
+
+
+def test_nothing_is_named_in_shocks_without_a_hidden_effect(rng) -> None:
+    found = [diagnose_shock(shock_of("none", 0.0, rng)) for _ in range(20)]
+    assert all(one.adequate for one in found)
+    sensitivity = [(one.fit.sensitivity - 1.0) / one.fit.sensitivity_error for one in found]
+    assert np.std(sensitivity) < 1.6
+
+
+def spins(radii=(0.5,), forces=(1.0, 3.0, 5.0, 10.0, 15.0, 20.0, 25.0, 30.0)) -> Spins:
+    way = [*forces, *forces[-2::-1]]
+    a = np.array([s * f for _ in radii for s in (1.0, -1.0) for f in way])
+    r = np.repeat(radii, 2 * len(way))
+    slow = np.array([float(k >= len(forces)) for _ in radii for _ in (1, -1) for k in range(len(way))])
+    return Spins(a, r, np.linspace(0.0, 1.0, a.size), slow)
+
+
+def spun(points: Spins, hidden: str, size: float, rng: np.random.Generator) -> np.ndarray:
+    """Output in g by mechanics: the rate is set for the nominal radius, the proof mass sits elsewhere, the spring bends."""
+    sign, rate2 = np.sign(points.acceleration), np.abs(points.acceleration) * G / points.radius_m
+    radius = points.radius_m.copy()
+    if hidden == "arm_stretch":
+        radius = radius * (1.0 + size * rate2)
+    if hidden == "mass_offset":
+        radius = radius + sign * size
+    a = sign * radius * rate2 / G
+    out = 2e-3 + 1.0004 * a + 2e-6 * a**2 + 5e-8 * a**3
+    if hidden == "odd_quadratic":
+        out = out + size * a * np.abs(a)
+    if hidden == "asymmetry":
+        out = out + size * np.abs(a)
+    if hidden == "scale_drift":
+        out = out + size * points.order * a
+    return out + 2e-5 * rng.normal(size=a.size)
+
+
+SPUN = {"arm_stretch": 1e-8, "mass_offset": 2e-6, "odd_quadratic": 2e-7, "asymmetry": 4e-6, "scale_drift": 6e-6}
+PAIR = {
+    "arm_stretch": "odd_quadratic",
+    "odd_quadratic": "arm_stretch",
+    "mass_offset": "asymmetry",
+    "asymmetry": "mass_offset",
+}
+
+
+@pytest.mark.parametrize("hidden", SPUN)
+def test_a_hidden_effect_of_a_centrifuge_is_named_with_its_rival_and_a_second_radius_parts_them(
+    hidden: str, rng
+) -> None:
+    points, size = spins(), 20.0 * SPUN[hidden]
+    error = np.full(len(points.order), 2e-5)
+    found = diagnose_spins(points, spun(points, hidden, size, rng), error)
+    assert found.adequate is False
+    named = set(found.classes[0].effects)
+    assert hidden in named
+    assert found.extended_g < 0.6 * found.error_g
+    assert found.left_out[1] == pytest.approx(1.0, abs=0.45)
+    if hidden not in PAIR:
+        return
+    assert PAIR[hidden] in named
+    assert any("radius" in text for text in found.next_steps)
+    two = spins(radii=(0.5, 0.3))
+    after = diagnose_spins(two, spun(two, hidden, size, rng), np.full(len(two.order), 2e-5))
+    assert hidden in after.classes[0].effects
+    assert PAIR[hidden] not in after.classes[0].effects
+
+
+def test_no_effect_of_a_centrifuge_is_named_where_there_is_none(rng) -> None:
+    points = spins()
+    error = np.full(len(points.order), 2e-5)
+    found = [diagnose_spins(points, spun(points, "none", 0.0, rng), error) for _ in range(100)]
+    assert sum(bool(one.classes) for one in found) <= 1
+    assert sum(one.adequate is False for one in found) <= 3
+
+
+def test_a_single_mounting_cannot_be_judged_for_what_it_does_not_show() -> None:
+    points = spins()
+    one = points.picked(points.acceleration > 0.0)
+    assert not SPIN_EFFECTS["asymmetry"].seen(one)
+    few = points.picked(np.arange(len(points.order)) < 6)
+    found = diagnose_spins(few, few.acceleration, np.full(6, 1e-5))
+    assert found.adequate is None
+    assert "add speeds" in found.reason
+
+
+@pytest.mark.parametrize("known", [SPIN_EFFECTS, SHOCK_EFFECTS])
+def test_every_effect_says_what_it_is(known) -> None:
+    for name, one in known.items():
+        assert one.id == name
+        assert all((type(one).__doc__, one.equation, one.source, one.breaker))

@@ -1,0 +1,139 @@
+"""Step records, departures over the supply, and transverse sensitivity: against scipy, closed forms and published values."""
+
+import numpy as np
+import pytest
+from scipy import signal
+
+from inertial.dynamics import settling
+from inertial.dynamics.ratiometry import departures, zero_and_sensitivity
+from inertial.dynamics.step_record import aligned, step_figures
+from inertial.dynamics.transverse import fit_transverse
+from inertial.errors import NotIdentified
+
+PUBLISHED = {  # ω_n·t to stay within 2 %, 1 %, 0.1 % of the step, and overshoot in %: the facts' table
+    0.6: (5.94, 6.26, 10.17, 9.5),
+    0.7: (5.98, 6.58, 10.29, 4.6),
+    0.75: (5.74, 6.60, 8.00, 2.8),
+    0.8: (3.76, 6.35, 8.47, 1.5),
+}
+FAST = 2500.0
+
+
+def recorded(zeta: float, noise: float = 0.0, seed: int = 0, natural: float = FAST):
+    """A step by scipy at 200 kHz with white noise."""
+    w = 2.0 * np.pi * natural
+    time = np.arange(-100, 4000) / 200e3
+    out = np.zeros(len(time))
+    out[100:] = signal.step(([w**2], [1.0, 2.0 * zeta * w, w**2]), T=time[100:])[1]
+    return time, out + noise * np.random.default_rng(seed).normal(size=len(time))
+
+
+@pytest.mark.parametrize("zeta", PUBLISHED)
+@pytest.mark.parametrize(("band", "which"), [(0.02, 0), (0.01, 1), (0.001, 2)])
+def test_settling_and_overshoot_of_a_record_are_the_published_ones(zeta: float, band: float, which: int) -> None:
+    time, out = recorded(zeta)
+    found = step_figures(time, out, np.full(len(time), 1e-6), band=band)
+    assert found.settling_s * 2.0 * np.pi * FAST == pytest.approx(PUBLISHED[zeta][which], abs=0.012)
+    assert 100.0 * found.overshoot == pytest.approx(PUBLISHED[zeta][3], abs=0.06)
+    assert settling.damping_from_overshoot(found.overshoot) == pytest.approx(zeta, abs=0.002)
+
+
+def test_the_pulls_of_the_figures_have_unit_variance() -> None:
+    time, clean = recorded(0.65)
+    true = step_figures(time, clean, np.full(len(time), 1e-6), band=0.02)
+    noise, pulls, known = 0.003, [], 0
+    generator = np.random.default_rng(7)
+    for _ in range(200):
+        out = clean + noise * generator.normal(size=len(time))
+        found = step_figures(time, out, np.full(len(time), noise), band=0.02)
+        known += found.settling_identified
+        pulls.append(
+            (
+                (found.overshoot - true.overshoot) / found.overshoot_error,
+                (found.settling_s - true.settling_s) / found.settling_error_s,
+                (found.rise_s - true.rise_s) / found.rise_error_s,
+            )
+        )
+    assert known >= 190
+    assert np.all(np.abs(np.std(pulls, axis=0, ddof=1) - 1.0) < 0.15)
+    assert np.all(np.abs(np.mean(pulls, axis=0)) < 0.35)
+
+
+def test_an_extremum_at_the_edge_of_the_band_is_said_and_no_settling_time_is_stated() -> None:
+    time, out = recorded(0.78, 5e-4, 3)  # overshoot 1.999 % beside a band of 2 %
+    found = step_figures(time, out, np.full(len(time), 5e-4), band=0.02)
+    assert not found.settling_identified
+    assert found.settling_low_s < 0.7 * found.settling_high_s
+
+
+def test_records_without_a_step_or_too_noisy_or_too_short_are_refused() -> None:
+    time, out = recorded(0.7)
+    with pytest.raises(NotIdentified, match="does not rise"):
+        step_figures(time, 0.0 * out, np.full(len(time), 1e-4), band=0.02)
+    with pytest.raises(NotIdentified, match="average more steps"):
+        step_figures(time, out, np.full(len(time), 0.02), band=0.02)
+    short = time < 3e-4
+    with pytest.raises(NotIdentified, match="record longer"):
+        step_figures(time[short], out[short], np.full(short.sum(), 1e-4), band=0.001)
+
+
+def test_alignment_removes_the_blur_of_a_sampled_edge(rng: np.random.Generator) -> None:
+    times, outs, late = [], [], rng.uniform(-1.0, 1.0, 16) * 10e-6
+    for one in late:
+        time = np.arange(-100, 900) / 50e3
+        outs.append(settling.step_response(time + one, 2000.0, 0.7))
+        times.append(time)
+    joined = np.concatenate(aligned(times, outs))
+    order = np.argsort(joined)
+    true = settling.step_response(joined[order] + late.mean(), 2000.0, 0.7)
+    assert np.max(np.abs(np.concatenate(outs)[order] - true)) < 0.004
+    blurred = np.concatenate([settling.step_response(t + late.mean(), 2000.0, 0.7) for t in times])
+    assert np.max(np.abs(np.concatenate(outs) - blurred)) > 0.03
+
+
+def test_a_ratiometric_output_departs_by_its_error_alone() -> None:
+    supply, error = np.array([3.0, 2.7, 3.3]), 0.02
+    ratio = supply / 3.0
+    sensitivity, zero = 0.3 * ratio * (1.0 + error * (ratio - 1.0)), 1.5 * ratio
+    means = np.column_stack([zero + sensitivity, zero - sensitivity])
+    z, s, u = zero_and_sensitivity(means, np.full((3, 2), 1e-5))
+    follows = departures(supply, z, s, u, follows=True)
+    assert follows.sensitivity == pytest.approx([0.0, -0.002, 0.002], abs=1e-12)
+    assert follows.zero_g == pytest.approx([0.0, 0.0, 0.0], abs=1e-12)
+    fixed = departures(supply, z, s, u, follows=False)
+    assert fixed.slope_g_V == pytest.approx(1.5 / 3.0 / 0.3, rel=1e-9)
+
+
+def test_pulls_over_the_supply_and_over_the_angle(rng: np.random.Generator) -> None:
+    supply, pulls = np.array([12.0, 11.0, 11.5, 12.5, 13.0]), []
+    angle = np.radians(np.arange(0.0, 360.0, 30.0))
+    for _ in range(300):
+        zero, gain = 1e-3 * rng.normal(), 2e-3 * rng.normal()
+        part = supply / 12.0 - 1.0
+        means = np.column_stack([5e-4 + zero * part + s * (1.0 + gain * part) for s in (1.0, -1.0)])
+        z, s, u = zero_and_sensitivity(means + 2e-5 * rng.normal(size=(5, 2)), np.full((5, 2), 2e-5))
+        one = departures(supply, z, s, u, follows=False)
+        size, turn = rng.uniform(2e-3, 2e-2), rng.uniform(-np.pi, np.pi)
+        output = size * np.cos(angle - turn) + 0.01 * rng.normal() + 5e-5 * rng.normal(size=angle.size)
+        across = fit_transverse(np.cos(angle), np.sin(angle), output, np.full(angle.size, 5e-5))
+        away = (across.direction_deg - np.degrees(turn) + 180.0) % 360.0 - 180.0
+        pulls.append(
+            (
+                (one.slope_g_V - zero / 12.0) / one.slope_error_g_V,
+                (one.sensitivity[4] - gain / 12.0) / one.sensitivity_error[4],
+                (across.value - size) / across.error,
+                away / across.direction_error_deg,
+            )
+        )
+    assert np.all(np.abs(np.std(pulls, axis=0, ddof=1) - 1.0) < 0.12)
+
+
+def test_no_transverse_sensitivity_gives_an_upper_limit_and_no_direction(rng: np.random.Generator) -> None:
+    angle = np.radians(np.arange(0.0, 360.0, 45.0))
+    found = [
+        fit_transverse(np.cos(angle), np.sin(angle), 1e-5 * rng.normal(size=8), np.full(8, 1e-5)) for _ in range(300)
+    ]
+    assert sum(one.low > 0.0 for one in found) <= 10  # 1.1 % expected
+    assert all((one.direction_error_deg == 180.0) == (one.low == 0.0) for one in found)
+    with pytest.raises(NotIdentified, match="turn over a whole circle"):
+        fit_transverse(np.ones(8), np.zeros(8), np.zeros(8), np.full(8, 1e-5))
