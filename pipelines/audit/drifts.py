@@ -18,6 +18,7 @@ from inertial.population.drift import (
     last_reliable,
     leaves,
     prudent,
+    seating_of,
     standing,
 )
 from pipelines.audit.parameters import FAMILIES, FAMILY_OF, NAMES
@@ -38,10 +39,6 @@ YEAR_D = 365.25
 MONTH_D = YEAR_D / 12.0
 OWN = tuple(name for name in NAMES if FAMILIES[FAMILY_OF[name]].own)
 FEWEST_PAIRS = 8
-PAIRS_A_DOF = 6.0
-"""Pairs for each degree of freedom of the mounting's variance: three variances are estimated from the same pairs. By
-simulation of units without drift, 20 units of three calibrations whose stated uncertainty is a fifth of their scatter: |E_n|
-> 1 in 4.4 % (8.3 % with a coverage factor of 2)."""
 AHEAD = np.arange(0.0, 10.0 + 1e-9, 1.0 / 24.0)  # years, in steps of half a month
 
 
@@ -61,6 +58,7 @@ class KindDrift:
     ahead : the drift for forecasts, see :func:`~inertial.population.drift.prudent`
     beyond : share of the pairs with |E_n| > 1; out : share with a change above the tolerance; median : of |change|
     reliable_months : time in which a unit of the kind stays in all tolerances with the target's probability; NaN without one
+    seating : standard deviation of one mounting as E_n allows for it, and its degrees of freedom
     known : whether any pair is long enough apart to identify a drift; without one there is no forecast
     """
 
@@ -74,6 +72,7 @@ class KindDrift:
     tolerance: float
     reliable_months: float
     known: bool = True
+    seating: tuple[float, float] = (0.0, 1.0)
 
 
 @dataclass(frozen=True)
@@ -139,8 +138,9 @@ def kind_drifts(calibrations: Calibrations, good: Flags, rules: Rules, since: fl
             together = tuple(np.concatenate(parts) for parts in both)
             kind = kind_of(*together)
             recent = kept & (calibrations.day[pairs.later] >= since)
+            seating = seating_of(kind, *together, pairs=int(kept.sum()))
             drift_of_kind = _kind_drift(
-                calibrations, pairs, recent, device, name, (kind, prudent(kind, *together)), rules
+                calibrations, pairs, recent, device, name, (kind, prudent(kind, *together)), seating, rules
             )
             own.append(replace(drift_of_kind, known=drifts_known(together[1])))
         forecast_known = all(one.known for one in own)
@@ -172,12 +172,13 @@ def _kind_drift(
     device: str,
     name: str,
     kinds: tuple[DeviceDrift, DeviceDrift],
+    seating: tuple[float, float],
     rules: Rules,
 ) -> KindDrift:
     tolerance = rules.tolerance_of(device, FAMILY_OF[name])
     kind, ahead = kinds
     change, _ = _changes(calibrations, pairs, name)
-    numbers, moved = _e_n(calibrations, pairs, name, kind)[recent], np.abs(change[recent])
+    numbers, moved = _e_n(calibrations, pairs, name, seating)[recent], np.abs(change[recent])
     numbers, moved = numbers[np.isfinite(numbers)], moved[np.isfinite(moved)]
     return KindDrift(
         device=device,
@@ -189,6 +190,7 @@ def _kind_drift(
         median=float(np.median(moved)) if moved.size else 0.0,
         tolerance=tolerance,
         reliable_months=float("nan"),
+        seating=seating,
     )
 
 
@@ -274,7 +276,7 @@ def _course(
 def _unit_drifts(calibrations: Calibrations, rows: Pairs, course: _Course, until: Array) -> list[UnitDrift]:
     drift_of_kind, now, times, beyond = course.drift_of_kind, course.now, course.times, course.beyond
     change, _ = _changes(calibrations, rows, drift_of_kind.parameter)
-    numbers = _e_n(calibrations, rows, drift_of_kind.parameter, drift_of_kind.kind)
+    numbers = _e_n(calibrations, rows, drift_of_kind.parameter, drift_of_kind.seating)
     return [
         UnitDrift(
             unit=str(calibrations.unit[row]),
@@ -316,13 +318,13 @@ def _changes(calibrations: Calibrations, pairs: Pairs, name: str) -> tuple[Array
     return value[pairs.later] - value[pairs.earlier], error[pairs.later] ** 2 + error[pairs.earlier] ** 2
 
 
-def _e_n(calibrations: Calibrations, pairs: Pairs, name: str, kind: DeviceDrift) -> Array:
+def _e_n(calibrations: Calibrations, pairs: Pairs, name: str, seating: tuple[float, float]) -> Array:
     """E_n of every pair; the mounting's variance is part of both uncertainties and is known only from the pairs of the kind."""
-    value = calibrations.column(name)
-    error = np.hypot(calibrations.error(name), kind.mount_sd)
+    value, (mount, known_from) = calibrations.column(name), seating
+    error = np.hypot(calibrations.error(name), mount)
     total = error[pairs.later] ** 2 + error[pairs.earlier] ** 2
-    share = np.maximum(2.0 * kind.mount_sd**2 / total, 1e-6)
-    dof = max(kind.pairs / PAIRS_A_DOF, 1.0) / share**2  # Welch and Satterthwaite (JCGM 100, G.4.1)
+    share = np.maximum(2.0 * mount**2 / total, 1e-6)
+    dof = known_from / share**2  # Welch and Satterthwaite (JCGM 100, G.4.1)
     return e_n(value[pairs.later], value[pairs.earlier], error[pairs.later], error[pairs.earlier], dof)
 
 
