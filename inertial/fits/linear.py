@@ -7,12 +7,14 @@ the cost stays linear in the units.
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from inertial import design
 from inertial.design import Values
+from inertial.effects import SensorEffect
 from inertial.errors import NotIdentified
 from inertial.state import State
 
@@ -26,6 +28,16 @@ _DELICATE = 1e3
 
 _SUSPICIOUS = 1e9
 """Variance inflation above which the eigenvalues are looked at."""
+
+
+_PIECE = 128
+"""Units with designs of their own that are solved at a time: their columns stay in the processor's cache."""
+
+_MANY = 64
+"""Matrices from which on they are inverted together: LAPACK takes them one by one."""
+
+_BATCHED = 3
+"""Dimensions of an array with one series for each unit and axis."""
 
 
 @dataclass(frozen=True)
@@ -112,17 +124,16 @@ def fit_lot(
     z = np.swapaxes(output, -1, -2)
     names = tuple(design.local_names(sensor, axis, values) for axis in range(3))
     weight = None if standard_error is None else 1.0 / np.swapaxes(standard_error, -1, -2)
-    local = _Local(design.local_columns(sensor, state, values), weight, names)
-    theta = local.solve(z)
     shared, shared_covariance = np.zeros(0), np.zeros((0, 0))
-    if station:
+    if not station:
+        solved = _in_pieces(sensor, state, values, z, weight, names)
+    else:
+        local = _Local(design.local_columns(sensor, state, values), weight, names)
+        theta = local.solve(z)
         columns = design.shared_columns(station, state, values, response_matrix(theta, names))
         shared, shared_covariance, z = _solve_shared(local, columns, z, design.shared_names(station))
-        theta = local.solve(z)
-    residual = local.apply(theta)
-    np.subtract(z, residual, out=residual)
-    chi2, dof = local.chi2(residual)
-    covariance = local.inverse
+        solved = _solved(local, z)
+    theta, residual, (chi2, dof), covariance = solved
     if weight is None:
         variance = chi2 / np.maximum(dof, 1)
         covariance = covariance * variance[..., None, None]
@@ -142,6 +153,58 @@ def fit_lot(
     )
 
 
+def _solved(local: "_Local", z: Array) -> "_Solution":
+    theta = local.solve(z)
+    residual = local.apply(theta)
+    np.subtract(z, residual, out=residual)
+    return _Solution(theta, residual, local.chi2(residual), local.inverse)
+
+
+def _in_pieces(
+    sensor: Sequence[SensorEffect],
+    state: State,
+    values: Values,
+    z: Array,
+    weight: Array | None,
+    names: Sequence[Sequence[tuple[str, str]]],
+) -> "_Solution":
+    """The solution of a lot whose units have nothing in common but the model, some units at a time where each has its own design.
+
+    What bounds it is memory: the columns of a thousand units pass through the cache once for each product, those of a piece stay.
+    """
+    own = state.temperature is not None and state.temperature.ndim > 1
+    if z.ndim != _BATCHED or len(z) <= _PIECE or not (own or state.force.ndim == _BATCHED or _varies(weight, len(z))):
+        return _solved(_Local(design.local_columns(sensor, state, values), weight, names), z)
+    units = len(z)
+    kept: list[_Solution] = []
+    for start in range(0, units, _PIECE):
+        piece = slice(start, start + _PIECE)
+        some = weight[piece] if _varies(weight, units) and weight is not None else weight
+        kept.append(
+            _solved(_Local(design.local_columns(sensor, state.of(piece, units), values), some, names), z[piece])
+        )
+    theta, residual = (
+        np.concatenate(parts) for parts in zip(*((one.theta, one.residual) for one in kept), strict=True)
+    )
+    chi2, dof = (np.concatenate(parts) for parts in zip(*(one.chi2 for one in kept), strict=True))
+    shape = (units, *kept[0].covariance.shape[-3:])
+    covariance = np.concatenate([np.broadcast_to(one.covariance, (len(one.theta), *shape[1:])) for one in kept])
+    return _Solution(theta, residual, (chi2, dof), covariance)
+
+
+def _varies(weight: Array | None, units: int) -> bool:
+    return weight is not None and weight.ndim == _BATCHED and len(weight) == units
+
+
+class _Solution(NamedTuple):
+    """Coefficients (..., 3, p), residuals (..., 3, n), χ² and degrees of freedom (..., 3), covariance (..., 3, p, p)."""
+
+    theta: Array
+    residual: Array
+    chi2: tuple[Array, Array]
+    covariance: Array
+
+
 def felt_force(force: Array, output: Array) -> Array:
     """Specific force along the sensor's own axes, (..., n, 3), g, from a plain fit of bias and response."""
     x = np.concatenate([np.ones((*force.shape[:-1], 1)), force], axis=-1)
@@ -156,12 +219,12 @@ class _Local:
 
     def __init__(self, columns: Array, weight: Array | None, names: Sequence[Sequence[tuple[str, str]]]) -> None:
         self.columns, self.weight = columns, weight
-        weighted = columns if weight is None else columns * weight[..., None]
-        self.scale = np.sqrt(np.einsum("...np,...np->...p", weighted, weighted))
+        self.weighted = columns if weight is None else columns * weight[..., None]
+        # columns are not scaled one by one: that is a second array as large as they are
+        gram = np.swapaxes(self.weighted, -1, -2) @ self.weighted
+        self.scale = np.sqrt(np.diagonal(gram, axis1=-2, axis2=-1))
         self._refuse_empty(names)
-        self.scaled = weighted / self.scale[..., None, :]
-        gram = np.swapaxes(self.scaled, -1, -2) @ self.scaled
-        self.gram_inverse = self._inverted(gram, names)
+        self.gram_inverse = self._inverted(gram / (self.scale[..., :, None] * self.scale[..., None, :]), names)
         # the largest variance inflation: 1/v² of the column that the others leave least of
         self.delicate = float(np.max(np.diagonal(self.gram_inverse, axis1=-2, axis2=-1))) > _DELICATE
         self.inverse = self.gram_inverse / (self.scale[..., :, None] * self.scale[..., None, :])
@@ -180,7 +243,7 @@ class _Local:
         """Inverse of the scaled normal matrices; a singular one is refused with the coefficients it confuses."""
         inverse: Array
         try:
-            inverse = np.linalg.inv(gram).astype(np.float64)
+            inverse = inverses(gram)
         except np.linalg.LinAlgError:
             inverse = np.full(gram.shape, np.inf)
         inflation = np.diagonal(inverse, axis1=-2, axis2=-1)
@@ -211,7 +274,7 @@ class _Local:
 
     def _step(self, z: Array) -> Array:
         weighted = z if self.weight is None else z * self.weight
-        right = _apply(np.swapaxes(self.scaled, -1, -2), weighted)
+        right = _apply(np.swapaxes(self.weighted, -1, -2), weighted) / self.scale
         return _apply(self.gram_inverse, right) / self.scale
 
     def apply(self, theta: Array) -> Array:
@@ -221,8 +284,9 @@ class _Local:
     def project_out(self, columns: Array) -> Array:
         """Weighted columns (..., 3, n, q) less what the local columns explain."""
         weighted = columns if self.weight is None else columns * self.weight[..., None]
-        inside = np.matmul(self.gram_inverse, np.matmul(np.swapaxes(self.scaled, -1, -2), weighted))
-        return weighted - np.matmul(self.scaled, inside)
+        scaled = self.weighted / self.scale[..., None, :]
+        inside = np.matmul(self.gram_inverse, np.matmul(np.swapaxes(scaled, -1, -2), weighted))
+        return weighted - np.matmul(scaled, inside)
 
     def chi2(self, residual: Array) -> tuple[Array, Array]:
         """Weighted sum of squares and degrees of freedom, each (..., 3)."""
@@ -233,6 +297,33 @@ class _Local:
             else np.count_nonzero(np.broadcast_to(self.weight, residual.shape), axis=-1)
         )
         return np.einsum("...n,...n->...", weighted, weighted), count - self.columns.shape[-1]
+
+
+def inverses(gram: Array) -> Array:
+    """Inverses of symmetric positive definite matrices (..., p, p); of many at once by Cholesky's method over all of them.
+
+    Raises
+    ------
+    numpy.linalg.LinAlgError
+        One is singular.
+    """
+    many = gram.reshape(-1, *gram.shape[-2:])
+    if len(many) < _MANY:
+        return np.linalg.inv(gram).astype(np.float64)
+    p = gram.shape[-1]
+    a = np.ascontiguousarray(many.transpose(1, 2, 0))
+    lower, back, out = np.zeros_like(a), np.zeros_like(a), np.empty_like(a)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        for k in range(p):
+            column = a[k:, k] - np.einsum("jb,ijb->ib", lower[k, :k], lower[k:, :k])
+            pivot = 1.0 / np.sqrt(column[0])
+            lower[k:, k], back[k, k] = column * pivot, pivot
+            back[k, :k] = -pivot * np.einsum("jb,jib->ib", lower[k, :k], back[:k, :k])
+    for i in range(p):
+        out[i, : i + 1] = np.einsum("kb,kjb->jb", back[i:, i], back[i:, : i + 1])
+        out[: i + 1, i] = out[i, : i + 1]
+    found = np.ascontiguousarray(out.transpose(2, 0, 1)).reshape(gram.shape)
+    return found if np.all(np.isfinite(found)) else np.linalg.inv(gram).astype(np.float64)
 
 
 def _apply(matrices: Array, vectors: Array) -> Array:
