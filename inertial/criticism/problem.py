@@ -149,11 +149,23 @@ class Problem:
         if kept is None:
             stacked = np.stack([self._columns(effect, values) for values in grid], axis=2)
             stacked = stacked if first is None else np.ascontiguousarray(stacked[..., :first])
-            kept = Candidate(stacked, effect.scope in SHARED, key=key if len(grid) > 1 or not grid[0] else None)
+            shared = effect.scope in SHARED
+            distinct = None if shared else self._distinct(stacked)
+            kept = Candidate(stacked, shared, key=key if len(grid) > 1 or not grid[0] else None, distinct=distinct)
             if stacked.size < self._room:
                 self._room -= stacked.size
                 self._kept[key] = kept
         return kept
+
+    def _distinct(self, columns: Array) -> int | None:
+        """How many blocks, the first, columns (blocks, ...) are repeated from: one, or one per axis; None where they are not."""
+        for count in (1, 3):
+            if not self.blocks % count and self.blocks > count:
+                many = columns.reshape(-1, count, *columns.shape[1:])
+                # most candidates differ in a few values already
+                if np.array_equal(many[-1, :, -1], many[0, :, -1]) and bool(np.all(many == many[:1])):
+                    return count
+        return None
 
     def pieces(
         self, effect: AnyEffect | Handling, grid: Sequence[Values], *, first: int | None = None

@@ -45,8 +45,12 @@ def summed(gap: Array, constants: Array, duration: float = 0.0) -> Array:
     """
     total = np.zeros(gap.shape)
     if duration <= 0.0:
-        for tau in constants:
-            total += np.exp(-gap / tau)
+        halving = constants.size > 1 and np.array_equal(constants[:-1], 2.0 * constants[1:])
+        fade = np.exp(-gap / constants[0]) if constants.size else total
+        for place, tau in enumerate(constants):
+            if place:  # of half the time constant it is the square
+                fade = fade * fade if halving else np.exp(-gap / tau)
+            total += fade
         return total
     apart = gap > 0.5 * duration
     for tau in constants:
