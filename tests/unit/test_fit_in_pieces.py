@@ -6,7 +6,8 @@ import pytest
 from inertial import poses
 from inertial.errors import NotIdentified
 from inertial.fits import linear
-from inertial.fits.linear import fit_lot, inverses
+from inertial.fits.linear import fit_lot
+from inertial.fits.normal_equations import inverses
 from inertial.frames import force_from_angles
 from inertial.state import State
 
