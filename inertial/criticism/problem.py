@@ -180,18 +180,26 @@ class Problem:
             yield self.candidate(effect, grid[start : start + size], first=first)
 
     def _places(self, effect: Handling, grid: Sequence[Values]) -> Iterator[Candidate]:
-        """The places of an alternative, those of one unit together."""
+        """The places of an alternative, those of one unit together, no more at a time than a piece has room for."""
+        units = self.lot.state.time.shape[0]
         for unit, places in groupby(grid, key=lambda values: values.get("unit")):
-            each = list(places)
-            key = (effect.id, unit, len(each), *each[0].items(), *each[-1].items())
-            if key not in self._kept:
-                found = [effect.change(self.lot, self.slope, **on_axis(p, 0)) for p in each]
-                blocks = None
-                if unit is None:
-                    units = self.lot.state.time.shape[0]
-                    found = [np.broadcast_to(f, (units, *f.shape[1:])) for f in found]
-                else:
-                    blocks = 3 * int(on_axis({"unit": unit}, 0)["unit"]) + np.arange(3)
-                columns = np.stack([by_block(f) for f in found], axis=2)
-                self._kept[key] = Candidate(columns, shared=True, blocks=blocks, key=key)
-            yield self._kept[key]
+            every = list(places)
+            size = max(1, _PIECE // (self.blocks * self.n * _WIDEST)) if unit is None else len(every)
+            for start in range(0, len(every), size):
+                each = every[start : start + size]
+                key = (effect.id, unit, len(each), *each[0].items(), *each[-1].items())
+                kept = self._kept.get(key)
+                if kept is None:
+                    found = [effect.change(self.lot, self.slope, **on_axis(p, 0)) for p in each]
+                    blocks = None
+                    if unit is None:
+                        found = [np.broadcast_to(f, (units, *f.shape[1:])) for f in found]
+                    else:
+                        blocks = 3 * int(on_axis({"unit": unit}, 0)["unit"]) + np.arange(3)
+                    kept = Candidate(
+                        np.stack([by_block(f) for f in found], axis=2), shared=True, blocks=blocks, key=key
+                    )
+                    if kept.columns.size < self._room:
+                        self._room -= kept.columns.size
+                        self._kept[key] = kept
+                yield kept

@@ -13,8 +13,8 @@ if TYPE_CHECKING:
 
 
 _TINY = float(np.finfo(float).tiny)
-_NODES, _WEIGHTS = np.polynomial.hermite_e.hermegauss(24)
-_WEIGHTS = _WEIGHTS / np.sqrt(2.0 * np.pi)
+_NODES, _RAW = np.polynomial.hermite_e.hermegauss(24)
+_WEIGHTS = _RAW / np.sqrt(2.0 * np.pi)
 
 
 def rms_uncertainty(error: Array, covariance: Array) -> Array:
