@@ -1,4 +1,4 @@
-"""Standard uncertainty of the RMS error over dwells whose errors hang together."""
+"""Standard uncertainty of the RMS error over dwells with correlated errors."""
 
 from __future__ import annotations
 
