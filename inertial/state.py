@@ -12,6 +12,9 @@ from inertial.errors import MissingInput
 
 Array = NDArray[np.float64]
 
+_DIMENSIONS = {"force": 3, "felt": 3, "slot": 1}
+"""Of the arrays that a lot of units has; two for all others."""
+
 T_REFERENCE = 25.0
 """Reference temperature in °C: θ = T − 25 °C."""
 
@@ -125,6 +128,23 @@ class State:
             return _at_dwells(self.history.time, operator(self.history.time, self.history.temperature), self.time)
 
         return self.remember(key, run)
+
+    def of(self, units: slice, count: int) -> Self:
+        """Some of the ``count`` units of a lot; arrays that all units share stay as they are."""
+
+        def some(name: str, value: Array | None) -> Array | None:
+            own = value is not None and value.ndim == _DIMENSIONS.get(name, 2) and len(value) == count
+            return value[units] if own and value is not None else value
+
+        changed: dict[str, object] = {
+            item.name: some(item.name, value)
+            for item in fields(self)
+            if isinstance(value := getattr(self, item.name), np.ndarray)
+        }
+        changed["covariates"] = {name: some(name, value) for name, value in self.covariates.items()}
+        if self.history is not None:
+            changed["history"] = replace(self.history, temperature=some("temperature", self.history.temperature))
+        return replace(self, **changed, memory={})
 
     def pick(self, index: slice | NDArray[np.intp]) -> Self:
         """The units at ``index`` along the first batch dimension."""

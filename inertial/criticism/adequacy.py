@@ -5,7 +5,6 @@ from collections.abc import Callable, Iterable, Iterator
 import numpy as np
 from numpy.random import Generator
 from numpy.typing import NDArray
-from scipy import stats
 
 from inertial.criticism.covariance import Noise, Shares
 from inertial.criticism.decisions import CERTAIN_BELOW, DRAWS, ENOUGH, LEAST_SHARE
@@ -16,6 +15,7 @@ from inertial.criticism.model import Model
 from inertial.criticism.penalty import log_p_value
 from inertial.criticism.shares import place_of, shares_at
 from inertial.criticism.space import SEEN, Candidate, Space
+from inertial.criticism.tail_areas import log_f_tail
 from inertial.criticism.tails import heavy
 
 Array = NDArray[np.float64]
@@ -147,7 +147,7 @@ class _At:
             after = self.space.dof - rank
             if rank and after > 0:
                 ratio = (drop / rank) / (np.maximum(self.total - drop, 1e-300) / after)
-                found = np.minimum(found, stats.f.logsf(ratio, rank, after))
+                found = np.minimum(found, log_f_tail(ratio, rank, after))
         return found
 
 
@@ -178,12 +178,15 @@ def _drops(candidate: Candidate, space: Space, noise: Array) -> list[tuple[Array
             along = u[:, s > SEEN].T @ noise_flat
             found.append((np.sum(along**2, axis=0), int(np.count_nonzero(s > SEEN))))
         return found
-    unit = (left / np.where(size > 0.0, size, 1.0)[:, None, :]).reshape(blocks, n, grid, p)
-    for g in range(grid):
-        columns = unit[:, :, g]
-        values, vectors = np.linalg.eigh(np.swapaxes(columns, -1, -2) @ columns)
-        seen = values > SEEN**2
-        whole = columns @ (vectors * np.where(seen, 1.0 / np.sqrt(np.where(seen, values, 1.0)), 0.0)[:, None, :])
-        along = np.swapaxes(whole, -1, -2) @ noise
-        found.append((np.einsum("bpd,bpd->d", along, along), int(seen.sum())))
-    return found
+    unit = left / np.where(size > 0.0, size, 1.0)[:, None, :]
+    along = (np.swapaxes(unit, -1, -2) @ noise).reshape(blocks, grid, p, -1)
+    each = unit.reshape(blocks, n, grid, p).transpose(0, 2, 3, 1)
+    values, vectors = np.linalg.eigh(each @ np.swapaxes(each, -1, -2))
+    seen = values > SEEN**2
+    # what each draw has along the directions of every value's columns: those columns themselves are not made
+    turned = (
+        np.swapaxes(vectors * np.where(seen, 1.0 / np.sqrt(np.where(seen, values, 1.0)), 0.0)[..., None, :], -1, -2)
+        @ along
+    )
+    drops, ranks = np.einsum("bgpd,bgpd->gd", turned, turned), seen.sum(axis=(0, 2))
+    return [(drop, int(rank)) for drop, rank in zip(drops, ranks.tolist(), strict=True)]

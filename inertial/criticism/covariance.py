@@ -212,9 +212,11 @@ class Covariance:
             level = self.level if blocks is None else self.level[blocks]
             found = self._whitener(place, steps, shares)
             if found is not None:
-                own = columns / level[:, None, None]
                 if columns.shape[-1] > _FEW:
-                    return np.matmul(found[0], own)
+                    white = np.matmul(found[0], columns)
+                    white /= level[:, None, None]
+                    return white
+                own = columns / level[:, None, None]
                 return np.swapaxes(_applied(found[0], np.swapaxes(own, -1, -2)), -1, -2)
         place_of = np.arange(len(self.level)) if blocks is None else blocks
         where = np.full(len(self.level), -1)
@@ -234,6 +236,18 @@ class Covariance:
                     flat = found[0] @ own.transpose(1, 0, 2).reshape(n, -1)
                     out[rows] = flat.reshape(n, rows.size, m).transpose(1, 0, 2)
         return out
+
+    def _repeated(self, columns: Array, shares: Shares, distinct: int) -> Array | None:
+        """Columns of which only so many blocks differ, whitened once; None where blocks have whiteners of their own."""
+        if len(self._groups) > 1:
+            return None
+        place, steps, _ = self._groups[0]
+        found = self._whitener(place, steps, shares)
+        if found is None:
+            return None
+        few = np.matmul(found[0], columns[:distinct])
+        whole = few[np.newaxis] / self.level.reshape(-1, distinct, 1, 1)
+        return whole.reshape(columns.shape)
 
     def whiteners(self, shares: Shares) -> Iterator[tuple[NDArray[np.intp], Array]]:
         """Blocks that share a whitener, and the whitener (n, n), lower triangle, for white noise of variance one."""
@@ -260,12 +274,26 @@ class Covariance:
             out[members] = own * (self.level * noise.scale)[members, None, None]
         return out
 
-    def whitened(self, key: object, columns: Array, shares: Shares, blocks: NDArray[np.intp] | None = None) -> Array:
-        """The same, kept under a key for the next time."""
+    def whitened(
+        self,
+        key: object,
+        columns: Array,
+        shares: Shares,
+        blocks: NDArray[np.intp] | None = None,
+        *,
+        distinct: int | None = None,
+    ) -> Array:
+        """The same, kept under a key for the next time.
+
+        Parameters
+        ----------
+        distinct : how many blocks, the first, have columns of their own, which the others repeat in turn; all where None
+        """
         name = (key, shares)
         found = self._kept.get(name)
         if found is None:
-            found = self.whiten(columns, shares, blocks)
+            found = self._repeated(columns, shares, distinct) if distinct and blocks is None else None
+            found = self.whiten(columns, shares, blocks) if found is None else found
             self._kept[name] = found
             self._used += found.size
             while self._used > _COLUMNS and self._kept:

@@ -19,6 +19,7 @@ from inertial.criticism.handling.base import Handling
 from inertial.criticism.model import Model, Term
 from inertial.criticism.penalty import freedom, price
 from inertial.criticism.space import Space
+from inertial.criticism.tail_areas import log_chi2_tail
 
 Array = NDArray[np.float64]
 
@@ -85,7 +86,7 @@ def weighed(deviance: float, rank: int, nonlinear: int, places: int = 1) -> Rati
     """A deviance with its price and its probability."""
     coefficients = rank + nonlinear
     paid = price(deviance, coefficients) + 2.0 * float(np.log(max(places, 1)))
-    return Ratio(deviance, rank, paid, float(stats.chi2.logsf(deviance, coefficients)))
+    return Ratio(deviance, rank, paid, float(log_chi2_tail(deviance, coefficients)))
 
 
 def _deviance(contrasts: Space, left: Space) -> float:

@@ -1,12 +1,12 @@
 """The price of an effect, and the probability of the same reduction by noise."""
 
 import numpy as np
-from scipy import stats
 
 from inertial.criticism import variance
 from inertial.criticism.handling.base import Handling
 from inertial.criticism.model import Model, Term
 from inertial.criticism.space import Gain, Space
+from inertial.criticism.tail_areas import log_f_tail
 
 PER_COEFFICIENT = 2.5
 PER_COLUMN = 6.0
@@ -44,7 +44,7 @@ def log_p_value(space: Space, drop: float, rank: int) -> float:
     if rank == 0 or after <= 0:
         return 0.0
     left = max(space.rss - drop, 1e-300)
-    return float(stats.f.logsf((drop / rank) / (left / after), rank, after))
+    return float(log_f_tail((drop / rank) / (left / after), rank, after))
 
 
 def cost_of_model(model: Model) -> float:

@@ -150,11 +150,23 @@ class Problem:
         if kept is None:
             stacked = np.stack([self._columns(effect, values) for values in grid], axis=2)
             stacked = stacked if first is None else np.ascontiguousarray(stacked[..., :first])
-            kept = Candidate(stacked, effect.scope in SHARED, key=key if len(grid) > 1 or not grid[0] else None)
+            shared = effect.scope in SHARED
+            distinct = None if shared else self._distinct(stacked)
+            kept = Candidate(stacked, shared, key=key if len(grid) > 1 or not grid[0] else None, distinct=distinct)
             if stacked.size < self._room:
                 self._room -= stacked.size
                 self._kept[key] = kept
         return kept
+
+    def _distinct(self, columns: Array) -> int | None:
+        """How many blocks, the first, columns (blocks, ...) are repeated from: one, or one per axis; None where they are not."""
+        for count in (1, 3):
+            if not self.blocks % count and self.blocks > count:
+                many = columns.reshape(-1, count, *columns.shape[1:])
+                # most candidates differ in a few values already
+                if np.array_equal(many[-1, :, -1], many[0, :, -1]) and bool(np.all(many == many[:1])):
+                    return count
+        return None
 
     def pieces(
         self, effect: AnyEffect | Handling, grid: Sequence[Values], *, first: int | None = None
@@ -169,18 +181,26 @@ class Problem:
             yield self.candidate(effect, grid[start : start + size], first=first)
 
     def _places(self, effect: Handling, grid: Sequence[Values]) -> Iterator[Candidate]:
-        """The places of an alternative, those of one unit together."""
+        """The places of an alternative, those of one unit together, no more at a time than a piece has room for."""
+        units = self.lot.state.time.shape[0]
         for unit, places in groupby(grid, key=lambda values: values.get("unit")):
-            each = list(places)
-            key = (effect.id, unit, len(each), *each[0].items(), *each[-1].items())
-            if key not in self._kept:
-                found = [effect.change(self.lot, self.slope, **on_axis(p, 0)) for p in each]
-                blocks = None
-                if unit is None:
-                    units = self.lot.state.time.shape[0]
-                    found = [np.broadcast_to(f, (units, *f.shape[1:])) for f in found]
-                else:
-                    blocks = 3 * int(on_axis({"unit": unit}, 0)["unit"]) + np.arange(3)
-                columns = np.stack([by_block(f) for f in found], axis=2)
-                self._kept[key] = Candidate(columns, shared=True, blocks=blocks, key=key)
-            yield self._kept[key]
+            every = list(places)
+            size = max(1, _PIECE // (self.blocks * self.n * _WIDEST)) if unit is None else len(every)
+            for start in range(0, len(every), size):
+                each = every[start : start + size]
+                key = (effect.id, unit, len(each), *each[0].items(), *each[-1].items())
+                kept = self._kept.get(key)
+                if kept is None:
+                    found = [effect.change(self.lot, self.slope, **on_axis(p, 0)) for p in each]
+                    blocks = None
+                    if unit is None:
+                        found = [np.broadcast_to(f, (units, *f.shape[1:])) for f in found]
+                    else:
+                        blocks = 3 * int(on_axis({"unit": unit}, 0)["unit"]) + np.arange(3)
+                    kept = Candidate(
+                        np.stack([by_block(f) for f in found], axis=2), shared=True, blocks=blocks, key=key
+                    )
+                    if kept.columns.size < self._room:
+                        self._room -= kept.columns.size
+                        self._kept[key] = kept
+                yield kept

@@ -27,12 +27,14 @@ class Candidate:
     shared : whether all blocks share the p coefficients
     blocks : the blocks that the columns are of, all if None; the columns of the others are zero. Only where shared
     key : under which whitened columns are stored; not stored if None
+    distinct : how many blocks, the first, have columns of their own, which the others repeat in turn; all if None
     """
 
     columns: Array
     shared: bool
     blocks: NDArray[np.intp] | None = None
     key: object = None
+    distinct: int | None = None
 
     def whitened(self, covariance: Covariance, noise: Noise) -> Array:
         """The columns in the whitened space, (blocks, n, grid, p)."""
@@ -41,7 +43,7 @@ class Candidate:
         if self.key is None:
             white = covariance.whiten(flat, noise.shares, self.blocks)
         else:
-            white = covariance.whitened(self.key, flat, noise.shares, self.blocks)
+            white = covariance.whitened(self.key, flat, noise.shares, self.blocks, distinct=self.distinct)
         scale = noise.scale if self.blocks is None else noise.scale[self.blocks]
         return (white / scale[:, None, None]).reshape(blocks, n, grid, p)
 

@@ -172,6 +172,8 @@ def others(axis: int) -> tuple[int, int]:
 def stack(state: State, columns: Sequence[Array]) -> Array:
     """Columns of shape (..., n) as one array (..., n, p), broadcast against the state's force and one another."""
     shape = np.broadcast_shapes(state.force.shape[:-1], *(c.shape for c in columns))
+    if len(columns) == 1:
+        return np.broadcast_to(columns[0], shape)[..., None]
     found = np.empty((*shape, len(columns)))
     for place, column in enumerate(columns):
         found[..., place] = column

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import solve_triangular
 
-from inertial.fits.restricted import Restricted
+from inertial.fits.restricted import Restricted, profiled_deviance
 
 Array = NDArray[np.float64]
 
@@ -118,7 +118,7 @@ class Series:
         if len(shared_inverse):
             sizes = np.linalg.eigvalsh(shared_inverse)
             logdet -= np.sum(np.log(sizes[sizes > _SINGULAR * sizes[-1]]))
-        deviance = dof * np.log(max(variance, 1e-300)) + 2.0 * blocks * np.sum(np.log(np.diagonal(root))) + logdet
+        deviance = float(profiled_deviance(variance, dof)) + 2.0 * blocks * np.sum(np.log(np.diagonal(root))) + logdet
         return variance, float(deviance)
 
     def deviances(self, first: Array, second: Array) -> Array:

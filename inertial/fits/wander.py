@@ -64,6 +64,10 @@ class WanderFit:
     nonlinear_error: dict[str, dict[str, float]]
     walk_shown: bool
     """Whether the record shows the walk: no flicker alone explains it as well."""
+    gain: Array
+    """(..., 3, p, n): what every output of the n dwells that were fitted adds to the coefficients."""
+    widened: float
+    """Factor of the errors of the coefficients where the noise is known from few degrees of freedom; one elsewhere."""
 
     @property
     def flicker(self) -> float:
@@ -167,6 +171,8 @@ def fit_lot_with_wander(
         lack_of_fit=stretch,
         nonlinear_error=columns.errors(solved),
         walk_shown=_shown(series, shares[1]),
+        gain=np.broadcast_to(solved.gain, (*theta.shape, int(there.sum()))),
+        widened=known,
     )
 
 

@@ -45,8 +45,12 @@ def summed(gap: Array, constants: Array, duration: float = 0.0) -> Array:
     """
     total = np.zeros(gap.shape)
     if duration <= 0.0:
-        for tau in constants:
-            total += np.exp(-gap / tau)
+        halving = constants.size > 1 and np.array_equal(constants[:-1], 2.0 * constants[1:])
+        fade = np.exp(-gap / constants[0]) if constants.size else total
+        for place, tau in enumerate(constants):
+            if place:  # of half the time constant it is the square
+                fade = fade * fade if halving else np.exp(-gap / tau)
+            total += fade
         return total
     apart = gap > 0.5 * duration
     for tau in constants:
@@ -60,16 +64,33 @@ def summed(gap: Array, constants: Array, duration: float = 0.0) -> Array:
 def flicker_kernel(time: Array, *, slowest: float = SLOWEST_DIAGNOSED) -> Array:
     """Correlation matrix (..., n, n) of 1/f wander at times ``time`` (..., n) in s.
 
-    Time constants run in octaves from a third of the typical spacing to ``slowest`` times the length of the record.
+    Time constants are those of :func:`constants_of`.
     """
     gap = np.abs(time[..., :, None] - time[..., None, :])
-    span = float(np.max(gap, initial=1.0))
+    constants = constants_of(time, slowest=slowest)
+    return summed(gap, constants) / constants.size
+
+
+def constants_of(time: Array, *, slowest: float) -> Array:
+    """Time constants (k,), s, of wander between dwells, in octaves from a third of their spacing to ``slowest`` records.
+
+    Parameters
+    ----------
+    time : (..., n), s
+    """
+    span = max(float(np.max(np.ptp(time, axis=-1))), 1.0) if time.size else 1.0
     spacing = max(float(np.median(np.diff(np.unique(time)))) if np.unique(time).size > 1 else 1.0, span / 1e5, 1e-6)
     octaves = max(int(np.ceil(np.log2(slowest * span / (spacing * FASTEST_SPACING)))), 2)
-    return summed(gap, time_constants(slowest * span, octaves)) / octaves
+    return time_constants(slowest * span, octaves)
 
 
 def flicker_of_means(gap: Array, duration: float, slowest: float) -> Array:
     """Covariance of means over ``duration`` s that are ``gap`` apart, for flicker with B = 1 and no slower than ``slowest`` s."""
-    octaves = max(2, int(np.ceil(np.log(slowest / (FASTEST_WITHIN * duration)) / np.log(RATIO))) + 1)
-    return summed(gap, time_constants(slowest, octaves), duration) * np.log(RATIO) / np.pi
+    return summed(gap, constants_of_means(duration, slowest), duration) * np.log(RATIO) / np.pi
+
+
+def constants_of_means(duration: float, slowest: float) -> Array:
+    """Time constants (k,), s, of the processes behind means over ``duration`` s; each has the variance B²·ln 2/π."""
+    return time_constants(
+        slowest, max(2, int(np.ceil(np.log(slowest / (FASTEST_WITHIN * duration)) / np.log(RATIO))) + 1)
+    )

@@ -49,27 +49,46 @@ def instability(deviation: Array, time: Array, *, slowest: float = 1.0) -> Array
     return deviation * np.sqrt(np.pi / (octaves * _OCTAVE))
 
 
-def walked(record: float, later: float = 0.0) -> float:
-    """Variance, for a random walk of K = 1, of its mean over some time against its value at the start of a record.
-
-    The coefficient of a fit is the bias at its first dwell: its walk is zero there. Its mean over the record is a/3 off that;
-    its mean over a time b that follows, a + b/3.
+def walk_mean(time: Array, since: float, start: float, length: float) -> tuple[Array, float]:
+    """Of a random walk of K = 1, zero at ``since``: covariance (n,) with its mean over a window, and that mean's variance.
 
     Parameters
     ----------
-    record, later : lengths a and b, s; the mean is that over the record where ``later`` is zero
+    time : (n,), s; since, start : s; length : of the window, s
     """
-    return record + later / 3.0 if later > 0.0 else record / 3.0
+    before, inside = start - since, np.clip(time - start, 0.0, length)
+    along = np.minimum(time - since, before) + inside - 0.5 * inside**2 / max(length, 1e-9)
+    return along, before + length / 3.0
 
 
-def of_the_record(error: Array, walk: Array) -> Array:
-    """Standard uncertainty of a bias as the mean of its record, from that of its value at the first dwell.
+def flicker_mean(time: Array, constants: Array, start: float, length: float) -> tuple[Array, float]:
+    """The same of a sum of Ornstein–Uhlenbeck processes, equal and of variance one together, for times inside the window.
 
     Parameters
     ----------
-    error : standard error of the coefficient; walk : standard deviation of the random walk at the last dwell
+    constants : (k,), time constants of the processes, s
     """
-    return np.hypot(error, walk * np.sqrt(walked(1.0)))
+    inside = np.clip(time - start, 0.0, length)
+    along, own = np.zeros(time.shape), 0.0
+    for tau in constants.tolist():
+        share = tau / max(length, 1e-9)
+        along += share * (2.0 - np.exp(-inside / tau) - np.exp(-(length - inside) / tau))
+        own += 2.0 * share * (1.0 + share * float(np.expm1(-1.0 / share)))
+    return along / constants.size, own / constants.size
+
+
+def against_mean(variance: Array, gain: Array, kind: tuple[Array, float]) -> Array:
+    """Change of a coefficient's variance where not zero but the mean of the wander over a window is what it should show.
+
+    The coefficient is wrong by gᵀ·v of the wander v; against the mean m it is wrong by gᵀ·v − m, whose variance is that of gᵀ·v
+    less 2·gᵀ·cov(v, m) − var(m). A fit follows the wander of its record.
+
+    Parameters
+    ----------
+    variance : (...), of the wander; gain : (..., n), g; kind : cov(v, m)/variance and var(m)/variance
+    """
+    along, own = kind
+    return variance * (own - 2.0 * gain @ along)
 
 
 def of_a_day(
@@ -77,18 +96,16 @@ def of_a_day(
     wander: Array,
     time: Array,
     *,
-    walk: Array | float = 0.0,
     slowest: float = 1.0,
     widened: float = 1.0,
 ) -> Array:
-    """Standard uncertainty of a bias as the mean of the day after its record; the shape and unit of ``record``.
+    """Standard uncertainty of a bias as the mean of the day after its record, as far as 1/f goes; the shape of ``record``.
 
-    Flicker between the record and that day, and the random walk since the first dwell, are added to the coefficient's error.
+    Flicker between the record and that day is added to the error of the record's mean.
 
     Parameters
     ----------
-    record : standard error of the coefficient; wander : standard deviation of the 1/f wander between dwells
-    walk : standard deviation of the random walk at the end of the record
+    record : standard uncertainty of the record's mean; wander : standard deviation of the 1/f wander between dwells
     time : (n,), s, of the dwells; slowest : as in :func:`instability`
     widened : factor of the wander's share, as it is known from few degrees of freedom
     """
@@ -96,4 +113,4 @@ def of_a_day(
     if not span > 0.0:
         return np.full_like(record, np.nan)
     flicker = instability(wander, time, slowest=slowest) * np.sqrt(between_means(span, DAY_S))
-    return np.hypot(record, widened * np.hypot(flicker, walk * np.sqrt(walked(span, DAY_S) / span)))
+    return np.hypot(record, widened * flicker)

@@ -71,6 +71,21 @@ def expected_errors(effects: Sequence[str], state: State, covariance: Array, *, 
     )
 
 
+def expected_gain(effects: Sequence[str], state: State, covariance: Array) -> Array:
+    """What every dwell of a plan adds to the coefficients of its fit, (3, p, n): (Hᵀ·C⁻¹·H)⁻¹·Hᵀ·C⁻¹ of the sensor's effects.
+
+    Parameters
+    ----------
+    effects, state, covariance : as in :func:`expected_errors`
+    """
+    sensor, _ = design.split(effects)
+    values = design.starting_values(sensor, state)
+    white = whitener(covariance)
+    h = white @ design.local_columns(sensor, state, values)
+    inverse = np.stack([inverted(part, design.local_names(sensor, axis, values)) for axis, part in enumerate(h)])
+    return inverse @ (np.swapaxes(h, -1, -2) @ white)
+
+
 def inverted(columns: Array, names: Sequence[tuple[str, str]]) -> Array:
     """(XᵀX)⁻¹ of whitened columns (n, p), inverted with scaled columns; raises NotIdentified where it is singular."""
     size = np.linalg.norm(columns, axis=0)

@@ -17,6 +17,7 @@ from inertial.population.drift import (
     last_reliable,
     leaves,
     prudent,
+    seating_of,
     standing,
 )
 from pipelines.audit.pairs import YEAR_D, Pairs, changes_of, e_n_of, last_of_each, pairs_of, spans_of
@@ -47,6 +48,7 @@ class KindDrift:
     ahead : the drift for forecasts, see :func:`~inertial.population.drift.prudent`
     beyond : share of the pairs with |E_n| > 1; out : share with a change above the tolerance; median : of |change|
     reliable_months : time in which a unit of the kind stays in all tolerances with the target's probability; NaN without one
+    seating : standard deviation of one mounting as E_n allows for it, and its degrees of freedom
     known : whether any pair is long enough apart to identify a drift; without one there is no forecast
     """
 
@@ -60,6 +62,7 @@ class KindDrift:
     tolerance: float
     reliable_months: float
     known: bool = True
+    seating: tuple[float, float] = (0.0, 1.0)
 
 
 @dataclass(frozen=True)
@@ -117,8 +120,9 @@ def kind_drifts(calibrations: Calibrations, good: Flags, rules: Rules, since: fl
             together = tuple(np.concatenate(parts) for parts in both)
             kind = kind_of(*together)
             recent = kept & (calibrations.day[pairs.later] >= since)
+            seating = seating_of(kind, *together, pairs=int(kept.sum()))
             drift_of_kind = _kind_drift(
-                calibrations, pairs, recent, device, name, (kind, prudent(kind, *together)), rules
+                calibrations, pairs, recent, device, name, (kind, prudent(kind, *together)), seating, rules
             )
             own.append(replace(drift_of_kind, known=drifts_known(together[1])))
         forecast_known = all(one.known for one in own)
@@ -150,12 +154,13 @@ def _kind_drift(
     device: str,
     name: str,
     kinds: tuple[DeviceDrift, DeviceDrift],
+    seating: tuple[float, float],
     rules: Rules,
 ) -> KindDrift:
     tolerance = rules.tolerance_of(device, FAMILY_OF[name])
     kind, ahead = kinds
     change, _ = changes_of(calibrations, pairs, name)
-    numbers, moved = e_n_of(calibrations, pairs, name, kind)[recent], np.abs(change[recent])
+    numbers, moved = e_n_of(calibrations, pairs, name, seating)[recent], np.abs(change[recent])
     numbers, moved = numbers[np.isfinite(numbers)], moved[np.isfinite(moved)]
     return KindDrift(
         device=device,
@@ -167,6 +172,7 @@ def _kind_drift(
         median=float(np.median(moved)) if moved.size else 0.0,
         tolerance=tolerance,
         reliable_months=float("nan"),
+        seating=seating,
     )
 
 
@@ -252,7 +258,7 @@ def _course(
 def _unit_drifts(calibrations: Calibrations, rows: Pairs, course: _Course, until: Array) -> list[UnitDrift]:
     drift_of_kind, now, times, beyond = course.drift_of_kind, course.now, course.times, course.beyond
     change, _ = changes_of(calibrations, rows, drift_of_kind.parameter)
-    numbers = e_n_of(calibrations, rows, drift_of_kind.parameter, drift_of_kind.kind)
+    numbers = e_n_of(calibrations, rows, drift_of_kind.parameter, drift_of_kind.seating)
     return [
         UnitDrift(
             unit=str(calibrations.unit[row]),

@@ -12,7 +12,6 @@ from inertial.population.agreement import e_n
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from inertial.population.drift import DeviceDrift
     from pipelines.audit.calibrations import Calibrations
 
     Array = NDArray[np.float64]
@@ -21,12 +20,6 @@ if TYPE_CHECKING:
 
 
 YEAR_D = 365.25
-
-
-PAIRS_A_DOF = 6.0
-"""Pairs for each degree of freedom of the mounting's variance: three variances are estimated from the same pairs. By
-simulation of units without drift, 20 units of three calibrations whose stated uncertainty is a fifth of their scatter: |E_n|
-> 1 in 4.4 % (8.3 % with a coverage factor of 2)."""
 
 
 @dataclass(frozen=True)
@@ -52,13 +45,18 @@ def changes_of(calibrations: Calibrations, pairs: Pairs, name: str) -> tuple[Arr
     return value[pairs.later] - value[pairs.earlier], error[pairs.later] ** 2 + error[pairs.earlier] ** 2
 
 
-def e_n_of(calibrations: Calibrations, pairs: Pairs, name: str, kind: DeviceDrift) -> Array:
-    """E_n of every pair; the mounting's variance is part of both uncertainties and is known only from the pairs of the kind."""
-    value = calibrations.column(name)
-    error = np.hypot(calibrations.error(name), kind.mount_sd)
+def e_n_of(calibrations: Calibrations, pairs: Pairs, name: str, seating: tuple[float, float]) -> Array:
+    """E_n of every pair; the mounting's variance is part of both uncertainties and is known only from the pairs of the kind.
+
+    Parameters
+    ----------
+    seating : standard deviation of one mounting, and its degrees of freedom
+    """
+    value, (mount, known_from) = calibrations.column(name), seating
+    error = np.hypot(calibrations.error(name), mount)
     total = error[pairs.later] ** 2 + error[pairs.earlier] ** 2
-    share = np.maximum(2.0 * kind.mount_sd**2 / total, 1e-6)
-    dof = max(kind.pairs / PAIRS_A_DOF, 1.0) / share**2  # Welch and Satterthwaite (JCGM 100, G.4.1)
+    share = np.maximum(2.0 * mount**2 / total, 1e-6)
+    dof = known_from / share**2  # Welch and Satterthwaite (JCGM 100, G.4.1)
     return e_n(value[pairs.later], value[pairs.earlier], error[pairs.later], error[pairs.earlier], dof)
 
 

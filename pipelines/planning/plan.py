@@ -11,8 +11,9 @@ from inertial import effects as catalogue
 from inertial.effects import SensorEffect
 from inertial.errors import NotIdentified
 from inertial.noise.dwells import dwell_covariance
-from inertial.noise.measurands import DAY_S, between_means, walked
-from inertial.planning.expected import expected_errors
+from inertial.noise.flicker import RATIO, constants_of_means
+from inertial.noise.measurands import DAY_S, against_mean, between_means, flicker_mean, walk_mean
+from inertial.planning.expected import expected_errors, expected_gain
 from inertial.planning.reasons import reason
 from inertial.planning.visibility import SEEN, visibilities
 from pipelines.planning.reach import reach
@@ -36,6 +37,8 @@ if TYPE_CHECKING:
     from schemas.limits import Limits
     from schemas.recipe import Recipe
     from schemas.station import StationConfig
+
+    Array = NDArray[np.float64]
 
 NO_SWITCH_ON = "no repeatability of switching on is stated for this device"
 
@@ -97,40 +100,63 @@ def plan(context: PlanContext, terms: BudgetTerms | None = None, limits: Limits 
         "dwell_s": {"planned": recipe.dwell_s, "white_as_large_as_wander": noise.balanced()},
         "minutes": spent(context.activities).document(),
         "coefficients": _coefficient_rows(expected),
-        "bias": _bias(context, expected, terms),
+        "bias": _bias(context, expected, of_record, terms),
         "effects": [_row(s, context.state, recipe.effects) | {"floor_white_ug": alone.get(s.effect)} for s in found],
         **({} if terms is None else {"uncertainty": reach(context, of_record, terms, limits)}),
     }
 
 
-def _of_record(context: PlanContext) -> NDArray[np.float64]:
+def _of_record(context: PlanContext) -> Array:
     """Covariance of the dwells as a fit sees it: what changes more slowly than the record is, for the record, the bias itself."""
     time, length = context.state.time, context.recipe.dwell_s
     return dwell_covariance(time, length, context.noise, since=float(time.min()) - 0.5 * length)
 
 
-def _bias(context: PlanContext, expected: Expected, terms: BudgetTerms | None) -> dict[str, float | str | None] | None:
+def _against_means(context: PlanContext, square: Array, gain: Array) -> tuple[Array, Array]:
+    """Variances (k,), g², of biases as the mean of the record and, as far as the walk goes, of the day after it.
+
+    Parameters
+    ----------
+    square : (k,), variances of the coefficients; gain : (k, n), what every dwell adds to them
+    """
+    time, noise, length = context.state.time, context.noise, context.recipe.dwell_s
+    span, first = float(np.ptp(time)), float(time.min())
+    since = first - 0.5 * length
+    if not span > 0.0:
+        return square, square
+    constants = constants_of_means(length, span + 0.5 * length)
+    flicker = np.full(len(square), noise.instability**2 * constants.size * np.log(RATIO) / np.pi)
+    square = square + against_mean(flicker, gain, flicker_mean(time, constants, first, span))
+    walk = np.full(len(square), noise.walk**2)
+    record = square + against_mean(walk, gain, walk_mean(time, since, first, span))
+    later = square + against_mean(walk, gain, walk_mean(time, since, first + span, DAY_S))
+    return np.maximum(record, 0.0), np.maximum(later, 0.0)
+
+
+def _bias(
+    context: PlanContext, expected: Expected, of_record: Array, terms: BudgetTerms | None
+) -> dict[str, float | str | None] | None:
     """Standard uncertainty of the bias by measurand, of the worst axis, as the fit will state it; None for a model without one.
 
     See :func:`pipelines.stages.bias_measurands.bias_measurands`.
     """
-    own = [
-        float(expected.errors[axis, k])
+    places = [
+        (axis, k)
         for axis, names in enumerate(expected.names)
         for k, (effect, _) in enumerate(names)
         if effect == "bias"
     ]
-    if not own:
+    if not places:
         return None
+    axes, columns = np.array(places).T
+    gain = expected_gain(context.recipe.effects, context.state, of_record)[axes, columns]
+    record, later = _against_means(context, expected.errors[axes, columns] ** 2, gain)
     span = float(np.ptp(context.state.time))
-    noise, apart = context.noise, 0.0
-    if span > 0.0:
-        flicker = noise.instability * np.sqrt(between_means(span, DAY_S))
-        apart = float(np.hypot(flicker, noise.walk * np.sqrt(walked(span, DAY_S))))
-    long = MICRO * float(np.hypot(max(own), apart))
+    apart = context.noise.instability * np.sqrt(between_means(span, DAY_S)) if span > 0.0 else 0.0
+    long = MICRO * float(np.max(np.hypot(np.sqrt(later), apart)))
     again = None if terms is None or terms.stability is None else terms.stability.switch_on_ug
     return {
-        "record_u_ug": MICRO * float(np.hypot(max(own), noise.walk * np.sqrt(walked(span)))),
+        "record_u_ug": MICRO * float(np.max(np.sqrt(record))),
         "long_u_ug": long,
         "long_s": DAY_S,
         "switch_on_u_ug": None if again is None else float(np.hypot(long, again)),

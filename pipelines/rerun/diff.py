@@ -60,10 +60,14 @@ def _table(run: Run, name: str) -> pd.DataFrame:
 
 
 def _standard(run: Run) -> pd.DataFrame:
-    """Figures with their standard uncertainty; the table has the expanded one (factor of the limits, if any)."""
+    """Figures with their standard uncertainty; the table has the expanded one, with the factor of the limits.
+
+    Runs of versions before the risk of decisions have figures without a limit with twice the standard uncertainty, whatever the
+    factor of their limits.
+    """
     figures = _table(run, "figures")
     factor = (run.about.get("limits") or {}).get("coverage_factor", PLAIN_FACTOR)
-    limited = figures["limit"].notna()
+    limited = figures["limit"].notna() | ("pfa" in figures)
     return figures.assign(
         standard_error=figures["uncertainty"].astype(float) / limited.map({True: factor, False: PLAIN_FACTOR})
     )

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from inertial.noise.measurands import DAY_S, instability, of_a_day, of_the_record
+from inertial.noise.flicker import SLOWEST_FITTED, constants_of
+from inertial.noise.measurands import DAY_S, against_mean, flicker_mean, instability, of_a_day, walk_mean
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -16,32 +18,66 @@ if TYPE_CHECKING:
 COLUMNS = ("bias_instability_ug", "bias_record_u_ug", "bias_long_u_ug", "bias_long_s", "bias_switch_on_u_ug")
 
 
-def bias_measurands(
-    record: Array,
-    wander: Array,
-    walk: Array,
-    time: Array,
-    widened: float,
-    switch_on: float | None = None,
-) -> dict[str, Array]:
+@dataclass(frozen=True)
+class BiasNoise:
+    """What a fit knows of its bias and its noise; arrays (units, 3), µg.
+
+    error : standard error of the coefficient; gain : (units, 3, n), what every dwell of the fit adds to the coefficient
+    flicker, walk : standard deviations of the wander between dwells, and of the random walk at the end of all dwells
+    carried : the walk that goes on after the record; excess : scatter of the dwells that their samples do not show, and what of
+        the walk is not carried on
+    time : (n,), s, of the dwells of the fit; every : (m,), s, of all dwells: the walk is zero at the first of them
+    known : factor of the errors, as the noise is known from few degrees of freedom; widened : of the flicker after the record
+    """
+
+    error: Array
+    gain: Array
+    flicker: Array
+    walk: Array
+    carried: Array
+    excess: Array
+    time: Array
+    every: Array
+    known: float
+    widened: float
+
+
+def bias_measurands(noise: BiasNoise, switch_on: float | None = None) -> dict[str, Array]:
     """Standard uncertainties of the bias by measurand, (units, 3) each, by the names of :data:`COLUMNS`.
 
-    ``record``: the mean over the dwells' own time: the standard error of the coefficient, and what a walk adds, as the
-    coefficient is its value at the first dwell. ``long``: the mean over the day after it; flicker and random walk until then
-    are added. ``switch_on``: the mean of a day after the device was switched off and on; not a number where no repeatability of
-    switching on is stated, never zero.
+    ``record``: the mean over the dwells' own time, which the coefficient follows: what both share of the wander is no error.
+    ``long``: the mean over the day after it; flicker and random walk until then are added. ``switch_on``: the mean of a day after
+    the device was switched off and on; not a number where no repeatability of switching on is stated, never zero.
 
     Parameters
     ----------
-    record : (units, 3), µg, standard error of the coefficient; wander : (units, 3), µg, standard deviation of the 1/f wander
-    between dwells
-    walk : (units, 3), µg, standard deviation of the random walk at the end of the record
-    time : (n,), s, of the dwells of the fit
-    widened : factor on the share of the wander, for its few degrees of freedom
     switch_on : standard deviation of the bias from one switch-on to the next, µg
     """
-    found, long = instability(wander, time), of_a_day(record, wander, time, walk=walk, widened=widened)
+    time, first, start = noise.time, float(noise.time.min()), float(noise.every.min())
+    length = float(np.ptp(time))
+    square = noise.error**2
+    if length > 0.0:
+        flicker = flicker_mean(time, constants_of(noise.every, slowest=SLOWEST_FITTED), first, length)
+        walk = _of_variance_one(walk_mean(time, start, first, length), noise)
+        day = _of_variance_one(walk_mean(time, start, first + length, DAY_S), noise)
+        square = square + noise.known**2 * against_mean(noise.flicker**2, noise.gain, flicker)
+        stays = noise.walk**2 - noise.carried**2
+        later = square + noise.known**2 * (
+            against_mean(stays, noise.gain, walk) + against_mean(noise.carried**2, noise.gain, day)
+        )
+        square = square + noise.known**2 * against_mean(noise.walk**2, noise.gain, walk)
+    else:
+        later = square
+    record, at_end = (np.sqrt(np.maximum(part, 0.0)) for part in (square, later))
+    wander = np.hypot(noise.flicker, noise.excess)
+    long = of_a_day(at_end, wander, time, widened=noise.widened)
     again = np.full_like(record, np.nan) if switch_on is None else np.hypot(long, switch_on)
     return dict(
-        zip(COLUMNS, (found, of_the_record(record, walk), long, np.full_like(record, DAY_S), again), strict=True)
+        zip(COLUMNS, (instability(wander, time), record, long, np.full_like(record, DAY_S), again), strict=True)
     )
+
+
+def _of_variance_one(kind: tuple[Array, float], noise: BiasNoise) -> tuple[Array, float]:
+    """A walk's covariance and variance for one that has the variance one at the end of all dwells."""
+    span = max(float(np.ptp(noise.every)), 1e-9)
+    return kind[0] / span, kind[1] / span

@@ -12,7 +12,7 @@ from inertial import design
 from inertial.errors import InertialError
 from inertial.fits.linear import LotFit, felt_force, fit_lot
 from inertial.fits.wander import WanderFit, fit_lot_with_wander, student
-from pipelines.stages.bias_measurands import COLUMNS, bias_measurands
+from pipelines.stages.bias_measurands import COLUMNS, BiasNoise, bias_measurands
 from pipelines.stages.nonlinear import profiled
 from pipelines.tables.calibration import coefficient_rows, covariance_rows
 from pipelines.tables.dwells import KINDS, LotArrays, lot_arrays
@@ -45,6 +45,7 @@ class _Noisy:
     distinguished from flicker
     lack_of_fit : (units, 3), variance over that of the noise, one where it is no larger
     per_g : (units, 3), output per g
+    gain : (units, 3, p, n), what every output of the n dwells of the fit adds to the coefficients; known : factor of their errors
     """
 
     method: Literal["wander", "birge"]
@@ -58,6 +59,8 @@ class _Noisy:
     lack_of_fit: Array
     nonlinear_error: dict[str, dict[str, float]]
     per_g: Array
+    gain: Array
+    known: float = 1.0
     walk_shown: bool = False
 
 
@@ -126,6 +129,8 @@ def _by_wander(lot: LotArrays, found: WanderFit, used: NDArray[np.bool_]) -> _No
         lack_of_fit=found.lack_of_fit,
         nonlinear_error=found.nonlinear_error,
         per_g=_per_g(lot, found.fit),
+        gain=found.gain,
+        known=found.widened,
         walk_shown=found.walk_shown,
     )
 
@@ -152,6 +157,7 @@ def _by_birge(lot: LotArrays, plain: LotFit, used: NDArray[np.bool_]) -> _Noisy:
         lack_of_fit=stretch,
         nonlinear_error={},
         per_g=_per_g(lot, plain),
+        gain=np.zeros((*plain.coefficients.shape, int(used.sum()))),  # no wander that the coefficients could follow
     )
 
 
@@ -250,15 +256,28 @@ def _bias_of(lot: LotArrays, found: _Noisy, scale: Array) -> dict[str, Array]:
         return {name: np.full(scale.shape, np.nan) for name in COLUMNS}
     used = lot.of_kind("dwell")
     errors = np.sqrt(np.diagonal(found.fit.covariance, axis1=-2, axis2=-1))
-    record = np.stack([errors[:, axis, place] for axis, place in enumerate(places)], axis=1)
     own = np.mean(lot.standard_error[:, used] ** 2, axis=1)
-    time = np.broadcast_to(lot.state.time, (len(lot.units), used.size))[0, used]
-    carried = found.walk_shown or np.ptp(time) >= LONG_S
+    time = np.broadcast_to(lot.state.time, (len(lot.units), used.size))[0]
+    carried = found.walk_shown or np.ptp(time[used]) >= LONG_S
     walk = found.walk if carried else np.zeros_like(found.walk)
-    wander = np.sqrt(found.flicker**2 + np.maximum(found.white**2 - own, 0.0) + 0.5 * (found.walk**2 - walk**2))
-    widened = student(max(int(np.sum(found.fit.dof)) - 2, 1))
-    record, wander, walk = (MICRO * part / scale for part in (record, wander, walk))
-    return bias_measurands(record, wander, walk, time, widened)
+    excess = np.sqrt(np.maximum(found.white**2 - own, 0.0) + 0.5 * (found.walk**2 - walk**2))
+    record = np.stack([errors[:, axis, place] for axis, place in enumerate(places)], axis=1)
+    record, flicker, whole, walk, excess = (
+        MICRO * part / scale for part in (record, found.flicker, found.walk, walk, excess)
+    )
+    noise = BiasNoise(
+        error=record,
+        gain=np.stack([found.gain[:, axis, place] for axis, place in enumerate(places)], axis=1),
+        flicker=flicker,
+        walk=whole,
+        carried=walk,
+        excess=excess,
+        time=time[used],
+        every=time,
+        known=found.known,
+        widened=student(max(int(np.sum(found.fit.dof)) - 2, 1)),
+    )
+    return bias_measurands(noise)
 
 
 def _nothing() -> dict[str, pd.DataFrame]:

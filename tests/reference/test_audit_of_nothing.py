@@ -1,5 +1,6 @@
 """What the audit says of archives in which nothing happens: shares of false findings, on histories from plain arithmetic."""
 
+import independent_noise as made
 import numpy as np
 import pytest
 
@@ -131,6 +132,41 @@ def test_units_that_stand_still_agree_in_nineteen_of_twenty(rng, stated):
         beyond += [kind.beyond for kind in kinds]
     assert len(beyond) == 8 * len(OWN)
     assert np.mean(beyond) < 0.062
+
+
+@pytest.mark.parametrize("units", [8, 60])
+@pytest.mark.parametrize("kind", ["white", "correlated", "flicker"])
+def test_second_calibrations_agree_in_nineteen_of_twenty(rng, kind, units):
+    """Units without drift whose stated uncertainty is a fifth of their scatter: 10 to 25 % disagreed before."""
+    beyond = []
+    for _ in range(6):
+        days = np.cumsum(rng.uniform(100.0, 300.0, (units, 2)), axis=1)
+        rows = units * len(NAMES)
+        if kind == "flicker":
+            series = made.flicker(rng, rows, 512, 1.0).reshape(units, len(NAMES), 512)
+            later = (days[:, 1] - days[:, 0]).astype(int)
+            pair = np.stack([series[..., 0], series[np.arange(units), :, later]], axis=1)
+        else:
+            memory = 0.6 if kind == "correlated" else 0.0
+            pair = np.swapaxes(made.autoregressive(rng, rows, 2, memory).reshape(units, len(NAMES), 2), 1, 2)
+        serials = np.repeat([f"U{u:05d}" for u in range(units)], 2)
+        values = (REPEAT * pair).reshape(-1, len(NAMES))
+        found = calibrations(serials, days.ravel(), values, errors=0.2 * REPEAT)
+        beyond += [one.beyond for one in kind_drifts(found, np.ones(len(found), dtype=bool), load_rules(), 0.0)]
+    assert len(beyond) == 6 * len(OWN)
+    assert np.mean(beyond) < 0.065
+
+
+def test_units_that_wander_disagree_all_the_same(rng):
+    """A random walk of a kind's parameters between calibrations at three and more times is no seating."""
+    units, times = 60, 4
+    days = np.cumsum(rng.uniform(100.0, 600.0, (units, times)), axis=1)
+    steps = np.sqrt(np.diff(days, axis=1, prepend=days[:, :1]) / 200.0)[..., None]
+    values = np.cumsum(steps * REPEAT * rng.standard_normal((units, times, len(NAMES))), axis=1)
+    serials = np.repeat([f"U{u:05d}" for u in range(units)], times)
+    found = calibrations(serials, days.ravel(), values.reshape(-1, len(NAMES)), errors=0.2 * REPEAT)
+    beyond = [one.beyond for one in kind_drifts(found, np.ones(len(found), dtype=bool), load_rules(), 0.0)]
+    assert np.mean(beyond) > 0.3
 
 
 FIGURES, LIMIT = 7, 4.0  # as many figures, normal with σ = 1 and limits of ± 4: Ppk is 4/3

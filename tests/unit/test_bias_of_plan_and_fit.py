@@ -9,7 +9,7 @@ import pandas as pd
 import pytest
 
 from inertial.noise.dwells import DwellNoise
-from inertial.noise.measurands import walked
+from inertial.noise.measurands import walk_mean
 from pipelines.jobs.recipes import load_recipe
 from pipelines.planning.plan import plan, plan_context
 from pipelines.stages.fit import fit
@@ -80,8 +80,8 @@ def test_plan_and_fit_state_the_bias_s_uncertainty_alike_and_lots_scatter_no_mor
     assert np.all(found.real < 1.25 * planned)
     assert np.all(found.real < 1.25 * found.stated)
     assert found.stated[0] / planned[0] == pytest.approx(1.0, abs=0.45)
-    # a fit cannot exclude a walk where there is flicker alone, and carries a part of it over the day
-    assert 0.7 < found.stated[1] / planned[1] < (2.2 if name == "flicker" else 1.35)
+    # a fit cannot exclude a walk where there is flicker alone, and carries it over the day as far as it may be there
+    assert 0.7 < found.stated[1] / planned[1] < (3.0 if name == "flicker" else 1.35)
 
 
 def test_nothing_is_stated_of_the_next_switch_on_and_the_plan_says_why() -> None:
@@ -93,5 +93,9 @@ def test_nothing_is_stated_of_the_next_switch_on_and_the_plan_says_why() -> None
 def test_the_mean_of_a_walk_is_off_its_start_as_sums_say() -> None:
     steps = np.random.default_rng(20_261_140).standard_normal((4000, 400))
     path = np.cumsum(steps, axis=1)
-    assert np.mean(path[:, :100].mean(axis=1) ** 2) == pytest.approx(walked(100.0), rel=0.08)
-    assert np.mean(path[:, 100:].mean(axis=1) ** 2) == pytest.approx(walked(100.0, 300.0), rel=0.08)
+    assert np.mean(path[:, :100].mean(axis=1) ** 2) == pytest.approx(
+        walk_mean(np.zeros(1), 0.0, 0.0, 100.0)[1], rel=0.08
+    )
+    assert np.mean(path[:, 100:].mean(axis=1) ** 2) == pytest.approx(
+        walk_mean(np.zeros(1), 0.0, 100.0, 300.0)[1], rel=0.08
+    )

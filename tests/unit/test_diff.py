@@ -2,8 +2,10 @@
 
 import json
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
+import pandas as pd
 import pytest
 from capture_double import CaptureDouble, small_job, small_run
 
@@ -11,7 +13,7 @@ from pipelines.archive import Archive, Run
 from pipelines.chain.chain import ORDER
 from pipelines.chain.runner import Runner
 from pipelines.jobs.model_change import change_from_options
-from pipelines.rerun.diff import diff
+from pipelines.rerun.diff import _standard, diff
 from pipelines.rerun.rerun import again
 from schemas.errors import DataRejected
 
@@ -108,3 +110,25 @@ def test_refuses_runs_without_a_common_unit(run: Run, tmp_path: Path) -> None:
     other = small_run(tmp_path / "other", None, ('units = ["A1", "A2", "A3"]', 'units = ["B1", "B2"]'))
     with pytest.raises(DataRejected, match="no unit in common"):
         diff(run, other)
+
+
+@pytest.mark.parametrize(
+    ("columns", "unlimited"), [(("pfa",), 4.0), ((), 5.0)], ids=["of today", "of earlier versions"]
+)
+def test_standard_uncertainties_of_figures_are_found_with_the_factor_that_they_were_expanded_with(
+    columns: tuple[str, ...], unlimited: float
+) -> None:
+    figures = pd.DataFrame(
+        {
+            "unit": "A",
+            "figure": ["f", "g"],
+            "value": 1.0,
+            "uncertainty": 10.0,
+            "limit": [100.0, np.nan],
+            "unit_text": "µg",
+        }
+    ).assign(**dict.fromkeys(columns, 0.0))
+    run = SimpleNamespace(
+        id="r", about={"limits": {"coverage_factor": 2.5}}, tables=lambda: ["figures"], table=lambda _: figures
+    )
+    assert _standard(run)["standard_error"].tolist() == [4.0, unlimited]  # pyright: ignore[reportArgumentType]

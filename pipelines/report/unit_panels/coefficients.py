@@ -23,7 +23,7 @@ TEMPLATE = """\
 <td>{{ line.unit }}</td></tr>
 {% endfor %}
 </table>
-<p class="note">output = Σ coefficient · column, temperatures counted from 25 °C; ± is U with k = {{ coverage }}, lack of fit included; that of the bias is of the record's mean.</p>
+<p class="note">output = Σ coefficient · column, temperatures counted from 25 °C; ± is U with k = {{ coverage }}, lack of fit included; that of the bias by measurand is below.</p>
 """
 
 
