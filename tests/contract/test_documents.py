@@ -46,8 +46,9 @@ CASES = {
     "allan --json": ["allan", "{folder}/rest.csv", "--rate", "100"],
     "psd --json": ["psd", "{folder}/rest.csv", "--rate", "100"],
     "doctor --json": ["doctor"],
+    "keys [SUBJECT] --json": ["keys", "recipe"],
 }
-WITHOUT_ARCHIVE = {"plan", "station", "inspect"}
+WITHOUT_ARCHIVE = {"plan", "station", "inspect", "keys"}
 
 
 @pytest.fixture(scope="module")
