@@ -18,6 +18,7 @@ from starlette.responses import HTMLResponse, JSONResponse, Response
 from pipelines.archive import Archive
 from pipelines.report.charts import csv_text, plotly_figure, png_bytes
 from pipelines.report.numbers import plain
+from pipelines.workbench.services.index import RecentIndex
 from pipelines.workbench.services.jobs import Jobs
 from schemas.errors import WrongUse
 from schemas.units import MICRO
@@ -48,6 +49,11 @@ class Workbench:
     jobs: Jobs
     boot: str = field(default_factory=lambda: secrets.token_hex(8))
     navigation: list[tuple[str, str]] = field(default_factory=list[tuple[str, str]])
+    index: RecentIndex = field(init=False)
+
+    def __post_init__(self) -> None:
+        """The index is shared by all handlers."""
+        self.index = RecentIndex(self.settings.archive)
 
     @property
     def archive(self) -> Archive:
@@ -82,6 +88,16 @@ def page(
         number=plain, micro=MICRO, finite=math.isfinite, **values,
     )  # fmt: skip
     return HTMLResponse(text, status)
+
+
+def part_of(request: Request) -> str:
+    """The part of a page that the browser replaces; empty where it needs the whole page."""
+    return request.headers.get("x-part", "")
+
+
+def page_part(request: Request, template: str, state: PageState, **values: Any) -> HTMLResponse:
+    """A part of a page, with the command line of its state: what a click changes, without the work of the whole page."""
+    return page(request, "part.html", state, inner=template, **values)
 
 
 def figure(chart: Chart | None, ending: str, name: str) -> Response:

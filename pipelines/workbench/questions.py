@@ -80,6 +80,11 @@ def yield_question(page: Search) -> str:
     )
 
 
+def newest_question(count: int) -> str:
+    """The newest runs, and how many there are."""
+    return f"SELECT run, count(*) OVER () AS runs FROM runs ORDER BY started DESC, run DESC LIMIT {count}"  # noqa: S608 - a number
+
+
 def history_question(unit: str) -> str:
     """The coefficients of a unit in all its runs."""
     return (

@@ -73,6 +73,7 @@ def test_a_kink_that_may_move_is_not_promised_as_far_away_as_one_that_may_not(pa
     assert free < 0.5 * fixed * found.weight / found.variance
 
 
+@pytest.mark.slow
 def test_what_is_proposed_parts_the_rivals_when_it_is_measured(part) -> None:
     """One run of the benchmark `python benchmarks/worlds part`, with a generator that the proposal knows nothing of."""
     found = part.followed(("cubic on 18, faint", 9100))[1]

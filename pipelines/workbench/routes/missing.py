@@ -10,7 +10,17 @@ from starlette.responses import JSONResponse, Response
 
 from pipelines.diagnosis.inputs import use_written_formulas
 from pipelines.report.diagnosis import chance
-from pipelines.workbench.pages import Wanted, figure, page, run_table, state_of, table_csv, workbench_of
+from pipelines.workbench.pages import (
+    Wanted,
+    figure,
+    page,
+    page_part,
+    part_of,
+    run_table,
+    state_of,
+    table_csv,
+    workbench_of,
+)
 from pipelines.workbench.services import models, requests, sources
 from pipelines.workbench.services.samples import samples_of
 from pipelines.workbench.state import MissingPage
@@ -32,6 +42,9 @@ def missing(request: Request) -> Response:
     """The page; what is not computed yet is asked for by the page itself."""
     bench = workbench_of(request)
     state, problems = state_of(request, MissingPage)
+    if part_of(request) == "samples" and state.source and not problems:
+        state = requests.settled(bench.settings, state)
+        return page_part(request, "missing_samples.html", state, is_file=sources.is_file(bench.settings, state.source))
     chosen, found, rows, work = sources.sources(bench.settings), None, None, {}
     if state.source:
         try:

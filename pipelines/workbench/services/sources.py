@@ -41,12 +41,17 @@ def resolve(settings: Settings, name: str, where: str) -> str:
     WrongUse
         It is neither a run of the archive nor a file of the folder.
     """
-    files = {one.name for one in _files(settings.folder)}
-    if name in files:
+    if is_file(settings, name):
         return name
+    files = {one.name for one in _files(settings.folder)}
     if "/" in name or "\\" in name or name.endswith(ENDINGS):
         raise WrongUse(f"{where}: no file '{name}' in {settings.folder}; {did_you_mean(name, files or {'none'})}")
     return Archive(settings.archive).run(name).id
+
+
+def is_file(settings: Settings, name: str) -> bool:
+    """Whether a source is a file of the folder."""
+    return name in {one.name for one in _files(settings.folder)}
 
 
 def stamp(settings: Settings, name: str) -> str:
