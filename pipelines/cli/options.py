@@ -200,7 +200,7 @@ def _print_part(
     from rich import box
     from rich.table import Table
 
-    table = Table(title=title or None, box=box.SIMPLE_HEAD, title_justify="left")
+    table = Table(box=box.SIMPLE_HEAD)
     texts = [[str(line[number]) for line in lines] for number in range(len(columns))]
     least = [_least(number < whole, column, texts[number]) for number, column in enumerate(columns)]
     most = [_longest([column, *own], None) for column, own in zip(columns, texts, strict=True)]
@@ -213,6 +213,8 @@ def _print_part(
     for line in lines:
         table.add_row(*line)
     table.width = sum(widths) + PADDING * len(widths) + 1
+    if title:
+        shown.print(title, style="italic", markup=False)  # the table's own title would wrap to the width of the table
     shown.print(table, crop=False)
 
 
