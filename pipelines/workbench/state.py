@@ -209,6 +209,21 @@ class UploadPage(PageState):
         return words + (["--fit", self.fit] if self.fit else [])
 
 
+class ModelsPage(PageState):
+    """Model files: their versions, their effect on the lots of the archive, and releases to the line.
+
+    model : a name among the model files · evaluate : whether the lots are computed with it
+    """
+
+    PATH: ClassVar[str] = "/models"
+    model: Text = ""
+    evaluate: Literal["", "yes"] = ""
+
+    def words(self) -> list[str]:
+        """The what-if, or the list of releases."""
+        return ["whatif", f"{self.model}.toml"] if self.model else ["release", "--list"]
+
+
 class PlanPage(PageState):
     """A recipe: what it sees and what it costs."""
 
@@ -259,5 +274,5 @@ class OperatorPage(PageState):
 
 
 PAGES: tuple[type[PageState], ...] = (
-    UnitsPage, RunPage, UnitPage, MissingPage, UploadPage, PlanPage, StationPage, AuditPage, OperatorPage,
+    UnitsPage, RunPage, UnitPage, MissingPage, ModelsPage, UploadPage, PlanPage, StationPage, AuditPage, OperatorPage,
 )  # fmt: skip

@@ -13,9 +13,11 @@ import pytest
 from browser import Served, chromium, served, tab, until
 from capture_double import small_run
 from numpy.typing import NDArray
+from typer.testing import CliRunner
 
 from inertial import poses
 from inertial.frames import force_from_angles
+from pipelines.cli import app
 
 SCRIPT = "<img src=x onerror=window.ran=1>"
 LONG = "L" * 64
@@ -26,6 +28,7 @@ PAGES = (
     "/missing",
     "/upload",
     "/operator",
+    "/models",
     "/plan",
     "/station",
     "/audit",
@@ -141,6 +144,33 @@ def test_a_hidden_effect_is_found_added_confirmed_and_taken_out_again(
         assert one.page.evaluate("() => window.ran") is None  # a column is called like a script
         assert one.outside == []
         assert one.errors == []
+
+
+def test_a_model_is_evaluated_on_the_archive_and_released_only_if_it_is_better(
+    bench: Served, browser: Any, pictures: Path
+) -> None:
+    place = bench.folder / "models" / "cubic.toml"
+    place.parent.mkdir(exist_ok=True)
+    done = CliRunner().invoke(app, ["extend", str(place), "third_order", "--why", "a trial"])
+    assert done.exit_code == 0, done.output
+    with tab(browser, bench.address) as one:
+        one.open("/models?model=cubic")
+        assert "+ third_order" in one.page.inner_text("[aria-label=Versions]")
+        one.page.fill("input[name=reason]", "no evidence yet")
+        one.press("form[data-post='/models/release'] button")
+        until(lambda: "a what-if is needed" in one.page.inner_text("main"), "a release without evidence is refused")
+        one.press("[data-evaluate]")
+        one.sees("[data-whatif=new]")
+        verdict = one.page.inner_text(".verdict")
+        assert "No better" in verdict  # 3 calibrations, nothing hidden in them
+        one.shot(pictures, "models")
+        one.page.fill("input[name=reason]", "it is no better")
+        one.press("form[data-post='/models/release'] button")
+        until(lambda: "a better model is needed" in one.page.inner_text("main"), "a worse model is refused")
+        assert one.findings() == []
+        assert one.outside == []
+    assert list((bench.archive / "whatif").glob("*.json"))
+    assert not (bench.archive / "releases").exists()
 
 
 def test_a_click_on_a_residual_shows_the_samples_of_its_dwell(bench: Served, browser: Any) -> None:

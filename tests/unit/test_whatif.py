@@ -204,3 +204,32 @@ def test_a_recipe_asks_for_the_line_s_model_of_its_device_and_station(tmp_path: 
 def test_a_command_without_an_archive_says_that_the_line_s_model_is_none_of_its_business(tmp_path: Path) -> None:
     with pytest.raises(RecipeInvalid, match="'line' is the model that is released in an archive"):
         load_recipe(recipe_file(tmp_path, (FULL, 'model = "line"')))
+
+
+def test_verdicts_on_models_that_are_equally_good_are_seldom_better(archive: Archive) -> None:
+    """Errors of six units under two models of one truth, which differ by noise alone: 'better' in 2.5 % of archives."""
+    from collections import Counter
+    from dataclasses import replace
+
+    from pipelines.rerun.lot_comparison import LotComparison, Side
+    from pipelines.rerun.selection import Entry
+
+    rng = np.random.default_rng(2611)
+    entry = judged(Batch(archive.address, (archive.runs()[0].id,), wanted("", None)))[0].entry
+    assert isinstance(entry, Entry)
+    side = Side({}, {}, {}, {}, {}, None)
+    verdicts: Counter[str] = Counter()
+    for _ in range(1000):
+        squares = rng.chisquare(18, (6, 2)) * 25.0
+        sides = [
+            replace(
+                side,
+                outcome={f"U{u}": "pass" for u in range(6)},
+                verified={f"U{u}": (squares[u, k], 18) for u in range(6)},
+            )
+            for k in (0, 1)
+        ]
+        verdicts[summary([LotComparison(entry, *sides)], [])["verdict"]] += 1
+    assert verdicts["better"] <= 40  # 25 expected
+    assert verdicts["worse"] <= 40
+    assert verdicts.total() == 1000

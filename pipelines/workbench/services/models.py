@@ -11,12 +11,13 @@ from typing import TYPE_CHECKING
 from inertial import effects
 from pipelines.diagnosis.inputs import WHY, use_written_formulas
 from pipelines.jobs.model_files import ModelStep, extended, model_text, new_model, publish_model
-from schemas.errors import WrongUse
+from schemas.errors import WrongUse, did_you_mean
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
     from pathlib import Path
 
+    from pipelines.jobs.releases import Release
     from pipelines.workbench.settings import Settings
 
 FOLDER = "models"
@@ -28,6 +29,39 @@ def models(settings: Settings) -> list[str]:
     """Names of the model files that there are."""
     folder = settings.folder / FOLDER
     return sorted(place.stem for place in folder.glob("*.toml")) if folder.is_dir() else []
+
+
+def place_of(settings: Settings, name: str) -> Path:
+    """The file of a model.
+
+    Raises
+    ------
+    WrongUse
+        There is none of this name.
+    """
+    known = models(settings)
+    if name not in known:
+        raise WrongUse(f"model: no file is called '{name[:60]}'; {did_you_mean(name, known or ['none'])}")
+    return settings.folder / FOLDER / f"{name}.toml"
+
+
+def release(settings: Settings, name: str, since: str, device: str, station: str, reason: str) -> Release:
+    """A model released to the line from a day on; only one whose what-if says "better".
+
+    Raises
+    ------
+    WrongUse
+        There is no such model, no evidence, no reason, or the day is no date.
+    """
+    from pipelines.archive import Archive
+    from pipelines.jobs.model_change import wanted
+    from pipelines.jobs.releases import release as publish
+    from pipelines.rerun.selection import moment
+
+    with _ALONE, effects.additions_forgotten():
+        change = wanted("", place_of(settings, name), where="release")
+        archive = Archive(settings.archive)
+        return publish(archive, change, moment(since, "release"), device=device, station=station, reason=reason)
 
 
 def save(

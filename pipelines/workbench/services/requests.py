@@ -6,8 +6,8 @@ from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from pipelines.workbench.services import sources, uploads
-from pipelines.workbench.state import AuditPage, MissingPage, PageState, PlanPage, UploadPage
+from pipelines.workbench.services import models, sources, uploads
+from pipelines.workbench.state import AuditPage, MissingPage, ModelsPage, PageState, PlanPage, UploadPage
 from schemas.errors import WrongUse, did_you_mean
 
 if TYPE_CHECKING:
@@ -93,6 +93,20 @@ def plan(settings: Settings, page: PlanPage) -> Request:
     return f"plan of {page.recipe}", content
 
 
+def what_if(settings: Settings, page: ModelsPage) -> Request:
+    """The lots of the archive with a model beside their own."""
+    from pipelines.archive import Archive
+
+    place = models.place_of(settings, page.model)
+    runs = Archive(settings.archive).root / "runs"
+    return f"what if {place.stem}", {
+        "archive": settings.archive,
+        "model": str(place),
+        "stamp": place.stat().st_mtime_ns,
+        "runs": runs.stat().st_mtime_ns if isinstance(runs, Path) and runs.is_dir() else 0,
+    }
+
+
 def audit(settings: Settings, page: AuditPage) -> Request:
     """The audit of the archive."""
     from pipelines.archive import Archive
@@ -133,5 +147,6 @@ KINDS: dict[str, tuple[type[PageState], Callable[[Settings, Any], Request]]] = {
     "ladder": (MissingPage, ladder),
     "plan": (PlanPage, plan),
     "audit": (AuditPage, audit),
+    "whatif": (ModelsPage, what_if),
     "import": (UploadPage, bring_in),
 }

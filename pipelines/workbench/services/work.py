@@ -116,6 +116,21 @@ def plan(request: Mapping[str, Any], tell: Tell) -> dict[str, Any]:
     return planned(request)
 
 
+def what_if(request: Mapping[str, Any], tell: Tell) -> dict[str, Any]:
+    """The effect of a model on the lots of the archive; kept there as evidence for its release."""
+    from pathlib import Path
+
+    from pipelines.archive import Archive
+    from pipelines.jobs.model_change import wanted
+    from pipelines.rerun.selection import selected
+    from pipelines.rerun.whatif import evaluated
+
+    steps = iter(range(3))
+    change, archive = wanted("", Path(request["model"]), where="what if"), Archive(request["archive"])
+    runs = [entry.id for entry in selected(archive, ["all"])]
+    return evaluated(archive, runs, change, tell=lambda text: tell(next(steps), 3, text))
+
+
 def audit(request: Mapping[str, Any], tell: Tell) -> dict[str, Any]:
     """The audit of the archive, and what its pictures are drawn from."""
     tell(0, 2, "reading the runs")
@@ -138,5 +153,6 @@ WORK: dict[str, Any] = {
     "ladder": ladder,
     "plan": plan,
     "audit": audit,
+    "whatif": what_if,
     "import": bring_in,
 }
