@@ -38,7 +38,7 @@ LEADS = {
         "`tumbleline run --fault KIND:KEY=VALUE:KEY=VALUE`. Every kind also has `at_s` (start on the clock of the station, s) "
         "and `for_s` (duration, s; permanent by default). [Outcomes](faults.md).\n"
     ),
-    "demo": "`tumbleline demo --effect NAME` takes a name of either column, or `random`.\n",
+    "demo": "The option `--effect` takes a name of either column, or `random`.\n",
 }
 
 

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
 PART = "Measure"
 ORDER = 190
-SUMMARY = "List the keys of recipes, limits and stations, the faults, hidden effects, and names of files."
+SUMMARY = "List keys of recipes, limits and stations, faults, hidden effects and names of files."
 EXAMPLES = (
     "tumbleline keys recipe",
     "tumbleline keys fault --json",
