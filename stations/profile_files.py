@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from schemas.errors import RecipeInvalid, did_you_mean
 from schemas.own_files import own_file, own_names
 from schemas.profile import Profile, parse_profile
-from schemas.recipe import read_text
+from schemas.toml_files import read_text
 
 if TYPE_CHECKING:
     from importlib.resources.abc import Traversable

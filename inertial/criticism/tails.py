@@ -1,9 +1,9 @@
-"""Tails of the noise: how far a dwell may be off where large values are common.
+"""Tails of the noise: limit for bad dwells if large deviations are frequent.
 
 Whether tails are heavy is judged by the kurtosis of the deletion residuals of all dwells that were kept (Anscombe & Glynn,
-Biometrika 70 (1983) 227); whitened residuals would not do, as whitening spreads what one dwell is off over those that follow.
-What was left out does not count: dwells that are off would pass for tails themselves. Beyond the values that were kept, heavy
-tails are taken to fall off as those of a t distribution with three degrees of freedom, P(|x| > z) ∝ z⁻³: few are heavier.
+Biometrika 70 (1983) 227); whitened residuals would not do, because whitening spreads the deviation of one dwell over the
+following ones. Dwells left out do not count: bad dwells would look like tails. Beyond the values that were kept, heavy tails are
+assumed to decay as those of a t distribution with three degrees of freedom, P(|x| > z) ∝ z⁻³: few are heavier.
 """
 
 from collections.abc import Sequence
@@ -23,14 +23,14 @@ _FROM = 3.0
 """Standard deviations from which values count as tails."""
 
 _POWER = 3.0
-"""By which heavy tails fall off."""
+"""Exponent of the decay of heavy tails."""
 
 _TELLS = 60
-"""Values below which tails are not told from a normal distribution's."""
+"""Fewest values for a test of the tails."""
 
 
 def with_tails(model: Model, removed: Sequence[BadDwell]) -> list[BadDwell]:
-    """Dwells that were left out of a model, each marked where noise with the tails of the others reaches as far.
+    """Dwells that were left out of a model, each marked if it is within noise with the tails of the others.
 
     Parameters
     ----------
@@ -44,5 +44,5 @@ def with_tails(model: Model, removed: Sequence[BadDwell]) -> list[BadDwell]:
 
 
 def heavy(values: Array) -> bool:
-    """Whether values (m,) have more large ones among them than a normal distribution."""
+    """Whether values (m,) have heavier tails than a normal distribution."""
     return values.size >= _TELLS and float(stats.kurtosistest(values, alternative="greater").pvalue) < HEAVY

@@ -57,11 +57,11 @@ def command(
     status 1: the model is not better.
     """
     from pipelines.archive import Archive
-    from pipelines.jobs.model_change import wanted
+    from pipelines.jobs.model_change import change_from_options
     from pipelines.rerun.selection import selected
     from pipelines.rerun.whatif import BETTER
 
-    change = wanted("", model, limits, effect_file, where="whatif")
+    change = change_from_options("", model, limits, effect_file, where="whatif")
     store = Archive(archive)
     runs = [entry.id for entry in selected(store, selection or ["all"])]
     document = _evaluated(store, runs, change, dask, workers)
@@ -76,15 +76,15 @@ def _evaluated(store: Archive, runs: list[str], change: ModelChange, dask: str, 
     """Every lot with both models, and the errors on later runs of units that were measured before."""
     from pathlib import Path as LocalPath
 
-    from pipelines.flows.spread import on_dask
+    from pipelines.flows.dask_cluster import on_dask
     from pipelines.parallel import processors
     from pipelines.rerun.whatif import evaluated
 
     count = max(1, min(workers or processors(), len(runs)))
     home = store.root.resolve() / "orchestrator" if isinstance(store.root, LocalPath) else None
-    spread = on_dask(dask, count, home)
+    distribute = on_dask(dask, count, home)
     with error_console().status(f"evaluating {number_of(len(runs), 'lot')}, {count} at a time"):
-        return evaluated(store, runs, change, spread, count)
+        return evaluated(store, runs, change, distribute, count)
 
 
 def _print(document: dict[str, Any]) -> None:

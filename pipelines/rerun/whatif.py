@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
     from pipelines.archive import Archive
     from pipelines.jobs.model_change import ModelChange
-    from pipelines.parallel import Spread
+    from pipelines.parallel import Distributor
     from pipelines.rerun.lot_comparison import Fresh, Side, Sums
 
 FALLS = 0.005
@@ -37,27 +37,27 @@ def evaluated(
     archive: Archive,
     runs: Sequence[str],
     change: ModelChange,
-    spread: Spread | None = None,
+    distribute: Distributor | None = None,
     workers: int = 1,
-    tell: Callable[[str], None] = lambda _: None,
+    report_progress: Callable[[str], None] = lambda _: None,
 ) -> dict[str, Any]:
     """The what-if of a model over lots, stored in the archive as evidence; nothing of the lots themselves is changed.
 
     Parameters
     ----------
     runs : of the archive, with the present and with the new model
-    spread, workers : where parts are computed, see :func:`pipelines.parallel.map_partitions`
-    tell : gets what is computed next
+    distribute, workers : where parts are computed, see :func:`pipelines.parallel.map_partitions`
+    report_progress : gets what is computed next
     """
-    tell("lots with both models")
+    report_progress("lots with both models")
     batches = parts(archive, list(runs), change, workers)
-    portions = map_partitions(lot_comparison.judged, batches, spread, workers=workers, name="what if")
+    portions = map_partitions(lot_comparison.judged, batches, distribute, workers=workers, name="what if")
     lots = [one for portion in portions for one in portion]
-    tell("later runs of the same units")
+    report_progress("later runs of the same units")
     tasks = fresh_tasks(lots, archive.address, change)
     size = max(1, -(-len(tasks) // (4 * workers)))
     chunks = [tasks[start : start + size] for start in range(0, len(tasks), size)]
-    done = map_partitions(lot_comparison.fresh, chunks, spread, workers=workers, name="what if, fresh runs")
+    done = map_partitions(lot_comparison.fresh, chunks, distribute, workers=workers, name="what if, fresh runs")
     document: dict[str, Any] = {
         "name": change.model_name,
         "version": change.model_version,
@@ -69,7 +69,7 @@ def evaluated(
     return document
 
 
-def fresh_tasks(lots: Sequence[LotComparison], archive: str, wanted: ModelChange) -> list[FreshTask]:
+def fresh_tasks(lots: Sequence[LotComparison], archive: str, change: ModelChange) -> list[FreshTask]:
     """For every run, the calibrations from the previous run of each of its units."""
     last: dict[str, LotComparison] = {}
     tasks: list[FreshTask] = []
@@ -84,7 +84,7 @@ def fresh_tasks(lots: Sequence[LotComparison], archive: str, wanted: ModelChange
             last[unit] = judged
         pairs = tuple((tuple(units), *_calibrations(runs[run])) for run, units in earlier.items())
         if pairs:
-            tasks.append(FreshTask(archive, judged.entry.id, wanted, pairs))
+            tasks.append(FreshTask(archive, judged.entry.id, change, pairs))
     return tasks
 
 

@@ -10,8 +10,8 @@ from pydantic import Field, FiniteFloat, ValidationError
 
 from schemas.errors import RecipeInvalid, did_you_mean
 from schemas.own_files import own_file, own_names
-from schemas.recipe import explain, parse_toml, read_text
 from schemas.strict import Strict
+from schemas.toml_files import explain, parse_toml, read_text
 from schemas.validity import Stability
 
 if TYPE_CHECKING:

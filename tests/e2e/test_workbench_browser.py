@@ -196,7 +196,7 @@ def test_a_browser_without_the_token_may_look_and_not_compute(bench: Served, bro
     source = urllib.parse.quote(str(bench.folder / "fresh.csv"))
     with tab(browser, bench.address, token=False) as one:
         one.page.goto(f"{bench.address}/missing?source={source}")
-        until(lambda: "may look, not change" in one.page.inner_text("main"), "the page says why nothing begins")
+        until(lambda: "has read access only" in one.page.inner_text("main"), "the page says why nothing begins")
 
 
 def test_a_server_that_is_killed_is_said_and_the_page_goes_on(bench: Served, browser: Any) -> None:
@@ -232,11 +232,11 @@ def test_an_upload_in_a_wrong_unit_says_so_and_is_corrected(bench: Served, brows
         one.page.select_option("select[name=output]", "g")
         one.page.fill("input[name=serial]", "HAND-1")
         one.page.fill("input[name=gravity]", "9.80665")
-        one.press("text=Read it so")
+        one.press("text=Apply")
         one.sees("[data-reading-problem]")
         assert "m/s^2" in one.page.inner_text("[data-reading-problem]")
         one.page.select_option("select[name=output]", "m/s^2")
-        one.press("text=Read it so")
+        one.press("text=Apply")
         one.sees("[data-dwells]")
         assert 12 <= int(one.page.inner_text("[data-dwells]")) <= 14
         one.press("text=Import it")

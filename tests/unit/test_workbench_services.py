@@ -95,7 +95,7 @@ def test_a_question_is_answered_once_and_by_its_number(settings: Settings) -> No
     with pytest.raises(lots.Stale):
         lots.answer(settings, name, 1, "go")
     lots.answer(settings, name, 2, "go")
-    with pytest.raises(lots.Stale, match="elsewhere"):
+    with pytest.raises(lots.Stale, match="another page"):
         lots.answer(settings, name, 2, "stop")
     assert json.loads((settings.folder / "lots" / name / "answer-2.json").read_text()) == {"answer": "go"}
     with pytest.raises(WrongUse):

@@ -1,4 +1,4 @@
-"""The panels of each unit, which open one by one."""
+"""The panels of each unit, in sections that can be opened."""
 
 from __future__ import annotations
 

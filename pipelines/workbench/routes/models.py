@@ -11,7 +11,7 @@ from starlette.responses import JSONResponse, Response
 from inertial import effects
 from pipelines.jobs.model_files import read_model, versions
 from pipelines.jobs.releases import released, releases
-from pipelines.workbench.pages import Wanted, page, state_of, table_csv, workbench_of
+from pipelines.workbench.pages import RequestBody, page, state_of, table_csv, workbench_of
 from pipelines.workbench.services import models, requests
 from pipelines.workbench.state import ModelsPage
 from schemas.errors import TumblelineError
@@ -59,9 +59,9 @@ def lots(request: Request) -> Response:
 
 
 @router.post("/models/release")
-def release(request: Request, wanted: Wanted) -> JSONResponse:
+def release(request: Request, body: RequestBody) -> JSONResponse:
     """Release a model to the line; refused without a what-if that says "better"."""
-    words = {name: str(wanted.get(name, "")).strip() for name in ("name", "since", "device", "station", "reason")}
+    words = {name: str(body.get(name, "")).strip() for name in ("name", "since", "device", "station", "reason")}
     record = models.release(workbench_of(request).settings, **words)
     name = f"{record.model_name} version {record.model_version}"
     return JSONResponse({"done": f"release {record.number}: {name} from {record.since:%Y-%m-%d}"})

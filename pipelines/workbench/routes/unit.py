@@ -31,7 +31,7 @@ CERTIFICATES = 20
 
 @router.get("/unit")
 def unit(request: Request) -> Response:
-    """Everything that is known of a unit in a run."""
+    """All data of a unit in a run."""
     bench = workbench_of(request)
     state, problems = state_of(request, UnitPage)
     run = bench.archive.run(state.run)

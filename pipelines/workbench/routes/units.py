@@ -1,4 +1,4 @@
-"""Units and runs, searched."""
+"""Search of units and runs."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ def units(request: Request) -> Response:
 
 @router.get("/units/table.csv")
 def table(request: Request) -> Response:
-    """All units that the page's fields choose."""
+    """All units of the search."""
     state, _ = state_of(request, UnitsPage)
     question = units_question(state.model_copy(update={"page": 1})).replace(f"LIMIT {ROWS}", f"LIMIT {EVERYTHING}")
     answer = workbench_of(request).index.ask(question)

@@ -1,4 +1,4 @@
-"""A model as it stands on a page, saved as the next version of a model file, with the reason."""
+"""The model of a page, saved as the next version of a model file, with the reason."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ _ALONE = threading.Lock()
 
 
 def models(settings: Settings) -> list[str]:
-    """Names of the model files that there are."""
+    """Names of the existing model files."""
     folder = settings.folder / FOLDER
     return sorted(place.stem for place in folder.glob("*.toml")) if folder.is_dir() else []
 
@@ -54,12 +54,12 @@ def release(settings: Settings, name: str, since: str, device: str, station: str
         There is no such model, no evidence, no reason, or the day is no date.
     """
     from pipelines.archive import Archive
-    from pipelines.jobs.model_change import wanted
+    from pipelines.jobs.model_change import change_from_options
     from pipelines.jobs.releases import release as publish
     from pipelines.rerun.selection import moment
 
     with _ALONE, effects.additions_forgotten():
-        change = wanted("", place_of(settings, name), where="release")
+        change = change_from_options("", place_of(settings, name), where="release")
         archive = Archive(settings.archive)
         return publish(archive, change, moment(since, "release"), device=device, station=station, reason=reason)
 
@@ -77,13 +77,13 @@ def save(
 
     Parameters
     ----------
-    start : the model that a new file begins with · formulas : ``id = expression`` of those that are used
-    why, source : the reason, and the dwells that showed it
+    start : the model that a new file begins with · formulas : ``id = expression`` of the used ones
+    why, source : the reason, and the dwells with the evidence
 
     Raises
     ------
     WrongUse
-        The name or the reason is missing, or there is nothing to save.
+        The name or the reason is missing, or there is no change to save.
     """
     if not NAME.fullmatch(name):
         raise WrongUse(
@@ -104,7 +104,7 @@ def save(
             text, after = extended(text, ModelStep(effect, by, at, why.strip(), source), f"model {place.name}")
             version = after.model.version
         if version == 0 and place.is_file():
-            raise WrongUse(f"model: {place} holds these effects already; nothing was written")
+            raise WrongUse(f"model: {place} has these effects already; nothing was written")
         place.parent.mkdir(parents=True, exist_ok=True)
         publish_model(place, text)
     return place, version or 1

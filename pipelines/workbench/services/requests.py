@@ -1,4 +1,4 @@
-"""The work that a page needs, from its state: what a browser asks for is a page's address, never a request as such."""
+"""The work that a page needs, from its state: a browser sends the address of a page, never a request itself."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ def _judging(settings: Settings, page: MissingPage) -> dict[str, Any]:
 
 
 def settled(settings: Settings, page: MissingPage) -> MissingPage:
-    """The page with the source's own name, and with the model that it begins with where none is named."""
+    """The page with the source's own name, and with the starting model if none is given."""
     name = sources.resolve(settings, page.source, "source")
     if page.effects:
         return page.model_copy(update={"source": name})
@@ -62,13 +62,13 @@ def settled(settings: Settings, page: MissingPage) -> MissingPage:
 
 @lru_cache(maxsize=64)
 def _starting_model(archive: str, name: str, stamp: str) -> tuple[str, ...]:
-    """The model that a diagnosis of these dwells judges where none is named."""
+    """The default model of a diagnosis of these dwells."""
     from inertial import effects
     from pipelines.diagnosis.diagnose import default_model
     from pipelines.diagnosis.inputs import judged_effects
     from pipelines.importers.exchange import read_dwells
 
-    del stamp  # another content is another answer
+    del stamp  # other content gives another result
     with effects.additions_forgotten():
         judged = judged_effects(name, archive, "", None, "diagnose")
     return tuple(judged or default_model(read_dwells(name, archive=archive)))
@@ -129,7 +129,7 @@ def bring_in(settings: Settings, page: UploadPage) -> Request:
 
 
 def recipes(settings: Settings) -> list[str]:
-    """Recipes that can be chosen: the built-in one, and files of the workbench's folder."""
+    """Available recipes: the built-in one, and files of the workbench's folder."""
     found = [str(place) for place in sorted(settings.folder.glob("*.toml"))] if settings.folder.is_dir() else []
     return ["production", *(name for name in found if _is_recipe(Path(name)))]
 
