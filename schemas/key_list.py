@@ -29,6 +29,7 @@ UNITS = {
     "urad": "µrad", "arcsec": "″", "deg": "°", "ppm": "ppm", "percent": "%", "ug": "µg", "K": "K", "s": "s", "g": "g",
     "m_s2": "m/s²",
 }  # fmt: skip
+TABLES: dict[Any, str] = {list: "list of tables", dict: "tables by name"}
 SHAPES: dict[Any, str] = {list: "list", tuple: "list", dict: "table"}
 PLAIN = {float: "number", int: "integer", str: "text", bool: "true or false"}
 
@@ -92,7 +93,7 @@ def _value(annotation: Any) -> str:
     """The kind of a value in words."""
     origin, parts = get_origin(annotation), get_args(annotation)
     if _models(annotation):
-        return {list: "list of tables", dict: "tables by name"}.get(origin or object, "table")
+        return TABLES.get(origin, "table")
     if origin is Literal:
         return " or ".join(f"{part}" if isinstance(part, int) else f"'{part}'" for part in parts)
     if origin in SHAPES:
