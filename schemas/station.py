@@ -18,6 +18,8 @@ from schemas.bounds import Celsius, Degrees, Name, NotNegative, Number, Positive
 from schemas.carrier import Carried
 from schemas.errors import WrongUse
 from schemas.fault import FaultOrder
+from schemas.foreign import is_file
+from schemas.own_files import own_file
 from schemas.reference import Reference
 from schemas.safety import Safety, SelfTest, Suspenders
 from schemas.strict import Strict
@@ -31,6 +33,7 @@ if TYPE_CHECKING:
 Bounds = tuple[Number, Number]
 Angles = tuple[Degrees, Degrees]
 SIMULATED = "simulated.toml"
+BUILT_IN = "simulated"
 SIMULATED_EQUIPMENT = "simulated_equipment.toml"
 MOST_SLOTS = 32  # the reader's registers name that many
 LAST_DEVICE_ID = 247  # Modbus over serial line 1.02, 2.2
@@ -307,12 +310,18 @@ def with_faults(config: StationConfig, faults: Sequence[FaultOrder]) -> StationC
 
 
 def load_station(path: Path | None = None) -> StationConfig:
-    """The station in a file, or the built-in simulated one; :class:`RecipeInvalid` names the key and what is needed."""
-    if path is None:
+    """The station in a file, or the built-in simulated one; :class:`RecipeInvalid` names the key and what is needed.
+
+    A name that is no file is searched in the user's folders (:mod:`schemas.own_files`).
+    """
+    if path is None or (
+        str(path) == BUILT_IN and not is_file(path) and own_file("stations", BUILT_IN, {BUILT_IN}) is None
+    ):
         source = f"stations/{SIMULATED}"
         text = files("stations").joinpath(SIMULATED).read_text("utf-8")
     else:
-        source, text = str(path), read_text(path, "station")
+        found = path if is_file(path) else own_file("stations", str(path), {BUILT_IN}) or path
+        source, text = str(found), read_text(found, "station")
     try:
         return StationConfig.model_validate(parse_toml(text, source))
     except ValidationError as problem:

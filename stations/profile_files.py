@@ -1,4 +1,4 @@
-"""The device profiles of the product, by name."""
+"""The device profiles by name: those of the product, and those of the user (:mod:`schemas.own_files`)."""
 
 from __future__ import annotations
 
@@ -7,7 +7,9 @@ from importlib.resources import files
 from typing import TYPE_CHECKING
 
 from schemas.errors import RecipeInvalid, did_you_mean
+from schemas.own_files import own_file, own_names
 from schemas.profile import Profile, parse_profile
+from schemas.toml_files import read_text
 
 if TYPE_CHECKING:
     from importlib.resources.abc import Traversable
@@ -22,7 +24,7 @@ def profile_folder() -> Traversable:
 
 def profile_names() -> list[str]:
     """Names of the profiles, sorted."""
-    return sorted(item.name.removesuffix(".toml") for item in profile_folder().iterdir() if item.name.endswith(".toml"))
+    return sorted({*built_in_profiles(), *own_names("profiles")})
 
 
 def profile_of(device: Carried) -> Profile:
@@ -39,10 +41,27 @@ def recorded_columns(reader: Carried) -> list[str]:
     return [register.column for register in profile_of(reader).registers if register.column]
 
 
-@cache
 def load_profile(name: str) -> Profile:
     """The profile with a name; an unknown name is refused with the most similar names."""
-    if name not in profile_names():
+    path = own_file("profiles", name, built_in_profiles())
+    if path is not None:
+        return _parsed(read_text(path, "profile"), str(path))
+    if name not in built_in_profiles():
         raise RecipeInvalid(f"profile: no '{name}'; {did_you_mean(name, profile_names())}", key="profile")
+    return _product_profile(name)
+
+
+def built_in_profiles() -> list[str]:
+    """Names of the profiles of the product."""
+    return [item.name.removesuffix(".toml") for item in profile_folder().iterdir() if item.name.endswith(".toml")]
+
+
+@cache
+def _product_profile(name: str) -> Profile:
     source = f"stations/profiles/{name}.toml"
     return parse_profile(profile_folder().joinpath(f"{name}.toml").read_text("utf-8"), source)
+
+
+@cache
+def _parsed(text: str, source: str) -> Profile:
+    return parse_profile(text, source)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
@@ -52,6 +53,8 @@ class Remaining:
     _ramp: float | None = field(init=False, default=None)
     _lag: float | None = field(init=False, default=None)
     _since: tuple[int, float] | None = field(init=False, default=None)
+    _started: float = field(init=False, default_factory=time.monotonic)
+    _recorded: float = field(init=False, default=0.0)
 
     def __post_init__(self) -> None:
         self._planned(self.config)
@@ -103,6 +106,7 @@ class Remaining:
     def add_record(self, step: Step, seconds: float) -> None:
         """Adds the measured seconds of a record."""
         self._records.add(self._record[step.record], seconds)
+        self._recorded += self._record[step.record]
         self._done.add(step.record)
         self._since = None
 
@@ -120,9 +124,22 @@ class Remaining:
         return left + max(0.0, under_way - (now - self._since[1]))
 
     def text(self, step: Step, now: float) -> str:
-        """The remaining time in words; for a simulated station it is named as the station's time."""
-        unit = " of the station's time" if self.config.kind == "simulated" else ""
-        return f"{duration_text(self.seconds(step, now))}{unit} left"
+        """The remaining time in words; of a simulated station the time of the station, and that of the wall clock."""
+        station = duration_text(self.seconds(step, now))
+        if self.config.kind != "simulated":
+            return f"{station} left"
+        wall = self.wall_seconds(step)
+        return f"{station} of station time left" + ("" if wall is None else f", about {duration_text(wall)} here")
+
+    def wall_seconds(self, step: Step) -> float | None:
+        """Time until the end of the capture by the wall clock, s; None before the first record.
+
+        A simulated station skips the soaks: its time goes by with the samples, which records have in proportion to their length.
+        """
+        if self._recorded <= 0.0:
+            return None
+        left = self._after[step.record][1] + (0.0 if step.record in self._done else self._record[step.record])
+        return (time.monotonic() - self._started) * left / self._recorded
 
 
 def duration_text(seconds: float) -> str:

@@ -14,16 +14,20 @@ from typer.core import TyperCommand, TyperGroup
 
 from inertial.errors import InertialError
 from pipelines.cli.discovery import find_commands
-from schemas.errors import UNEXPECTED, UNUSABLE, TumblelineError, WrongUse, did_you_mean
+from schemas.errors import DONE, UNEXPECTED, UNUSABLE, TumblelineError, WrongUse, did_you_mean
 from schemas.foreign import shown
 from schemas.log_lines import VARIABLE as LOG
 from schemas.log_lines import tell
+from schemas.own_files import report_to
 
 if TYPE_CHECKING:
     from typer._click import Command, Context
 
 INTERRUPTED = 130  # the exit status that shells use for Ctrl-C
 PIPE_CLOSED = 141  # the exit status that shells use for a reader that closed the pipe
+
+COMPLETES = "_TUMBLELINE_COMPLETE"
+"""Variable by which a shell asks for candidates; typer defines its name."""
 
 THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "VECLIB_MAXIMUM_THREADS")
 """Variables that BLAS libraries read when they are loaded."""
@@ -51,6 +55,9 @@ class _OnDemand(TyperCommand):
             own = typer.Typer(add_completion=False, pretty_exceptions_enable=False)
             own.command(self.name)(module.command)
         command = typer.main.get_command(own)
+        from pipelines.cli.candidates import attach
+
+        attach(command)
         command.epilog = "\n\n".join(["Examples:", *getattr(module, "EXAMPLES", ())])  # a paragraph each
         return command
 
@@ -78,7 +85,6 @@ class _Commands(TyperGroup):
 app = typer.Typer(
     cls=_Commands,
     no_args_is_help=True,
-    add_completion=False,
     pretty_exceptions_enable=False,
     context_settings={"help_option_names": ["-h", "--help"]},
 )
@@ -125,9 +131,12 @@ def _product(
 def main() -> None:
     """Run the command line; an error that the user can correct is one message on standard error and an exit status."""
     _one_thread()
+    report_to(_remark)
     try:
         app()
     except TumblelineError as problem:
+        if COMPLETES in os.environ:  # a press of the tab key prints no message
+            sys.exit(DONE)
         _leave(str(problem), problem.exit_status)
     except InertialError as problem:
         _leave(str(problem), UNUSABLE)
@@ -155,6 +164,10 @@ def _one_thread() -> None:
     """
     for name in THREADS:
         os.environ.setdefault(name, os.environ.get("OMP_NUM_THREADS", "1"))
+
+
+def _remark(line: str) -> None:
+    sys.stderr.write(f"{line}\n")
 
 
 def _leave(message: str, status: int) -> None:

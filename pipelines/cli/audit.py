@@ -108,15 +108,14 @@ def _show(found: Audit, audit_findings: list[AuditFinding], page: Path | None) -
     from pipelines.audit.calibrations import date_of
     from pipelines.audit.document import counts
     from pipelines.audit.finding import WHO
+    from schemas.counts import number_of
 
     out, number = console(), counts(found)
     period = f"{date_of(found.scope.since)} to {date_of(found.scope.until - 1)}" if found.scope.since > _BEGINNING else (
         f"all until {date_of(found.scope.until - 1)}"
     )  # fmt: skip
-    out.print(
-        f"{number['calibrations']} calibrations of {number['units']} units in {number['runs']} runs on {number['stations']} "
-        f"stations; {period}", markup=False, soft_wrap=True,
-    )  # fmt: skip
+    counted = ", ".join(number_of(number[f"{noun}s"], noun) for noun in ("calibration", "unit", "run", "station"))
+    out.print(f"{counted}; {period}", markup=False, soft_wrap=True)
     _show_yield(found)
     out.print(_certificates(found), markup=False, soft_wrap=True)
     for who, words in WHO.items():

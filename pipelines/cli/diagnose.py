@@ -95,7 +95,9 @@ def command(
     if report is not None:
         write_report(report, report_text)
     if following is not None and base is not None:
-        write_next(following, document, base, Path(recipe).parent if recipe else Path(), dwells)
+        from pipelines.jobs.recipes import folder_of
+
+        write_next(following, document, base, folder_of(recipe) if recipe else Path(), dwells)
     if as_json:
         print_json(document)
     else:

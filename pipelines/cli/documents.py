@@ -448,3 +448,10 @@ class CertificateDocument(TypedDict):
 
     certificates: list[CertificateFiles]
     left_out: Annotated[dict[str, str], "units of a run that have no certificate, with the reason"]
+
+
+class KeysDocument(TypedDict):
+    """``keys [SUBJECT] --json``: the keys of a file, or the names that an option takes."""
+
+    subject: Annotated[str, "empty: the list of subjects"]
+    rows: Annotated[list[dict[str, str]], "one for each key or name, by the heads of the printed table"]

@@ -96,7 +96,7 @@ def _print(rows: list[dict[str, Any]], name: str, file: Path) -> None:
     changes = [
         [str(row["version"]), _change(row), row["by"], row["at"][:16].replace("T", " "), row["why"]] for row in rows
     ]
-    print_table(["version", "change", "by", "when", "why"], changes, title=f"Model {name}", whole=2)
+    print_table(["version", "change", "by", "when", "why"], changes, title=f"Versions of {name}", whole=2)
     if rows[0]["fitted_ug"] is None:
         return
     fresh = rows[0]["fresh_ug"] is not None
@@ -112,7 +112,6 @@ def _print(rows: list[dict[str, Any]], name: str, file: Path) -> None:
         ["version", *(heads[k] for k in keys), "verdict by data not fitted"],
         errors,
         title="Error, rms",
-        whole=5,
     )
     out.print(
         "cross-validated: the worst of poses, soaks and stretches of time · fresh run: coefficients unchanged, the bias change "

@@ -124,16 +124,16 @@ STYLES = {"pass": "bold green", "fail": "bold red", "refused": "bold magenta"}
 
 def console() -> Console:
     """The console for results; brackets and colons in it are text, never markup."""
-    from rich.console import Console
+    from pipelines.cli.console import WordConsole
 
-    return Console(highlight=False, markup=False, emoji=False)
+    return WordConsole(highlight=False, markup=False, emoji=False)
 
 
 def error_console() -> Console:
     """The console for progress and remarks: standard output has results only."""
-    from rich.console import Console
+    from pipelines.cli.console import WordConsole
 
-    return Console(stderr=True, highlight=False, markup=False, emoji=False)
+    return WordConsole(stderr=True, highlight=False, markup=False, emoji=False)
 
 
 def print_json(document: Any) -> None:
@@ -157,31 +157,83 @@ def print_table(
 ) -> None:
     """A table for people; numbers stand to the right.
 
-    Neither they nor the first ``whole`` columns are ever broken or cut: a table that needs more than the terminal is wider.
+    Neither they nor the first ``whole`` columns are ever broken or cut. A table that needs more than the terminal continues
+    below with its other columns, the first ``whole`` repeated; in a pipe it is as wide as it needs to be.
     """
+    from pipelines.cli.console import limited
+
+    shown = out or console()
+    least = [_least(number < whole, column, [line[number] for line in lines]) for number, column in enumerate(columns)]
+    for part in _parts(least, whole, shown.width if limited(shown) else None):
+        _print_part(shown, [columns[k] for k in part], [[line[k] for k in part] for line in lines], title, whole)
+        title = ""
+
+
+PADDING = 3  # characters between two columns
+
+
+def _least(kept: bool, column: str, cells: Sequence[str | Text]) -> int:
+    """Characters that a column needs at least: its longest line where it is kept whole, else its longest word."""
+    texts = [str(cell) for cell in cells]
+    if kept or _numeric(texts):
+        return _longest([column, *texts], None)
+    return min(_longest([column, *texts], " "), NARROW)
+
+
+def _parts(least: Sequence[int], whole: int, width: int | None) -> list[list[int]]:
+    """The columns in portions that fit a width, each with the first ``whole`` ones."""
+    head = list(range(min(whole, len(least))))
+    if width is None:
+        return [list(range(len(least)))]
+    parts, own = list[list[int]](), list(head)
+    for k in range(len(head), len(least)):
+        if len(own) > len(head) and sum(least[m] + PADDING for m in [*own, k]) + 1 > width:
+            parts.append(own)
+            own = list(head)
+        own.append(k)
+    return [*parts, own]
+
+
+def _print_part(
+    shown: Console, columns: Sequence[str], lines: Sequence[Sequence[str | Text]], title: str, whole: int
+) -> None:
     from rich import box
     from rich.table import Table
 
-    shown = out or console()
-    table = Table(title=title or None, box=box.SIMPLE_HEAD, title_justify="left")
+    table = Table(box=box.SIMPLE_HEAD)
+    texts = [[str(line[number]) for line in lines] for number in range(len(columns))]
+    least = [_least(number < whole, column, texts[number]) for number, column in enumerate(columns)]
+    most = [_longest([column, *own], None) for column, own in zip(columns, texts, strict=True)]
+    widths = _widths(least, most, shown.width - 1 - PADDING * len(columns))
     for number, column in enumerate(columns):
-        cells = [str(line[number]) for line in lines]
-        numeric = bool(cells) and all(_is_number(cell) for cell in cells)
-        kept = number < whole or numeric
-        least = _longest([column, *cells], None if kept else " ")
-        table.add_column(
-            column,
-            justify="right" if numeric else "left",
-            overflow="fold",
-            no_wrap=kept,
-            min_width=least if kept else min(least, NARROW),
-        )
+        numeric = _numeric(texts[number])
+        justify = "right" if numeric else "left"
+        kept = numeric or number < whole
+        table.add_column(column, justify=justify, overflow="fold", no_wrap=kept, width=widths[number])
     for line in lines:
         table.add_row(*line)
-    needed = sum((column.min_width or 0) + 3 for column in table.columns) + 1  # padding, dividers and edges
-    if needed > shown.width:
-        table.width = needed
+    table.width = sum(widths) + PADDING * len(widths) + 1
+    if title:
+        shown.print(title, style="italic", markup=False)  # the table's own title would wrap to the width of the table
     shown.print(table, crop=False)
+
+
+def _widths(least: Sequence[int], most: Sequence[int], room: int) -> list[int]:
+    """Widths between what columns need at least and at most; room is given to the narrowest of those that want more."""
+    widths = list(least)
+    spare = room - sum(widths)
+    while spare > 0:
+        wanting = [k for k in range(len(widths)) if widths[k] < most[k]]
+        if not wanting:
+            break
+        narrowest = min(wanting, key=lambda k: widths[k])
+        widths[narrowest] += 1
+        spare -= 1
+    return widths
+
+
+def _numeric(cells: Sequence[str]) -> bool:
+    return bool(cells) and all(_is_number(cell) for cell in cells)
 
 
 def _longest(texts: Sequence[str], between: str | None) -> int:

@@ -107,6 +107,7 @@ def command(
 
     For effects that are not visible: the reason, and what to add to the recipe.
     """
+    from pipelines.jobs.recipes import folder_of
     from pipelines.jobs.terms import planned_terms
     from pipelines.planning.plan import plan, plan_context
     from pipelines.planning.preset_noise import noise_of
@@ -115,7 +116,7 @@ def command(
     config = load_station(station)
     found = with_model(recipe, effects, model, archive, config.name)
     context = plan_context(found, config, noise_of(found, device or found.device, noise, wander))
-    limits = _limits(found, Path(recipe).parent)
+    limits = _limits(found, folder_of(recipe))
     document = plan(context, planned_terms(found, config, limits), limits)
     if page is not None:
         _write(page, document, context)
@@ -227,6 +228,7 @@ def optimise(
     """
     from pipelines.cli.optimal import cheapest_recipe, missing_limits, print_optimum, written
     from pipelines.cli.optimise_options import OptimiseOptions
+    from pipelines.jobs.recipes import folder_of
     from pipelines.planning.preset_noise import noise_of
     from schemas.station import load_station
 
@@ -240,7 +242,7 @@ def optimise(
     )
     target = output or Path(f"{optimum.planned.recipe.name}.toml")
     document["file"] = str(target)
-    home = Path(recipe).parent
+    home = folder_of(recipe)
     document["limits_missing"] = missing_limits(base, home)
     _save(target, written(optimum, target, home, document))
     if page is not None:

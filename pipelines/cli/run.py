@@ -131,23 +131,42 @@ def _measured(request: Request, job: Job, store: Archive, *, direct: bool, asks:
         return runner.run
 
 
+DOES = {
+    "validate": "checking the records",
+    "reduce": "averaging the dwells",
+    "fit": "fitting the models",
+    "verify": "comparing with the poses that no fit uses",
+    "noise": "computing the Allan deviations",
+    "budget": "computing the uncertainties",
+    "procedures": "evaluating the procedures",
+    "grade": "deciding by the limits",
+    "report": "drawing the report",
+}
+"""What each stage does, for the progress line."""
+
+
 @contextmanager
 def shown() -> Generator[tuple[Progress, Callable[[Done], None], Callable[[], AbstractContextManager[None]]]]:
     """A progress bar for the capture and a line for each stage, on standard error; and a context that pauses both."""
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
+    from rich.table import Column
 
     out = error_console()
-    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
+    stages = list(DOES)
+    words = TextColumn("{task.description}", table_column=Column(no_wrap=False))  # wraps where the terminal is narrow
+    columns = (BarColumn(bar_width=12), MofNCompleteColumn(), TimeElapsedColumn(), words)
     with Progress(*columns, console=out, transient=True) as bars:
-        bar = bars.add_task("starting", total=None)
+        bar = bars.add_task("preparing", total=None)
 
         def progress(done: int, total: int, note: str) -> None:
-            bars.update(bar, completed=done, total=total, description=f"capture  {note}")
+            bars.update(bar, completed=done, total=total, description=note)
 
         def report_stage(done: Done) -> None:
             how = "reused" if done.reused else f"{done.seconds:.1f} s"
-            bars.console.print(f"{done.stage:<9} {how}", markup=False)
-            bars.update(bar, description="computing", completed=0, total=None)
+            bars.console.print(f"{done.stage:<10} {how}", markup=False)
+            at = stages.index(done.stage) + 1 if done.stage in DOES else 0
+            note = DOES[stages[at]] if at < len(stages) else "finishing"
+            bars.update(bar, description=note, completed=at, total=len(stages))
 
         @contextmanager
         def quiet() -> Generator[None]:

@@ -8,6 +8,7 @@ from pipelines.capture.interruptions import interruptions
 from pipelines.cli.options import STYLES, console, print_table, short
 from pipelines.tables.frames import rows_of
 from pipelines.tables.json_values import json_value
+from schemas.counts import number_of
 from schemas.errors import DONE, PART_FAILED
 
 if TYPE_CHECKING:
@@ -35,9 +36,9 @@ NOISE_ONLY = (
 
 LEGEND = (
     "fit: rms residual · verify: largest | |a| − g | of a pose not used, mean of its dwells · error: rms of the worst axis in "
-    "these poses · period: the same, expected over the period of validity\n"
-    "N, B: noise of the worst axis, an upper limit where a term is not identified"
+    "these poses · period: the same, expected over the period of validity"
 )
+NOISE_LEGEND = "N, B: noise of the worst axis, an upper limit where a term is not identified"
 
 
 def summary(run: Run) -> dict[str, Any]:
@@ -84,7 +85,10 @@ def print_summary(document: dict[str, Any]) -> None:
     calibrated = any(name in unit["figures"] for unit in document["units"] for name, _ in SHOWN) or not _listed(
         document
     )
-    shown = [*(SHOWN if calibrated else ()), *_listed(document)]
+    measured = {
+        name for unit in document["units"] for name in unit["figures"]
+    }  # a recipe without a static record has no N
+    shown = [one for one in (*(SHOWN if calibrated else ()), *_listed(document)) if one[0] in measured or not measured]
     for unit in document["units"]:
         values = [short(unit["figures"].get(name, {}).get("value")) for name, _ in shown]
         outcome = Text(unit["outcome"], style=STYLES[unit["outcome"]])
@@ -92,7 +96,9 @@ def print_summary(document: dict[str, Any]) -> None:
     print_table(["slot", "unit", "result", "grade", *(title for _, title in shown)], lines)
     out = console()
     if calibrated:
-        out.print(LEGEND, style="dim")
+        out.print(LEGEND, style="dim", soft_wrap=True)
+        if any(name == "velocity_random_walk_ug_rtHz" for name, _ in shown):
+            out.print(NOISE_LEGEND, style="dim", soft_wrap=True)
     for unit in document["units"]:
         if unit["reasons"]:
             out.print(f"  {unit['unit']}: {unit['reasons']}", markup=False)
@@ -124,10 +130,11 @@ def _interrupted(found: Interruptions | None) -> list[str]:
     """The interruptions of a run as lines; empty if there were none."""
     if not found or not found["events"]:
         return []
-    door = f", the door was opened {found['door_opened']} times" if found["door_opened"] else ""
-    head = f"  station: {found['pauses']} pauses ({found['paused_s'] / 60.0:.1f} min waited){door}"
+    door = f", the door was opened {number_of(found['door_opened'], 'time')}" if found["door_opened"] else ""
+    head = f"  station: {number_of(found['pauses'], 'pause')} ({found['paused_s'] / 60.0:.1f} min waited){door}"
     dwells = [
-        f"  dwell {one['record']} (pose {one['pose']}) measured again {one['times']} times: {'; '.join(one['reasons'])}"
+        f"  dwell {one['record']} (pose {one['pose']}) measured again {number_of(one['times'], 'time')}: "
+        f"{'; '.join(one['reasons'])}"
         for one in found["repeated_dwells"]
     ]
     return [head, *dwells]

@@ -14,6 +14,7 @@ import urllib.request
 import uuid
 from contextlib import contextmanager
 from hashlib import sha256
+from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -37,6 +38,14 @@ if TYPE_CHECKING:
 
 POLL_S = 0.1
 PRIVATE = 0o600
+NEEDED = (
+    "pipelines.flows.calibrate",
+    "pipelines.flows.dead_runs",
+    "pipelines.capture.capture",
+    "pipelines.report.plots",
+)
+SIMULATED = ("stations.plant.plant", "stations.plant.server")
+"""Modules that a run imports, and those of a simulated station: the slow ones."""
 
 _started: list[subprocess.Popen[bytes]] = []  # they end by themselves; kept so that the interpreter does not complain
 
@@ -52,25 +61,34 @@ def run_locally(
     """The run that the flow ``calibrate_lot`` made, on the server named by PREFECT_API_URL or on one of our own."""
     archive.prepare()
     progress(0, len(steps(job.recipe)), "starting the orchestrator")
-    with reached(archive):
+    with reached(archive, lambda: _prepare(job)):
         return _run(request, job, archive, progress, report, operator)
 
 
+def _prepare(job: Job) -> None:
+    """Import what the run needs, while the server starts on another processor."""
+    for name in (*NEEDED, *(SIMULATED if job.station.simulation is not None else ())):
+        import_module(name)
+
+
 @contextmanager
-def reached(archive: Archive) -> Generator[None]:
-    """A block in which an orchestrator answers: the one named by PREFECT_API_URL, or one of our own beside the archive."""
+def reached(archive: Archive, meanwhile: Callable[[], None] = lambda: None) -> Generator[None]:
+    """A block in which an orchestrator answers: the one named by PREFECT_API_URL, or one of our own beside the archive.
+
+    ``meanwhile`` is called while a server of our own starts.
+    """
     if os.environ.get("PREFECT_API_URL"):
         reach_named()
         yield
         return
-    with own_server(_home(archive)):
+    with own_server(_home(archive), meanwhile):
         yield
 
 
 @contextmanager
-def own_server(home: Path) -> Generator[None]:
+def own_server(home: Path, meanwhile: Callable[[], None] = lambda: None) -> Generator[None]:
     """A block in which this process is a client of a server of our own; nothing of it is left afterwards."""
-    with local_server(home) as found, with_environment(found):
+    with local_server(home, meanwhile) as found, with_environment(found):
         from prefect.settings import temporary_settings
 
         # Prefect reads the environment when it is imported, which an earlier block may have done for another server
@@ -119,7 +137,7 @@ def _run(
 
 
 @contextmanager
-def local_server(home: Path) -> Generator[dict[str, str], None, None]:
+def local_server(home: Path, meanwhile: Callable[[], None] = lambda: None) -> Generator[dict[str, str], None, None]:
     """The environment of a server that runs for as long as this block, shared with others who want it."""
     _refuse_foreign(home)
     private_folder(home)
@@ -129,7 +147,7 @@ def local_server(home: Path) -> Generator[dict[str, str], None, None]:
         fcntl.flock(held, fcntl.LOCK_SH)
         with (home / START_LOCK).open("w") as lock:
             fcntl.flock(lock, fcntl.LOCK_EX)
-            port, key = _running(home) or _start(home)
+            port, key = _running(home) or _start(home, meanwhile)
         try:
             yield settings(home, port, key)
         finally:
@@ -162,7 +180,7 @@ def _running(home: Path) -> tuple[int, str] | None:
     return (port, key) if _answers(port) else None
 
 
-def _start(home: Path) -> tuple[int, str]:
+def _start(home: Path, meanwhile: Callable[[], None]) -> tuple[int, str]:
     port, key = _free_port(), new_key()
     with os.fdopen(_private_file(home / "server.log", os.O_APPEND), "ab") as log:
         process = subprocess.Popen(  # noqa: S603 - our own module, by our own interpreter
@@ -179,6 +197,8 @@ def _start(home: Path) -> tuple[int, str]:
             start_new_session=True,
         )
     _started.append(process)
+    with with_environment(settings(home, port, key)):  # Prefect reads it when it is imported
+        meanwhile()
     end = time.monotonic() + STARTUP_S
     while not _answers(port):
         if process.poll() is not None or time.monotonic() > end:

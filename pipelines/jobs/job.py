@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import asdict, dataclass, replace
+from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from inertial.errors import InertialError
 from pipelines.archive.keys import digest
 from pipelines.jobs.model_files import read_model, refuse_unknown_effects, use_formulas
-from pipelines.jobs.recipes import MAIN_JOB, load_limits, load_recipe, lot_of, units_of
+from pipelines.jobs.recipes import MAIN_JOB, folder_of, load_limits, load_recipe, lot_of, units_of
 from pipelines.jobs.terms import refuse_contradictions, refuse_unreachable, with_stability
 from pipelines.procedures import refuse_unusable
 from pipelines.schedule.planned_state import refuse_unidentified
@@ -19,6 +20,7 @@ from pipelines.tables.dwell_table import covariates
 from schemas.errors import RecipeInvalid, WrongUse
 from schemas.fault import parse_fault
 from schemas.limits import Limits, limits_of
+from schemas.own_files import contents
 from schemas.recipe import Lot, Recipe
 from schemas.station import StationConfig, load_station, with_faults
 from stations.profile_files import recorded_columns
@@ -27,6 +29,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from pipelines.archive import Archive, Run
+    from schemas.own_files import Kind
 
 ANALYSIS_KEYS = {
     "name",
@@ -82,8 +85,21 @@ class Job:
             unmoved.add("equipment")
         station = self.station.model_dump(mode="json", exclude=unmoved)
         after = {"parents": list(self.parents)} if self.parents else {}
-        content = {"recipe": measured, "lot": self.lot.model_dump(), "station": station, **after}
+        own = {"own_files": hashes} if (hashes := self.own_files) else {}
+        content = {"recipe": measured, "lot": self.lot.model_dump(), "station": station, **after, **own}
         return digest(content)[:16]
+
+    @cached_property  # as they are when the job is made, also where somebody edits one during the run
+    def own_files(self) -> dict[str, str]:
+        """SHA-256 of the user's profiles and preset that the station and the lot name: they decide what is measured."""
+        devices = self.station.devices
+        fitted = [devices.outer, devices.inner, devices.chamber, devices.reader, devices.slots]
+        if self.recipe.procedures:
+            fitted += self.station.fitted().values()
+        named: list[tuple[Kind, str]] = [("profiles", device.profile) for device in fitted]
+        if self.station.simulation is not None:
+            named.append(("presets", self.lot.device))
+        return contents(named)
 
     @property
     def about(self) -> dict[str, Any]:
@@ -95,6 +111,7 @@ class Job:
             "station": self.station.model_dump(mode="json"),
             "capture": self.capture_id,
             **({"parents": list(self.parents)} if self.parents else {}),
+            **({"own_files": own} if not self.captured and (own := self.own_files) else {}),
         }
 
 
@@ -134,7 +151,7 @@ class Request:
         archive : where the line's model is released, for recipes that ask for it; the default one where None
         """
         recipe = load_recipe(self.recipe, lambda device: self._line_model(archive, device))
-        limits = load_limits(recipe, Path(self.recipe).parent)
+        limits = load_limits(recipe, folder_of(self.recipe))
         lot = lot_of(recipe, self.units, self.slots, seed=self.seed, repeat=self.repeat)
         station = with_faults(load_station(self.station), [*recipe.faults, *map(parse_fault, self.faults)])
         refuse_contradictions(recipe, station)

@@ -19,6 +19,7 @@ from pipelines.jobs.model_files import read_model, refuse_unknown_effects
 from schemas.errors import RecipeInvalid, WrongUse, close_matches, did_you_mean
 from schemas.foreign import is_file, shown
 from schemas.limits import Limits, parse_limits, unknown_limits
+from schemas.own_files import own_file, own_names
 from schemas.recipe import Lot, Pose, Recipe, RecipeFile, Unit, parse_recipe
 from schemas.serials import refuse_unusable_serials
 from schemas.toml_files import explain, read_text
@@ -89,21 +90,28 @@ def units_of(name: str = MAIN_JOB) -> list[str]:
     return parse_recipe(text, source).units
 
 
+def folder_of(name: str) -> Path:
+    """The folder that names of files in a recipe are relative to; the working folder for a built-in one."""
+    return _recipe_text(name)[2]
+
+
 def load_limits(recipe: Recipe, folder: Path | None = None) -> Limits:
     """The limits that a recipe names: a file beside the recipe or anywhere, or built-in ones."""
     return read_limits(recipe.limits, folder)
 
 
 def read_limits(name: str, folder: Path | None = None) -> Limits:
-    """The limits of a file in a folder or anywhere, or the built-in ones of this name."""
+    """The limits of a file in a folder or anywhere, of the user, or the built-in ones of this name."""
     from pipelines.stages.figures import UNITS
 
-    for path in ((folder or Path()) / name, Path(name)):
-        if is_file(path):
-            return parse_limits(read_text(path, "limits"), f"limits {path.name}", UNITS)
+    known = sample_names("limits-")
+    paths = (path for path in ((folder or Path()) / name, Path(name)) if is_file(path))
+    path = next(paths, None) or own_file("limits", name, known)
+    if path is not None:
+        return parse_limits(read_text(path, "limits"), f"limits {path.name}", UNITS)
     built_in = files("schemas") / "samples" / f"limits-{name}.toml"
-    if name not in sample_names("limits-"):
-        raise unknown_limits(name, sample_names("limits-"))
+    if name not in known:
+        raise unknown_limits(name, [*known, *own_names("limits")])
     return parse_limits(built_in.read_text(encoding="utf-8"), f"limits {name}", UNITS)
 
 
@@ -137,17 +145,29 @@ def sample_names(prefix: str = "") -> list[str]:
     return sorted(stem for stem in stems if not stem.startswith("limits-"))
 
 
+def recipe_names() -> list[str]:
+    """Names of the built-in recipes and of the user's."""
+    return sorted({*sample_names(), *own_names("recipes")})
+
+
+def limits_names() -> list[str]:
+    """Names of the built-in limits and of the user's."""
+    return sorted({*sample_names("limits-"), *own_names("limits")})
+
+
 def _recipe_text(name: str) -> tuple[str, str, Path]:
     """Content, what to call it in messages, and the folder that names inside it are relative to."""
-    path = Path(name)
-    if is_file(path):
+    built_in = sample_names()
+    path = Path(name) if is_file(name) else own_file("recipes", name, built_in)
+    if path is not None:
         return read_text(path, "recipe"), f"recipe {path.name}", path.parent
-    built_in = files("schemas") / "samples" / f"{name}.toml"
-    if name in sample_names() and built_in.is_file():
-        return built_in.read_text(encoding="utf-8"), f"recipe {name}", Path()
+    if name in built_in:
+        text = (files("schemas") / "samples" / f"{name}.toml").read_text(encoding="utf-8")
+        return text, f"recipe {name}", Path()
+    known = recipe_names()
     raise RecipeInvalid(
-        f"recipe: no file and no built-in recipe is called '{shown(name)}'; {did_you_mean(name, sample_names())}",
-        close=close_matches(name, sample_names()),
+        f"recipe: no file and no recipe is called '{shown(name)}'; {did_you_mean(name, known)}",
+        close=close_matches(name, known),
     )
 
 

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from pipelines.archive import code_hash, stage_key
 from pipelines.certificates.statement import stated
 from pipelines.report.run_page import render
+from pipelines.report.templates import page_hash
 from schemas.errors import WrongUse
 
 if TYPE_CHECKING:
@@ -33,9 +34,10 @@ def make_report(run: Run) -> bool:
     names = [*INPUTS, *(name for name in OPTIONAL if name in run.tables())]
     inputs, code = {name: run.manifest(name)["sha256"] for name in names}, code_hash(MODULES)
     certificates = stated(run, run.table("grades")["unit"])
-    parameters = (
+    parameters: dict[str, Any] = (
         {"certificates": {unit: list(one) for unit, one in sorted(certificates.items())}} if certificates else {}
     )
+    parameters["page"] = page_hash()  # the code's hash has no templates
     key = stage_key("report", inputs, parameters, code)
     if run.has_report(key):
         run.seal()  # a killed writer may not have written it

@@ -10,7 +10,7 @@ from inertial import effects
 from inertial.criticism.handling import named as handled
 from pipelines.report.diagnosis_plots import driver_plots, model_plot, pose_maps
 from pipelines.report.numbers import plain
-from pipelines.report.residuals import drivers_shown, lot_residuals
+from pipelines.report.residuals import bands_without_zero, drivers_shown, lot_residuals
 from pipelines.report.templates import template
 from schemas.units import MICRO
 
@@ -106,7 +106,11 @@ def _pictures(diagnosis: Diagnosis, units: tuple[str, ...]) -> dict[str, Any]:
     lot = diagnosis.problem.lot
     left = lot_residuals(diagnosis, units)
     drivers = drivers_shown(diagnosis)
+    excluding = bands_without_zero(left, drivers)
     return {
+        "turned": lot.state.temperature is not None and any(series.name == "unit_C" for series in drivers),
+        "excluding": excluding,
+        "bands": len(drivers) * len(left.axes),
         "unit": left.unit,
         "several": len(units) > 1,
         "added": left.before is not left.after,

@@ -103,6 +103,22 @@ def _alike(one: Array, other: Array) -> bool:
     return bool(abs(np.corrcoef(one.ravel(), other.ravel())[0, 1]) > _ALIKE)
 
 
+def bands_without_zero(left: LotResiduals, drivers: list[DriverValues]) -> list[str]:
+    """The drivers, with their axes, whose band after the added effects lies beside zero somewhere."""
+    found: list[str] = []
+    for series in drivers:
+        values = series.values[left.shown]
+        axes: list[str] = []
+        for column, axis in enumerate(left.axes):
+            x = values[:, column] if values.ndim > 1 else values
+            _, low, high = band(x, left.after[left.shown, column])
+            if bool(np.any(low > 0.0) or np.any(high < 0.0)):
+                axes.append(axis)
+        if axes:
+            found.append(f"{series.label} ({', '.join(axes)})")
+    return found
+
+
 def band(x: Array, y: Array) -> tuple[Array, Array, Array]:
     """Smooth curve through points with its 95 % band: (places, low, high); empty where there are too few."""
     there = np.isfinite(x) & np.isfinite(y)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from functools import cache
+from hashlib import sha256
 from importlib.resources import files
 from typing import Any
 
@@ -18,6 +19,13 @@ def _environment() -> Environment:
 def template(name: str) -> Template:
     """The template of this name, which may include others of this folder."""
     return _environment().get_template(name)
+
+
+@cache
+def page_hash() -> str:
+    """SHA-256 of the template and the style of the page of a run."""
+    folder = files("pipelines.report")
+    return sha256(b"".join((folder / name).read_bytes() for name in ("page.html", "style.css"))).hexdigest()
 
 
 def fill(text: str, **values: Any) -> str:

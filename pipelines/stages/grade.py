@@ -219,7 +219,7 @@ def _why(figure: Figure, best: str, basis: str, limits: Limits) -> str:
     """The reason that limits a grade, in brackets."""
     if figure.name == PERIOD_FIGURE:
         expanded = limits.coverage_factor * figure.uncertainty
-        return f" (error expected over the period of validity {figure.value:.3g} ± {expanded:.2g} µg)"
+        return f" (error expected over the period of validity {float(f'{figure.value:.3g}'):g} ± {float(f'{expanded:.2g}'):g} µg)"
     if best != BEST_OF_NOISE:
         return ""
     if basis == NOISE_ONLY:

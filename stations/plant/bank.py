@@ -43,6 +43,9 @@ class Bank:
         self._sink = sink
         self._window = window
         self._registers = [self._scaled(register) for register in profile.registers]
+        self._addresses: dict[Space, set[int]] = {}
+        for register in profile.registers:
+            self._addresses.setdefault(register.space, set()).update(range(register.address, register.end))
         missing = [r.name for r in profile.registers if r.access != "write" and r.name not in self._sources]
         if missing:
             raise LookupError(
@@ -53,6 +56,13 @@ class Bank:
         """The register with the decimals that are set in the device."""
         decimals = self._sources[register.scaled_by]() if register.scaled_by in self._sources else 0
         return register.with_decimals(decimals) if isinstance(decimals, int) and register.scaled_by else register
+
+    def has(self, address: int, space: Space) -> bool:
+        """Whether a register, or the window of the samples, is at this address."""
+        fifo = self.profile.fifo
+        if fifo is not None and space == "holding" and address >= fifo.address:
+            return True
+        return address in self._addresses.get(space, ())
 
     def read(self, address: int, count: int, space: Space = "holding") -> list[tuple[int, list[int]]]:
         """Words, or bits, of every register in an address range, each with its address."""

@@ -72,6 +72,9 @@ class Journal:
         self._writes = array("q")  # time, device, space, address, count and words of each write, in sequence
         self._count = 0
         self._others: list[tuple[int, LineOrder | Injection]] = []  # with the number of writes before each
+        self._texts: list[
+            str
+        ] = []  # the first events as JSON, so that a state after every record costs no more each time
 
     def add(self, event: Event) -> None:
         """Appends an event."""
@@ -82,26 +85,29 @@ class Journal:
         self._writes.extend((event.at_us, *place, len(event.words), *event.words))
         self._count += 1
 
-    def events(self) -> Iterator[Event]:
-        """Every event, in order."""
-        others, at = deque(self._others), 0
+    def events(self, after: int = 0) -> Iterator[Event]:
+        """Every event behind the first ``after``, in order."""
+        others, at, skipped = deque(self._others), 0, 0
         for number in range(self._count + 1):
             while others and others[0][0] == number:
-                yield others.popleft()[1]
+                other = others.popleft()[1]
+                if skipped >= after:
+                    yield other
+                skipped += 1
             if number < self._count:
-                time, device_id, space, address, words = self._writes[at : at + HEAD]
+                words = self._writes[at + HEAD - 1]
+                if skipped >= after:
+                    time, device_id, space, address, _ = self._writes[at : at + HEAD]
+                    own = self._writes[at + HEAD : at + HEAD + words]
+                    yield Write(time, device_id, address, tuple(own), SPACES[space])
                 at += HEAD + words
-                yield Write(time, device_id, address, tuple(self._writes[at - words : at]), SPACES[space])
+                skipped += 1
 
     def state(self, now_us: int) -> bytes:
         """The journal and the time as bytes."""
-        content = {
-            "version": VERSION,
-            "belongs_to": self._belongs_to,
-            "now_us": now_us,
-            "events": [_as_json(event) for event in self.events()],
-        }
-        return zlib.compress(json.dumps(content, separators=(",", ":")).encode(), 6)
+        self._texts += [_compact(_as_json(event)) for event in self.events(len(self._texts))]
+        head = _compact({"version": VERSION, "belongs_to": self._belongs_to, "now_us": now_us})
+        return zlib.compress(f'{head[:-1]},"events":[{",".join(self._texts)}]}}'.encode(), 6)
 
     def recorded(self, state: bytes) -> tuple[list[Event], int]:
         """The events in ``state`` and its time, µs; a state of another station or lot is refused.
@@ -122,6 +128,10 @@ class Journal:
                 "station state: it belongs to another station or lot; resume with the same files and the same units"
             )
         return [_from_json(item) for item in content["events"]], int(content["now_us"])
+
+
+def _compact(content: object) -> str:
+    return json.dumps(content, separators=(",", ":"))
 
 
 def _as_json(event: Event) -> dict[str, object]:

@@ -9,8 +9,9 @@ from typing import TYPE_CHECKING, Annotated, Literal
 from pydantic import Field, FiniteFloat, ValidationError
 
 from schemas.errors import RecipeInvalid, did_you_mean
+from schemas.own_files import own_file, own_names
 from schemas.strict import Strict
-from schemas.toml_files import explain
+from schemas.toml_files import explain, parse_toml, read_text
 from schemas.validity import Stability
 
 if TYPE_CHECKING:
@@ -76,23 +77,37 @@ class Preset(Strict):
 
 
 def preset_names() -> list[str]:
-    """Names of the presets, as they are written in their files."""
-    return sorted(_texts())
+    """Names of the presets, as they are written in their files; those of the user by the names of their files."""
+    return sorted({*_texts(), *own_names("presets")})
 
 
 def load_preset(name: str, overrides: Mapping[str, float] | None = None) -> Preset:
     """The preset of that name (in any case), with some figures replaced; unknown names and keys are refused."""
     texts = {key.lower(): text for key, text in _texts().items()}
-    if name.lower() not in texts:
+    own = next((one for one in own_names("presets") if one.lower() == name.lower()), name)
+    path = own_file("presets", own, {own} if own.lower() in texts else ())
+    if path is None and name.lower() not in texts:
         raise RecipeInvalid(f"device: no preset '{name}'; {did_you_mean(name, preset_names())}", key="device")
-    figures = tomllib.loads(texts[name.lower()]) | dict(overrides or {})
+    source = f"preset {name}" if path is None else str(path)
+    figures = parse_toml(texts[name.lower()] if path is None else read_text(path, "preset"), source)
+    if path is not None and str(figures.get("name", "")).lower() != own.lower():
+        raise RecipeInvalid(
+            f"{path}: key 'name': '{figures.get('name', '')}', '{own}' as in the name of the file is needed; correct it",
+            key="name",
+        )
     try:
-        return Preset.model_validate(figures)
+        return Preset.model_validate(figures | dict(overrides or {}))
     except ValidationError as problem:
-        raise explain(problem, f"preset {name}", Preset) from None
+        raise explain(problem, source, Preset) from None
+
+
+def built_in_presets() -> list[str]:
+    """Names of the presets of the product, sorted."""
+    return sorted(_texts())
 
 
 def _texts() -> dict[str, str]:
+    """The presets of the product by their names."""
     folder = files("stations.plant").joinpath("presets")
     found = {item.name: item.read_text("utf-8") for item in folder.iterdir() if item.name.endswith(".toml")}
     return {str(tomllib.loads(text)["name"]): text for text in found.values()}

@@ -15,6 +15,7 @@ from pymodbus.constants import ExcCodes
 from pymodbus.exceptions import NoSuchIdException
 from pymodbus.server import ModbusTcpServer
 from pymodbus.server.base import ModbusBaseServer
+from pymodbus.server.requesthandler import ServerRequestHandler
 from pymodbus.simulator import DataType, SimData, SimDevice
 
 from schemas.errors import StationRefused
@@ -81,10 +82,8 @@ async def _answer(
 ) -> ExcCodes | None:
     """Fills the registers of a read, or passes on the values of a write."""
     space = SPACES[function]
-    if not any(r.space == space and r.address <= address < r.end for r in plant.banks[device_id].profile.registers):
-        fifo = plant.banks[device_id].profile.fifo
-        if fifo is None or space != "holding" or address < fifo.address:
-            return ExcCodes.ILLEGAL_ADDRESS
+    if not plant.banks[device_id].has(address, space):
+        return ExcCodes.ILLEGAL_ADDRESS
     with plant.lock:
         plant.requested.add(device_id)
         code = plant.exception_of(device_id)
@@ -116,6 +115,31 @@ def _fill(plant: Plant, device_id: int, space: Space, span: tuple[int, int], blo
             word, bit = place // WORD - start, place % WORD
             if word < len(registers):
                 registers[word] = registers[word] & ~(1 << bit) | value << bit
+
+
+class _Handler(ServerRequestHandler):
+    """A connection whose requests are tasks of the server's own loop.
+
+    pymodbus hands each one over as if it came from another thread, which wakes the loop three more times for a request.
+    """
+
+    def handle_later(self) -> None:
+        """Answers the request that was decoded."""
+        task = self.loop.create_task(self.handle_request())
+        _TASKS.add(task)
+        task.add_done_callback(_TASKS.discard)
+
+
+_TASKS: set[asyncio.Task[None]] = set()
+"""Requests under way: a loop itself keeps its tasks only weakly."""
+
+
+class _TcpServer(ModbusTcpServer):
+    """Modbus TCP with the handler above."""
+
+    def callback_new_connection(self) -> ServerRequestHandler:
+        """The handler of a new connection."""
+        return _Handler(self, self.trace_packet, self.trace_pdu, self.trace_connect)
 
 
 class PlantServer:
@@ -167,7 +191,7 @@ class PlantServer:
 
     def make(self, devices: list[SimDevice]) -> ModbusBaseServer:
         """The server for TCP; servers for other wires override this method."""
-        return ModbusTcpServer(devices, address=(self.host, self.port), ignore_missing_devices=True)
+        return _TcpServer(devices, address=(self.host, self.port), ignore_missing_devices=True)
 
     def listening_at(self, server: ModbusBaseServer) -> int:
         """The port of a listening server."""

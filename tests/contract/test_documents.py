@@ -52,8 +52,9 @@ CASES = {
     "psd --json": ["psd", "{folder}/rest.csv", "--rate", "100"],
     "doctor --json": ["doctor"],
     "monitor --json": ["monitor"],
+    "keys [SUBJECT] --json": ["keys", "recipe"],
 }
-WITHOUT_ARCHIVE = {"plan", "station", "inspect"}
+WITHOUT_ARCHIVE = {"plan", "station", "inspect", "keys"}
 
 
 @pytest.fixture(scope="module")

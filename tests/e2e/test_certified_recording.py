@@ -112,7 +112,13 @@ def test_from_a_recording_with_stated_references_to_its_certificate(folder: Path
     assert [one["certificate"] for one in certified["certified"]] == ["H1/1"]
     assert certified["certified"][0]["station"] == "lab-2"
     page = done.report.read_text(encoding="utf-8")
-    for words in ("H1/1", "Uncertainty budget", "G-2025-7", "dwells were held out of the fit", "rms error of the worst axis"):
+    for words in (
+        "H1/1",
+        "Uncertainty budget",
+        "G-2025-7",
+        "dwells were held out of the fit",
+        "rms error of the worst axis",
+    ):
         assert words in page
     assert "not stated: level" not in page
     unit = json.loads(run("export", fitted["run"]).stdout)["units"][0]

@@ -122,7 +122,7 @@ def test_a_capture_that_was_cut_off_goes_on_and_ends_the_same(tmp_path: Path, so
 @pytest.mark.parametrize(
     ("arguments", "words", "status"),
     [
-        (["run", "nosuch"], "no built-in recipe is called 'nosuch'", 2),
+        (["run", "nosuch"], "no recipe is called 'nosuch'", 2),
         (["run", "production", "--units", "A,A"], "serial A is there twice", 2),
         (["run", "production", "--units", ","], "serial '' is", 2),
         (["run", "production", "--station", "none.toml"], "none.toml cannot be read", 2),

@@ -68,7 +68,6 @@ def test_rows_of_another_width_are_refused_below_a_preamble_too(tmp_path) -> Non
         files.read(tmp_path / "a.csv")
 
 
-
 def test_a_line_break_in_a_quoted_field_of_every_row_is_part_of_the_field() -> None:
     """It ended in a traceback of the csv library while the other dividers were tried."""
     rows = "".join(f'0.{k},1.{k},"moved\nagain"\n' for k in range(1, 7))

@@ -12,7 +12,7 @@ from pipelines.schedule.steps import steps
 from schemas.recipe import Pose
 from stations.opening import open_station
 
-LEFT = re.compile(r"(?:(\d+) h )?(?:(\d+) min|(\d+) s) of the station's time left$")
+LEFT = re.compile(r"(?:(\d+) h )?(?:(\d+) min|(\d+) s) of station time left(?:, about [^,]+ here)?$")
 
 
 def told_and_true(recipe, config, lot=None):
@@ -100,5 +100,20 @@ def test_only_a_simulated_station_has_a_time_of_its_own():
     recipe = short_recipe()
     plan = steps(recipe)
     real = station_of().model_copy(update={"kind": "modbus", "simulation": None})
-    assert Remaining(plan, station_of(), recipe).text(plan[0], 0.0).endswith(" of the station's time left")
+    assert Remaining(plan, station_of(), recipe).text(plan[0], 0.0).endswith(" of station time left")
     assert re.fullmatch(r"\d+ min left", Remaining(plan, real, recipe).text(plan[0], 0.0))
+
+
+def test_the_time_by_the_wall_clock_is_in_proportion_to_the_records_that_are_left(monkeypatch: pytest.MonkeyPatch):
+    clock = [100.0]
+    monkeypatch.setattr("pipelines.capture.time_left.time.monotonic", lambda: clock[0])
+    recipe = short_recipe(poses=4)
+    plan = steps(recipe)
+    left = Remaining(plan, station_of(), recipe)
+    assert left.wall_seconds(plan[0]) is None
+    clock[0] += 6.0
+    for step in plan[:2]:
+        left.add_record(step, 12.0)
+    done, rest = (sum(left._record[step.record] for step in part) for part in (plan[:2], plan[2:]))
+    assert left.wall_seconds(plan[2]) == pytest.approx(6.0 * rest / done)
+    assert left.text(plan[2], 0.0).endswith(" here")

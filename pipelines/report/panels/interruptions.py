@@ -19,6 +19,16 @@ TEMPLATE = """\
 <p class="note">None: the door stayed closed, nothing paused the run, no dwell was measured again.</p>
 {% else %}
 <p>Pauses: {{ interruptions.pauses }}, {{ (interruptions.paused_s / 60) | round(1) }} min waited. Door opened: {{ interruptions.door_opened }}. Dwells measured again: {{ interruptions.repeated_dwells | length }}.</p>
+{% if interruptions.repeated_dwells %}
+<h3>Dwells measured again</h3>
+<table>
+<tr><th class="n">dwell</th><th>pose</th><th class="n">repetitions</th><th>reasons</th></tr>
+{% for dwell in interruptions.repeated_dwells %}
+<tr><td class="n">{{ dwell.record }}</td><td>{{ dwell.pose }}</td><td class="n">{{ dwell.times }}</td><td>{{ dwell.reasons | join("; ") }}</td></tr>
+{% endfor %}
+</table>
+{% endif %}
+<h3>Events in order of time</h3>
 <table>
 <tr><th class="n">time<br><small>min</small></th><th>event</th><th>dwell</th><th>reason</th><th>action</th></tr>
 {% for event in interruptions.events %}

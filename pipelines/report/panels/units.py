@@ -27,7 +27,7 @@ TEMPLATE = """\
 <th class="n">fit<br><small>rms, µg</small></th><th class="n">verification<br><small>largest, µg</small></th><th class="n">error<br><small>worst axis, µg</small></th>
 <th class="n">zero-g offset<br><small>mg</small></th><th class="n">N<br><small>µg/√Hz</small></th><th class="n">B<br><small>µg</small></th></tr>
 {% for unit in units %}
-<tr><td class="n">{{ unit.slot }}</td><td>{% if unit.outcome != "refused" %}<a href="#{{ unit.unit }}">{{ unit.unit }}</a>{% else %}{{ unit.unit }}{% endif %}</td>
+<tr><td class="n">{{ unit.slot }}</td><td><a href="#{{ unit.unit }}">{{ unit.unit }}</a></td>
 <td><span class="tag {{ unit.outcome }}">{{ unit.outcome }}</span></td><td>{{ unit.grade }}</td>
 {% for name in figures %}
 <td class="n">{{ unit["values"].get(name, "") }}</td>

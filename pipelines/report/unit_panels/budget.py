@@ -14,7 +14,7 @@ from pipelines.tables.frames import rows_of
 if TYPE_CHECKING:
     from pipelines.report.context import UnitContext
 
-ORDER = 32
+ORDER = 47
 TITLE = "Uncertainty"
 NAMES = {
     "bias": "bias",
@@ -33,10 +33,10 @@ TEMPLATE = """\
 <table>
 <tr><th>quantity</th><th>axis</th><th class="n">value</th><th class="n">u, type A</th><th class="n">u, type B</th><th class="n">ν<sub>eff</sub></th><th class="n">k</th><th class="n">U</th><th>unit</th><th>largest contributions</th></tr>
 {% for line in lines %}
-<tr><td>{{ line.name }}</td><td>{{ line.axis }}</td><td class="n">{{ line.value }}</td><td class="n">{{ line.a }}</td><td class="n">{{ line.b }}</td><td class="n">{{ line.dof }}</td><td class="n">{{ line.k }}</td><td class="n">{{ line.expanded }}</td><td>{{ line.unit }}</td><td><small>{{ line.largest }}</small></td></tr>
+<tr{% if not line.worst %} class="other-axis"{% endif %}><td>{{ line.name }}</td><td>{{ line.axis }}</td><td class="n">{{ line.value }}</td><td class="n">{{ line.a }}</td><td class="n">{{ line.b }}</td><td class="n">{{ line.dof }}</td><td class="n">{{ line.k }}</td><td class="n">{{ line.expanded }}</td><td>{{ line.unit }}</td><td><small>{{ line.largest }}</small></td></tr>
 {% endfor %}
 </table>
-<p class="note">Type A: noise of the run. Type B: references, station and device as stated. U = k·u, coverage about 95 %.</p>
+<p class="note">Type A: noise of the run. Type B: references, station and device as stated. U = k·u, coverage about 95 %.<span class="print-only"> Printed: the axis with the largest U of each quantity; the page on a screen shows every axis.</span></p>
 """
 
 
@@ -45,7 +45,9 @@ def render(unit: UnitContext) -> str | None:
     rows = unit.tables.get("uncertainties")
     if rows is None or rows.empty:
         return None
-    return fill(TEMPLATE, lines=[_line(row) for row in rows_of(rows)])
+    worst = set(rows.groupby("quantity", sort=False)["expanded"].idxmax().dropna())
+    lines = [{**_line(row), "worst": at in worst} for at, row in zip(rows.index, rows_of(rows), strict=True)]
+    return fill(TEMPLATE, lines=lines)
 
 
 def _line(row: dict[str, Any]) -> dict[str, Any]:

@@ -14,11 +14,12 @@ ORDER = 10
 TITLE = "Model and measurement"
 TEMPLATE = """\
 {{ model | safe }}
-<p class="note">Colours: temperature of the soak, from blue (cold) to red (warm).</p>
+{% if soaks > 1 %}<p class="note">Colours: temperature of the soak, from blue (cold) to red (warm).</p>{% endif %}
 {{ checks | safe }}
-<p class="note">Grey band: error expected from the covariance of the coefficients and the wander of a dwell. Allan deviation: band 68 % interval, line fitted terms where they explain
-the curve; dotted: slopes −½ and +½.</p>
+{% if notes %}<p class="note">{{ notes | join(" ") }}</p>{% endif %}
 """
+VERIFIED = "Grey band: error expected from the covariance of the coefficients and the wander of a dwell."
+NOISE = "Allan deviation: band 68 % interval, line fitted terms where they explain the curve; dotted: slopes −½ and +½."
 
 
 def render(unit: UnitContext) -> str | None:
@@ -27,8 +28,11 @@ def render(unit: UnitContext) -> str | None:
     if tables["residuals"].empty:
         return None
     fitted = tables["dwells"][tables["dwells"]["kind"] == "dwell"]
+    notes = [text for name, text in (("verification", VERIFIED), ("allan", NOISE)) if len(tables[name])]
     return fill(
         TEMPLATE,
+        soaks=fitted["soak"].nunique(),
+        notes=notes,
         model=model_plots(fitted, tables["residuals"]),
         checks=check_plots(tables["residuals"], tables["verification"], tables["allan"]),
     )

@@ -34,6 +34,19 @@ def figures(kind: type[Fault]) -> dict[str, float]:
     return {f.name: float(f.default) for f in fields(kind) if f.init and isinstance(f.default, int | float)}
 
 
+def fault_rows() -> list[dict[str, str]]:
+    """The kinds for people: name, the targets that it is given for, its figures with defaults, and what happens."""
+    return [
+        {
+            "fault": name,
+            "target": " or ".join("serial=SN" if one == UNIT else f"device={one}" for one in kind.targets),
+            "keys": ":".join(f"{key}={value:g}" for key, value in figures(kind).items()),
+            "meaning": (kind.__doc__ or "").partition("\n\n")[0].replace("\n", " ").replace("``", "").strip(),
+        }
+        for name, kind in kinds().items()
+    ]
+
+
 def build_fault(order: FaultOrder, serials: Sequence[str]) -> Fault:
     """The fault that an order describes, for a lot of these serial numbers.
 

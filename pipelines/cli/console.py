@@ -1,0 +1,35 @@
+"""A console whose long lines are wrapped between words at a terminal, and left whole in a pipe."""
+
+from __future__ import annotations
+
+import os
+from typing import Any
+
+from rich.console import Console
+
+COMMAND = "tumbleline "
+
+
+def limited(out: Console) -> bool:
+    """Whether the width is that of a terminal, or stated in COLUMNS; a pipe has none."""
+    return out.is_terminal or bool(os.environ.get("COLUMNS"))
+
+
+class WordConsole(Console):
+    """Text for people.
+
+    With ``soft_wrap`` a line is written as it is, and a terminal breaks it within a word. Here this holds only for lines that
+    are copied: commands, and lines with a word (a path) that is longer than the terminal is wide.
+    """
+
+    def print(self, *objects: Any, soft_wrap: bool | None = None, **options: Any) -> None:
+        """Print as :class:`rich.console.Console` does."""
+        if soft_wrap and limited(self) and len(objects) == 1 and isinstance(objects[0], str):
+            soft_wrap = _copied(objects[0], self.width)
+        super().print(*objects, soft_wrap=soft_wrap, **options)
+
+
+def _copied(text: str, width: int) -> bool:
+    """Whether a line of the text is copied as a whole: it is a command, or has a word without room."""
+    lines = text.splitlines() or [""]
+    return any(line.lstrip().startswith(COMMAND) or max(map(len, line.split()), default=0) > width for line in lines)

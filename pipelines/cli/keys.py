@@ -1,0 +1,133 @@
+"""``tumbleline keys``: the keys and names that recipes, limits, stations, --fault and demo know."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from pipelines.cli.options import JsonOption, console, print_json, print_table
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+PART = "Measure"
+ORDER = 190
+SUMMARY = "List keys of recipes, limits and stations, faults, hidden effects and names of files."
+EXAMPLES = (
+    "tumbleline keys recipe",
+    "tumbleline keys fault --json",
+)
+
+
+def command(
+    subject: Annotated[
+        str,
+        typer.Argument(
+            metavar="[SUBJECT]", help="recipe, limits, station, fault, demo or names; all in short by default."
+        ),
+    ] = "",
+    *,
+    as_json: JsonOption = False,
+) -> None:
+    """List what a recipe, limits or station file may contain, what --fault and demo know, and the names of files.
+
+    The same lists are on the page docs/reference/keys.md.
+    """
+    from schemas.errors import WrongUse, did_you_mean
+
+    if subject and subject not in SUBJECTS:
+        raise WrongUse(f"keys: no list is called '{subject}'; {did_you_mean(subject, SUBJECTS)}")
+    if not subject:
+        rows = [{"subject": name, "meaning": text} for name, (text, _) in SUBJECTS.items()]
+        document: dict[str, Any] = {"subject": "", "rows": rows}
+    else:
+        document = {"subject": subject, "rows": SUBJECTS[subject][1]()}
+    if as_json:
+        print_json(document)
+        return
+    _print(document["rows"])
+    if not subject:
+        console().print("tumbleline keys SUBJECT shows a list", markup=False)
+
+
+def _print(rows: list[dict[str, str]]) -> None:
+    """Rows in two columns, a table for each table of a file: the name, and all that is known of it."""
+    for table in dict.fromkeys(row.get("table", "") for row in rows):
+        own = [row for row in rows if row.get("table", "") == table]
+        head = next(name for name in own[0] if name != "table")
+        print_table([head, "meaning"], [[row[head], _text(row, head)] for row in own], f"[{table}]" if table else "")
+
+
+def _text(row: dict[str, str], head: str) -> str:
+    """The meaning of a row first, and then its other values by their heads."""
+    meaning = row.get("meaning", "")
+    more = [f"{name}: {value}" for name, value in row.items() if value and name not in {head, "table", "meaning"}]
+    return f"{meaning} {'; '.join(more)}".strip()
+
+
+def _keys(name: str) -> Callable[[], list[dict[str, str]]]:
+    def rows() -> list[dict[str, str]]:
+        from schemas.key_list import FILES, keys_of
+
+        return [
+            {"table": key.table, "key": key.name, "value": key.value, "default": key.default, "meaning": key.meaning}
+            for key in keys_of(FILES[name])
+        ]
+
+    return rows
+
+
+def _faults() -> list[dict[str, str]]:
+    from stations.plant.faults.catalogue import fault_rows
+
+    return fault_rows()
+
+
+def _hidden() -> list[dict[str, str]]:
+    from pipelines.demo.scenes import SCENES
+
+    return [
+        {
+            "hidden effect": scene.kind,
+            "effect of the catalogue": scene.effect,
+            "parameters": ", ".join(f"{name} = {value:g}" for name, value in scene.figures.items()),
+            "meaning": f"{scene.truth[:1].upper()}{scene.truth[1:]}.",
+        }
+        for scene in SCENES
+    ]
+
+
+def _names() -> list[dict[str, str]]:
+    from pipelines.jobs.recipes import sample_names
+    from schemas.own_files import KINDS, own_files
+    from schemas.station import BUILT_IN
+    from stations.plant.preset import built_in_presets
+    from stations.profile_files import built_in_profiles
+
+    built_in = {
+        "recipes": sample_names(),
+        "limits": sample_names("limits-"),
+        "stations": [BUILT_IN],
+        "profiles": built_in_profiles(),
+        "presets": built_in_presets(),
+    }
+    return [
+        {"table": kind, "name": name, "meaning": file}
+        for kind in KINDS
+        for name, file in [
+            *((name, "built in") for name in built_in[kind]),
+            *((name, str(path)) for name, path in own_files(kind).items()),
+        ]
+    ]
+
+
+SUBJECTS: dict[str, tuple[str, Callable[[], list[dict[str, str]]]]] = {
+    "recipe": ("keys of a recipe file", _keys("recipe")),
+    "limits": ("keys of a limits file", _keys("limits")),
+    "station": ("keys of a station file", _keys("station")),
+    "fault": ("kinds of --fault KIND:KEY=VALUE, with their keys", _faults),
+    "demo": ("hidden effects of 'tumbleline demo --effect NAME'", _hidden),
+    "names": ("recipes, limits, stations, profiles and presets, built in and of your own", _names),
+}
+"""The lists by what the command calls them: content and rows."""

@@ -1,0 +1,92 @@
+"""Files of the user beside the built-in ones, by name: recipes, limits, stations, profiles and presets.
+
+A name is searched in the folder of its kind in the working folder (``recipes/NAME.toml``), and then in that of the user
+(``$XDG_CONFIG_HOME/tumbleline/recipes/NAME.toml``; XDG Base Directory Specification 0.8, by default ``~/.config``). A name means
+one file: a file with the name of a built-in one is refused, because two people would mean different content by it.
+"""
+
+from __future__ import annotations
+
+import os
+from hashlib import sha256
+from pathlib import Path
+from typing import TYPE_CHECKING, Literal, get_args
+
+from schemas.errors import RecipeInvalid
+from schemas.foreign import is_file
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterable
+
+Kind = Literal["recipes", "limits", "stations", "profiles", "presets"]
+KINDS: tuple[Kind, ...] = get_args(Kind)
+SUFFIX = ".toml"
+
+_listeners: list[Callable[[str], None]] = []
+_reported: set[Path] = set()
+
+
+def folders(kind: Kind) -> list[Path]:
+    """The folders that are searched for files of a kind, in order: that of the working folder, that of the user."""
+    config = os.environ.get("XDG_CONFIG_HOME") or str(Path.home() / ".config")
+    return [Path(kind), Path(config) / "tumbleline" / kind]
+
+
+def own_files(kind: Kind) -> dict[str, Path]:
+    """The user's files of a kind by their names, sorted; of two with one name that of the working folder."""
+    found = {path.stem: path for folder in reversed(folders(kind)) for path in folder.glob(f"*{SUFFIX}")}
+    return dict(sorted(found.items()))
+
+
+def own_names(kind: Kind) -> list[str]:
+    """The names of the user's files of a kind, sorted."""
+    return list(own_files(kind))
+
+
+def own_file(kind: Kind, name: str, built_in: Iterable[str] = ()) -> Path | None:
+    """The file of the user with this name; None where there is none.
+
+    Parameters
+    ----------
+    built_in : names that the product has itself
+
+    Raises
+    ------
+    RecipeInvalid
+        The name is that of a built-in file, too.
+    """
+    if not name or Path(name).name != name or name.startswith("."):
+        return None
+    path = next((path for folder in folders(kind) if is_file(path := folder / f"{name}{SUFFIX}")), None)
+    if path is None:
+        return None
+    if name in built_in:
+        raise RecipeInvalid(
+            f"{kind}: '{name}' is built in, and {path} has the same name, one file per name is needed; rename {path}"
+        )
+    _report(kind, name, path)
+    return path
+
+
+def contents(named: Iterable[tuple[Kind, str]]) -> dict[str, str]:
+    """SHA-256 of the user's files among those named, by ``kind/name``; built-in ones are part of the product's version."""
+    found = {(kind, name): own_file(kind, name) for kind, name in named}
+    return {
+        f"{kind}/{name}": sha256(path.read_bytes()).hexdigest()
+        for (kind, name), path in sorted(found.items())
+        if path is not None
+    }
+
+
+def report_to(listener: Callable[[str], None]) -> None:
+    """Call ``listener``, and no earlier one, with one line for each file of the user that is used, at its first use."""
+    _listeners[:] = [listener]
+    _reported.clear()
+
+
+def _report(kind: Kind, name: str, path: Path) -> None:
+    if path in _reported or not _listeners:
+        return
+    _reported.add(path)
+    for listener in _listeners:
+        listener(f"{kind.removesuffix('s') if kind != 'limits' else kind} '{name}': {path}")

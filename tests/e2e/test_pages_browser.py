@@ -1,0 +1,186 @@
+"""Pages in a real browser: nothing is clipped at 1280 px, dark mode is dark, and every unit is printed on a page of its own."""
+
+import re
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import pypdfium2
+import pytest
+from browser import chromium
+from capture_double import SMALL, recipe_file, small_run
+from typer.testing import CliRunner
+
+from inertial import poses
+from inertial.frames import force_from_angles
+from pipelines.archive import Run
+from pipelines.cli import app
+from pipelines.report import make_report
+from pipelines.report.context import ReportContext
+from pipelines.report.panels import unit_by_unit
+
+CLIPPED = """() => {
+    const wide = document.documentElement.clientWidth;
+    const cut = (e) => !e.closest('svg') && e.clientWidth > 0 && e.scrollWidth > e.clientWidth + 2
+        && getComputedStyle(e).overflowX !== 'visible';
+    return [...document.querySelectorAll('body *')].filter((e) => {
+        const r = e.getBoundingClientRect();
+        return r.width > 0 && !e.closest('svg *') && (r.right > wide + 1 || cut(e));
+    }).map((e) => `${e.tagName} ${e.className} ${(e.textContent || '').trim().slice(0, 60)}`);
+}"""
+"""Elements that reach beyond the window, or that hide a part of their own content."""
+
+FAINT = """() => {
+    const part = (v) => { const c = v / 255; return c <= .04045 ? c / 12.92 : ((c + .055) / 1.055) ** 2.4; };
+    const light = (colour) => {
+        const [r, g, b] = colour.match(/[\\d.]+/g).slice(0, 3).map(part);
+        return .2126 * r + .7152 * g + .0722 * b;
+    };
+    const behind = (e) => {
+        for (; e; e = e.parentElement) {
+            const colour = getComputedStyle(e).backgroundColor;
+            if (!/, 0\\)$/.test(colour)) return colour;
+        }
+        return 'rgb(255, 255, 255)';
+    };
+    const says = (e) => [...e.childNodes].some((n) => n.nodeType === 3 && n.textContent.trim());
+    return [...document.querySelectorAll('body *')].filter((e) => !e.closest('svg') && says(e)).filter((e) => {
+        const a = light(getComputedStyle(e).color), b = light(behind(e));
+        return (Math.max(a, b) + .05) / (Math.min(a, b) + .05) < 4.5;
+    }).map((e) => `${e.tagName} ${e.className} ${e.textContent.trim().slice(0, 60)}`);
+}"""
+"""Texts with less contrast than 4.5 (WCAG 2.2, 1.4.3)."""
+
+
+@pytest.fixture(scope="module")
+def run(tmp_path_factory: pytest.TempPathFactory) -> Run:
+    """A run with two units that passed, and one between them that was refused."""
+    made = small_run(tmp_path_factory.mktemp("run"), {"A2": "dead"})
+    make_report(made)
+    return made
+
+
+@pytest.fixture(scope="module")
+def pages(run: Run, tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
+    """The pages of the product, each written by its command."""
+    folder = tmp_path_factory.mktemp("pages")
+    recipe = recipe_file(folder)
+    archive = str(run.archive.root)
+    commands: dict[str, list[str]] = {
+        "plan": ["plan", recipe, "--page", str(folder / "plan.html")],
+        "audit": ["audit", "--archive", archive, "--page", str(folder / "audit.html")],
+        "diagnosis": ["diagnose", str(one_soak(folder)), "--report", str(folder / "diagnosis.html")],
+    }
+    for words in commands.values():
+        result = CliRunner().invoke(app, words)
+        assert result.exit_code in {0, 1}, result.output
+    return {"report": Path(str(run.report)), **{name: folder / f"{name}.html" for name in commands}}
+
+
+def one_soak(folder: Path) -> Path:
+    """Dwells of three units at one temperature, with 4 µg of noise and nothing hidden."""
+    rng = np.random.default_rng(20)
+    angles = np.radians(np.concatenate([poses.plan("fibonacci24")] * 2))
+    force = force_from_angles(angles[:, 0], angles[:, 1])
+    parts = []
+    for unit in range(3):
+        output = force + 1e-3 * unit + 4e-6 * rng.normal(size=force.shape)
+        columns = {f"out_{axis}": output[:, k] for k, axis in enumerate("xyz")}
+        columns |= {f"force_{axis}": force[:, k] for k, axis in enumerate("xyz")}
+        columns |= {f"sd_{axis}": np.full(len(force), 4e-5) for axis in "xyz"}
+        parts.append(pd.DataFrame({"unit": f"U{unit}", "dwell": range(len(force)), "n": 100, **columns}))
+    path = folder / "dwells.csv"
+    pd.concat(parts).assign(time_s=lambda table: 10.0 * table["dwell"]).to_csv(path, index=False)
+    return path
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[Any]:
+    with chromium() as opened:
+        yield opened
+
+
+@pytest.mark.parametrize("name", ["report", "plan", "audit", "diagnosis"])
+def test_nothing_is_clipped_and_all_text_can_be_read_light_and_dark(
+    browser: Any, pages: dict[str, Path], name: str
+) -> None:
+    for scheme, brightest in (("light", 300), ("dark", 40)):
+        page = browser.new_page(viewport={"width": 1280, "height": 900}, color_scheme=scheme)
+        page.goto(pages[name].as_uri())
+        page.evaluate("() => document.querySelectorAll('details').forEach((e) => { e.open = true; })")
+        assert page.evaluate(CLIPPED) == []
+        assert page.evaluate(FAINT) == []
+        page.add_style_tag(content="h1 { width: 1400px } p { color: #808080; background: #909090 }")
+        assert page.evaluate(CLIPPED)  # both checks find what they look for
+        assert page.evaluate(FAINT)
+        back = page.evaluate("() => getComputedStyle(document.body).backgroundColor.match(/\\d+/g).map(Number)")
+        assert max(back) < brightest
+        assert scheme == "dark" or min(back) > 240
+        page.close()
+
+
+def test_every_unit_is_printed_on_a_page_of_its_own(
+    browser: Any, run: Run, pages: dict[str, Path], tmp_path: Path
+) -> None:
+    printed = pdf(browser, pages["report"], tmp_path)
+    begun = [[unit for unit in ("A1", "A2", "A3") if f"{unit} · slot" in text] for text in printed]
+    assert sorted(unit for units in begun for unit in units) == ["A1", "A2", "A3"]
+    assert max(map(len, begun)) == 1
+    first = next(k for k, units in enumerate(begun) if units)
+    assert all(begun[first : first + 3])  # one page each: the next page has the next unit
+    whole = "\n".join(printed)
+    for serial in ("A1", "A3"):
+        own = printed[next(k for k, units in enumerate(begun) if units == [serial])]
+        assert "Figures and limits" in own
+        assert "Noise of the static record" in own
+    assert "Why it was refused" in whole
+
+
+def test_failed_and_refused_units_are_first_and_open(browser: Any, pages: dict[str, Path]) -> None:
+    page = browser.new_page()
+    page.goto(pages["report"].as_uri())
+    units = page.evaluate("() => [...document.querySelectorAll('details.unit')].map((e) => [e.id, e.open])")
+    assert units == [["A2", True], ["A1", False], ["A3", False]]
+    page.close()
+
+
+def test_a_failed_unit_says_why_and_is_before_the_others(run: Run) -> None:
+    report = ReportContext(run, {})
+    report.units[2].outcome, report.units[2].reasons = "fail", ["scale over temperature 900 ppm/K, 500 is allowed"]
+    html = unit_by_unit.render(report)
+    assert re.findall(r'<details class="unit" id="(\w+)"( open)?>', html) == [
+        ("A2", " open"),
+        ("A3", " open"),
+        ("A1", ""),
+    ]
+    assert re.search(r"Why it failed</h3>\s*<ul[^>]*><li>scale over temperature 900 ppm/K", html)
+
+
+@pytest.mark.parametrize("name", ["plan", "audit", "diagnosis"])
+def test_a_page_fits_a4(browser: Any, pages: dict[str, Path], name: str, tmp_path: Path) -> None:
+    page = browser.new_page(viewport={"width": 710, "height": 1000})  # the printed width of A4 in CSS pixels
+    page.emulate_media(media="print")
+    page.goto(pages[name].as_uri())
+    assert page.evaluate(CLIPPED) == []
+    page.close()
+    assert pdf(browser, pages[name], tmp_path)[0].strip()
+
+
+def test_a_run_of_one_soak_has_no_caption_without_a_picture(browser: Any, pages: dict[str, Path]) -> None:
+    text = pages["diagnosis"].read_text(encoding="utf-8")
+    assert "Adequate" in text
+    assert "reached heating" not in text
+    assert "temperatures_C" in SMALL
+
+
+def pdf(browser: Any, path: Path, folder: Path) -> list[str]:
+    """The text of every printed page."""
+    page = browser.new_page()
+    page.goto(path.as_uri())
+    target = folder / f"{path.stem}.pdf"
+    page.pdf(path=str(target), prefer_css_page_size=True)
+    page.close()
+    document = pypdfium2.PdfDocument(str(target))
+    return [one.get_textpage().get_text_range() for one in document]

@@ -1,0 +1,77 @@
+"""Eighty columns: no word is broken, nothing is cut, and what is copied stays on one line."""
+
+import io
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner
+
+from pipelines.cli import app
+from pipelines.cli.console import WordConsole
+from pipelines.cli.options import print_table
+
+HEADS = ["run", "started (UTC)", "station", "passed", "largest deviation, µg", "meaning of the number", "unit"]
+LINE = ["production-30db20d7e5", "2026-11-22 09:24", "simulated", "8 of 8", "472.25", "deviation of the norm", "µg"]
+
+
+def printed(width: int, *, terminal: bool = True) -> list[str]:
+    sink = io.StringIO()
+    out = WordConsole(file=sink, width=width, force_terminal=terminal, color_system=None, legacy_windows=False)
+    print_table(HEADS, [LINE, LINE], out=out)
+    return sink.getvalue().splitlines()
+
+
+@pytest.mark.parametrize("width", [60, 80, 100, 200])
+def test_a_table_fits_the_terminal_and_keeps_every_word(width: int) -> None:
+    lines = printed(width)
+    assert max(map(len, lines)) <= width
+    words = " ".join(lines).split()
+    for text in (*HEADS, *LINE):
+        assert set(text.split()) <= set(words), text
+    assert sum("production-30db20d7e5" in line for line in lines) % 2 == 0
+
+
+def test_a_table_in_a_pipe_is_one_table(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delenv("COLUMNS", raising=False)
+    assert sum("production-30db20d7e5" in line for line in printed(80, terminal=False)) == 2
+    assert sum("production-30db20d7e5" in line for line in printed(80)) > 2
+
+
+def test_a_sentence_is_wrapped_between_words_and_a_command_stays_whole() -> None:
+    sink = io.StringIO()
+    out = WordConsole(file=sink, width=40, force_terminal=True, color_system=None)
+    out.print("the largest deviation of the norm from local gravity over all poses", soft_wrap=True)
+    out.print(
+        "  tumbleline diagnose a/long/path/of/dwells.parquet --history a/long/path/of/history.parquet", soft_wrap=True
+    )
+    out.print(f"report  /{'folder/' * 12}report.html", soft_wrap=True)
+    first, second, command, report = sink.getvalue().splitlines()
+    assert f"{first.strip()} {second}" == "the largest deviation of the norm from local gravity over all poses"
+    assert command.endswith("history.parquet")
+    assert report.endswith("report.html")
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ["keys", "station"],
+        ["plan"],
+        ["station", "profiles"],
+        ["station", "profiles", "watlow_f4t"],
+        ["list"],
+        ["run", "--help"],
+    ],
+    ids=" ".join,
+)
+def test_a_command_needs_eighty_columns_at_most(
+    words: list[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("NO_COLOR", "1")
+    result = CliRunner().invoke(app, words, env={"COLUMNS": "80"})
+    assert result.exit_code == 0, result.output
+    long = [
+        line for line in result.stdout.splitlines() if len(line) > 80 and not line.lstrip().startswith("tumbleline ")
+    ]
+    assert long == []
+    assert "…" not in "".join(line[-2:] for line in result.stdout.splitlines() if "│" in line)
