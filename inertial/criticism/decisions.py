@@ -32,10 +32,15 @@ COMMON = 0.01
 """Probability below which a dwell stands out in most units at once: then it is the pose, not the unit."""
 
 HEAVY = 0.05
-"""Probability of the kurtosis of normal noise below which the tails of the noise are called heavy.
+"""Probability of the kurtosis of normal noise below which adequacy is judged against the model's own residuals."""
 
-Then a dwell is named only where such tails do not reach it, from about fifty standard deviations on; the others are listed as
-left out. t3 tails under 1/f, 8 units: 25 of 50 lots name a dwell without it, 0 of 40 with it; of one or two units still 11 of 80.
+TAILS = 0.2
+"""Probability, before the data, that the noise of dwells has heavy tails (t of three degrees of freedom, any share of it)."""
+
+TAILS_REACH = 0.005
+"""Probability, over the dwells of a run, that its noise reaches as far as a dwell, below which the dwell is named.
+
+CHARACTERISTIC
 """
 
 TOGETHER = 2.5

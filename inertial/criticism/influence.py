@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from inertial.criticism.likelihood import along_mean, shared_noise, weighed
+from inertial.criticism.likelihood import along_mean, of_station, scatter_of_poses, shared_noise, weighed
 from inertial.criticism.model import Model, Term
 from inertial.criticism.penalty import fall, freedom
 from inertial.criticism.problem import Lot, Problem
@@ -80,5 +80,7 @@ def log_p_without(model: Model, term: Term, dwells: tuple[Influence, ...]) -> fl
     rank = int(gain.rank[0])
     if rank == 0:
         return 0.0
-    common = along_mean(model, model.noise, term) * (1.0 - 1.0 / shared_noise(model.with_term(term)))
+    richer = model.with_term(term)
+    together = max(shared_noise(richer), scatter_of_poses(richer) if of_station(term) else 1.0)
+    common = along_mean(model, model.noise, term) * (1.0 - 1.0 / together)
     return weighed(float(fall(space, gain)[0]) * (1.0 - common), rank, freedom(term)).log_p

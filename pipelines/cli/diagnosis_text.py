@@ -71,9 +71,14 @@ def _dwells(document: dict[str, Any]) -> None:
             soft_wrap=True,
         )
     if removed and removed["heavy_tails"]:
-        count = sum(d.get("tail", True) for d in removed["dwells"])
+        tails = [d for d in removed["dwells"] if d.get("tail", True)]
+        names = ", ".join(f"{d['unit']} dwell {d['dwell']} ({d['deviations']:.1f})" for d in tails[:5])
         out.print(
-            f"{count} dwells left out: the noise has heavier tails than a normal one", style="dim", soft_wrap=True
+            f"{len(tails)} dwell{'s' if len(tails) != 1 else ''} left out (standard deviations): {names}"
+            f"{' …' if len(tails) > 5 else ''}; the noise of this run may have tails that reach as far",
+            style="dim",
+            markup=False,
+            soft_wrap=True,
         )
     if document["adequate"]:
         return

@@ -128,7 +128,7 @@ class RemovedDwells(TypedDict):
     """The dwells left out."""
 
     heavy_tails: Annotated[
-        bool, "the noise has heavier tails than a normal distribution, and reaches some of the dwells"
+        bool, "the tails of the noise may reach as far as some of the dwells"
     ]
     dwells: list[RemovedDwell]
 
