@@ -12,7 +12,7 @@ from inertial.criticism.problem import Lot, Problem
 
 Array = NDArray[np.float64]
 
-_MOST = 8
+_MOST, _MOST_DWELLS = 8, 3
 _CARRY = 0.5
 """Share of the whole that the dwells named carry at the most; further ones are many small ones."""
 
@@ -43,14 +43,28 @@ def influence(model: Model, term: Term | None) -> tuple[Influence, ...]:
     whole = float(np.sum(np.maximum(each, 0.0)))
     if whole <= 0.0:
         return ()
-    order = np.argsort(each, axis=None)[::-1][:_MOST]
+    if term is not None and of_station(term):
+        # what concerns all units is carried by a dwell in all of them: without it in one, the others say the same
+        return _whole_dwells(each / whole)
     found: list[Influence] = []
-    for place in order.tolist():
+    for place in np.argsort(each, axis=None)[::-1][:_MOST].tolist():
         unit, dwell = divmod(place, model.problem.n)
         share = float(each[unit, dwell]) / whole
         if share <= 0.0 or sum(f.share for f in found) > _CARRY:
             break
         found.append(Influence(unit, dwell, share))
+    return tuple(found)
+
+
+def _whole_dwells(share: Array) -> tuple[Influence, ...]:
+    """The dwells (units, n) that carry most over all units together, each in every unit."""
+    total = share.sum(axis=0)
+    found: list[Influence] = []
+    for dwell in np.argsort(total)[::-1][:_MOST_DWELLS].tolist():
+        if total[dwell] <= 0.0 or sum(f.share for f in found) > _CARRY:
+            break
+        units = np.argsort(share[:, dwell])[::-1].tolist()
+        found += [Influence(unit, dwell, max(float(share[unit, dwell]), 0.0)) for unit in units]
     return tuple(found)
 
 

@@ -23,8 +23,9 @@ from inertial.criticism.space import Space
 Array = NDArray[np.float64]
 
 _MEDIAN = float(stats.chi2.median(1))
-_MEDIAN_OF_TWO = float(stats.chi2.median(2))
 _FEWEST_POSES = 10
+_QUANTILES = (0.5, 0.75, 0.9)
+"""Of the poses, at which their scatter is compared with that of the noise: a table may be off in a part of its poses only."""
 
 
 @dataclass(frozen=True)
@@ -128,8 +129,8 @@ def scatter_of_poses(model: Model) -> float:
     """Variance of the table's angles from dwell to dwell, as all units see it, over that of the units' own noise; one at least.
 
     Of each dwell by itself the two angles are fitted that all units share. Where the table comes to rest within some
-    microradians, their chi-square is larger than the noise of the units makes it, in every dwell; the median over the dwells is
-    not raised by one wrong pose. What is said of the station has to stand out of this scatter.
+    microradians, their chi-square is larger than the noise of the units makes it, in many dwells; the quantiles over the dwells
+    are not raised by one wrong pose. What is said of the station has to stand out of this scatter.
     """
     lot = model.problem.lot
     units, n = lot.state.time.shape
@@ -142,9 +143,14 @@ def scatter_of_poses(model: Model) -> float:
     drop = gain.drop[gain.rank == 2]
     if drop.size < _FEWEST_POSES:
         return 1.0
-    found = float(np.median(drop)) / _MEDIAN_OF_TWO
-    # the median of exponential values scatters by 1/(ln 2·√n) of itself
-    return found if found > 1.0 + TOGETHER / (np.log(2.0) * np.sqrt(drop.size)) else 1.0
+    largest = 1.0
+    for quantile in _QUANTILES:
+        expected = -2.0 * np.log1p(-quantile)
+        found = float(np.quantile(drop, quantile)) / expected
+        # standard error of a quantile of exponential values, over the quantile
+        error = 2.0 * np.sqrt(quantile / (1.0 - quantile) / drop.size) / expected
+        largest = max(largest, found if found > 1.0 + TOGETHER * error else 1.0)
+    return largest
 
 
 def along_mean(model: Model, noise: Noise, term: Term) -> float:

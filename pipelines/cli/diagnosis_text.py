@@ -91,6 +91,9 @@ def _dwells(document: dict[str, Any]) -> None:
             out.print(text, style="dim", markup=False, soft_wrap=True)
     if not document["classes"] and document["influence"]:
         text = f"largest residuals, share of all: {_carried(document['influence'])}"
+        without = document.get("without_influence")
+        if without:
+            text += f"; without these {without['dwells']} p {equal(without['p_value'])}"
         out.print(text, style="dim", markup=False, soft_wrap=True)
 
 
