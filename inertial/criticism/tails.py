@@ -2,11 +2,11 @@
 
 The noise of a dwell is taken to be normal plus t of three degrees of freedom with an unknown share of the variance: few noises
 have heavier tails. The share has a distribution given the dwells that were kept, by the likelihood of their deletion residuals
-below the smallest value that was left out: it is right whether what was left out is the tail of the noise or not. Whitened
-residuals would not do, as whitening spreads what one dwell is off over those that follow. A dwell is the tail of the noise as long
-as noise of such a share would reach as far in one of the dwells of the run with more than a stated probability: by the length of
-its deviation, and by the product of the probabilities of its axes, as noise that is independent on three axes does not reach far
-on two of them at once.
+below the smallest value that was left out: this holds whether what was left out is the tail of the noise or not. Whitened
+residuals would not do, as whitening spreads the error of one dwell over those that follow. A dwell counts as tail of the noise
+where such noise reaches as far in one of the dwells of the run with more than a stated probability: by the length of its
+deviation, and by the product of the probabilities of its axes, as noise that is independent on three axes does not reach far on
+two of them at once.
 
 Whether a lot's tails are heavy is judged by the kurtosis of its residuals (Anscombe & Glynn, Biometrika 70 (1983) 227).
 """

@@ -213,7 +213,7 @@ class DiagnosisDocument(TypedDict):
     without_influence: NotRequired[
         Annotated[
             WithoutInfluence | None,
-            "the verdict without the dwells of `influence`: on the first class, or on the model where it is not adequate and nothing is named",
+            "the verdict without the dwells of `influence`: on the first class; on the model where nothing is named",
         ]
     ]
     removed: NotRequired[RemovedDwells | None]
