@@ -150,7 +150,7 @@ def scatter_of_poses(model: Model) -> float:
         # standard error of a quantile of exponential values, over the quantile
         error = 2.0 * np.sqrt(quantile / (1.0 - quantile) / drop.size) / expected
         largest = max(largest, found if found > 1.0 + TOGETHER * error else 1.0)
-    return largest
+    return float(largest)
 
 
 def along_mean(model: Model, noise: Noise, term: Term) -> float:

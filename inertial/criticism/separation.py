@@ -70,6 +70,8 @@ def rivals_of(model: Model, terms: Sequence[Term], others: Sequence[Term], most:
     units = model.problem.lot.state.time.shape[0]
     pick = np.unique(np.linspace(0, units - 1, min(units, most)).round().astype(int)).tolist()
     blocks = pick if model.problem.lot.radial else [3 * u + a for u in pick for a in range(3)]
+    # what memories held before the run is not known, whatever explains the run at the least price
+    terms, others = ([replace(t, rest=False) for t in each] for each in (terms, others))
     others = [
         t for t in others if not isinstance(t.effect, Handling)
     ]  # of single units, and no step to come changes them
