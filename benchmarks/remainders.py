@@ -48,20 +48,20 @@ def beside(world: World, seed: int) -> list[tuple[str, float, bool]]:
 
     made, found = make(world, seed), []
     own = {name for told in made.faults for name in told.names}
-    plain = search._remainder
+    plain = search.is_remainder
 
     def noted(model: Any, rival: Any, chosen: Any) -> bool:
         if chosen and isinstance(rival.term.effect, Handling):
             largest = max(search.size_of(model.without_term(t), t) for t in chosen)
-            ratio = search._size_where_it_acts(model, rival.term) / largest
+            ratio = search.size_where_it_acts(model, rival.term) / largest
             found.append((rival.term.effect.id, ratio, rival.term.effect.id in own))
         return plain(model, rival, chosen)
 
-    search._remainder = noted
+    search.is_remainder = noted
     try:
         diagnose(made.dwells, made.history)
     finally:
-        search._remainder = plain
+        search.is_remainder = plain
     return found
 
 

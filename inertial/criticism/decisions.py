@@ -40,10 +40,10 @@ TAILS = 0.2
 TAILS_REACH = 0.005
 """Probability, over the dwells of a run, that its noise reaches as far as a dwell, below which the dwell is named.
 
-One unit, 72 dwells, t3 tails of 60 % of the variance: a dwell is named in 4 % of runs without a fault, of all of it in 1 %; eight
-units at most 4 %. Normal noise with a dwell 7, 8, 10 standard deviations off in a random direction: named in 80, 93, 98 % (given
-its neighbours; five times the noise about the record's mean is 5.5 to 9 of these). Synthetic noise, 150 runs with one unit, 50
-with eight. Below, the dwell is left out and listed.
+Synthetic noise, 150 runs of one unit, 50 of eight. t3 tails of 20, 35, 60, 100 % of the variance and no fault: a dwell is named in
+3, 4, 4, 1 % of the runs of one unit, in 4, 6, 0, 0 % of eight. Normal noise with a dwell 7, 8, 10 standard deviations off (given its
+neighbours) in a random direction: named in 80, 93, 98 %, with eight units in 84, 94, 98 %. Five times the noise about the record's
+mean is 5.5 to 9 of these. Dwells that are not named are left out and listed.
 """
 
 TOGETHER = 2.5
@@ -65,10 +65,10 @@ Of handling the size counts in the dwells that it changes.
 REMAINDER = 0.1
 """Share of the largest effect of inexact shape below which what handling does beside it counts as what the effect leaves over.
 
-Only of effects with a nonlinear parameter or a memory: a polynomial of the force has the shape of its equation and leaves nothing
-over. `python benchmarks/remainders.py`, 2 runs of 10 worlds: nothing left over at 20 times the noise; real faults beside a cubic of
-10 times the noise are 0.13 and 0.16 of it, and were lost from 15 times on when the rule held for every effect. The one case known:
-the lag of a part, found as `thermal_rate` of 30 µg, left 2 µg of a `gain_step` in one unit, with a probability below 1e-8.
+Only of effects with a nonlinear parameter or a memory: a polynomial of the force has the shape of its equation and leaves
+nothing over. `python benchmarks/remainders.py`, 2 runs of 10 worlds: nothing left over at 20 times the noise; a unit that moved by
+0.2 mrad beside a cubic of 10 times the noise is 0.13 and 0.16 of it, and would be lost beside a larger one if the rule held for
+every effect. The one case known: the lag of a part, found as `thermal_rate` of 30 µg, left 2 µg of a `gain_step` in one unit.
 """
 
 TOLD_APART = 15.0

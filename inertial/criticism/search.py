@@ -74,7 +74,7 @@ def search(
     for _ in range(_MOST - len(chosen)):
         rivals = contest(field, model)
         ladder = ladder or tuple(rivals)
-        best = next((r for r in rivals if convincing(field, model, r) and not _remainder(model, r, chosen)), None)
+        best = next((r for r in rivals if convincing(field, model, r) and not is_remainder(model, r, chosen)), None)
         if best is None or (len(chosen) >= 2 and stop(chosen)):
             break
         if isinstance(best.term.effect, Handling):
@@ -111,7 +111,7 @@ def convincing(field: Candidates, model: Model, rival: Rival) -> bool:
         return False
     if -rival.cost < np.log(max(field.problem.count, 1)):
         return False
-    return _size_where_it_acts(model, rival.term) > MATERIAL * model.with_term(rival.term).scatter()
+    return size_where_it_acts(model, rival.term) > MATERIAL * model.with_term(rival.term).scatter()
 
 
 def size_of(model: Model, term: Term) -> float:
@@ -119,7 +119,7 @@ def size_of(model: Model, term: Term) -> float:
     return model.explained(term.candidate(model.problem), model.with_term(term).scatter())
 
 
-def _remainder(model: Model, rival: Rival, chosen: Sequence[Term]) -> bool:
+def is_remainder(model: Model, rival: Rival, chosen: Sequence[Term]) -> bool:
     """Whether handling explains no more than what effects leave over whose shape is not known exactly.
 
     Effects without a nonlinear parameter or a memory have the shape that their equation gives, and leave nothing over.
@@ -128,10 +128,10 @@ def _remainder(model: Model, rival: Rival, chosen: Sequence[Term]) -> bool:
     if not inexact or not isinstance(rival.term.effect, Handling):
         return False
     largest = max(size_of(model.without_term(t), t) for t in inexact)
-    return _size_where_it_acts(model, rival.term) < REMAINDER * largest
+    return size_where_it_acts(model, rival.term) < REMAINDER * largest
 
 
-def _size_where_it_acts(model: Model, term: Term) -> float:
+def size_where_it_acts(model: Model, term: Term) -> float:
     """The same over the dwells that the term changes: what happened to one dwell of one unit is not thinned out by the others."""
     size = size_of(model, term)
     if not isinstance(term.effect, Handling):

@@ -1,5 +1,7 @@
 """A dwell is named where the tails of the noise that its run allows do not reach it, and listed as left out where they do."""
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 from scipy import integrate, stats
@@ -39,7 +41,7 @@ def test_tables_agree_with_an_integral_of_the_convolution(share, z):
         points = np.linspace(-9.0 * rest, 9.0 * rest, 40)
         expected = 2.0 * sum(
             integrate.quad(lambda x: stats.norm.pdf(x, scale=rest) * stats.t.sf((z - x) / scale, 3), a, b)[0]
-            for a, b in zip(points[:-1], points[1:], strict=True)
+            for a, b in pairwise(points)
         )
     found = tails._beyond(tails._SHARES.index(share), np.array([z]))[0]
     # beyond eight standard deviations the normal part is left out, where it adds a few per cent
